@@ -201,7 +201,11 @@ class Mesh(Suggesting):
         """
         if group in self.point_groups and group not in self.cell_groups:
             similar = difflib.get_close_matches(group, self.cell_groups, n=2, cutoff=0.3) or [*self.cell_groups][:6]
-            remedy = f": name one such as {' or '.join(map(repr, similar))}" if similar else ", and the mesh has none of cells"
+            remedy = (
+                f": name one such as {' or '.join(map(repr, similar))}"
+                if similar
+                else ", and the mesh has none of cells"
+            )
             raise MeshError(
                 f"'{group}' is a group of points, but here one of cells is needed (lines, faces, solids){remedy}"
             )
@@ -306,16 +310,16 @@ class Mesh(Suggesting):
         selected = np.asarray(where(np.array(self.points)))
         if selected.shape != (self.n_points,) or selected.dtype != bool:
             raise MeshError(
-                f"the function of facet group '{name}' returned {selected.dtype} of shape {selected.shape}: it must return True "
-                f"or False for each point, shape ({self.n_points},)"
+                f"the function of facet group '{name}' returned {selected.dtype} of shape {selected.shape}: it must return "
+                f"True or False for each point, shape ({self.n_points},)"
             )
         facets = _facets_with_nodes(self.solids, selected, between, None if of is None else self._cells_in(name, of))
         if not facets:
             of_group = f" of '{of}'" if of else ""
             raise MeshError(
                 f"facet group '{name}' would be empty: its function selects {int(selected.sum())} points, but no "
-                f"facet{of_group} {'between two cells' if between else 'on the outside'} has all its nodes among them; compare coordinates "
-                "with a tolerance, or define a group of points with with_groups"
+                f"facet{of_group} {'between two cells' if between else 'on the outside'} has all its nodes among them; "
+                "compare coordinates with a tolerance, or define a group of points with with_groups"
             )
         return self.with_facets({name: facets})
 

@@ -101,7 +101,7 @@ def quality(mesh: Mesh) -> MeshQuality:
         measure=float(sum(measure.sum() for measure, _, _ in bad)),
         n_points=mesh.n_points,
         n_cells={name: len(block) for name, block in mesh.cells.items()},
-        n_bad=sum(int((flat | inverted).sum()) for _, flat, inverted in bad),
+        n_bad=sum(int((degenerate | inverted).sum()) for _, degenerate, inverted in bad),
         dim=mesh.dim,
     )
 
@@ -116,8 +116,8 @@ def check_cells(mesh: Mesh) -> None:
     for name in mesh.solids:
         _check_nodes(mesh, name)
         _check_duplicates(mesh, name)
-        measure, flat, inverted = _bad_cells(mesh, name)
-        for fault, bad in (("degenerate", flat), ("inverted", inverted)):
+        measure, degenerate, inverted = _bad_cells(mesh, name)
+        for fault, bad in (("degenerate", degenerate), ("inverted", inverted)):
             if bad.any():
                 row = int(np.flatnonzero(bad)[0])
                 cell = _described(mesh, name, row, measure[row])
@@ -150,14 +150,14 @@ def poorest_cell(mesh: Mesh) -> str:
 
 
 def _check_nodes(mesh: Mesh, name: str) -> None:
-    """Raise MeshError if a cell contains a node repeated, because its stresses are then undefined."""
+    """Raise MeshError if a cell contains a node twice, because its stresses are then undefined."""
     nodes = np.sort(mesh.cells[name], axis=1)
     repeated = nodes[:, 1:] == nodes[:, :-1]
     bad = np.flatnonzero(repeated.any(axis=1))
     if len(bad):
         node = int(nodes[bad[0], :-1][repeated[bad[0]]][0])
         raise MeshError(
-            f"{_described(mesh, name, int(bad[0]))} has point {node} repeated, one of {len(bad)} such cells: write it as the "
+            f"{_described(mesh, name, int(bad[0]))} has point {node} twice, one of {len(bad)} such cells: write it as the "
             "element that it collapses to, a triangle, wedge, pyramid or tetrahedron"
         )
 

@@ -97,7 +97,9 @@ def _direction(facets: Indices) -> Indices:
     return np.column_stack([facets[rows, first], following, preceding if count > 2 else first])
 
 
-def remembered(function: Callable[Concatenate[Mesh, Arguments], Result]) -> Callable[Concatenate[Mesh, Arguments], Result]:
+def remembered(
+    function: Callable[Concatenate[Mesh, Arguments], Result],
+) -> Callable[Concatenate[Mesh, Arguments], Result]:
     """Decorate `function` such that its results are cached by mesh, which is immutable, and by the other arguments."""
     results: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Result]] = WeakKeyDictionary()
 
@@ -187,7 +189,7 @@ def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Nu
 
 
 def equal_rows(rows: Indices | Numbers) -> tuple[Indices, Indices]:
-    """Return pairs (n_pairs,), (n_pairs,) of equal `rows` (n, k). For m equal rows there are m - 1 pairs, which connect them."""
+    """Return pairs (n_pairs,), (n_pairs,) of equal `rows` (n, k); m equal rows are connected by m - 1 pairs."""
     columns = np.ascontiguousarray(rows.T)  # long columns are compared faster than short rows
     order = np.lexsort(columns)
     columns = columns[:, order]

@@ -210,15 +210,13 @@ def _friction(model: Model) -> list[str]:
     ]
 
 
-def _penetrating(model: Model, pairs: Pairs, of_supports: Array) -> Iterator[str]:
+def _penetrating(model: Model, pairs: Pairs, pushed: Array) -> Iterator[str]:
     """Yield a warning for each contact whose initial penetration exceeds the prescribed motion along its normal.
 
-    `of_supports` (dim,) are the largest displacements that supports prescribe [length].
+    `pushed` (dim,) are the largest displacements that supports prescribe [length].
     """
     for pair, bound in pairs:
-        motion = (
-            of_supports if not any(pair.motion) else np.maximum(of_supports, _peak(pair.ramp) * np.abs(pair.motion))
-        )
+        motion = pushed if not any(pair.motion) else np.maximum(pushed, _peak(pair.ramp) * np.abs(pair.motion))
         if not motion.any():
             continue  # the penetration is an interference, which loads the bodies
         gap, normal = initial_gaps(bound)
@@ -227,7 +225,7 @@ def _penetrating(model: Model, pairs: Pairs, of_supports: Array) -> Iterator[str
         row = int(np.argmin(gap + approach))
         if -gap[row] > approach[row]:
             point = bound.secondary.points[row]
-            driver = "supports push" if motion is of_supports else "motions push"
+            driver = "supports push" if motion is pushed else "motions push"
             yield (
                 f"contact '{pair.name}' begins with a penetration of {-gap[row]:.4g} at point {point} "
                 f"{np.array2string(model.mesh.points[point], precision=4)}, more than the {np.abs(normal[row]) @ motion:.4g} "
@@ -301,8 +299,8 @@ def _load_integral(model: Model, load: Load) -> Iterator[str]:
             error, total = error + float(np.abs(coarse - fine).sum()), total + float(np.abs(fine).sum())
     if error > LARGEST_LOAD_ERROR * total:
         yield (
-            f"{load.name} varies within single elements, so that its quadrature is not exact: its error is {error / total:.2%} "
-            "of the total; refine the mesh there"
+            f"{load.name} varies within single elements, so that its quadrature is not exact: its error is "
+            f"{error / total:.2%} of the total; refine the mesh there"
         )
 
 

@@ -161,13 +161,11 @@ def _rows_to_facets(mesh: Mesh, dependent: str, facets: str, rotation: Rotation,
     other, nodes = surface(mesh, facets), mesh.points_of(dependent).astype(np.intp)
     turn, centre = rotation.matrix(sign * rotation.angle), np.array(rotation.centre)
     corners = other.corners(mesh.points)
-    closest = closest_of_kinds((mesh.points[nodes] - centre) @ turn.T + centre, corners)
+    near = closest_of_kinds((mesh.points[nodes] - centre) @ turn.T + centre, corners)
     sizes = np.concatenate([np.ptp(block, axis=1).max(axis=1) for block in corners])
-    if (closest.distance > LARGEST_DISTANCE * sizes[closest.facet]).any() or (
-        closest.overhang > LARGEST_DISTANCE
-    ).any():
+    if (near.distance > LARGEST_DISTANCE * sizes[near.facet]).any() or (near.overhang > LARGEST_DISTANCE).any():
         return None
-    projected = places(other, closest.facet, closest.xi)
+    projected = places(other, near.facet, near.xi)
     m, dim, n = len(nodes), mesh.dim, mesh.n_points
     weights, identity = shapes_at(projected.shape, projected.nodes, n), shapes_at(np.ones((m, 1)), nodes[:, None], n)
     return csr_array(kron(identity, turn) - kron(weights, np.eye(dim)))

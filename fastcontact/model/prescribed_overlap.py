@@ -123,12 +123,11 @@ def _overlap_at(
     pose = Pose(translation, angle_at(contact, ramp, instant))
     configuration = replace(Configuration.displaced(displacement), pose=pose, clearance_factor=factor)
     if formulation.options.tied:
-        depth, paired = _relative_displacements(formulation, candidates, displacement, supports.fixed)
+        depth, paired = _jumps(formulation, candidates, displacement, supports.fixed)
     else:
         depth, paired = _depths(formulation, candidates, gap0, configuration, supports.fixed)
-    admissible = max(
-        ADMISSIBLE_DEPTH * np.abs(displacement).max(), LENGTH_ROUND_OFF * np.ptp(formulation.points, axis=0).max()
-    )
+    size = np.ptp(formulation.points, axis=0).max()
+    admissible = max(ADMISSIBLE_DEPTH * np.abs(displacement).max(), LENGTH_ROUND_OFF * size)
     row = int(np.argmax(depth))
     return Overlap(
         int((depth > admissible).sum()), int(paired.sum()), float(depth[row]), int(candidates.nodes[row, 0]), instant
@@ -164,10 +163,8 @@ def _gaps(
     return np.where(pairing.paired, gap, 0.0), rows, pairing.paired
 
 
-def _relative_displacements(
-    formulation: Formulation, candidates: Candidates, displacement: Array, fixed: Mask
-) -> tuple[Array, Mask]:
-    """Return the relative displacements (m,) of tied nodes due to supports [length], and the mask (m,) of paired nodes."""
+def _jumps(formulation: Formulation, candidates: Candidates, displacement: Array, fixed: Mask) -> tuple[Array, Mask]:
+    """Return the displacement jumps (m,) at tied nodes due to supports [length], and the mask (m,) of paired nodes."""
     pairing = formulation.facing(candidates, Configuration.undeformed(formulation.points))
     square = np.zeros(len(pairing.paired))
     for axis in np.eye(fixed.shape[1]):

@@ -20,9 +20,8 @@ from fastcontact.errors import FileError
 Write = tuple[int, bytes]
 MAGIC = b"fastcontact journal\n"
 FOOTER = struct.Struct(f"<Q32s{len(MAGIC)}s")  # length and SHA-256 of the writes
-HEADER = struct.Struct(
-    "<QQ?"
-)  # offset and length of a write, and whether it is new data, of which the checksum follows
+# Offset and length of a write, and whether it is new data, of which only the checksum follows.
+HEADER = struct.Struct("<QQ?")
 DIGEST = hashlib.sha256().digest_size
 # Largest size of the changes in a journal [bytes]. Larger changes are divided, so that a journal fits in memory.
 LARGEST = 1 << 28

@@ -460,10 +460,8 @@ class StepResult(Suggesting):
     def __post_init__(self) -> None:
         if not isinstance(self.contact, Mapping):
             raise FastcontactError(f"contact of a StepResult must be a dict, not {type(self.contact).__name__}")
-        with_units = (
-            {name: replace(pair, units=self.units) for name, pair in self.contact.items()} if self.units else {}
-        )
-        object.__setattr__(self, "contact", ContactsByName(with_units or self.contact))
+        pairs = {name: replace(pair, units=self.units) for name, pair in self.contact.items()} if self.units else {}
+        object.__setattr__(self, "contact", ContactsByName(pairs or self.contact))
 
     @property
     def instant(self) -> str:

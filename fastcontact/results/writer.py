@@ -152,13 +152,11 @@ class ResultWriter:
             try:
                 if resume:
                     state = file_state(self.path)
-                    self.done, self._ended, old_text = _steps_to_resume(
-                        self.path, mesh, str(kinematics), self._cell_fields
-                    )
+                    self.done, self._ended, text = _steps_to_resume(self.path, mesh, str(kinematics), self._cell_fields)
                 if self.done:
                     self._resumed_state, self.n_steps = state, len(self.done)
                     self._last = self.done[-1].index, _case_of(self.done[-1])
-                    self._notes = {"case": case_text} if case_text not in ("", old_text) else {}
+                    self._notes = {"case": case_text} if case_text not in ("", text) else {}
                 else:
                     _check_replaceable(self.path, overwrite or resume)
                     self._begin(str(kinematics), case_text)

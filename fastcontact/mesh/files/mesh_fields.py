@@ -109,9 +109,8 @@ def row_of(instant: float, times: Array | None, name: str, error: type[Fastconta
         raise error(f"{name} has no times: omit instant")
     row = int(np.abs(times - instant).argmin())
     if abs(times[row] - instant) > SAME_TIME * np.abs(times).max():
-        raise error(
-            f"{name} has no instant {instant:g}, the nearest is {times[row]:g}, of {times[0]:g} to {times[-1]:g}"
-        )
+        nearest = f"the nearest is {times[row]:g}, of {times[0]:g} to {times[-1]:g}"
+        raise error(f"{name} has no instant {instant:g}, {nearest}")
     return row
 
 

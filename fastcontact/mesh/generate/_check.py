@@ -1,4 +1,4 @@
-"""Checks of the generators' arguments: each message names the argument and the admissible range."""
+"""Checks of the arguments of generators. Their messages contain the name of the argument and the admissible range."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from fastcontact.errors import MeshError, check_known
 TRIANGLES = ("tri3", "tri6")
 QUADRANGLES = ("quad4", "quad8", "quad9")
 FACES = TRIANGLES + QUADRANGLES
-# Largest admissible number, whose cube can still be represented, and largest numbers of segments and cells. Larger numbers
-# are probably mistakes in units or decimal points, and would not fit into memory.
+# Largest admissible number, whose cube can still be represented.
 LARGEST = 1e100
-MOST_ALONG = 1_000_000
+# Largest numbers of segments of a line and of cells. Larger numbers are probably due to wrong units or decimal points.
+MOST_SEGMENTS = 1_000_000
 MOST_CELLS = 5_000_000
 
 Number = TypeVar("Number", int, float)
 
 
 def number(name: str, value: Any) -> float:
-    """Return `value` as a float; MeshError if it is not a finite number."""
+    """Return `value` as a float. Raises MeshError if it is not a finite number, or too large."""
     result = float(value)
     if not math.isfinite(result):
         raise MeshError(f"{name} must be a finite number, not {repr(value)}")
@@ -32,7 +32,7 @@ def number(name: str, value: Any) -> float:
 
 
 def positive(name: str, value: Any, at_most: float = math.inf, limit: str = "") -> float:
-    """Return `value` as a float; MeshError unless 0 < value <= at_most (called `limit` in the message)."""
+    """Return `value` as a float. Raises MeshError unless 0 < value <= at_most, which the message calls `limit`."""
     result = number(name, value)
     if 0.0 < result < 1.0 / LARGEST:
         raise MeshError(f"{name} = {result:g} is out of range: it must be at least {1.0 / LARGEST:g}")
@@ -43,7 +43,7 @@ def positive(name: str, value: Any, at_most: float = math.inf, limit: str = "") 
 
 
 def growth_of(name: str, value: Any) -> float:
-    """Return the ratio of neighbouring edges as a float; MeshError unless it is more than 1."""
+    """Return the ratio of the lengths of adjacent edges as a float. Raises MeshError unless it is greater than 1."""
     result = positive(name, value)
     if not result > 1.0:
         raise MeshError(f"{name} = {result:g} is out of range: it must be more than 1")
@@ -51,7 +51,7 @@ def growth_of(name: str, value: Any) -> float:
 
 
 def within(name: str, value: Any, low: float, high: float) -> float:
-    """Return `value` as a float; MeshError unless low <= value <= high."""
+    """Return `value` as a float. Raises MeshError unless low <= value <= high."""
     result = number(name, value)
     if not low <= result <= high:
         raise MeshError(f"{name} = {result:g} is out of range: it must be between {low:g} and {high:g}")
@@ -59,23 +59,23 @@ def within(name: str, value: Any, low: float, high: float) -> float:
 
 
 def count(name: str, value: Any) -> int:
-    """Return `value` as an int; MeshError unless it is a whole number from 1 to MOST_ALONG."""
+    """Return `value` as an int. Raises MeshError unless it is an integer from 1 to MOST_SEGMENTS."""
     result = number(name, value)
     if result != int(result) or result < 1:
         raise MeshError(f"{name} = {repr(value)} is out of range: it must be a whole number, at least 1")
-    if result > MOST_ALONG:
-        raise MeshError(f"{name} = {repr(value)} is out of range: it must be at most {MOST_ALONG}")
+    if result > MOST_SEGMENTS:
+        raise MeshError(f"{name} = {repr(value)} is out of range: it must be at most {MOST_SEGMENTS}")
     return int(result)
 
 
-def segments(wanted: float) -> int:
-    """Return `wanted` rounded up, at least 1; MeshError if it is more than MOST_ALONG."""
-    if not wanted <= MOST_ALONG:
+def segments(quotient: float) -> int:
+    """Return a number of segments, which is at least 1 and `quotient` rounded up. Raises MeshError if it is too large."""
+    if not quotient <= MOST_SEGMENTS:
         raise MeshError(
-            f"a line of the mesh would be divided into {wanted:.3g} segments, more than {MOST_ALONG}: check the units of "
-            "the element sizes, or request larger elements"
+            f"a line of the mesh would be divided into {quotient:.3g} segments, more than {MOST_SEGMENTS}: check the units "
+            "of the element sizes, or request larger elements"
         )
-    return max(1, math.ceil(wanted - 1e-9))
+    return max(1, math.ceil(quotient - 1e-9))
 
 
 def affordable(n_cells: float) -> None:
@@ -88,18 +88,18 @@ def affordable(n_cells: float) -> None:
 
 
 def each(check: Callable[[str, Any], Number], name: str, value: Sequence[Any]) -> list[Number]:
-    """Return the members of `value`, checked one by one."""
+    """Return the members of `value` after checking each of them."""
     return [check(f"{name}[{i}]", member) for i, member in enumerate(value)]
 
 
 def one_of(name: str, value: str, known: Sequence[str]) -> str:
-    """Return `value`; MeshError with similar names unless it is one of `known`."""
+    """Return `value`. Raises MeshError, with similar names, unless it is one of `known`."""
     check_known(name, value, known, MeshError)
     return value
 
 
 def unused(element: str, *instead: str, **arguments: Any) -> None:
-    """Raise MeshError if an argument without effect on `element` is given (not None); suggest arguments with an effect."""
+    """Raise MeshError if an argument without effect on `element` is not None. The message suggests those in `instead`."""
     remedy = f"use {', '.join(instead)}" if instead else "omit it"
     for name, value in arguments.items():
         if value is not None:

@@ -82,12 +82,12 @@ def divided(curve: Curve, length: float, spacing: Spacing) -> Array:
     """
     if spacing.uniform:
         return curve(np.linspace(0.0, 1.0, segments_for(length, spacing.far) + 1))
-    # The integral of ds / h counts the segments; 16 samples per smallest segment resolve it.
-    fine = np.linspace(0.0, 1.0, 16 * segments_for(length, min(spacing.near, spacing.far)) + 1)
-    density = length / spacing(curve(0.5 * (fine[:-1] + fine[1:])))
-    cumulative = np.concatenate([[0.0], np.cumsum(density * np.diff(fine))])
+    # The number of segments is the integral of ds / h, for which each of the smallest segments has 16 samples.
+    samples = np.linspace(0.0, 1.0, 16 * segments_for(length, min(spacing.near, spacing.far)) + 1)
+    density = length / spacing(curve(0.5 * (samples[:-1] + samples[1:])))
+    cumulative = np.concatenate([[0.0], np.cumsum(density * np.diff(samples))])
     n = segments(cumulative[-1])
-    parameter = np.interp(np.linspace(0.0, cumulative[-1], n + 1), cumulative, fine)
+    parameter = np.interp(np.linspace(0.0, cumulative[-1], n + 1), cumulative, samples)
     parameter[0], parameter[-1] = 0.0, 1.0
     return curve(parameter)
 
@@ -108,7 +108,7 @@ def growing(length: float, first: float, growth: float) -> Array:
 
 
 def straight(start: Sequence[float], end: Sequence[float], relative: Array) -> Array:
-    """Return points (n, 2) [length] of a straight side at the abscissae `relative` (n,) [-], with exact ends."""
+    """Return points (n, 2) [length] of a straight side at relative abscissae (n,) from 0 to 1 [-]. The ends are exact."""
     a, b, s = np.asarray(start, float), np.asarray(end, float), relative[:, None]
     return np.where(s < 1.0, a + s * (b - a), b)
 
@@ -118,9 +118,6 @@ def arc(centre: Sequence[float], radius: float, angles: Array) -> Array:
     return np.asarray(centre, float) + radius * np.column_stack([np.sin(angles), np.cos(angles)])
 
 
-SIDES = ("BOTTOM", "RIGHT", "TOP", "LEFT")
-
-
 def rectangular(x: Array, y: Array) -> Array:
     """Return the grid (n + 1, m + 1, 2) [length] of the coordinates `x` (n + 1,) [length] and `y` (m + 1,) [length]."""
     affordable(len(x) * len(y))
@@ -128,11 +125,11 @@ def rectangular(x: Array, y: Array) -> Array:
 
 
 def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, v: Array) -> Array:
-    """Return the grid (n + 1, m + 1, 2) [length] between four sides by bilinear blending; its border is the given nodes.
+    """Return the grid (n + 1, m + 1, 2) [length] between four sides, whose nodes it contains.
 
     It is the bilinearly blended Coons patch (W. J. Gordon and C. A. Hall, Int. J. Numer. Meth. Engng 7, 1973, eq. 6). The
-    sides are `bottom` (n + 1, 2) [length] and `top` (n + 1, 2) [length], with the relative abscissae `u` (n + 1,) [-] of
-    their nodes from 0 to 1, and `right` (m + 1, 2) [length] and `left` (m + 1, 2) [length], with `v` (m + 1,) [-].
+    nodes of `bottom` and `top` (n + 1, 2) [length] have the relative abscissae `u` (n + 1,) from 0 to 1 [-], and those of
+    `right` and `left` (m + 1, 2) [length] have `v` (m + 1,) [-].
     """
     affordable(len(u) * len(v))
     U, V = u[:, None, None], v[None, :, None]
@@ -147,22 +144,22 @@ def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, 
 def structured(grid: Array, solid: str, sides: Mapping[str, str], triangles: bool = False) -> Mesh:
     """Return the linear mesh of a grid, with all cells in the group `solid`.
 
-    The `grid` (n + 1, m + 1, 2) [length] is right-handed: the first index runs to the right, the second up. `sides` maps
-    BOTTOM, RIGHT, TOP, LEFT to names of groups of lines; with `triangles`, each quadrangle is divided in two along
+    The first index of the `grid` (n + 1, m + 1, 2) [length] increases to the right, the second one upward. `sides` maps
+    BOTTOM, RIGHT, TOP and LEFT to names of groups of lines. With `triangles`, each quadrangle is divided in two along
     alternating diagonals.
     """
     n, m = grid.shape[0] - 1, grid.shape[1] - 1
     numbers = np.arange((n + 1) * (m + 1)).reshape(n + 1, m + 1)
     quads = np.stack([numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]], axis=2)
-    name, block = ("tri3", _cut(quads)) if triangles else ("quad4", quads.reshape(-1, 4))
+    name, block = ("tri3", _triangles(quads)) if triangles else ("quad4", quads.reshape(-1, 4))
     nodes = {"BOTTOM": numbers[:, 0], "RIGHT": numbers[-1], "TOP": numbers[::-1, -1], "LEFT": numbers[0, ::-1]}
     lines = {side: np.column_stack([nodes[side][:-1], nodes[side][1:]]) for side in sides}
     mesh = Mesh(grid.reshape(-1, 2), {name: block}, {solid: np.arange(len(block))})
     return mesh.with_facets({group: {"line2": lines[side]} for side, group in sides.items()})
 
 
-def _cut(quads: Indices) -> Indices:
-    """Return the triangles (2 n m, 3) into which diagonals divide quadrangles (n, m, 4), alternating like a chessboard."""
+def _triangles(quads: Indices) -> Indices:
+    """Return the triangles (2 n m, 3) into which alternating diagonals divide quadrangles (n, m, 4)."""
     i, j = np.indices(quads.shape[:2])
     rising = quads[..., [[0, 1, 2], [0, 2, 3]]]
     falling = quads[..., [[0, 1, 3], [1, 2, 3]]]

@@ -1,6 +1,6 @@
-"""Triangulation of bodies with a convex outline of named sides, without random numbers.
+"""Deterministic triangulation of bodies with a convex outline of named sides.
 
-Edges are at most as long as a size function prescribes. The initial inner points form a lattice, or rings about the pole.
+The longest admissible edges are prescribed by a function. The initial inner points form a lattice, or rings about the pole.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from fastcontact.mesh.generate._spacing import Spacing
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import corner_angles
 
-# Since no triangulation has equal edges, inner points are placed at a fraction of the longest admissible edge. Attempts with
-# these fractions are made in turn until the best one so far has no angle below the second number [degrees].
+# Since the edges of a triangulation differ, the distance of inner points is a fraction of the longest admissible edge. These
+# fractions are tried in turn until the smallest angle of the best triangulation so far reaches the second number [degrees].
 _ATTEMPTS = ((0.84, 35.0), (0.82, 35.0), (0.80, 33.0), (0.78, 31.0), (0.75, 29.0), (0.70, 20.0))
 _ROUNDS = 8  # number of passes that add points where edges are too long
 _MOVING_RADIUS = 3.0  # distance from an added point, in edge lengths, within which points move
@@ -27,10 +27,10 @@ _CLEARANCE = 0.6  # smallest distance of seeds from the outline, in edge lengths
 
 
 def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> Mesh:
-    """Return a triangle mesh of a convex body, its cells in the group `solid`.
+    """Return a triangle mesh of a convex body, with all cells in the group `solid`.
 
-    The `sides` (n, 2) [length], each given by a name and its nodes, run counter-clockwise, each from the end of the previous
-    one. `spacing` defines the longest inner edges.
+    Each of the `sides` consists of a name and nodes (n, 2) [length]. They are in counter-clockwise order, and each begins at
+    the end of the previous one. `spacing` defines the longest inner edges.
     """
     outline = np.vstack([nodes[:-1] for _, nodes in sides])
     points, triangles = triangulated(outline, spacing)
@@ -46,8 +46,8 @@ def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:
     """Return points (n_points, 2) [length] and triangles (n_triangles, 3), counter-clockwise, that fill a convex polygon.
 
     The corners of the `outline` (n, 2) [length], counter-clockwise, are the first n points, and no other point lies on it.
-    `spacing` defines the longest admissible edge, at the middle of each inner edge. Raises MeshError if no well-shaped
-    triangulation with such edges is found.
+    `spacing` is the longest admissible length of an inner edge as a function of its midpoint. Raises MeshError if no
+    well-shaped triangulation with such edges is found.
     """
     best, best_angle = None, 0.0
     for density, good_angle in _ATTEMPTS:
@@ -64,26 +64,26 @@ def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:
 
 
 def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
-    """Return the points of a triangulation whose edges are short enough, or None."""
+    """Return the points of a triangulation with edges of admissible length, or None if there are still longer edges."""
     n_fixed = len(outline)
     points = np.vstack([outline, inner_seeds(outline, spacing, density)])
     movable = np.arange(len(points)) >= n_fixed
     points = relax(points, movable, spacing, 40)
     for _ in range(_ROUNDS):
         points = polish(points, movable, spacing, 20)
-        added = _middles_of_long_edges(points, n_fixed, spacing)
+        added = _midpoints_of_long_edges(points, n_fixed, spacing)
         if not len(added):
             return points
         points = np.vstack([points, added])
         movable = np.arange(len(points)) >= n_fixed
-        # Only points around the new ones are relaxed; the positions of the others are already good.
+        # Only points near the new ones are relaxed, because the positions of the others are already good.
         near = nearest(added, points)[0] < _MOVING_RADIUS * spacing(points)
         points = relax(points, movable & near, spacing, 16)
     return None
 
 
-def _middles_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> Array:
-    """Return the middle points (m, 2) of edges that are too long; at each point only the longest counts."""
+def _midpoints_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> Array:
+    """Return the midpoints (m, 2) of edges that are too long and the longest, relative to the spacing, at both ends."""
     edges = edges_of(delaunay(points))
     # Sides of the outline are excluded, but not chords that cut off a corner.
     side = np.isin(edges[:, 1] - edges[:, 0], (1, n_fixed - 1)) & (edges[:, 1] < n_fixed)
@@ -98,7 +98,7 @@ def _middles_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> Arr
 
 
 def _checked(triangles: Indices, n_points: int, n_outline: int) -> Indices:
-    """Return the triangles if they fill the polygon: by Euler's formula there are 2 n_points - 2 - n_outline."""
+    """Return the triangles, after checking by Euler's formula that their number is 2 n_points - 2 - n_outline."""
     expected = 2 * n_points - 2 - n_outline
     if len(triangles) != expected:
         raise MeshError(
@@ -108,20 +108,20 @@ def _checked(triangles: Indices, n_points: int, n_outline: int) -> Indices:
 
 
 def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
-    """Return points (m, 2) [length] inside a convex `outline` (n, 2) [length], about ``density * spacing`` apart."""
+    """Return points (m, 2) [length] in a convex `outline` (n, 2) [length] at distances of about ``density * spacing``."""
     low, high = outline.min(axis=0), outline.max(axis=0)
-    field = _lattice(spacing, density, low, high) if spacing.uniform else _rings(spacing, density, low, high)
-    corners = _spaced(_corner_seeds(outline, spacing, density), outline, spacing, density)
-    size = density * spacing(field)
-    inside = field[_depth(outline, field) > _CLEARANCE * size]
+    candidates = _lattice(spacing, density, low, high) if spacing.uniform else _rings(spacing, density, low, high)
+    corners = _separated(_corner_seeds(outline, spacing, density), outline, spacing, density)
+    size = density * spacing(candidates)
+    inside = candidates[_depth(outline, candidates) > _CLEARANCE * size]
     if not len(corners):
         return inside
     free = nearest(corners, inside)[0] > 0.7 * density * spacing(inside)
     return np.vstack([corners, inside[free]])
 
 
-def _spaced(seeds: Array, outline: Array, spacing: Spacing, density: float) -> Array:
-    """Return the seeds (m, 2) far enough from the outline and from earlier seeds, where a body is narrow."""
+def _separated(seeds: Array, outline: Array, spacing: Spacing, density: float) -> Array:
+    """Return the seeds (m, 2) without those too close to the outline or to earlier seeds, as in narrow bodies."""
     accepted: list[Array] = []
     for seed, depth, size in zip(seeds, _depth(outline, seeds), density * spacing(seeds), strict=True):
         if depth > 0.4 * size and all(np.hypot(*(seed - other)) > 0.7 * size for other in accepted):
@@ -130,7 +130,7 @@ def _spaced(seeds: Array, outline: Array, spacing: Spacing, density: float) -> A
 
 
 def _depth(outline: Array, points: Array) -> Array:
-    """Return the distances (m,) of the points to the nearest side of the convex polygon, negative outside [length]."""
+    """Return the distances (m,) of points to the nearest side of a convex polygon, which are negative outside [length]."""
     sides = np.roll(outline, -1, axis=0) - outline
     normals = np.column_stack([-sides[:, 1], sides[:, 0]]) / np.hypot(sides[:, 0], sides[:, 1])[:, None]
     offsets = (normals * outline).sum(axis=1)
@@ -142,19 +142,19 @@ def _depth(outline: Array, points: Array) -> Array:
 
 def _corner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
     """Return a point on the bisector of each corner of about 90 degrees, so that an edge halves the angle of the corner."""
-    ahead = np.roll(outline, -1, axis=0) - outline
-    behind = np.roll(outline, 1, axis=0) - outline
-    ahead /= np.hypot(ahead[:, 0], ahead[:, 1])[:, None]
-    behind /= np.hypot(behind[:, 0], behind[:, 1])[:, None]
-    square = np.abs((ahead * behind).sum(axis=1)) < 0.3
-    bisector = (ahead + behind)[square]
+    to_next = np.roll(outline, -1, axis=0) - outline
+    to_previous = np.roll(outline, 1, axis=0) - outline
+    to_next /= np.hypot(to_next[:, 0], to_next[:, 1])[:, None]
+    to_previous /= np.hypot(to_previous[:, 0], to_previous[:, 1])[:, None]
+    right_angle = np.abs((to_next * to_previous).sum(axis=1)) < 0.3
+    bisector = (to_next + to_previous)[right_angle]
     bisector /= np.hypot(bisector[:, 0], bisector[:, 1])[:, None]
-    corner = outline[square]
+    corner = outline[right_angle]
     return corner + 0.8 * density * spacing(corner)[:, None] * bisector
 
 
 def _lattice(spacing: Spacing, density: float, low: Array, high: Array) -> Array:
-    """Return an equilateral lattice over the box, with one row through the pole."""
+    """Return the points of an equilateral lattice over a box, with one row through the pole."""
     size = density * spacing.far
     rows = np.arange(np.floor(low[1] / (_ROW_HEIGHT * size)), np.ceil(high[1] / (_ROW_HEIGHT * size)) + 1)
     columns = np.arange(np.floor(low[0] / size) - 1, np.ceil(high[0] / size) + 1)
@@ -164,10 +164,10 @@ def _lattice(spacing: Spacing, density: float, low: Array, high: Array) -> Array
 
 
 def _rings(spacing: Spacing, density: float, low: Array, high: Array) -> Array:
-    """Return points on circles around the pole, with radial and circumferential distances by the spacing.
+    """Return points on circles around the pole, with radial and circumferential distances according to the spacing.
 
-    If the spacing is proportional to the distance from the pole this is an equilateral lattice under the conformal map exp,
-    so that the triangles stay equilateral.
+    If the spacing is proportional to the distance from the pole, the points are the image of an equilateral lattice under the
+    conformal map exp, so that the triangles are nearly equilateral.
     """
     farthest = max(np.hypot(x, y) for x in (low[0], high[0]) for y in (low[1], high[1]))
     rings, radius, shift, total = [], 0.0, 0.0, 0
@@ -185,20 +185,20 @@ def _rings(spacing: Spacing, density: float, low: Array, high: Array) -> Array:
 
 Size = Callable[[Array], Array]
 
-_KEPT = 4  # steps with one triangulation
+_STEPS_PER_TRIANGULATION = 4  # steps of `relax` and sweeps of `polish` with one triangulation
 _STEP = 0.2  # pseudo-time of one step of `relax`
 _STRETCH = 1.2  # rest length of bars over their scaled length, so that the points spread
 _DIRECTIONS = np.linspace(0.0, 2 * np.pi, 13)[:-1]
 _TRIALS = np.column_stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 _TRIALS = np.vstack([_TRIALS, 0.5 * _TRIALS])
-_GOOD = np.sin(np.radians(50.0))  # stars with a larger smallest angle are not changed
-_TOO_LONG = 0.5, 2.0  # penalty of an edge that is too long, and per relative excess, as sine of an angle
+_GOOD = np.sin(np.radians(50.0))  # points around which all angles are larger are not moved
+_TOO_LONG = 0.5, 2.0  # penalty of an edge that is too long, constant and per relative excess, as the sine of an angle
 
 
 def delaunay(points: Array) -> Indices:
-    """Return counter-clockwise triangles (n_triangles, 3) of the convex hull of `points` (n, 2) [length], without flat ones.
+    """Return the counter-clockwise triangles (n_triangles, 3) of the Delaunay triangulation of `points` (n, 2) [length].
 
-    Collinear nodes on the hull cause triangles of zero area by round-off, which are dropped.
+    Triangles of zero area, which collinear points of the convex hull cause by round-off, are left out.
     """
     from scipy.spatial import Delaunay
 
@@ -213,7 +213,7 @@ def delaunay(points: Array) -> Indices:
 
 
 def edges_of(triangles: Indices) -> Indices:
-    """Return the edges (n_edges, 2) of `triangles` (n_triangles, 3), each once, smaller point number first."""
+    """Return the edges (n_edges, 2) of `triangles` (n_triangles, 3), each once, with the smaller point number first."""
     ends = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     ends.sort(axis=1)
     n = int(ends.max()) + 1
@@ -235,51 +235,50 @@ def stars_of(triangles: Indices, n_points: int) -> Indices:
 
 
 def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
-    """Return points (n, 2) [length], the movable ones relaxed by repulsive bars along the edges.
+    """Return points (n, 2) after relaxation by repulsive bars along the edges [length].
 
-    The bars of a truss push its nodes apart until the lengths follow the size function (P.-O. Persson and G. Strang, A simple
-    mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Only the `movable` (n,) of the `points` (n, 2) [length] move,
-    in `steps` steps; the function `size` (n,) [length] of points returns the desired length of edges.
+    The bars of a truss push its nodes apart until their lengths follow the function `size` of positions (P.-O. Persson and
+    G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Only points with True in `movable` (n,)
+    move, in `steps` steps.
     """
     points = points.copy()
     if not movable.any():
         return points
     for step in range(steps):
-        if step % _KEPT == 0:
+        if step % _STEPS_PER_TRIANGULATION == 0:
             edges = edges_of(delaunay(points))
             edges = edges[movable[edges].any(axis=1)]
-            wanted = size(points[edges].mean(axis=1))
-        push = _push(points, edges, wanted)
-        points[movable] += _STEP * push[movable]
+            desired = size(points[edges].mean(axis=1))
+        points[movable] += _STEP * _bar_forces(points, edges, desired)[movable]
     return points
 
 
-def _push(points: Array, edges: Indices, wanted: Array) -> Array:
-    """Return the sums (n, 2) of the bar forces at the points; a bar longer than its rest length does not pull."""
+def _bar_forces(points: Array, edges: Indices, desired: Array) -> Array:
+    """Return the sums (n, 2) of the bar forces at the points. Bars that exceed their rest length have no force."""
     bars = points[edges[:, 0]] - points[edges[:, 1]]
     length = np.sqrt((bars * bars).sum(axis=1))
     # The rest lengths are scaled to the actual lengths, so that the pressure is the same everywhere.
-    rest = _STRETCH * wanted * np.sqrt((length**2).sum() / (wanted**2).sum())
+    rest = _STRETCH * desired * np.sqrt((length**2).sum() / (desired**2).sum())
     force = (np.maximum(rest - length, 0.0) / length)[:, None] * bars
-    push = np.empty_like(points)
+    total = np.empty_like(points)
     for axis in range(2):
-        push[:, axis] = np.bincount(edges[:, 0], force[:, axis], len(points))
-        push[:, axis] -= np.bincount(edges[:, 1], force[:, axis], len(points))
-    return push
+        total[:, axis] = np.bincount(edges[:, 0], force[:, axis], len(points))
+        total[:, axis] -= np.bincount(edges[:, 1], force[:, axis], len(points))
+    return total
 
 
 def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
-    """Return points (n, 2) [length], moved one by one so that the worst triangle around each becomes better.
+    """Return points (n, 2) that are moved one by one to improve the worst triangle around each of them [length].
 
-    A trial move is accepted if it raises the smallest angle of the star, with a penalty on edges that are too long (smart
-    smoothing after L. Freitag and C. Ollivier-Gooch, Int. J. Numer. Meth. Engng 40, 1997). Points moved simultaneously share
-    no edge. Only the `movable` (n,) of the `points` (n, 2) [length] move, in at most `sweeps` sweeps. The function
-    `limit` (n,) [length] of points returns the longest admissible edge.
+    A trial move is accepted if it increases the smallest angle around the point, with a penalty on edges that are too long
+    (smart smoothing after L. Freitag and C. Ollivier-Gooch, Int. J. Numer. Meth. Engng 40, 1997). Points that move
+    simultaneously share no edge. Only points with True in `movable` (n,) move, in at most `sweeps` sweeps. The function
+    `limit` of positions returns the longest admissible edge.
     """
     points = points.copy()
     radius, moved = 0.1, True
     for sweep in range(sweeps):
-        if sweep % _KEPT == 0:
+        if sweep % _STEPS_PER_TRIANGULATION == 0:
             if not moved:
                 break
             triangles = delaunay(points)
@@ -290,41 +289,39 @@ def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
 
 
 def _sweep(points: Array, movable: Mask, edges: Indices, stars: Indices, limit: Array, radius: float) -> bool:
-    """Try to move every bad point once, the worst first, in place; return whether any point moved."""
-    worth = np.full(len(points), np.inf)
-    worth[movable] = _star_quality(points[movable, None], points, stars[movable], limit[movable])[:, 0]
-    worth[worth >= _GOOD] = np.inf
+    """Try to move every point with a small angle, the worst first, in place, and return whether any point has moved."""
+    quality = np.full(len(points), np.inf)
+    quality[movable] = _star_quality(points[movable, None], points, stars[movable], limit[movable])[:, 0]
+    quality[quality >= _GOOD] = np.inf
     moved = False
     for _ in range(6):
         neighbours = np.full(len(points), np.inf)
-        np.minimum.at(neighbours, edges[:, 0], worth[edges[:, 1]])
-        np.minimum.at(neighbours, edges[:, 1], worth[edges[:, 0]])
-        chosen = np.flatnonzero(worth < neighbours)
-        if not len(chosen):
+        np.minimum.at(neighbours, edges[:, 0], quality[edges[:, 1]])
+        np.minimum.at(neighbours, edges[:, 1], quality[edges[:, 0]])
+        selected = np.flatnonzero(quality < neighbours)
+        if not len(selected):
             break
-        moved |= _try_moves(points, chosen, stars, limit, radius)
-        worth[chosen] = np.inf
+        moved |= _try_moves(points, selected, stars, limit, radius)
+        quality[selected] = np.inf
     return moved
 
 
-def _try_moves(points: Array, chosen: Indices, stars: Indices, limit: Array, radius: float) -> bool:
-    """Move each chosen point in place to its best trial position if that is better; return whether any point moved."""
-    here = points[chosen]
-    trials = here[:, None] + radius * limit[chosen, None, None] * _TRIALS
-    places = np.concatenate([here[:, None], trials], axis=1)
-    quality = _star_quality(places, points, stars[chosen], limit[chosen])
-    best = quality.argmax(axis=1)
-    points[chosen] = places[np.arange(len(chosen)), best]
+def _try_moves(points: Array, selected: Indices, stars: Indices, limit: Array, radius: float) -> bool:
+    """Move each selected point in place to its best trial position if that is better, and return whether any has moved."""
+    trials = points[selected, None] + radius * limit[selected, None, None] * _TRIALS
+    positions = np.concatenate([points[selected, None], trials], axis=1)
+    best = _star_quality(positions, points, stars[selected], limit[selected]).argmax(axis=1)
+    points[selected] = positions[np.arange(len(selected)), best]
     return bool(best.any())
 
 
-def _star_quality(places: Array, points: Array, stars: Indices, limit: Array) -> Array:
-    """Return the quality (m, n_places) of the worst triangle around each point for positions `places` (m, n_places, 2)."""
+def _star_quality(positions: Array, points: Array, stars: Indices, limit: Array) -> Array:
+    """Return the quality (m, k) of the worst triangle around each of m points for its trial positions (m, k, 2)."""
     a, b = points[stars[:, None, :, 0]], points[stars[:, None, :, 1]]
-    u, v, w = a - places[:, :, None], b - places[:, :, None], b - a
+    u, v, w = a - positions[:, :, None], b - positions[:, :, None], b - a
     twice_area = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
     uu, vv, ww = (u * u).sum(axis=-1), (v * v).sum(axis=-1), (w * w).sum(axis=-1)
-    # The smallest angle is opposite the shortest side: its sine is 2 area / (product of the two others).
+    # The smallest angle is opposite the shortest side. Its sine is twice the area over the product of the other sides.
     shortest = np.minimum(np.minimum(uu, vv), ww)
     sine = twice_area * np.sqrt(shortest / np.maximum(uu * vv * ww, 1e-300))
     excess = np.sqrt(np.maximum(uu, vv)) / limit[:, None, None] - 1.0

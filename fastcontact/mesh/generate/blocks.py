@@ -12,7 +12,6 @@ from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
 from fastcontact.mesh.generate._check import FACES, TRIANGLES, count, each, number, one_of, positive, within
 from fastcontact.mesh.generate._spacing import (
-    SIDES,
     Spacing,
     divided,
     geometric,
@@ -76,15 +75,15 @@ def block(
     amount = within("distortion", distortion, 0.0, 0.24)
     grid = rectangular(left + width * np.linspace(0, 1, n + 1), bottom + height * np.linspace(0, 1, m + 1))
     grid += _pattern(n, m) * amount * np.array([width / n, height / m])
-    return _finished(grid, element, name)
+    return _with_corners(grid, element, name)
 
 
-def _finished(grid: Array, element: str, name: str) -> Mesh:
+def _with_corners(grid: Array, element: str, name: str) -> Mesh:
     """Return the mesh of a grid with cells of type `element` and with groups for its sides and corners."""
-    sides = {side: side for side in SIDES}
+    sides = {side: side for side in ("BOTTOM", "RIGHT", "TOP", "LEFT")}
     mesh = in_element(structured(grid, name, sides, triangles=element in TRIANGLES), element)
-    places = {"BOTTOM_LEFT": grid[0, 0], "BOTTOM_RIGHT": grid[-1, 0]}
-    return with_points_at(mesh, {**places, "TOP_RIGHT": grid[-1, -1], "TOP_LEFT": grid[0, -1]})
+    corners = {"BOTTOM_LEFT": grid[0, 0], "BOTTOM_RIGHT": grid[-1, 0]}
+    return with_points_at(mesh, {**corners, "TOP_RIGHT": grid[-1, -1], "TOP_LEFT": grid[0, -1]})
 
 
 def _pattern(n: int, m: int) -> Array:
@@ -230,14 +229,14 @@ _BLOCK_NAMES = {
 
 
 def _graded_block(element: str, width: float, height: float, near: float, far: float) -> Mesh:
-    """Return a block of quadrangles whose lengths form geometric progressions from the pole."""
+    """Return a block of quadrangles whose edges along the axes form geometric progressions from the pole."""
     x = width * geometric(width, near, far)
     y = -height * geometric(height, near, far)[::-1]
-    return renamed(_finished(rectangular(x, y + 0.0), element, "BLOCK"), _BLOCK_NAMES.get)
+    return renamed(_with_corners(rectangular(x, y + 0.0), element, "BLOCK"), _BLOCK_NAMES.get)
 
 
 def _free_block(element: str, width: float, height: float, spacing: Spacing) -> Mesh:
-    """Return a block of triangles whose size increases with the distance from the pole, as in the cylinder."""
+    """Return a block of triangles whose size varies with the distance from the pole, as in the cylinder."""
     corners = [(0.0, 0.0), (0.0, -height), (width, -height), (width, 0.0)]
     names = ["LEFT", "BOTTOM", "RIGHT", "TOP"]
     sides = [

@@ -16,19 +16,19 @@ from fastcontact.mesh.generate.blocks import block as rectangle
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 
-# Steps per hexahedron of the lattice that contains all nodes of all elements, also the mid-side nodes of pyramids.
+# Steps per edge of a hexahedron of the lattice that contains the nodes of all elements, also the mid-side nodes of pyramids.
 STEPS = 4
 _HEX = elements.get("hex8")
 _CORNERS = ((_HEX.nodes + 1) / 2 * STEPS).astype(np.int64)
-# Corners of the cells into which a hexahedron is divided; the number 8 is its centre. Adjacent hexahedra are compatible,
-# because opposite faces are divided in the same way.
-_CUTS = {
+# Corners of the cells into which a hexahedron is divided, where 8 is its centre. Adjacent hexahedra are compatible, because
+# opposite faces are divided in the same way.
+_DIVISIONS = {
     "hex8": [list(range(8))],
     "tet4": [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]],
     "wedge6": [[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]],
     "pyramid5": [[*reversed(facet), 8] for facet in _HEX.facets],
 }
-SOLIDS = tuple(name for name, element in elements.ELEMENTS.items() if element.linear in _CUTS)
+SOLIDS = tuple(name for name, element in elements.ELEMENTS.items() if element.linear in _DIVISIONS)
 
 
 @typed(MeshError)
@@ -75,23 +75,23 @@ def box(
     sides = {}
     for axis, letter in enumerate("XYZ"):
         x = mesh.points[:, axis]
-        for end, on in (("MIN", x == x.min()), ("MAX", x == x.max())):
-            facets = {kind: block[on[block].all(axis=1)] for kind, block in outer_facets(mesh).items()}
+        for end, on_side in (("MIN", x == x.min()), ("MAX", x == x.max())):
+            facets = {kind: block[on_side[block].all(axis=1)] for kind, block in outer_facets(mesh).items()}
             sides[letter + end] = {kind: block for kind, block in facets.items() if len(block)}
     return mesh.with_facets(sides)
 
 
 def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:
-    """Return the connectivity of the cells, and the points (n_points, 3) in steps of the lattice."""
-    affordable(float(np.prod(shape, dtype=float)) * len(_CUTS[solid.linear]))
+    """Return the cells (n_cells, n_nodes), and the positions (n_points, 3) of their nodes in steps of the lattice."""
+    affordable(float(np.prod(shape, dtype=float)) * len(_DIVISIONS[solid.linear]))
     corners = np.vstack([_CORNERS, _CORNERS.mean(axis=0, keepdims=True).astype(np.int64)])
-    local = solid.corner_shape(solid.nodes) @ corners[_CUTS[solid.linear]]
-    # A single integer for each position in the lattice, by which equal points are identified.
+    local = solid.corner_shape(solid.nodes) @ corners[_DIVISIONS[solid.linear]]
+    # Positions in the lattice are numbered, so that coincident nodes have equal numbers.
     n_y, n_z = STEPS * shape[1:] + 1
     weights = np.array([n_y * n_z, n_z, 1])
     first = STEPS * np.indices(tuple(shape.tolist())).reshape(3, -1).T @ weights
-    places = first[:, None, None] + np.rint(local).astype(np.int64) @ weights
-    used, block = np.unique(places, return_inverse=True)
+    positions = first[:, None, None] + np.rint(local).astype(np.int64) @ weights
+    used, block = np.unique(positions, return_inverse=True)
     lattice = np.column_stack([used // (n_y * n_z), used // n_z % n_y, used % n_z])
     return block.reshape(-1, solid.n_nodes), lattice
 
@@ -108,11 +108,11 @@ def on_lines(element: str, lines: Sequence[Array], name: str = "BLOCK") -> Mesh:
     name : str
         Name of the group of all solid cells.
     """
-    divisions = [len(places) - 1 for places in lines]
+    divisions = [len(line) - 1 for line in lines]
     if len(lines) == 2:
         lattice = rectangle((divisions[0], divisions[1]), (divisions[0], divisions[1]), element, name=name)
     else:
         n, m, k = divisions
         lattice = box((n, m, k), (n, m, k), element, name=name)
-    moved = [np.interp(x, np.arange(len(places)), places) for x, places in zip(lattice.points.T, lines, strict=True)]
-    return lattice.replace(points=np.column_stack(moved))
+    points = [np.interp(x, np.arange(len(line)), line) for x, line in zip(lattice.points.T, lines, strict=True)]
+    return lattice.replace(points=np.column_stack(points))

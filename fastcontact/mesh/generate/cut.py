@@ -1,4 +1,4 @@
-"""Cut a mesh along a group of internal facets, for example at the pretension section of a bolt."""
+"""Cuts of meshes along groups of internal facets, for example at the pretension section of a bolt."""
 
 from __future__ import annotations
 
@@ -64,11 +64,11 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
 
 
 def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] | None) -> Array:
-    """Return the unit normal (dim,) of a section."""
+    """Return the unit normal (dim,) of a section, by default that of the plane fitted to its points."""
     if normal is None:
         positions = mesh.points[points] - mesh.points[points].mean(axis=0)
-        across = np.linalg.svd(positions, full_matrices=True)[2][-1]
-        return np.asarray(across * np.sign(across[np.argmax(np.abs(across))]))
+        fitted = np.linalg.svd(positions, full_matrices=True)[2][-1]
+        return np.asarray(fitted * np.sign(fitted[np.argmax(np.abs(fitted))]))
     vector = np.asarray(normal, float)
     length = np.linalg.norm(vector)
     if vector.shape != (mesh.dim,) or not (np.isfinite(length) and length > 0):
@@ -77,12 +77,12 @@ def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] 
 
 
 def _as_sets(facets: dict[str, Numbers]) -> set[Facet]:
-    """Return the facets as a set with the set of nodes of each facet."""
+    """Return the sets of nodes of all facets."""
     return {frozenset(facet) for block in facets.values() for facet in block.tolist()}
 
 
 def _facets_at(mesh: Mesh, touched: Mask) -> Iterator[tuple[str, int, Facet]]:
-    """Yield the element type, the row of the cell and the nodes of all facets of solid cells that have marked points."""
+    """Yield the element type, the row of the cell and the nodes of all facets of solid cells with a marked point."""
     for name, block in mesh.solids.items():
         rows = np.flatnonzero(touched[block].any(axis=1))
         for facet in elements.get(name).facets:
@@ -100,61 +100,62 @@ def _cells_beyond(
     owners: dict[Facet, list[int]] = {}
     for name, row, facet in _facets_at(mesh, touched):
         owners.setdefault(facet, []).append(number.setdefault((name, row), len(number)))
-    if any(len(owners.get(facet, ())) != 2 for facet in section):
-        wrong = sum(len(owners.get(facet, ())) != 2 for facet in section)
+    n_invalid = sum(len(owners.get(facet, ())) != 2 for facet in section)
+    if n_invalid:
         raise MeshError(
-            f"{wrong} of {len(section)} facets of '{group}' do not lie between two solids that share their nodes: a cut "
+            f"{n_invalid} of {len(section)} facets of '{group}' do not lie between two solids that share their nodes: a cut "
             "needs facets inside a body"
         )
-    joined = np.array([pair for facet, pair in owners.items() if len(pair) == 2 and facet not in section], int)
-    joined = joined.reshape(-1, 2)
-    graph = coo_array((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(len(number), len(number)))
+    pairs = np.array([pair for facet, pair in owners.items() if len(pair) == 2 and facet not in section], int)
+    pairs = pairs.reshape(-1, 2)
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(number), len(number)))
     component = connected_components(graph, directed=False)[1]
-    middle = np.array([mesh.points[mesh.cells[name][row]].mean(axis=0) for name, row in number])
-    side = _sides_of_parts(mesh, group, {facet: owners[facet] for facet in section}, component, middle, direction)
+    centres = np.array([mesh.points[mesh.cells[name][row]].mean(axis=0) for name, row in number])
+    beyond = _parts_beyond(mesh, group, {facet: owners[facet] for facet in section}, component, centres, direction)
     cells: dict[str, list[int]] = {}
-    for (name, row), body, centre in zip(number, component, middle, strict=True):
+    for (name, row), part, centre in zip(number, component, centres, strict=True):
         nodes = mesh.cells[name][row]
-        at = mesh.points[nodes[touched[nodes]]].mean(axis=0)  # the cell may touch the section only in an edge or a node
-        if side.get(int(body), bool((centre - at) @ direction > 0)):
+        # A part without a facet in the section touches it only at edges or nodes.
+        touching = mesh.points[nodes[touched[nodes]]].mean(axis=0)
+        if beyond.get(int(part), bool((centre - touching) @ direction > 0)):
             cells.setdefault(name, []).append(row)
     return cells
 
 
-def _sides_of_parts(
-    mesh: Mesh, group: str, between: dict[Facet, list[int]], component: Numbers, middle: Array, direction: Array
+def _parts_beyond(
+    mesh: Mesh, group: str, owners: dict[Facet, list[int]], component: Numbers, centres: Array, direction: Array
 ) -> dict[int, bool]:
-    """Return for each connected part of the cells at a section whether it lies on the side of `direction`.
+    """Return for each connected part of the cells with facets in a section whether it lies on the side of `direction`.
 
-    MeshError if a part lies on both sides.
+    `owners` are the two cells of each facet of the section. Raises MeshError if a part lies on both sides.
     """
-    side: dict[int, bool] = {}
-    for facet, pair in between.items():
-        here, there = sorted(pair, key=lambda cell: float(middle[cell] @ direction))
-        for number, beyond in ((int(component[here]), False), (int(component[there]), True)):
-            if side.setdefault(number, beyond) != beyond:
-                where = mesh.points[list(facet)].mean(axis=0)
+    is_beyond: dict[int, bool] = {}
+    for facet, pair in owners.items():
+        lower, upper = sorted(pair, key=lambda cell: float(centres[cell] @ direction))
+        for part, beyond in ((int(component[lower]), False), (int(component[upper]), True)):
+            if is_beyond.setdefault(part, beyond) != beyond:
+                position = mesh.points[list(facet)].mean(axis=0)
                 raise MeshError(
                     f"the facets of '{group}' do not divide the body: the cells on both sides are still connected (near "
-                    f"{where}); extend the group to the surface of the body, with a normal across it (now {direction})"
+                    f"{position}); extend the group to the surface of the body, with a normal across it (now {direction})"
                 )
-    return side
+    return is_beyond
 
 
 def _opened(
     mesh: Mesh, group: str, facets: dict[str, Numbers], beyond: dict[str, list[int]], new_node: Numbers
 ) -> Mesh:
-    """Return the mesh in which the cells beyond the section have new nodes.
+    """Return the mesh in which the cells `beyond` the section, given by their rows, have new nodes.
 
-    `new_node` (n_points,) is the number of the new node of each point, -1 for points that do not lie in the section.
+    `new_node` (n_points,) is the number of the new node of each point, and -1 for points that do not lie in the section.
     """
     cells = {name: np.array(block) for name, block in mesh.cells.items()}
     moved = [_with_nodes(cells, name, np.array(rows), new_node) for name, rows in beyond.items()]
     outer = {facet for sides in moved for facet in sides} - _as_sets(facets)
     for name, block in mesh.facets.items():
         rows = np.flatnonzero((new_node[block] >= 0).any(axis=1))
-        follow = [row for row in rows.tolist() if frozenset(block[row].tolist()) in outer]
-        _with_nodes(cells, name, np.array(follow, int), new_node)
+        of_moved = [row for row in rows.tolist() if frozenset(block[row].tolist()) in outer]
+        _with_nodes(cells, name, np.array(of_moved, int), new_node)
     old = np.flatnonzero(new_node >= 0)
     point_groups = {
         name: np.concatenate([members, new_node[members[new_node[members] >= 0]]])
@@ -166,7 +167,7 @@ def _opened(
 
 
 def _with_nodes(cells: dict[str, Numbers], name: str, rows: Indices, new_node: Numbers) -> list[Facet]:
-    """Replace the nodes of some cells by new nodes, in place, and return the facets that these solid cells had before."""
+    """Replace the nodes of some cells by new nodes, in place, and return the facets that the cells had before."""
     if not len(rows):
         return []
     block = cells[name][rows]

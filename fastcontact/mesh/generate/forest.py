@@ -1,8 +1,8 @@
-"""Local red-green refinement of 2D meshes of triangles and quadrangles.
+"""Local red-green refinement of 2D meshes of triangles and quadrangles (Bank, Sherman and Weiser, 1983).
 
-A forest contains every cell of an initial mesh and its descendants; cells without descendants are its leaves. Marked
-leaves are divided into four ("red"). Neighbours of smaller leaves are divided in the mesh, but not in the forest ("green":
-Bank, Sherman and Weiser, 1983), so that angles do not deteriorate with repeated refinement.
+A forest contains every cell of an initial mesh and its descendants. Cells without descendants are its leaves. Red refinement
+divides marked leaves into four. Green refinement divides neighbours of smaller leaves in the mesh, but not in the forest, so
+that angles do not deteriorate with repeated refinement.
 """
 
 from __future__ import annotations
@@ -21,13 +21,15 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 
 CORNERS = {"line2": 2, "tri3": 3, "quad4": 4}
-# Nodes of the children of a cell: its corners come first, then the middles of its edges, then (quadrangles) its centre.
+# Nodes of the children of a cell. They are numbers of its corners, of the midpoints of its edges, and of the centre of
+# quadrangles, in this order.
 RED = {
     "line2": [[0, 2], [2, 1]],
     "tri3": [[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]],
     "quad4": [[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]],
 }
-# Cells of the mesh if edge 0 (or edges 0 and 2) of a cell, rotated accordingly, are divided.
+# Cells that replace a leaf by element type and number of divided edges. The leaf is rotated such that edge 0, or the edges 0
+# and 2, are divided.
 GREEN: dict[tuple[str, int], dict[str, list[list[int]]]] = {
     ("tri3", 1): {"tri3": [[0, 3, 2], [3, 1, 2]]},
     ("quad4", 1): {"tri3": [[0, 4, 3], [4, 1, 2], [4, 2, 3]]},
@@ -37,7 +39,7 @@ GREEN: dict[tuple[str, int], dict[str, list[list[int]]]] = {
 
 @dataclass(eq=False)
 class _Leaves:
-    """Leaves of one element type: corners (n, k), and the cell of the initial mesh from which each descends."""
+    """Leaves of one element type: the corners (n, k), and the number (n,) of the initial cell from which each descends."""
 
     corners: AnyArray
     root: AnyArray
@@ -82,7 +84,7 @@ class Forest:
             name: _Leaves(block.astype(np.int64), mesh.offsets[name] + np.arange(len(block)))
             for name, block in mesh.cells.items()
         }
-        # Keys of divided edges, sorted, and their middle points.
+        # The sorted keys of divided edges, and the numbers of their midpoints.
         self._divided, self._middle = np.empty(0, np.int64), np.empty(0, np.int64)
         self._groups = {group: np.asarray(members) for group, members in mesh.point_groups.items()}
         self._on_curve = [edges_on(mesh, curve) for curve in self.curves]
@@ -98,7 +100,7 @@ class Forest:
         return sum(len(self._leaves[name].corners) for name in self.solids)
 
     def refine(self, marked: Mask) -> None:
-        """Divide the marked solid leaves into four, and others so that neighbours differ by at most one level.
+        """Divide the marked solid leaves into four, and further leaves such that neighbours differ by at most one level.
 
         Parameters
         ----------
@@ -114,27 +116,27 @@ class Forest:
             marks = {name: self._too_coarse(name) for name in self.solids}
         self._halve_lines()
 
-    def _middles(self, keys: AnyArray) -> AnyArray:
-        """Return the middle points of edges, -1 where an edge is not divided."""
+    def _midpoints(self, keys: AnyArray) -> AnyArray:
+        """Return the numbers of the midpoints of edges, and -1 for edges that are not divided."""
         if not len(self._divided):
             return np.full(keys.shape, -1)
         index = np.minimum(np.searchsorted(self._divided, keys), len(self._divided) - 1)
         return np.where(self._divided[index] == keys, self._middle[index], -1)
 
     def _divide(self, keys: AnyArray) -> None:
-        """Add a point in the middle of edges without one."""
+        """Add the midpoints of edges that are not divided yet."""
         new = np.setdiff1d(keys, self._divided)
         if not len(new):
             return
         ends = ends_of(new)
         numbers = len(self.points) + np.arange(len(new))
-        places = self.points[ends].mean(axis=1)
+        positions = self.points[ends].mean(axis=1)
         for k, curve in enumerate(self.curves):
-            on = np.isin(new, self._on_curve[k])
-            places[on] = curve.project(places[on])
-            halves = edge_keys(np.stack([ends[on], np.column_stack([numbers[on], numbers[on]])], axis=2).reshape(-1, 2))
+            rows = np.isin(new, self._on_curve[k])
+            positions[rows] = curve.project(positions[rows])
+            halves = edge_keys(np.stack([ends[rows], np.repeat(numbers[rows, None], 2, axis=1)], axis=2)).ravel()
             self._on_curve[k] = np.concatenate([self._on_curve[k], halves])
-        self.points = np.concatenate([self.points, places])
+        self.points = np.concatenate([self.points, positions])
         for group, members in self._groups.items():
             if len(members) > 1:
                 self._groups[group] = np.concatenate([members, numbers[np.isin(ends, members).all(axis=1)]])
@@ -143,12 +145,12 @@ class Forest:
         self._middle = np.concatenate([self._middle, numbers])[order]
 
     def _quarter(self, name: str, mask: Mask) -> None:
-        """Divide the marked leaves of one element type, quadrangles and triangles into four, lines into two."""
+        """Divide the marked leaves of one element type: quadrangles and triangles into four, lines into two."""
         leaves = self._leaves[name]
         parents = leaves.corners[mask]
         keys = edges_of(name, parents)
         self._divide(np.unique(keys))
-        lattice = [parents, self._middles(keys)]
+        lattice = [parents, self._midpoints(keys)]
         if name == "quad4":
             lattice.append(len(self.points) + np.arange(len(parents))[:, None])
             self.points = np.concatenate([self.points, centres(self.points[parents], self.points[lattice[1]])])
@@ -160,16 +162,19 @@ class Forest:
         )
 
     def _too_coarse(self, name: str) -> Mask:
-        """Return the leaves (n,) that green division cannot adapt: with an edge divided twice, or too many divided edges."""
+        """Return the mask (n,) of leaves for which there is no green refinement.
+
+        They have an edge that is divided more than once, or too many divided edges.
+        """
         corners = self._leaves[name].corners
         keys = edges_of(name, corners)
-        middles = self._middles(keys)
-        divided = middles >= 0
+        midpoints = self._midpoints(keys)
+        divided = midpoints >= 0
         ends = corners[:, elements.get(name).edges]
         twice = np.zeros(divided.shape, bool)
         for end in (0, 1):
-            half = edge_keys(np.stack([ends[:, :, end], np.where(divided, middles, 0)], axis=2))
-            twice |= divided & (self._middles(half) >= 0)
+            half = edge_keys(np.stack([ends[:, :, end], np.where(divided, midpoints, 0)], axis=2))
+            twice |= divided & (self._midpoints(half) >= 0)
         count = divided.sum(axis=1)
         opposite = (count == 2) & (divided[:, 0] == divided[:, 2]) if name == "quad4" else np.zeros(len(corners), bool)
         return np.asarray(twice.any(axis=1) | ((count > 1) & ~opposite))
@@ -180,7 +185,7 @@ class Forest:
             return
         while True:
             corners = self._leaves["line2"].corners
-            mask = (self._middles(edges_of("line2", corners)) >= 0).ravel()
+            mask = (self._midpoints(edges_of("line2", corners)) >= 0).ravel()
             if not mask.any():
                 return
             self._quarter("line2", mask)
@@ -188,42 +193,42 @@ class Forest:
     def mesh(self) -> tuple[Mesh, AnyArray]:
         """Return the mesh of all leaves, and the leaf (n,) of each of its solid cells, in the order of `Mesh.solids`.
 
-        Cell groups contain the descendants of their cells; a new point belongs to the point groups of both ends of its
-        edge.
+        Cell groups contain the descendants of their cells. A new point belongs to the point groups that contain both ends of
+        its edge.
         """
         blocks: dict[str, list[AnyArray]] = {}
         roots: dict[str, list[AnyArray]] = {}
         owners: dict[str, list[AnyArray]] = {}
         first = 0
         for name, leaves in self._leaves.items():
-            for kind, cells, source in self._fitted(name, leaves.corners):
+            for kind, cells, leaf in self._green(name, leaves.corners):
                 blocks.setdefault(kind, []).append(cells)
-                roots.setdefault(kind, []).append(leaves.root[source])
-                owners.setdefault(kind, []).append(first + source)
+                roots.setdefault(kind, []).append(leaves.root[leaf])
+                owners.setdefault(kind, []).append(first + leaf)
             first += len(leaves.corners) if name != "line2" else 0
-        cells_by = {kind: np.concatenate(parts) for kind, parts in blocks.items()}
-        root = np.concatenate([np.concatenate(roots[kind]) for kind in cells_by])
+        all_cells = {kind: np.concatenate(parts) for kind, parts in blocks.items()}
+        root = np.concatenate([np.concatenate(roots[kind]) for kind in all_cells])
         groups = {group: np.flatnonzero(np.isin(root, members)) for group, members in self.initial.cell_groups.items()}
-        mesh = Mesh(self.points, cells_by, groups, self._groups)
+        mesh = Mesh(self.points, all_cells, groups, self._groups)
         check_cells(mesh)
         return mesh, np.concatenate([np.concatenate(owners[kind]) for kind in mesh.solids])
 
-    def _fitted(self, name: str, corners: AnyArray) -> list[tuple[str, AnyArray, AnyArray]]:
-        """Return element type, cells and leaf of each cell: leaves with divided edges are divided (green), others are not."""
+    def _green(self, name: str, corners: AnyArray) -> list[tuple[str, AnyArray, AnyArray]]:
+        """Return element types, cells and the leaf of each cell, after green refinement of leaves with divided edges."""
         if name == "line2":
             return [(name, corners, np.arange(len(corners)))]
-        middles = self._middles(edges_of(name, corners))
-        count = (middles >= 0).sum(axis=1)
+        midpoints = self._midpoints(edges_of(name, corners))
+        count = (midpoints >= 0).sum(axis=1)
         blocks = [(name, corners[count == 0], np.flatnonzero(count == 0))]
         sides = CORNERS[name]
-        for turn in range(sides):
-            turned = (np.arange(sides) + turn) % sides
+        for rotation in range(sides):
+            rotated = (np.arange(sides) + rotation) % sides
             for number in (1, 2):
-                here = (count == number) & (middles[:, turn] >= 0)
-                if (name, number) not in GREEN or (number == 2 and turn > 1):
+                rows = (count == number) & (midpoints[:, rotation] >= 0)
+                if (name, number) not in GREEN or (number == 2 and rotation > 1):
                     continue
-                lattice = np.concatenate([corners[:, turned], middles[:, turned]], axis=1)[here]
+                lattice = np.concatenate([corners[:, rotated], midpoints[:, rotated]], axis=1)[rows]
                 for kind, pattern in GREEN[name, number].items():
                     cells = lattice[:, pattern].reshape(-1, CORNERS[kind])
-                    blocks.append((kind, cells, np.repeat(np.flatnonzero(here), len(pattern))))
+                    blocks.append((kind, cells, np.repeat(np.flatnonzero(rows), len(pattern))))
         return blocks

@@ -84,10 +84,10 @@ def graded_block(
     near = min(min(radii) / 10, far) if contact_size is None else positive("contact_size", contact_size, far, "size")
     reach = max(far - near, near) / positive("growth", growth, 1.0)
 
-    def places(length: float, plateau: float) -> Array:
+    def coordinates(length: float, plateau: float) -> Array:
         return graded(length, Spacing(near, far, plateau=plateau, reach=plateau + reach))
 
-    lines = [*(places(width, radius) for radius in radii), -places(depth, min(*radii, 2 * depth) / 2)[::-1]]
+    lines = [*(coordinates(width, radius) for radius in radii), -coordinates(depth, min(*radii, 2 * depth) / 2)[::-1]]
     return _named(on_lines(element, lines), lines, radii)
 
 
@@ -95,9 +95,7 @@ def _named(mesh: Mesh, lines: list[Array], radii: list[float]) -> Mesh:
     """Return the mesh with the groups of `graded_block`."""
     mesh = renamed(mesh, dict.fromkeys(_CORNERS) | (_NAMES_2D if mesh.dim == 2 else _NAMES_3D))
     # The fine region ends at the first grid line at or beyond the radius.
-    edges = np.array(
-        [places[places >= min(radius, places[-1]) * (1 - 1e-9)][0] for places, radius in zip(lines, radii)]
-    )
+    edges = np.array([x[x >= min(radius, x[-1]) * (1 - 1e-9)][0] for x, radius in zip(lines, radii)])
     fine = edges * (1 + 1e-9)
     mesh = with_cells_inside(mesh, "CONTACT", "TOP", lambda points: np.all(points[:, :-1] <= fine, axis=1))
     return with_points_at(mesh, {"POLE": [0.0] * mesh.dim})
@@ -220,6 +218,6 @@ def crowned_blocks(
 
 
 def _lines(size: float, fine: float, length: float, growth: float) -> Array:
-    """Return positions (n + 1,) [length] from 0 to `length` with a spacing of about `size` up to `fine`, growing beyond."""
+    """Return positions (n + 1,) from 0 to `length`, at distances of about `size` up to `fine` that grow beyond [length]."""
     equal = np.linspace(0.0, fine, segments(round(fine / size)) + 1)
     return np.concatenate([equal, fine + growing(length - fine, size * growth, growth)[1:]])

@@ -1,4 +1,4 @@
-"""Meshes of quarter discs and rings in the (r, y) plane, such as the two half-spheres of the test case FORMA04."""
+"""Meshes of quarter discs and rings, such as the two half-spheres of the test case FORMA04 in the (r, y) plane."""
 
 from __future__ import annotations
 
@@ -145,12 +145,13 @@ def quarter_disc(
 
 
 def _corners(R: float) -> dict[str, tuple[float, float]]:
-    """Return the corners of the lower body by name; D is bitwise identical to the node of the arc."""
+    """Return the corners of the lower body by name. D1 is bitwise identical to the node of the arc."""
     x, y = arc((0.0, -R), R, np.array([0.25 * math.pi]))[0]
     return {"A1": (0.0, -R), "B1": (R, -R), "C1": (0.0, 0.0), "D1": (float(x), float(y))}
 
 
 def _spacing(R: float, size: float | None, contact_size: float | None, contact_radius: float | None) -> Spacing:
+    """Return the spacing of triangles, after a check of the arguments of `half_spheres`."""
     far = R / 25 if size is None else positive("size", size, R, "R")
     if contact_size is None:
         unused("uniform", contact_radius=contact_radius)
@@ -178,21 +179,20 @@ def _of_quadrangles(
     """Return the lower body meshed with quad4 cells: the square A-P-N-M, and two blocks between the square and the arc."""
     n = 15 if segments is None else count("segments", segments)
     length = 0.25 * math.pi * R
-    near, far = (
-        (R / 250, R / 25) if arc_sizes is None else each(partial(positive, at_most=length), "arc_sizes", arc_sizes)
-    )
-    along = geometric(length, near, far)
+    sizes = (R / 250, R / 25) if arc_sizes is None else arc_sizes
+    near, far = each(partial(positive, at_most=length), "arc_sizes", sizes)
+    on_arc = geometric(length, near, far)
     equal = np.linspace(0.0, 1.0, n + 1)
     if radial_sizes is None:
         lengths = (near / far) ** (np.arange(n) / max(n - 1, 1))
         outward = np.append(0.0, np.cumsum(lengths)) / lengths.sum()
     else:
-        at_contact, inside = each(partial(positive, at_most=0.5 * R), "radial_sizes", radial_sizes)
-        outward = geometric(0.5 * R, inside, at_contact)
-    return _three_blocks(R, along, outward, equal)
+        at_arc, at_square = each(partial(positive, at_most=0.5 * R), "radial_sizes", radial_sizes)
+        outward = geometric(0.5 * R, at_square, at_arc)
+    return _three_blocks(R, on_arc, outward, equal)
 
 
-def _three_blocks(R: float, along: Array, outward: Array, equal: Array) -> Mesh:
+def _three_blocks(R: float, on_arc: Array, outward: Array, equal: Array) -> Mesh:
     """Return the lower body from the relative abscissae of the nodes on C-D, on M-C and on the equally divided sides."""
     corners = {**_corners(R), "M1": (0.0, -R / 2), "N1": (R / 2, -R / 2), "P1": (R / 2, -R)}
 
@@ -200,14 +200,14 @@ def _three_blocks(R: float, along: Array, outward: Array, equal: Array) -> Mesh:
         return straight(corners[start], corners[end], relative)
 
     angle_D = 0.25 * math.pi
-    contact_arc = arc((0.0, -R), R, angle_D * along)
+    contact_arc = arc((0.0, -R), R, angle_D * on_arc)
     outer_arc = arc((0.0, -R), R, angle_D * (2.0 - equal))
-    bottom, across = line("A1", "P1", along), line("M1", "N1", along)
-    inner, radial = line("P1", "N1", equal), line("N1", "D1", outward)
-    radial[-1] = contact_arc[-1] = outer_arc[-1]  # D is common to three sides, which must agree bitwise
-    square = transfinite(bottom, inner, across, line("A1", "M1", equal), along, equal)
-    upper = transfinite(across, radial, contact_arc, line("M1", "C1", outward), along, outward)
-    outer = transfinite(line("P1", "B1", outward), outer_arc, radial, inner, outward, equal)
+    bottom, top = line("A1", "P1", on_arc), line("M1", "N1", on_arc)  # of the square
+    right, radial = line("P1", "N1", equal), line("N1", "D1", outward)
+    radial[-1] = contact_arc[-1] = outer_arc[-1]  # D1 is common to three sides, which must agree bitwise
+    square = transfinite(bottom, right, top, line("A1", "M1", equal), on_arc, equal)
+    upper = transfinite(top, radial, contact_arc, line("M1", "C1", outward), on_arc, outward)
+    outer = transfinite(line("P1", "B1", outward), outer_arc, radial, right, outward, equal)
     blocks = [
         structured(square, "SPHBAS", {"BOTTOM": "A1B1", "LEFT": "A1A2"}),
         structured(upper, "SPHBAS", {"TOP": "CONT1", "LEFT": "A1A2"}),

@@ -1,4 +1,4 @@
-"""Convert linear to quadratic meshes, with mid-side nodes on the exact curves of the boundary."""
+"""Conversion of linear to quadratic meshes, with mid-side nodes on the exact curves of the boundary."""
 
 from __future__ import annotations
 
@@ -114,17 +114,17 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
     """
     names = _quadratic_names(mesh, centre_nodes)
     edges = _edges(mesh.cells)
-    middles = mesh.points[ends_of(edges)].mean(axis=1)
+    midpoints = mesh.points[ends_of(edges)].mean(axis=1)
     for curve in curves:
         rows = np.searchsorted(edges, edges_on(mesh, curve))
-        middles[rows] = curve.project(middles[rows])
-    points = [mesh.points, middles]
-    cells, n_points = {}, mesh.n_points + len(middles)
+        midpoints[rows] = curve.project(midpoints[rows])
+    points = [mesh.points, midpoints]
+    cells, n_points = {}, mesh.n_points + len(midpoints)
     for name, block in mesh.cells.items():
-        mids = mesh.n_points + np.searchsorted(edges, edges_of(name, block))
-        columns = [block, mids]
+        rows = np.searchsorted(edges, edges_of(name, block))
+        columns = [block, mesh.n_points + rows]
         if names[name] in _WITH_CENTRE.values():
-            points.append(centres(mesh.points[block], middles[mids - mesh.n_points]))
+            points.append(centres(mesh.points[block], midpoints[rows]))
             columns.append(n_points + np.arange(len(block))[:, None])
             n_points += len(block)
         cells[names[name]] = np.column_stack(columns)
@@ -134,7 +134,7 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
 
 
 def in_element(mesh: Mesh, element: str, curves: Iterable[Curve] = ()) -> Mesh:
-    """Return the mesh, converted with `to_quadratic` if `element` is quadratic, after a check of its cells."""
+    """Return a linear mesh after a check of its cells, converted by `to_quadratic` if `element` is quadratic."""
     if elements.get(element).order == 1:
         check_cells(mesh)
         return mesh
@@ -176,17 +176,20 @@ def _edges(cells: Mapping[str, AnyArray]) -> AnyArray:
 
 
 def edges_on(mesh: Mesh, curve: Curve) -> AnyArray:
-    """Return the keys (n,) of the edges in the group of a curve whose ends both lie on it; MeshError if there is none."""
+    """Return the keys (n,) of the edges in the group of a curve whose ends both lie on it.
+
+    Raises MeshError if there is no such edge.
+    """
     edges = _edges(facets_of(mesh, curve))
-    on = all_on(mesh, curve, ends_of(edges))
-    if not on.any():
-        where = "outer facets" if curve.group is None else f"group '{curve.group}'"
-        raise MeshError(f"no edge of {where} has both ends on {curve}: check its centre and radius")
-    return edges[on]
+    on_curve = all_on(mesh, curve, ends_of(edges))
+    if not on_curve.any():
+        facets = "outer facets" if curve.group is None else f"group '{curve.group}'"
+        raise MeshError(f"no edge of {facets} has both ends on {curve}: check its centre and radius")
+    return edges[on_curve]
 
 
 def facets_of(mesh: Mesh, curve: Curve) -> Mapping[str, AnyArray]:
-    """Return the facets (n, n_nodes) in the group of a curve, by element type."""
+    """Return the facets (n, n_nodes) in the group of a curve, by element type; without a group all outer facets."""
     return outer_facets(mesh) if curve.group is None else mesh.cells_of(curve.group, dim=mesh.dim - 1)
 
 
@@ -195,11 +198,11 @@ def all_on(mesh: Mesh, curve: Curve, nodes: AnyArray) -> Mask:
 
     `nodes` (n, n_nodes) contains the nodes of each facet or edge, its two ends first.
     """
-    places = mesh.points[nodes]
-    length = np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
-    flat = places.reshape(-1, mesh.dim)
-    off = np.linalg.norm(curve.project(flat) - flat, axis=1).reshape(nodes.shape).max(axis=1)
-    return np.asarray(off <= ON_CURVE * length)
+    x = mesh.points[nodes]
+    length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
+    points = x.reshape(-1, mesh.dim)
+    distance = np.linalg.norm(curve.project(points) - points, axis=1).reshape(nodes.shape).max(axis=1)
+    return np.asarray(distance <= ON_CURVE * length)
 
 
 def centres(corners: Array, middles: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Uniform refinement of a 2D mesh: each cell is divided into two or four cells; new boundary nodes may lie on curves."""
+"""Uniform refinement of 2D meshes, with new nodes on exact curves of the boundary, and detection of such circles."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from fastcontact.mesh.quality import check_cells
 
 # Quadratic elements whose nodes are the corners of the children in `RED`; each child has the orientation of its parent.
 _LATTICE = {"line2": "line3", "tri3": "tri6", "quad4": "quad9"}
-# A polygon that turns by more than this angle at a node is not regarded as a circle [radian].
+# Largest angle that a facet of a circle may subtend [radian]. Nodes at larger distances are regarded as those of a polygon.
 _TURN = np.pi / 5
 
 
@@ -30,18 +30,19 @@ class _Pattern:
 
     The first n_nodes points are the nodes of the parent. `shape` (m, n_nodes) [-] contains the shape functions of the
     parent at the points, and `children` (n_children, n_nodes) the points of each child. `on_edge` (m,) is the number of the
-    edge of the parent on which a new point lies, -1 for other points, and `along` (m,) its distance from the start of this
+    edge of the parent on which a new point lies, -1 for other points, and `quarters` (m,) its distance from the start of this
     edge in quarters of the length.
     """
 
     shape: Array
     children: AnyArray
     on_edge: AnyArray
-    along: AnyArray
+    quarters: AnyArray
 
 
 @cache
 def _pattern(name: str) -> _Pattern:
+    """Return the division of the cells of an element type. Raises MeshError if there is none."""
     element = elements.get(name)
     if element.linear not in _LATTICE:
         raise MeshError(f"cells of {name} cannot be refined: only lines, triangles and quadrangles are divided here")
@@ -57,14 +58,14 @@ def _pattern(name: str) -> _Pattern:
             child.append(points.index(node))
         children.append(child)
     lattice = np.array(points)
-    on_edge, along = np.full(len(points), -1), np.zeros(len(points), int)
+    on_edge, quarters = np.full(len(points), -1), np.zeros(len(points), int)
     for number, (a, b) in enumerate(element.edges):
         start, edge = element.nodes[a], element.nodes[b] - element.nodes[a]
         fraction = (lattice - start) @ edge / (edge @ edge)
-        on = np.abs(lattice - start - fraction[:, None] * edge).max(axis=1) < 1e-12
-        on[: element.n_nodes] = False
-        on_edge[on], along[on] = number, np.round(4 * fraction[on]).astype(int)
-    return _Pattern(element.shape(lattice), np.array(children), on_edge, along)
+        new = np.abs(lattice - start - fraction[:, None] * edge).max(axis=1) < 1e-12
+        new[: element.n_nodes] = False
+        on_edge[new], quarters[new] = number, np.round(4 * fraction[new]).astype(int)
+    return _Pattern(element.shape(lattice), np.array(children), on_edge, quarters)
 
 
 @typed(MeshError)
@@ -128,7 +129,8 @@ class _NewPoints(NamedTuple):
 
 
 def _new_points(mesh: Mesh) -> _NewPoints:
-    codes, origins, next_key = [np.empty(0, np.int64)], [], 4 * mesh.n_points**2  # keys of edges are smaller
+    """Return the new points of a refined mesh."""
+    point_keys, origins, next_key = [np.empty(0, np.int64)], [], 4 * mesh.n_points**2  # keys of edges are smaller
     lattices = {}
     for name, block in mesh.cells.items():
         pattern, ends = _pattern(name), block[:, elements.get(name).edges].astype(np.int64)
@@ -137,12 +139,14 @@ def _new_points(mesh: Mesh) -> _NewPoints:
         for point in range(block.shape[1], len(pattern.shape)):
             edge = pattern.on_edge[point]
             if edge >= 0:
-                codes.append(_keys(ends[:, edge, 0], ends[:, edge, 1], int(pattern.along[point]), mesh.n_points))
-            else:  # one for each cell
-                codes.append(next_key + np.arange(len(block)))
+                point_keys.append(
+                    _keys(ends[:, edge, 0], ends[:, edge, 1], int(pattern.quarters[point]), mesh.n_points)
+                )
+            else:  # a separate point for each cell
+                point_keys.append(next_key + np.arange(len(block)))
                 next_key += len(block)
             origins.append((name, point))
-    keys, first, rank = np.unique(np.concatenate(codes), return_index=True, return_inverse=True)
+    keys, first, rank = np.unique(np.concatenate(point_keys), return_index=True, return_inverse=True)
     sources, start = [], 0
     for name, point in origins:
         numbers = mesh.n_points + rank[start : start + len(lattices[name])]
@@ -163,8 +167,8 @@ def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
     """Return the facets in the group of a curve whose nodes all lie on the curve, as one array for each element type."""
     facets = [block[all_on(mesh, curve, block)] for block in facets_of(mesh, curve).values()]
     if not sum(map(len, facets)):
-        where = "outer facet" if curve.group is None else f"facet of group '{curve.group}'"
-        raise MeshError(f"no {where} has all its nodes on {curve}: check its centre and radius")
+        kind = "outer facet" if curve.group is None else f"facet of group '{curve.group}'"
+        raise MeshError(f"no {kind} has all its nodes on {curve}: check its centre and radius")
     return facets
 
 
@@ -177,31 +181,33 @@ def _on_curve(mesh: Mesh, curve: Curve, keys: AnyArray) -> AnyArray:
 
 def _cell_groups(mesh: Mesh) -> dict[str, AnyArray]:
     """Return the cell groups of the refined mesh; the children of a cell have consecutive numbers."""
-    pieces, start = {}, 0  # first cell, first child and children per cell, by element type
-    for name, first in mesh.offsets.items():
-        pieces[name] = (first, start, len(_pattern(name).children))
-        start += pieces[name][2] * len(mesh.cells[name])
+    n_children = {name: len(_pattern(name).children) for name in mesh.cells}
+    starts = np.cumsum([0, *(n_children[name] * len(block) for name, block in mesh.cells.items())]).tolist()
+    first_child = dict(zip(mesh.cells, starts, strict=False))
     groups: dict[str, AnyArray] = {}
     for group, members in mesh.cell_groups.items():
-        rows = mesh.split(members)
-        cells = [pieces[n][1] + (r[:, None] * pieces[n][2] + np.arange(pieces[n][2])).ravel() for n, r in rows.items()]
-        groups[group] = np.concatenate(cells) if cells else np.empty(0, np.int64)
+        cells = [np.empty(0, np.int64)]
+        for name, rows in mesh.split(members).items():
+            n = n_children[name]
+            cells.append(first_child[name] + (rows[:, None] * n + np.arange(n)).ravel())
+        groups[group] = np.concatenate(cells)
     return groups
 
 
 def _point_groups(mesh: Mesh, new: _NewPoints) -> dict[str, AnyArray]:
+    """Return the point groups of the refined mesh."""
     groups: dict[str, AnyArray] = {}
     for group, members in mesh.point_groups.items():
-        inside = np.zeros(mesh.n_points, bool)
-        inside[members] = True
-        joining = [members]
+        in_group = np.zeros(mesh.n_points, bool)
+        in_group[members] = True
+        parts = [members]
         for name, point, cells, rows in new.sources if len(members) > 1 else ():
             edge, nodes, element = _pattern(name).on_edge[point], mesh.cells[name][cells], elements.get(name)
             if edge >= 0:
                 middle = [element.n_corners + edge] if element.order == 2 else []
                 nodes = nodes[:, [*element.edges[edge], *middle]]
-            joining.append(rows[inside[nodes].all(axis=1)])
-        groups[group] = np.concatenate(joining)
+            parts.append(rows[in_group[nodes].all(axis=1)])
+        groups[group] = np.concatenate(parts)
     return groups
 
 
@@ -265,6 +271,7 @@ def circles(mesh: Mesh) -> list[Circle]:
 
 
 def _circle(mesh: Mesh, group: str, blocks: list[AnyArray]) -> Circle | None:
+    """Return the circle on which the facets of a group lie, or None; see `circles`."""
     points = mesh.points[np.unique(np.concatenate([block.ravel() for block in blocks]))]
     if len(points) < 4:
         return None

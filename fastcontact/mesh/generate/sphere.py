@@ -19,13 +19,14 @@ from fastcontact.mesh.quality import check_cells
 
 Map = Callable[[Array, Array, Array], Array]
 
-# Wedges are excluded because those of different blocks are not compatible, and pyramids because the apex of a pyramid would
-# lie outside a thin curved cell.
+# Wedges are excluded because the facets of adjacent blocks would not match, and pyramids because the apex of a pyramid would
+# lie outside a thin curved hexahedron.
 SOLIDS = ("hex8", "hex20", "hex27", "tet4", "tet10")
 
-# Distance of the face centres of the inner block from the centre of the sphere, relative to the radius, and curvature of
-# these faces between plane (0) and spherical (1).
-INNER, BULGE = 0.45, 0.5
+# Distance of the face centres of the inner block from the centre of the sphere, relative to the radius.
+INNER = 0.45
+# Curvature of the faces of the inner block, from 0 for planes to 1 for spheres.
+BULGE = 0.5
 
 
 @typed(MeshError)
@@ -151,11 +152,11 @@ def sphere_octant(
     cubes = []
     for outside, outer in grids.items():
         grid = [around, around, upward]
-        kept = dict(names)
+        names_of_block = dict(names)
         if outside >= 0:
             grid[outside] = outward
-            del kept[("XMIN", "YMIN", "ZMIN")[outside]]
-        cubes.append(_mapped(element, (grid[0], grid[1], grid[2]), ball(outside), "SPHERE", kept | outer))
+            del names_of_block[("XMIN", "YMIN", "ZMIN")[outside]]
+        cubes.append(_mapped(element, grid, ball(outside), "SPHERE", names_of_block | outer))
     mesh = merge_points(union(*cubes), 1e-6 * R * float(np.diff(around).min()))
     check_cells(mesh)
     return with_points_at(mesh, {"POLE_SPHERE": (0.0, 0.0, 0.0), "CENTRE": (0.0, R, 0.0)})
@@ -164,13 +165,14 @@ def sphere_octant(
 def _ball(cube: Array) -> Array:
     """Map points (n, 3) of the cube [-1, 1]^3 smoothly to the unit ball, and its faces to the sphere (Nowell, 2005)."""
     square = cube * cube
-    next_, last = np.roll(square, -1, axis=1), np.roll(square, -2, axis=1)
-    return cube * np.sqrt(1.0 - next_ / 2 - last / 2 + next_ * last / 3)
+    second, third = np.roll(square, -1, axis=1), np.roll(square, -2, axis=1)
+    return cube * np.sqrt(1.0 - second / 2 - third / 2 + second * third / 3)
 
 
 def _spacing(
     R: float, size: float | None, contact_size: float | None, contact_radius: float | None, growth: float
 ) -> Spacing:
+    """Return the spacing along the surfaces, after a check of the arguments of `sphere_on_block`."""
     far = R / 4 if size is None else positive("size", size, R / 2, "R/2")
     near = min(R / 50, far) if contact_size is None else positive("contact_size", contact_size, far, "size")
     plateau = R / 10 if contact_radius is None else positive("contact_radius", contact_radius, R / 2, "R/2")
@@ -178,13 +180,13 @@ def _spacing(
 
 
 def _shallow(spacing: Spacing) -> Spacing:
-    """Return the spacing normal to the surface, whose fine region has half the extent of the region along the surface."""
+    """Return the spacing normal to the surface, whose fine region is half as long as that along the surface."""
     shift = 0.5 * spacing.plateau
     return Spacing(spacing.near, spacing.far, plateau=spacing.plateau - shift, reach=spacing.reach - shift)
 
 
 def _mapped(element: str, grid: Sequence[Array], place: Map, solid: str, names: Mapping[str, str]) -> Mesh:
-    """Return a box with the given grid lines, mapped by `place`, whose groups are those in `names`, renamed."""
+    """Return a box with the given grid lines, mapped by `place`, with those groups that `names` contains, renamed."""
     lattice = on_lines(element, grid, solid)
     sides = {side: lattice.cells_of(side) for side in lattice.cell_groups if side in names and side != solid}
     body = Mesh(place(*lattice.points.T), lattice.solids, {solid: lattice.cell_groups[solid]})

@@ -1,4 +1,4 @@
-"""Operations on meshes: mirror, transform, unite, merge points, rename groups, and add reference points and groups."""
+"""Operations on meshes: mirror images, transformations, unions, merged points, renamed groups and reference points."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
 
 @typed(MeshError)
 def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None) -> Mesh:
-    """Return the mirror image of a mesh; the orientation of cells and facets remains positive.
+    """Return the mirror image of a mesh, whose cells and facets are oriented positively again.
 
     Parameters
     ----------
@@ -163,30 +163,30 @@ def union(*meshes: Mesh) -> Mesh:
         raise MeshError("union needs at least one mesh")
     if len({mesh.dim for mesh in meshes}) > 1:
         raise MeshError(f"union needs meshes of one dimension, not {[mesh.dim for mesh in meshes]}")
-    shifts = np.cumsum([0] + [mesh.n_points for mesh in meshes])[:-1]
-    both = list(zip(meshes, shifts, strict=True))
-    cells = _joined({name: block + shift for name, block in mesh.cells.items()} for mesh, shift in both)
+    first_points = np.cumsum([0] + [mesh.n_points for mesh in meshes])[:-1]
+    shifted = list(zip(meshes, first_points, strict=True))
+    cells = _joined({name: block + shift for name, block in mesh.cells.items()} for mesh, shift in shifted)
     starts = starts_of(cells)
     numbers = [(mesh, _renumbering(mesh, starts)) for mesh in meshes]
     return Mesh(
         np.concatenate([mesh.points for mesh in meshes]),
         cells,
         _joined({name: new[members] for name, members in mesh.cell_groups.items()} for mesh, new in numbers),
-        _joined({name: members + shift for name, members in mesh.point_groups.items()} for mesh, shift in both),
+        _joined({name: members + shift for name, members in mesh.point_groups.items()} for mesh, shift in shifted),
     )
 
 
 def _joined(groups_of_meshes: Iterable[Groups]) -> Groups:
-    """Return the groups of several meshes, with the arrays of groups of the same name concatenated."""
-    groups_of_all: dict[str, list[AnyArray]] = {}
-    for groups_of_mesh in groups_of_meshes:
-        for name, values in groups_of_mesh.items():
-            groups_of_all.setdefault(name, []).append(values)
-    return {name: np.concatenate(arrays) for name, arrays in groups_of_all.items()}
+    """Return the concatenated arrays of several meshes by name."""
+    by_name: dict[str, list[AnyArray]] = {}
+    for groups in groups_of_meshes:
+        for name, values in groups.items():
+            by_name.setdefault(name, []).append(values)
+    return {name: np.concatenate(arrays) for name, arrays in by_name.items()}
 
 
 def _renumbering(mesh: Mesh, starts: dict[str, int]) -> AnyArray:
-    """Return the number of each cell of `mesh` in the united mesh, and add its cells to the counts in `starts`."""
+    """Return the number of each cell of `mesh` in the union, and move the `starts` of element types behind its cells."""
     numbers = np.empty(mesh.n_cells, np.int64)
     for name, start in mesh.offsets.items():
         n = len(mesh.cells[name])
@@ -237,31 +237,33 @@ def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
     target = np.searchsorted(unique, first)[cluster]
     cells = {name: target[block] for name, block in mesh.cells.items()}
     for name, block in cells.items():
-        in_order = np.sort(block, axis=1)
-        bad = np.flatnonzero((in_order[:, 1:] == in_order[:, :-1]).any(axis=1))
-        if len(bad):
+        nodes = np.sort(block, axis=1)
+        collapsed = np.flatnonzero((nodes[:, 1:] == nodes[:, :-1]).any(axis=1))
+        if len(collapsed):
             raise MeshError(
-                f"tolerance = {tolerance:g} welds two nodes of cell {mesh.offsets[name] + bad[0]} ({name}): "
+                f"tolerance = {tolerance:g} welds two nodes of cell {mesh.offsets[name] + collapsed[0]} ({name}): "
                 "it must be smaller than the shortest edge"
             )
     point_groups = {name: target[members] for name, members in mesh.point_groups.items()}
     return mesh.replace(points=mesh.points[unique], cells=cells, point_groups=point_groups)
 
 
-def with_points_at(mesh: Mesh, places: Mapping[str, Sequence[float]]) -> Mesh:
-    """Return the mesh with point groups of one point each, the point nearest to a position in `places` [length]."""
-    nearest = {name: [int(((mesh.points - np.asarray(x)) ** 2).sum(axis=1).argmin())] for name, x in places.items()}
+def with_points_at(mesh: Mesh, positions: Mapping[str, Sequence[float]]) -> Mesh:
+    """Return the mesh with point groups that contain the point nearest to each of the `positions` [length], by name."""
+    nearest = {name: [int(((mesh.points - np.asarray(x)) ** 2).sum(axis=1).argmin())] for name, x in positions.items()}
     return mesh.with_groups(points=nearest)
 
 
 def with_cells_inside(mesh: Mesh, name: str, group: str, inside: Callable[[Array], Mask]) -> Mesh:
-    """Return the mesh with a new cell group called `name`, with the cells of `group` whose nodes all lie in a region.
+    """Return the mesh with a cell group called `name`, which contains the cells of `group` with all nodes in a region.
 
-    The function `inside` (n,) maps positions (n, dim) [length] to booleans, which are True in the region.
+    The function `inside` returns for positions (n, dim) [length] whether they are in the region (n,).
     """
-    near = inside(mesh.points)
-    rows = mesh.split(mesh.cell_groups[group])
-    members = [mesh.offsets[kind] + chosen[near[mesh.cells[kind][chosen]].all(axis=1)] for kind, chosen in rows.items()]
+    in_region = inside(mesh.points)
+    rows_of = mesh.split(mesh.cell_groups[group])
+    members = [
+        mesh.offsets[name] + rows[in_region[mesh.cells[name][rows]].all(axis=1)] for name, rows in rows_of.items()
+    ]
     return mesh.with_groups(cells={name: np.concatenate(members)})
 
 

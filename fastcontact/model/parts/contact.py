@@ -329,11 +329,9 @@ class ModelContact(ModelConnections):
         if formulation == "mortar":
             chosen.setdefault("multipliers", "dual")
         driving = self._driving(name, components, force)
-        rotation_and_ramp = rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
+        turned = rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
         self._add_pair(
-            ContactPair(
-                name, secondary, "", formulation, chosen, obstacle, displacement, history, driving, *rotation_and_ramp
-            )
+            ContactPair(name, secondary, "", formulation, chosen, obstacle, displacement, history, driving, *turned)
         )
 
     def _source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
@@ -405,10 +403,10 @@ class ModelContact(ModelConnections):
         """
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
-        no_options = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
+        given = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
         available = [
             *SHARED_OPTIONS,
-            *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in no_options),
+            *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given),
         ]
         for option in pair.options:
             check_known(f"option of {pair.formulation}", option, available, ContactError)

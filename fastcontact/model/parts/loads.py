@@ -9,20 +9,10 @@ from collections.abc import Sequence
 
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
+from fastcontact.elasticity import loads
 from fastcontact.elasticity.following_pressure import FollowingPressure
 from fastcontact.elasticity.inertia_loads import Centrifugal, Densities, Gravity, InertiaLoad
-from fastcontact.elasticity.loads import (
-    BodyForce,
-    Hydrostatic,
-    Load,
-    NodalForce,
-    Pressure,
-    TotalForce,
-    Traction,
-    Value,
-    axes_of,
-    check_number,
-)
+from fastcontact.elasticity.loads import Load, Pressure, Value, axes_of, check_number
 from fastcontact.errors import ModelError
 from fastcontact.model.checks import check_forces
 from fastcontact.model.couplings import Moment, Spread, SpreadForce
@@ -76,7 +66,7 @@ class ModelLoads(ModelHeat):
         >>> model.add_traction("TOP", x=1.0, y=-5.0)
         """
         axes = axes_of(f"the traction on '{group}'", components, self.mesh.dim)
-        self._add(Traction(group, axes, table_of(ramp, f"the ramp of the traction on '{group}'")))
+        self._add(loads.Traction(group, axes, table_of(ramp, f"the ramp of the traction on '{group}'")))
 
     def add_body_force(
         self, groups: Sequence[str] | str | None = None, *, ramp: History = None, **components: Value | None
@@ -102,7 +92,7 @@ class ModelLoads(ModelHeat):
         """
         names = group_names(groups)
         axes = axes_of("the body force", components, self.mesh.dim)
-        self._add(BodyForce(names, axes, table_of(ramp, "the ramp of the body force")))
+        self._add(loads.BodyForce(names, axes, table_of(ramp, "the ramp of the body force")))
 
     def add_gravity(
         self, groups: Sequence[str] | str | None = None, *, ramp: History = None, **components: float | None
@@ -208,7 +198,7 @@ class ModelLoads(ModelHeat):
         (along,) = axes_of(f"the hydrostatic pressure on '{group}'", {name: 1.0}, self.mesh.dim)
         for quantity, value in (("weight", weight), ("level", level)):
             check_number(f"the {quantity} of the hydrostatic pressure on '{group}'", value)
-        self.add_pressure(group, Hydrostatic(float(weight), float(level), along), ramp=ramp)
+        self.add_pressure(group, loads.Hydrostatic(float(weight), float(level), along), ramp=ramp)
 
     def add_force(
         self,
@@ -281,7 +271,7 @@ class ModelLoads(ModelHeat):
                 f"the total force on '{group}' must be a number: a function of position gives the force on each node, with "
                 "distribute=False; or use add_traction"
             )
-        kind: type[TotalForce] | type[NodalForce] = TotalForce if distribute else NodalForce
+        kind: type[loads.TotalForce] | type[loads.NodalForce] = loads.TotalForce if distribute else loads.NodalForce
         self._add(kind(group, axes, table))
 
     def add_moment(self, group: str, *, ramp: History = None, **components: float | None) -> None:

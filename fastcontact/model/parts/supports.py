@@ -120,8 +120,8 @@ class ModelSupports(ModelContact):
         if rotation is not None:
             if axes is not None or normal is not None:
                 raise ModelError(f"the support of '{group}' rotates: give the displacement of its axis as x, y, z")
-            rotation_and_ramp = rotation_of(f"the rotation of '{group}'", rotation, self.kinematics)
-            self._support(group, dict.fromkeys("xyz"[: self.mesh.dim], 0.0) | components, ramp, *rotation_and_ramp)
+            turned = rotation_of(f"the rotation of '{group}'", rotation, self.kinematics)
+            self._support(group, dict.fromkeys("xyz"[: self.mesh.dim], 0.0) | components, ramp, *turned)
             return
         if axes is not None:
             if normal is not None:
@@ -207,16 +207,14 @@ class ModelSupports(ModelContact):
         return fixed, by_ramp
 
     def _refuse(self, number: int, node: int) -> None:
-        """Raise a ModelError which states that support `number` contradicts an earlier support at `node`."""
+        """Raise a ModelError which states that support `number` contradicts an before support at `node`."""
         support = self.supports[number]
-        for earlier in self.supports[:number]:
-            if earlier.component == support.component and node in self.mesh.points_of(earlier.group):
+        for before in self.supports[:number]:
+            if before.component == support.component and node in self.mesh.points_of(before.group):
                 break
-        value, other = (
-            float(np.sum(list(s.by_history(self.mesh.points[[node]]).values()))) for s in (support, earlier)
-        )
+        value, other = (float(np.sum(list(s.by_history(self.mesh.points[[node]]).values()))) for s in (support, before))
         raise ModelError(
-            f"'{support.group}' prescribes {'xyz'[support.component]} = {value:g} at point {node}, but '{earlier.group}' "
+            f"'{support.group}' prescribes {'xyz'[support.component]} = {value:g} at point {node}, but '{before.group}' "
             f"prescribes {other:g} there{' with another ramp' if value == other else ''}: remove one of the two"
         )
 

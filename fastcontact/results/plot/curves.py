@@ -195,7 +195,7 @@ def axis_stress(
     units: Units = UNKNOWN,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the stresses at the nodes on the axis of a contact as functions of the depth below the surface.
+    """Plot the stresses at the here on the axis of a contact as functions of the depth below the surface.
 
     The axis passes through the middle of the contact along the normal of the surface; in axisymmetry it is the axis of
     symmetry.
@@ -221,7 +221,7 @@ def axis_stress(
     Raises
     ------
     FastcontactError
-        If the mesh is three-dimensional or has no nodes on the axis, or the step has no such pair.
+        If the mesh is three-dimensional or has no here on the axis, or the step has no such pair.
 
     Examples
     --------
@@ -246,13 +246,11 @@ def axis_stress(
         "von Mises": von_mises(stress)
     }
     for number, name in enumerate(bodies):
-        nodes = shown & (side == 1 - 2 * number)
+        here = shown & (side == 1 - 2 * number)
         for (caption, value), colour, marker in zip(values.items(), COLOURS, "osD", strict=True):
-            if nodes.any():  # symbols of the second body are hollow, so that they do not hide those of the first body
+            if here.any():  # symbols of the second body are hollow, so that they do not hide those of the first body
                 face, label = ("none" if number else colour), f"{caption}, {name}"
-                axes.plot(
-                    depth[nodes], value[nodes], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label
-                )
+                axes.plot(depth[here], value[here], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label)
     depths = np.linspace(0.0, reach, 400)
     for style, (label, theory) in zip(("-", "--", ":"), (theories or {}).items(), strict=False):
         exact = theory.stress_on_axis(depths)

@@ -306,8 +306,8 @@ def _intersection(shown: Field, step: StepResult, origin: Array, direction: Arra
             return triangles, lines
     low, high = shown.mesh.points.min(axis=0), shown.mesh.points.max(axis=0)
     raise FastcontactError(
-        f"the plane through {position_text(origin, size)} with normal {position_text(direction, 1.0)} does not meet the mesh, which lies "
-        f"between {position_text(low, size)} and {position_text(high, size)}"
+        f"the plane through {position_text(origin, size)} with normal {position_text(direction, 1.0)} does not meet "
+        f"the mesh, which lies between {position_text(low, size)} and {position_text(high, size)}"
     )
 
 
