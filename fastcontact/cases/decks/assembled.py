@@ -44,7 +44,7 @@ class Element:
         return self.type
 
     @property
-    def given_section(self) -> Section:
+    def assigned_section(self) -> Section:
         """The section of a solid, which exists once the sections are checked."""
         assert self.section is not None
         return self.section
@@ -102,7 +102,7 @@ class Assembly:
         """Return the part of an instance, or the content outside all parts if `scope` is empty."""
         return self.content.instances[scope].part if scope else self.content.root
 
-    def turned(self, scope: str) -> bool:
+    def is_rotated(self, scope: str) -> bool:
         """Return whether an instance is rotated."""
         return bool(scope and self.content.instances[scope].rotation)
 
@@ -111,7 +111,7 @@ class Assembly:
         """Names of all instances in the form used for lookup, preceded by the empty name."""
         return ["", *self.content.instances]
 
-    def place_of(self, name: str) -> tuple[str, str]:
+    def split_name(self, name: str) -> tuple[str, str]:
         """Split a name into its instance, which may be empty, and the rest: ``Part-1.17`` is node 17 of Part-1."""
         text = folded(name)
         for scope in self.content.instances:
@@ -121,7 +121,7 @@ class Assembly:
 
     def members(self, kind: str, name: str, location: Location) -> list[Any]:
         """Return the points or the elements, by `kind`, of a set or a number; CaseError if it is not defined."""
-        scope, rest = self.place_of(name)
+        scope, rest = self.split_name(name)
         if rest.isdecimal():
             return [self._existing(kind, scope, int(rest[:19]), location)]
         return self.members_of(kind, scope, rest, location, name)
@@ -223,7 +223,7 @@ class Assembly:
 
     def surface(self, name: str, location: Location) -> tuple[SurfaceDefinition, str]:
         """Return the definition of a surface and the instance that contains it; CaseError if it is not defined."""
-        scope, rest = self.place_of(name)
+        scope, rest = self.split_name(name)
         surfaces = self.part(scope).surfaces
         if rest not in surfaces:
             known = ", ".join(sorted(other.name for other in surfaces.values())) or "none"
@@ -241,21 +241,21 @@ class Assembly:
             raise location.refuse(
                 f"element {element.number} of type {element.type.name} has no face {label}, only 1 to {len(faces)}"
             )
-        return matching(element.type.element)[label - 1]
+        return facets_of_faces(element.type.element)[label - 1]
 
     def _free_faces(self, element: Element, location: Location) -> Iterator[Face]:
         """Yield the faces of an element that no other solid shares."""
         if element.type is None:
             raise location.refuse(f"element {element.number} is not a solid, so it has no faces")
-        facets = matching(element.type.element)
-        for label in np.flatnonzero(self.free[element.type.element][element.row]).tolist():
+        facets = facets_of_faces(element.type.element)
+        for label in np.flatnonzero(self.free_faces[element.type.element][element.row]).tolist():
             yield element, facets[label]
 
     @cached_property
-    def free(self) -> dict[str, Mask]:
+    def free_faces(self) -> dict[str, Mask]:
         """Masks (n_elements, n_faces), by type of mesh element, of the faces that no other solid shares."""
         corners, shapes = [], {}
-        for name, members in self.by_kind.items():
+        for name, members in self.solids_by_type.items():
             points = np.array([element.points for element in members], np.int32)
             faces = members[0].solid.faces
             shapes[name] = len(members), len(faces)
@@ -269,7 +269,7 @@ class Assembly:
         return {name: part.reshape(shapes[name]) for name, part in zip(shapes, parts, strict=True)}
 
     @cached_property
-    def by_kind(self) -> dict[str, list[Element]]:
+    def solids_by_type(self) -> dict[str, list[Element]]:
         """The solids by type of mesh element, each at index `row`."""
         elements: dict[str, list[Element]] = {}
         for element in self.solids:
@@ -277,12 +277,12 @@ class Assembly:
         return elements
 
     @cached_property
-    def outer(self) -> dict[int, list[tuple[Face, frozenset[int]]]]:
+    def outer_faces(self) -> dict[int, list[tuple[Face, frozenset[int]]]]:
         """The outer faces at each point, with their corner points."""
         by_part: dict[int, list[tuple[Face, frozenset[int]]]] = {}
-        for name, members in self.by_kind.items():
-            facets, faces = matching(name), members[0].solid.faces
-            for row, label in np.argwhere(self.free[name]).tolist():
+        for name, members in self.solids_by_type.items():
+            facets, faces = facets_of_faces(name), members[0].solid.faces
+            for row, label in np.argwhere(self.free_faces[name]).tolist():
                 face = members[row], facets[label]
                 corners = frozenset(members[row].points[i] for i in faces[label])
                 for point in facet_points(*face):
@@ -291,7 +291,7 @@ class Assembly:
 
     def faces_within(self, points: set[int]) -> list[Face]:
         """Return the outer faces whose corners are all in `points`."""
-        near = dict.fromkeys(face for point in sorted(points) for face in self.outer.get(point, ()))
+        near = dict.fromkeys(face for point in sorted(points) for face in self.outer_faces.get(point, ()))
         return [face for face, corners in near if corners <= points]
 
     def surface_nodes(self, definition: SurfaceDefinition, scope: str) -> list[int]:
@@ -312,7 +312,7 @@ class Assembly:
         chosen = set(self.surface_nodes(definition, scope))
         whole: list[tuple[Face, set[int]]] = []
         others: list[tuple[Face, set[int]]] = []
-        for face, corners in dict.fromkeys(face for point in sorted(chosen) for face in self.outer.get(point, ())):
+        for face, corners in dict.fromkeys(face for point in sorted(chosen) for face in self.outer_faces.get(point, ())):
             points = chosen.intersection(facet_points(*face))
             (whole if corners <= chosen else others).append((face, points))
         left = chosen.difference(*(points for _, points in whole))
@@ -331,7 +331,7 @@ def facet_points(element: Element, facet: int) -> tuple[int, ...]:
 MATCHING: dict[str, tuple[int, ...]] = {}
 
 
-def matching(element: str) -> tuple[int, ...]:
+def facets_of_faces(element: str) -> tuple[int, ...]:
     """Return the index of the facet of an element for each face label 1, 2, ..."""
     if element not in MATCHING:
         kind = ElementType("", element, "")
@@ -376,7 +376,7 @@ def _placed(part: Part, instance: Instance | None) -> Array:
         axis = (b - a) / np.linalg.norm(b - a)
         angle = math.radians(instance.rotation[6])
         relative = points - a
-        along = np.outer(relative @ axis, axis)
+        along = np.outer_faces(relative @ axis, axis)
         points = a + along + math.cos(angle) * (relative - along) + math.sin(angle) * np.cross(axis, relative)
         size = np.abs(points).max(initial=0.0)
         points[np.abs(points) < 1e-14 * size] = 0.0

@@ -143,13 +143,13 @@ class Building:
             raise cell.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
         by_material: dict[tuple[str, str, bool], list[Any]] = {}
         for element in self.assembly.solids:
-            given = element.given_section
+            given = element.assigned_section
             key = (folded(given.material), folded(given.orientation), element.solid.modes)
             by_material.setdefault(key, []).append(element)
         materials = []
         for (name, turned, modes), members in by_material.items():
             material = self.content.materials[name]
-            axes = self._axes(members[0].given_section, members)
+            axes = self._axes(members[0].assigned_section, members)
             group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
             group += " with incompatible modes" if modes else ""
             law = law_of(self.content, material, axes, modes)
@@ -162,7 +162,7 @@ class Building:
             return None
         axes = orientation_of(self.content, section.orientation, section.location)
         for element in members:
-            if axes.part is not self.content.root and self.assembly.turned(element.scope):
+            if axes.part is not self.content.root and self.assembly.is_rotated(element.scope):
                 raise axes.refuse(
                     "axes of a part whose instance is rotated are not supported: give them in the assembly"
                 )
@@ -295,7 +295,7 @@ class Building:
     def _density(self, element: Element, name: Target, conditions: Conditions) -> float:
         if name.kind[0] == "B":
             return 1.0
-        material = self._material(element.given_section)
+        material = self._material(element.assigned_section)
         if material.density is None:
             location = conditions.loads.tracks[name].location
             raise location.refuse(f"material '{material.name}' has no *DENSITY, which {name.kind} requires")
@@ -432,7 +432,7 @@ def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> d
 
     def outward(k: int, points: Array) -> Array:
         relative = np.pad(points, ((0, 0), (0, 3 - points.shape[1]))) - origin
-        return np.asarray((relative - np.outer(relative @ axis, axis))[:, k])
+        return np.asarray((relative - np.outer_faces(relative @ axis, axis))[:, k])
 
     return {"xyz"[k]: times(partial(outward, k)) for k in range(dim) if abs(axis[k]) < 1.0}
 

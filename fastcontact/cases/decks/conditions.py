@@ -53,7 +53,7 @@ class Conditions:
         self.supports: Histories[Component] = Histories(content)
         self.forces: Histories[Component] = Histories(content)
         self.loads: Histories[Target] = Histories(content)
-        initial = initial_temperatures(assembly, content.initial)
+        initial = initial_temperatures(assembly, content.initial_temperatures)
         self.temperatures: Histories[int] = Histories(content, rest=initial)
         self.acting: dict[Component, Acting] = {}  # supports that do not act from the start
         self.over: list[tuple[Component, Acting]] = []

@@ -24,7 +24,7 @@ def initial_conditions(content: Content, block: Block) -> None:
     kind = " ".join(block.required("TYPE").upper().split())
     if kind not in ("TEMPERATURE", "STRESS"):
         raise block.refuse(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
-    (content.initial if kind == "TEMPERATURE" else content.stresses).append(block)
+    (content.initial_temperatures if kind == "TEMPERATURE" else content.initial_stresses).append(block)
 
 
 def initial_temperatures(assembly: Assembly, blocks: Iterable[Block]) -> dict[int, float]:
@@ -86,11 +86,11 @@ def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
     orientation.
     """
     content, names = deck_mesh.content, ORDER[deck_mesh.dim]
-    if not content.stresses:
+    if not content.initial_stresses:
         return
     starts = starts_of(model.mesh.solids)
     values = np.zeros((sum(map(len, model.mesh.solids.values())), len(names)))
-    for block in content.stresses:
+    for block in content.initial_stresses:
         for row in block.each():
             if len(row.entries) != 1 + len(names):
                 raise row.refuse(
@@ -322,7 +322,7 @@ def _reference(assembly: Assembly, initial: Mapping[int, float]) -> float:
     values = {initial.get(point, 0.0) for point in assembly.of_solids}
     if len(values) == 1:
         return values.pop()
-    location = content.initial[0].location
+    location = content.initial_temperatures[0].location
     if content.heat == "coupled" and any(material.expansion for material in content.materials.values()):
         raise location.refuse(
             f"initial temperatures from {min(values):g} to {max(values):g} are not supported with thermal expansion in "

@@ -125,7 +125,7 @@ def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Condit
     if gap.opposite:
         between = second - first
         along = between @ gap.direction
-        off = np.abs(between - np.outer(along, gap.direction)).max()
+        off = np.abs(between - np.outer_faces(along, gap.direction)).max()
         if max(np.ptp(along), off, -along.mean()) > size:
             raise gap.refuse(
                 "gap elements between bodies are supported along their direction, in planes normal to it only"

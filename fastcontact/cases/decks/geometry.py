@@ -75,7 +75,7 @@ def _joined(block: Block, needed: int) -> Iterator[tuple[Row, tuple[str, ...]]]:
         else:
             entries += row.entries
         short = len(entries) < needed + 1
-        if not (short and (row.goes_on or (needed >= LONG and len(row.entries) >= 8))):
+        if not (short and (row.continued or (needed >= LONG and len(row.entries) >= 8))):
             yield first, entries
             first = None
     if first is not None:

@@ -94,7 +94,7 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
         for scope in scopes:
             for element in assembly.elements_of(f"{scope}.{row.text(0)}" if scope else row.text(0), row.location):
                 given[id(element)] = frame
-    first = dict(zip(assembly.by_kind, np.cumsum([0, *map(len, assembly.by_kind.values())]).tolist()))
+    first = dict(zip(assembly.solids_by_type, np.cumsum([0, *map(len, assembly.solids_by_type.values())]).tolist()))
     frames = np.tile(np.eye(3), (len(assembly.solids), 1, 1))
     for element in members:
         axes_here = given.get(id(element), default)

@@ -241,11 +241,11 @@ def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
         "a nearly incompressible elastic material": any(
             law.averaged and not isinstance(law, ElasticPlastic) for law in laws
         ),
-        "initial stresses": bool(content.stresses),
+        "initial stresses": bool(content.initial_stresses),
         "couplings, rigid bodies and multi-point constraints": bool(
             content.links or content.pins or content.multi_points
         ),
-        "pretension sections": bool(content.pretensions),
+        "pretension sections": bool(content.pretension_sections),
         "incompatible modes": any(law.incompatible_modes for law in laws),
     }
     present = [name for name, given in reasons.items() if given]

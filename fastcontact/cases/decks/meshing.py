@@ -99,7 +99,7 @@ class DeckMesh(Assembly):
 
     def mesh(self) -> Mesh:
         """Return the mesh, with inverted solids reoriented."""
-        solids = {name: [element.points for element in members] for name, members in self.by_kind.items()}
+        solids = {name: [element.points for element in members] for name, members in self.solids_by_type.items()}
         cells = {name: np.array(block, np.int32) for name, block in {**solids, **self.facets}.items()}
         del solids
         starts = starts_of(cells)

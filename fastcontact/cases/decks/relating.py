@@ -161,7 +161,7 @@ def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[T
     k = weights.shape[1]
     across = across / np.linalg.norm(across, axis=1, keepdims=True)
     return [
-        _terms([nodes[i], *nodes[:k]], np.outer([1.0, *-weights[i]], normal))
+        _terms([nodes[i], *nodes[:k]], np.outer_faces([1.0, *-weights[i]], normal))
         for i in range(k, len(nodes))
         for normal in across
     ]
@@ -181,7 +181,7 @@ def _mean_rotation(constraint: MultiPoint, nodes: list[int], where: Array) -> li
             "the coordinates of the last node of MEANROT are the direction of the axis, which must not be zero"
         )
     axis = axis / length
-    offset = places - np.outer(places @ axis, axis)
+    offset = places - np.outer_faces(places @ axis, axis)
     squared = np.einsum("nd,nd->n", offset, offset)
     if squared.min() <= FLAT * squared.max():
         raise constraint.refuse("a node of MEANROT lies on the axis through the centre, where it has no angle")

@@ -23,7 +23,7 @@ def pretension_section(content: Content, block: Block) -> None:
     normal = None if row is None else (row.number(0), row.number(1, 0.0), row.number(2, 0.0))
     if normal is not None and not any(normal):
         raise block.refuse("the normal is zero")
-    content.pretensions.append(
+    content.pretension_sections.append(
         PretensionSection(block.location, block.required("SURFACE"), block.required("NODE"), normal)
     )
 
@@ -31,7 +31,7 @@ def pretension_section(content: Content, block: Block) -> None:
 def section_points(assembly: Assembly) -> dict[int, PretensionSection]:
     """Return the sections by the point of their node; CaseError if the node belongs to a body or another section."""
     sections: dict[int, PretensionSection] = {}
-    for section in assembly.content.pretensions:
+    for section in assembly.content.pretension_sections:
         point = assembly.node(section.node, section.location)
         if point in assembly.of_solids:
             raise section.refuse(f"node {section.node} belongs to an element: a section needs a separate node")
@@ -85,7 +85,7 @@ class Locks:
 def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
     """Return the mesh cut along all pretension sections; CaseError if it cannot be cut or a surface has two sections."""
     sections: set[str] = set()
-    for section in deck_mesh.content.pretensions:
+    for section in deck_mesh.content.pretension_sections:
         deck_mesh.faces(section.surface, section.location)
         group = group_of_surface(deck_mesh, section.surface)
         if group in sections:
