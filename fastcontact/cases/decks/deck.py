@@ -208,8 +208,8 @@ class Deck:
             angle, _ = largest_rotation(self.model.mesh, step.displacement)
             warn(
                 f"{nonlinear.location}: NLGEOM, but small strains and rotations were assumed; the equivalent strain is up to "
-                f"{self._largest_strain(step):.3g} and the rotation up to {angle:.3g} radian, whose squares linear kinematics "
-                "neglect"
+                f"{self._largest_strain(step):.3g} and the rotation up to {angle:.3g} radian, whose squares linear "
+                "kinematics neglect"
             )
 
 

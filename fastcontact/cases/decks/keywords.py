@@ -51,7 +51,7 @@ def heading(content: Content, block: Block) -> None:
     content.title = " ".join(" ".join(", ".join(row.entries) for row in block.rows[:1]).split())
 
 
-def ignored_with_note(text: str) -> Callable[..., None]:
+def without_effect(text: str) -> Callable[..., None]:
     """Return the reading function of a keyword without effect, which only records the note `text`."""
     return lambda content, *owner_and_block: content.note(owner_and_block[-1], text)
 
@@ -98,14 +98,18 @@ TRANSLATED = {
     "EXPANSION": Keyword("material", materials.expansion, "TYPE", "ZERO"),
     "HYPERELASTIC": Keyword("material", materials.hyperelastic, "NEO HOOKE; MOONEY-RIVLIN; YEOH; OGDEN; N", "MODULI"),
     "PLASTIC": Keyword("material", materials.plastic, "HARDENING"),
-    "SPECIFIC HEAT": Keyword("material", ignored_with_note("no effect, heat is steady, or temperatures are given"), ANYTHING),
+    "SPECIFIC HEAT": Keyword(
+        "material", without_effect("no effect, heat is steady, or temperatures are given"), ANYTHING
+    ),
     # Below *SURFACE INTERACTION.
     "COHESIVE BEHAVIOR": Keyword("interaction", interactions.keep, "TYPE; ELIGIBILITY"),
     "DAMAGE EVOLUTION": Keyword(
         "interaction", interactions.keep, "TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO", "DEGRADATION"
     ),
     "DAMAGE INITIATION": Keyword("interaction", interactions.keep, "CRITERION"),
-    "DAMAGE STABILIZATION": Keyword("interaction", ignored_with_note("no effect: damage has no viscous regularisation"), ANYTHING),
+    "DAMAGE STABILIZATION": Keyword(
+        "interaction", without_effect("no effect: damage has no viscous regularisation"), ANYTHING
+    ),
     "FRICTION": Keyword("interaction", interactions.friction),
     "GAP CONDUCTANCE": Keyword("interaction", interactions.gap_conductance, "PRESSURE"),
     "GAP HEAT GENERATION": Keyword("interaction", interactions.gap_heat_generation),
@@ -119,7 +123,7 @@ TRANSLATED = {
     "GAP": Keyword("model", gaps.gap, "ELSET"),
     "INITIAL CONDITIONS": Keyword("model", fields.initial_conditions, "TYPE"),
     "MPC": Keyword("model", relating.multi_point),
-    "PHYSICAL CONSTANTS": Keyword("model", ignored_with_note("no effect: there is no radiation"), ANYTHING),
+    "PHYSICAL CONSTANTS": Keyword("model", without_effect("no effect: there is no radiation"), ANYTHING),
     "PRE-TENSION SECTION": Keyword("model", sections.pretension_section, "SURFACE; NODE"),
     "RIGID BODY": Keyword("model", relating.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
     "SPRING": Keyword("model", gaps.spring, "ELSET"),
@@ -140,11 +144,12 @@ TRANSLATED = {
     "STATIC": Keyword("procedure", stepping.static, "", SOLUTION_CONTROLS),
 }
 # Ignored keywords: output requests, because results contain all output, and convergence controls.
-OUTPUT = (
+_OUTPUT = (
     "CONTACT FILE; CONTACT OUTPUT; CONTACT PRINT; EL FILE; EL PRINT; ELEMENT OUTPUT; ENERGY FILE; ENERGY OUTPUT; "
     "ENERGY PRINT; FACE PRINT; FILE FORMAT; FILE OUTPUT; MONITOR; NODE FILE; NODE OUTPUT; NODE PRINT; OUTPUT; "
     "PREPRINT; PRINT; RESTART; SECTION FILE; SECTION PRINT; TIME POINTS; CONTROLS"
-).split("; ")
+)
+OUTPUT = _OUTPUT.split("; ")
 # Unsupported keywords by the reason in the error message.
 _REASONS = {
     "is outside the scope of fastcontact (elastic, elastic-plastic and hyperelastic materials)": (
