@@ -77,7 +77,8 @@ def _not_to_theory(series: Series, quantity: str, start: str, split: Split) -> s
     """Return the sentence for a formulation that does not converge to a theory that is exact for the model."""
     limit = series.limits[quantity]
     return (
-        f"{start} tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)} where the theory has {number(split.theory, 6)}. That theory is exact for the bodies of the model, "
+        f"{start} tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)} where the theory has "
+        f"{number(split.theory, 6)}. That theory is exact for the bodies of the model, "
         f"so this is not a model error: {series.combination} does not converge to it on these meshes. Compare formulations "
         "(--formulations all), or let the meshes of the two sides match."
     )
