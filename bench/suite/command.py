@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from fastcontact.cli._outputs import check_outputs, write_json
-from fastcontact.cli._terminal import say, somebody_watches
+from fastcontact.cli._terminal import say, stderr_is_terminal
 from fastcontact.errors import FastcontactError, FileError
 
 from . import pictures, subjects, table, timing
@@ -20,7 +20,7 @@ def run(options):
     before = _stored(options.compare) if options.compare else None
     results = {}
     tables = {}
-    show = somebody_watches() and not options.quiet
+    show = stderr_is_terminal() and not options.quiet
     for name in options.names or subjects.names():
         subject = subjects.load(name)
         if hasattr(subject, "entries"):  # a table of its own

@@ -1,12 +1,12 @@
 """Closed-form solutions of contact mechanics.
 
-Each module contains one theory: a frozen result class and a function that returns an instance of the class. `THEORIES`
-lists the functions that case files can name. All normal contacts have `radius` (the half-width in plane problems),
-`force`, `pressure_max` and `pressure(distance)`. Units are those of the caller; forces of plane problems are per unit
-length.
+Each module contains a theory, or a group of related ones, as frozen result classes and functions that return instances of
+them. `THEORIES` contains the functions that case files can name. Most normal contacts have `radius` (the half-width in plane
+problems), `force`, `pressure_max` and `pressure(distance)`. Units are those of the caller; forces of plane problems are per
+unit length.
 
-Positions are numbers or arrays of any shape (...), and results have the same shape. ModelError is raised for a number out
-of range, and unless exactly one load is given where one is needed.
+Positions are numbers or arrays of any shape (...), and results have the same shape, followed by the components of vectors and
+tensors. ModelError is raised for a number out of range, and unless exactly one load is given where one is needed.
 """
 
 from __future__ import annotations

@@ -33,8 +33,8 @@ def _roots(x: ArrayLike, y: ArrayLike, b: float) -> tuple[Array, ComplexArray, C
 def stress(x: ArrayLike, y: ArrayLike, b: float, p0: float, nu: float, kinematics: str) -> Array:
     """Return the stresses (..., 4) xx, yy, zz, xy [pressure] at `x` (...) [length], `y` (...) [length] (McEwen 1949)."""
     depth, _, w, q = _roots(x, y, b)
-    inside = depth > 0.0
-    gradient = depth * q / np.where(inside, w, 1.0)  # depth times -dq/dk; w vanishes only on the surface
+    # Depth times -dq/dk; w vanishes only on the surface, at the edges of the contact.
+    gradient = depth * q / np.where(depth > 0.0, w, 1.0)
     xx, yy = -(q - gradient).real, -(q + gradient).real
     zz = nu * (xx + yy) if kinematics == "plane_strain" else np.zeros_like(xx)
     return p0 * np.stack([xx, yy, zz, -gradient.imag], axis=-1)

@@ -44,7 +44,7 @@ def _spheroidal(r: ArrayLike, z: ArrayLike, a: float) -> tuple[Array, Array]:
 
 
 def _legendre(s: Array) -> tuple[Array, Array, Array]:
-    """Return q0 = acot s, q1 = 1 - s q0 and q2 = ((3 s^2 + 1) q0 - 3 s)/2."""
+    """Return q0 = acot s, q1 = 1 - s q0 and q2 = ((3 s^2 + 1) q0 - 3 s)/2, where i s is the argument of Q0, Q1 and Q2."""
     q0 = np.arctan2(1.0, s)
     q1 = 1.0 - s * q0
     q2 = 0.5 * ((3.0 * s**2 + 1.0) * q0 - 3.0 * s)
@@ -99,7 +99,7 @@ class VonMisesMaximum(NamedTuple):
     value : float
         Von Mises stress [pressure].
     depth : float
-        Depth of the maximum below the surface, on the axis [length].
+        Depth [length] of the maximum below the surface, on the axis.
     """
 
     value: float

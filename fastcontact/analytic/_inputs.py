@@ -1,4 +1,4 @@
-"""Inputs of the analytic solutions: checked numbers, elastic constants and radii of curvature."""
+"""Checks of the inputs of analytic solutions, elastic constants of two bodies, and laws common to normal contacts."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike
 from fastcontact.arrays import REFUSAL, Array, is_masked
 from fastcontact.errors import ModelError, check_known
 
-# Largest magnitude of an input. Its cube is finite in double precision.
+# Largest magnitude of an input, whose cube is finite in double precision.
 LARGEST = 1e60
 PLANE = ("plane_strain", "plane_stress")
 
 
 def number(name: str, value: object) -> float:
     """Return `value` as a finite float, or raise ModelError."""
-    # The comparison precedes the conversion because an integer may exceed the range of floats. NaN compares false.
+    # The comparison precedes the conversion, since an integer may exceed the range of floats. NaN compares false.
     size: Any = abs(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
     if not size < math.inf:
         raise ModelError(f"{name} is {value!r}: it must be a finite number")
@@ -31,16 +31,16 @@ def number(name: str, value: object) -> float:
 
 
 def array(name: str, values: ArrayLike) -> Array:
-    """Return `values` (...) [unit of the quantity] as floats (...) [unit of the quantity], or raise ModelError."""
+    """Return `values` (...), in the unit of the quantity, as floats (...), or raise ModelError."""
     if is_masked(values):
         raise ModelError(f"{name} {REFUSAL}")
     try:
-        values_read = np.asarray(values)
+        converted = np.asarray(values)
     except ValueError:  # rows of different lengths
-        values_read = np.empty(0, object)
-    if values_read.dtype.kind not in "biuf":
+        converted = np.empty(0, object)
+    if converted.dtype.kind not in "biuf":
         raise ModelError(f"{name} must be a number or an array of real numbers, not {type(values).__name__}")
-    return values_read.astype(np.float64, copy=False)
+    return converted.astype(np.float64, copy=False)
 
 
 def positive(name: str, value: object, *, infinite: bool = False) -> float:
@@ -71,19 +71,12 @@ def poisson(name: str, value: object) -> float:
     return checked
 
 
-def exactly_one(**given: float | None) -> tuple[str, float]:
+def exactly_one(**loads: float | None) -> tuple[str, float]:
     """Return the name and the value of the only argument that is not None; ModelError unless it is a positive number."""
-    present = [name for name, value in given.items() if value is not None]
-    if len(present) != 1:
-        present_names = " and ".join(present) if present else "none"
-        raise ModelError(f"give exactly one of {', '.join(given)}: got {present_names}")
-    return present[0], positive(present[0], given[present[0]])
-
-
-def one_of(name: str, value: str, known: tuple[str, ...]) -> str:
-    """Return `value` if it is one of the `known` words; otherwise raise ModelError."""
-    check_known(name, value, known, ModelError)
-    return value
+    names = [name for name, value in loads.items() if value is not None]
+    if len(names) != 1:
+        raise ModelError(f"give exactly one of {', '.join(loads)}: got {' and '.join(names) or 'none'}")
+    return names[0], positive(names[0], loads[names[0]])
 
 
 @dataclass(frozen=True)
@@ -97,7 +90,7 @@ class Bodies:
     nu1 : float
         Poisson's ratio of the first body [-].
     E2 : float or None
-        Young's modulus of the second body; None if the body is rigid [pressure].
+        Young's modulus of the second body [pressure]; None if the body is rigid.
     nu2 : float
         Poisson's ratio of the second body [-].
     """
@@ -108,37 +101,37 @@ class Bodies:
     nu2: float = 0.0
 
     def __post_init__(self) -> None:
-        set_ = object.__setattr__
-        set_(self, "E1", positive("E1", self.E1))
-        set_(self, "nu1", poisson("nu1", self.nu1))
-        set_(self, "nu2", poisson("nu2", self.nu2))
+        checked = {"E1": positive("E1", self.E1), "nu1": poisson("nu1", self.nu1), "nu2": poisson("nu2", self.nu2)}
         if self.E2 is not None:
-            set_(self, "E2", positive("E2", self.E2))
+            checked["E2"] = positive("E2", self.E2)
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)  # the class is frozen
 
     @property
     def E_star(self) -> float:
-        """Contact modulus, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2 (Johnson 1985, section 4.2) [pressure]."""
+        """Contact modulus [pressure], 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2 (Johnson 1985, section 4.2)."""
         return 1.0 / sum((1.0 - nu**2) / E for E, nu in self._elastic)
 
     @property
     def E_star_plane_stress(self) -> float:
-        """Contact modulus of two thin discs, 1/E* = 1/E1 + 1/E2 [pressure]."""
+        """Contact modulus [pressure] of two thin discs, 1/E* = 1/E1 + 1/E2."""
         return 1.0 / sum(1.0 / E for E, _ in self._elastic)
 
     @property
     def G_star(self) -> float:
-        """Tangential modulus, 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2 (Mindlin 1949) [pressure]."""
+        """Tangential modulus [pressure], 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2 (Mindlin 1949)."""
         return 1.0 / sum(2.0 * (2.0 - nu) * (1.0 + nu) / E for E, nu in self._elastic)
 
     @property
     def dundurs(self) -> float:
-        """Dundurs' parameter beta in plane strain [-]; if it is 0, normal and shear tractions decouple (Dundurs 1969)."""
+        """Dundurs' parameter beta [-] in plane strain; if it is 0, normal and shear tractions decouple (Dundurs 1969)."""
         first = (1.0 - 2.0 * self.nu1) * (1.0 + self.nu1) / self.E1
         second = 0.0 if self.E2 is None else (1.0 - 2.0 * self.nu2) * (1.0 + self.nu2) / self.E2
         return 0.5 * (first - second) * self.E_star
 
     @property
     def _elastic(self) -> list[tuple[float, float]]:
+        """E and nu of the bodies that are not rigid."""
         first = [(self.E1, self.nu1)]
         return first if self.E2 is None else [*first, (self.E2, self.nu2)]
 
@@ -152,7 +145,7 @@ class Bodies:
 
 
 def effective_radius(R1: float, R2: float, names: tuple[str, str] = ("R1", "R2")) -> float:
-    """Return the effective radius R with 1/R = 1/R1 + 1/R2 [length]; one radius may be infinite, for a plane."""
+    """Return the relative radius R [length], with 1/R = 1/R1 + 1/R2; one radius may be infinite, for a plane."""
     R1 = positive(names[0], R1, infinite=True)
     R2 = positive(names[1], R2, infinite=True)
     if math.isinf(R1) and math.isinf(R2):
@@ -162,13 +155,14 @@ def effective_radius(R1: float, R2: float, names: tuple[str, str] = ("R1", "R2")
 
 def in_plane(kinematics: str) -> str:
     """Return `kinematics` if it is "plane_strain" or "plane_stress"; otherwise raise ModelError."""
-    return one_of("kinematics", kinematics, PLANE)
+    check_known("kinematics", kinematics, PLANE, ModelError)
+    return kinematics
 
 
 def by_power_laws(laws: Mapping[str, tuple[float, float]], name: str, value: float) -> dict[str, float]:
-    """Return all quantities ``coefficient * radius**exponent`` of a contact from the value of one of them.
+    """Return all quantities ``coefficient * radius**exponent`` of a contact from the `value` of the one called `name`.
 
-    `laws` contains the coefficient and the exponent of each quantity by its name.
+    `laws` contains the coefficient and the exponent of each quantity by name.
 
     Examples
     --------

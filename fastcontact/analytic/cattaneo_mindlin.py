@@ -19,7 +19,7 @@ from fastcontact.errors import ModelError, warn
 
 @dataclass(frozen=True)
 class _PartialSlip:
-    """Base class for line and point contact: a tangential load up to a peak, possibly followed by unloading.
+    """Base class of line and point contact under a tangential load up to a peak, possibly followed by unloading.
 
     The theory is that of Mindlin and Deresiewicz (1953). Let F be the normal force, f the coefficient of friction and a the
     contact radius. Under a first tangential load T the shear traction is f times the difference between the contact
@@ -36,13 +36,13 @@ class _PartialSlip:
 
     @property
     def stick_radius(self) -> float:
-        """Radius, in line contact half-width, of the stick zone (Cattaneo 1938; Mindlin 1949) [length]."""
+        """Radius [length], in line contact half-width, of the stick zone (Cattaneo 1938; Mindlin 1949)."""
         return self._zone(self._reversal if self._reversal > 0.0 else self.tangential_force)
 
     def unloaded_to(self, tangential_force: float) -> Self:
         """Return the contact after the tangential force has been reduced from its peak to `tangential_force`.
 
-        ModelError if the force is larger than the current force, or smaller than the negative peak.
+        Raises ModelError if the force is larger than the current force, or smaller than the negative peak.
         """
         force = number("tangential_force", tangential_force)
         if not -self.tangential_force_peak <= force <= self.tangential_force:
@@ -63,17 +63,17 @@ class _PartialSlip:
         return self.friction * self.normal.force
 
     def _zone(self, load: float) -> float:
-        """Return the radius or half-width of the stick zone under a first load."""
+        """Return the radius or half-width [length] of the stick zone under a first load."""
         return self.normal.radius * max(1.0 - load / self._limit, 0.0) ** self._POWER
 
-    def _present(self, of_first_load: Callable[[float], Any]) -> Any:
+    def _current(self, of_first_load: Callable[[float], Any]) -> Any:
         """Return a quantity at the current force, given as a function of a first load."""
         return of_first_load(self.tangential_force_peak) - 2.0 * of_first_load(self._reversal)
 
     def _traction(self, name: str, position: ArrayLike) -> Array:
-        """Return the shear traction at the current force.
+        """Return the shear traction [pressure] at the current force; errors call the position `name`.
 
-        Under a first load it is f p0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)] with the stick radius c, where a root of
+        Under a first load it is f p0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)] with the stick radius c, where the root of
         a negative number is replaced by zero.
         """
         x2, a = array(name, position) ** 2, self.normal.radius
@@ -82,7 +82,7 @@ class _PartialSlip:
             roots = np.sqrt(np.maximum(a**2 - x2, 0.0)) - np.sqrt(np.maximum(self._zone(load) ** 2 - x2, 0.0))
             return self.friction * self.normal.pressure_max / a * roots
 
-        return np.asarray(self._present(of_first_load))
+        return np.asarray(self._current(of_first_load))
 
 
 @dataclass(frozen=True)
@@ -108,32 +108,34 @@ class CattaneoMindlinLine(_PartialSlip):
         For ``c <= |x| <= a`` it is the integral of f p0/a (2/E*) sqrt(x^2 - c^2) from the edge c of the stick zone to
         ``|x|``; it is zero in the stick zone and outside the contact (from Johnson 1985, eq. 2.25 and section 7.2(a)).
         """
-        return np.asarray(self._present(lambda load: self._slip(self._zone(load), x)))
+        return np.asarray(self._current(lambda load: self._slip(self._zone(load), x)))
 
     @property
     def slip_displacement(self) -> float:
-        """Part of the tangential displacement of distant points that is due to slip [length].
+        """Part [length] of the tangential displacement of distant points that is due to slip.
 
         During loading it is f F/(pi E*) [(1 - t) ln(1 - t) + t] with t = T/(f F). This is the integral over the tangential
         force of the compliance of a strip that sticks for ``|x| < c = a sqrt(1 - t)``, which is -2/(pi E*) ln c up to a
         constant (from Johnson 1985, eq. 2.25). The elastic part of the displacement is proportional to the force and depends
         on the distant supports of the bodies; it is not included.
         """
-        return float(self._present(self._beyond))
 
-    def _beyond(self, load: float) -> float:
-        rest = max(1.0 - load / self._limit, 0.0)
-        logarithm = rest * math.log(rest) if rest > 0.0 else 0.0
-        return self._limit / (math.pi * self.normal.E_star) * (logarithm + 1.0 - rest)
+        def of_first_load(load: float) -> float:
+            remainder = max(1.0 - load / self._limit, 0.0)
+            logarithm = remainder * math.log(remainder) if remainder > 0.0 else 0.0
+            return self._limit / (math.pi * self.normal.E_star) * (logarithm + 1.0 - remainder)
+
+        return float(self._current(of_first_load))
 
     def _slip(self, c: float, x: ArrayLike) -> Array:
+        """Return the slip (...) [length] at `x` (...) [length] for a stick zone of half-width c."""
         a = self.normal.radius
         distance = np.abs(array("x", x))
-        beyond = np.clip(distance, c, a)
-        root = beyond * np.sqrt((beyond - c) * (beyond + c))
-        hyperbolic = c**2 * np.arccosh(beyond / c) if c > 0.0 else 0.0
-        amount = self.friction * self.normal.pressure_max / (a * self.normal.E_star) * (root - hyperbolic)
-        return np.where(distance <= a, amount, 0.0)
+        clipped = np.clip(distance, c, a)
+        root = clipped * np.sqrt((clipped - c) * (clipped + c))
+        hyperbolic = c**2 * np.arccosh(clipped / c) if c > 0.0 else 0.0
+        slip = self.friction * self.normal.pressure_max / (a * self.normal.E_star) * (root - hyperbolic)
+        return np.where(distance <= a, slip, 0.0)
 
 
 @dataclass(frozen=True)
@@ -152,24 +154,24 @@ class CattaneoMindlinSphere(_PartialSlip):
 
     @property
     def G_star(self) -> float:
-        """Tangential modulus, 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2 [pressure]."""
+        """Tangential modulus [pressure], 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2."""
         return self.normal.bodies.G_star
 
     @property
     def tangential_displacement(self) -> float:
-        """Relative tangential displacement of distant points (Mindlin 1949; Johnson 1985, section 7.2(b)) [length].
+        """Relative tangential displacement [length] of distant points (Mindlin 1949; Johnson 1985, section 7.2(b)).
 
         During loading it is 3 f F/(16 a G*) [1 - (1 - T/(f F))^(2/3)].
         """
         factor, a = 3.0 * self._limit / (16.0 * self.normal.radius * self.G_star), self.normal.radius
-        return float(self._present(lambda load: factor * (1.0 - (self._zone(load) / a) ** 2)))
+        return float(self._current(lambda load: factor * (1.0 - (self._zone(load) / a) ** 2)))
 
     @property
     def dissipation_per_cycle(self) -> float:
         """Frictional work of a cycle between the peak and the negative peak (Mindlin and Deresiewicz 1953) [force length]."""
         load = self.tangential_force_peak / self._limit
-        rest = max(1.0 - load, 0.0)
-        bracket = 1.0 - rest ** (5.0 / 3.0) - 5.0 * load / 6.0 * (1.0 + rest ** (2.0 / 3.0))
+        remainder = max(1.0 - load, 0.0)
+        bracket = 1.0 - remainder ** (5.0 / 3.0) - 5.0 * load / 6.0 * (1.0 + remainder ** (2.0 / 3.0))
         return 9.0 * self._limit**2 / (10.0 * self.normal.radius) * bracket / self.G_star
 
     def traction(self, r: ArrayLike) -> Array:
@@ -180,7 +182,7 @@ class CattaneoMindlinSphere(_PartialSlip):
 def _checked(normal: HertzLine | HertzPoint, friction: float, tangential_force: float) -> tuple[float, float]:
     """Return the checked coefficient of friction and tangential force.
 
-    Warn if the bodies have different materials, which couple the normal and the tangential contact.
+    Warns if the bodies have different materials, which couple the normal and the tangential contact.
     """
     f = positive("friction", friction)
     T = not_negative("tangential_force", tangential_force)
@@ -214,11 +216,11 @@ def cattaneo_mindlin_line(
     Parameters
     ----------
     E1, nu1, R1, E2, nu2, R2, force, radius, pressure_max : float
-        Parameters of the normal contact, described for `hertz_line`.
+        Parameters of the normal contact, see `hertz_line`.
     friction : float
         Coulomb's coefficient of friction f > 0 [-].
     tangential_force : float
-        Tangential force per unit length, between 0 and f times the normal force, at which the bodies slide [force/length].
+        Tangential force per unit length [force/length], between 0 and f times the normal force, at which the bodies slide.
 
     Returns
     -------
@@ -272,11 +274,11 @@ def cattaneo_mindlin_sphere(
     Parameters
     ----------
     E1, nu1, R1, E2, nu2, R2, force, approach, radius, pressure_max : float
-        Parameters of the normal contact, described for `hertz_point`.
+        Parameters of the normal contact, see `hertz_point`.
     friction : float
         Coulomb's coefficient of friction f > 0 [-].
     tangential_force : float
-        Tangential force, between 0 and f times the normal force, at which the bodies slide [force].
+        Tangential force [force], between 0 and f times the normal force, at which the bodies slide.
 
     Returns
     -------
@@ -311,7 +313,7 @@ def cattaneo_mindlin_sphere(
 
 @dataclass(frozen=True)
 class BlockSliding:
-    """A block that is pressed on a plane by a uniform pressure and whose top is displaced tangentially.
+    """A block that a uniform pressure presses on a plane, and whose top is displaced tangentially.
 
     The shear strain gamma is uniform. The shear traction is the smaller of G gamma, with the shear modulus G, and f p, with
     the coefficient of friction f and the pressure p.
@@ -323,7 +325,7 @@ class BlockSliding:
     slip : float
         Sliding distance of the block on the plane [length].
     sliding : bool
-        Whether the shear traction has reached f p.
+        True if the shear traction has reached f p.
     dissipation : float
         Frictional work per unit area [force/length].
     """

@@ -1,7 +1,7 @@
 """Mesh-converged reference values for two equal elastic half-spheres that are pressed together.
 
-Hertz's theory regards each body as a half-space with a parabolic surface. For half-spheres of radius R the relative error of
-the theory is of the order a/R with the contact radius a: at an approach of 8 % of R the force is 12.6 % larger.
+Hertz's theory regards each body as a half-space with a parabolic surface. For half-spheres of radius R its relative error is
+of the order a/R, where a is the contact radius: at an approach of 8 % of R the force is 12.6 % larger than Hertz's.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ class FiniteHalfSpheres:
     Attributes
     ----------
     E : float
-        Young's modulus of both half-spheres; their Poisson's ratio is 0.3 [pressure].
+        Young's modulus [pressure] of both half-spheres, whose Poisson's ratio is 0.3.
     R : float
         Radius of both half-spheres [length].
     approach : float
-        Approach of the two flat faces, on which radial displacements are free [length].
+        Approach [length] of the two flat faces, on which radial displacements are free.
     force : float
-        Normal force, integrated over the full circle [force].
+        Normal force [force] of the full circle.
     pressure_max : float
-        Pressure at the centre per unit reference area [pressure].
+        Pressure [pressure] at the centre, per unit reference area.
     radius : float
-        Contact radius in the reference configuration [length].
+        Contact radius [length] in the reference configuration.
     """
 
     E: float
@@ -58,6 +58,7 @@ class FiniteHalfSpheres:
 
 
 def _hertz(E: float, R: float, approach: float) -> HertzPoint:
+    """Return the Hertzian contact of two spheres with these constants."""
     return hertz_point(E1=E, nu1=NU, R1=R, E2=E, nu2=NU, R2=R, approach=approach)
 
 
@@ -89,11 +90,11 @@ def _interpolated(table: Array, x: float) -> tuple[float, float, float]:
     radius_excess = table[:, 3] / [h.at_force(F).radius for h, F in zip(hertz, table[:, 1])] - 1.0
     known = np.isfinite(radius_excess)
 
-    here, root = _hertz(1.0, 1.0, x), np.sqrt(x)
-    force = here.force * (1.0 + root * CubicSpline(np.log(s), force_excess)(np.log(root)))
-    pressure = here.pressure_max * (1.0 + root * CubicSpline(np.log(s), pressure_excess)(np.log(root)))
+    at_approach, root = _hertz(1.0, 1.0, x), np.sqrt(x)
+    force = at_approach.force * (1.0 + root * CubicSpline(np.log(s), force_excess)(np.log(root)))
+    pressure = at_approach.pressure_max * (1.0 + root * CubicSpline(np.log(s), pressure_excess)(np.log(root)))
     excess = CubicSpline(np.append(0.0, s[known]), np.append(0.0, radius_excess[known]))(root)
-    return float(force), float(pressure), float(here.at_force(float(force)).radius * (1.0 + excess))
+    return float(force), float(pressure), float(at_approach.at_force(float(force)).radius * (1.0 + excess))
 
 
 def finite_half_spheres(approach: float, *, R: float = 50.0, E: float = 20_000.0, nu: float = NU) -> FiniteHalfSpheres:
@@ -101,20 +102,20 @@ def finite_half_spheres(approach: float, *, R: float = 50.0, E: float = 20_000.0
 
     The function interpolates in a table of mesh-converged axisymmetric solutions for a half-sphere on a frictionless plane,
     with linear elasticity and gaps in the reference configuration, measured along the axis. Three rows of the table were
-    computed twice, independently, with elements of degree 8 to 10, and 21 rows with elements of degree 4. The relative
-    error of the rows is about 3e-6. If a row is interpolated from the others, force and pressure change by less than 2e-5
-    and the radius by less than 4e-5; at approaches from 0.8 % to 8 % of the radius, by less than 4e-6 and 1e-5.
+    recomputed independently with elements of degree 8 to 10, and 21 rows with elements of degree 4. The relative error of the
+    rows is about 3e-6. If a row is interpolated from the others, force and pressure change by less than 2e-5 and the radius
+    by less than 4e-5; at approaches from 0.8 % to 8 % of the radius, by less than 4e-6 and 1e-5, respectively.
 
     Parameters
     ----------
     approach : float
-        Approach of the two flat faces, between 4e-5 R and 0.08 R [length].
+        Approach [length] of the two flat faces, between 4e-5 R and 0.08 R.
     R : float
         Radius of both half-spheres [length].
     E : float
-        Young's modulus of both half-spheres [pressure]. The default values of R and E are those of FORMA04 in mm and MPa.
+        Young's modulus [pressure] of both half-spheres. The default values of R and E are those of FORMA04 in mm and MPa.
     nu : float
-        Poisson's ratio of both half-spheres, for which only 0.3 is available [-].
+        Poisson's ratio [-] of both half-spheres, which must be 0.3.
 
     Returns
     -------

@@ -26,7 +26,7 @@ class HertzElliptical:
     E_star : float
         Contact modulus [pressure].
     R_x, R_y : float
-        Relative principal radii of curvature, with 1/R_x = 1/R1x + 1/R2x and 1/R_y = 1/R1y + 1/R2y [length].
+        Relative principal radii of curvature [length], with 1/R_x = 1/R1x + 1/R2x and 1/R_y = 1/R1y + 1/R2y.
     radius_x, radius_y : float
         Semi-axes of the contact area along x and y [length].
     approach : float
@@ -49,7 +49,7 @@ class HertzElliptical:
 
     @property
     def radius(self) -> float:
-        """Radius sqrt(radius_x radius_y) of the circle whose area is equal to the contact area [length]."""
+        """Radius sqrt(radius_x radius_y) [length] of the circle whose area is equal to the contact area."""
         return math.sqrt(self.radius_x * self.radius_y)
 
     def at_force(self, force: float) -> HertzElliptical:
@@ -73,7 +73,7 @@ def _ratio_of_radii(ratio: float) -> float:
     """Return the ratio R'/R'' >= 1 of the relative radii for an ellipse with semi-axes b <= a (Johnson 1985, eq. 4.28).
 
     `ratio` is b/a. Textbooks use [(a/b)^2 E - K]/[K - E] with complete elliptic integrals K and E, whose differences
-    suffer from cancellation for nearly circular ellipses. Carlson's integral R_D avoids it.
+    suffer from cancellation for nearly circular ellipses. Carlson's integral R_D avoids this cancellation.
     """
     from scipy.special import elliprd
 
@@ -90,9 +90,9 @@ def _ratio_of_axes(ratio_of_radii: float) -> float:
         raise ModelError(
             f"the relative radii differ by a factor of {ratio_of_radii:g}: use hertz_line for line contact"
         )
-    goal = math.log(ratio_of_radii)
+    logarithm = math.log(ratio_of_radii)
     return math.exp(
-        brentq(lambda x: math.log(_ratio_of_radii(math.exp(x))) - goal, math.log(_FLATTEST), 0.0, xtol=1e-15)
+        brentq(lambda x: math.log(_ratio_of_radii(math.exp(x))) - logarithm, math.log(_FLATTEST), 0.0, xtol=1e-15)
     )
 
 
@@ -132,9 +132,9 @@ def hertz_elliptical(
     Parameters
     ----------
     E1, nu1, E2, nu2
-        Described for `hertz_point`.
+        See `hertz_point`.
     R1x, R1y, R2x, R2y : float
-        Principal radii of curvature of bodies 1 and 2 in the planes through the normal and x or y [length]; infinity for a
+        Principal radii of curvature [length] of bodies 1 and 2 in the planes through the normal and x or y; infinity for a
         straight section.
     force, approach, pressure_max : float
         Normal force [force], approach [length] or largest pressure [pressure]; give exactly one of them.

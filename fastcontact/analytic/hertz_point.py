@@ -18,9 +18,9 @@ from fastcontact.arrays import Array
 class HertzPoint:
     """Frictionless contact of two spheres (Hertz 1881; Johnson 1985, sections 3.4 and 4.2).
 
-    Each body is regarded as the half-space z <= 0, where r is the distance from the axis and z the coordinate along the
-    outward normal of the body; ModelError if z > 0. Stress components are rr, zz, hoop, rz, positive in tension. The
-    parameter `nu` of several methods is by default the Poisson's ratio of the first body.
+    Each body is regarded as the half-space z <= 0, where r is the distance from the axis and z is the coordinate along the
+    outward normal of the body. Methods raise ModelError for z > 0. Stress components are rr, zz, hoop, rz, positive in
+    tension. The parameter `nu` of several methods defaults to the Poisson's ratio of the first body.
 
     Attributes
     ----------
@@ -67,21 +67,21 @@ class HertzPoint:
 
     def stress_on_axis(self, depth: ArrayLike, nu: float | None = None) -> Array:
         """Return the stresses (..., 4) [pressure] on the axis at `depth` (...) [length], >= 0 (Johnson 1985, eq. 3.45)."""
-        return self.stress(np.zeros_like(places := array("depth", depth)), -places, nu)
+        return self.stress(np.zeros_like(depths := array("depth", depth)), -depths, nu)
 
     def surface_stress(self, r: ArrayLike, nu: float | None = None) -> Array:
         """Return the stresses (..., 4) [pressure] of the surface at `r` (...) [length] (Johnson 1985, eqs 3.43 and 3.44)."""
         return self.stress(r, np.zeros_like(array("r", r)), nu)
 
     def von_mises(self, r: ArrayLike, z: ArrayLike, nu: float | None = None) -> Array:
-        """Return the equivalent stress (...) [pressure] at points `r` (...) [length], `z` (...) [length]."""
+        """Return the von Mises stress (...) [pressure] at points `r` (...) [length], `z` (...) [length]."""
         return von_mises(self.stress(r, z, nu))
 
     def displacement(self, r: ArrayLike, z: ArrayLike, *, body: int = 1) -> Array:
         """Return the displacements (..., 2) [length] of body 1 or 2 along r and z, which vanish at infinity.
 
         They are evaluated at points `r` (...) [length], `z` (...) [length] from Boussinesq's potentials of the pressure
-        (Johnson 1985, eqs 3.2 to 3.6). ModelError for a rigid body.
+        (Johnson 1985, eqs 3.2 to 3.6). Raises ModelError for a rigid body.
         """
         return _half_space.displacement(r, z, self.radius, self.pressure_max, *self.bodies.constants(body))
 
@@ -90,7 +90,7 @@ class HertzPoint:
         return self.displacement(r, np.zeros_like(array("r", r)), body=body)
 
     def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
-        """Return the largest equivalent stress on the axis and its depth.
+        """Return the largest von Mises stress on the axis and its depth.
 
         It is the stationary value of ``|rr - zz|`` in eq. 3.45 of Johnson (1985), computed to round-off. For nu >= -0.3 it
         is the maximum in the entire body; for a smaller Poisson's ratio the stress at the edge of the contact is larger.
@@ -139,11 +139,11 @@ def hertz_point(
     Parameters
     ----------
     E1, nu1 : float
-        Young's modulus [pressure] and Poisson's ratio, -1 < nu1 <= 0.5 [-], of body 1.
+        Young's modulus [pressure] and Poisson's ratio [-], -1 < nu1 <= 0.5, of body 1.
     R1 : float
         Radius of body 1 [length]; infinity for a plane. At most one of the two radii may be infinite.
     E2, nu2 : float, optional
-        Young's modulus [pressure] and Poisson's ratio, -1 < nu2 <= 0.5 [-], of body 2, which is rigid without `E2`.
+        Young's modulus [pressure] and Poisson's ratio [-], -1 < nu2 <= 0.5, of body 2, which is rigid without `E2`.
     R2 : float
         Radius of body 2 [length]; by default infinity, a plane.
     force, approach, radius, pressure_max : float

@@ -18,7 +18,7 @@ class LameShell:
 
     With m = 2 for a cylinder and m = 3 for a sphere, the radial stress is C - (m - 1) D/r^m and the hoop stress
     C + D/r^m, where the constants C and D follow from the pressures (Lamé 1852; Timoshenko and Goodier 1970, articles 28
-    and 136). ModelError if a radius lies outside the body.
+    and 136). Methods raise ModelError for a radius outside the body.
 
     Attributes
     ----------
@@ -58,12 +58,12 @@ class LameShell:
     def displacement(self, r: ArrayLike) -> Array:
         """Return the radial displacement (...) [length] at radii `r` (...) [length], which is r times the hoop strain."""
         radii, _, uniform, varying = self._fields(r)
-        bulk = {
+        compliance = {  # of the uniform part, times E
             "plane_strain": (1.0 + self.nu) * (1.0 - 2.0 * self.nu),
             "plane_stress": 1.0 - self.nu,
             "sphere": 1.0 - 2.0 * self.nu,
         }[self.kinematics]
-        return radii * (bulk * uniform + (1.0 + self.nu) * varying) / self.E
+        return radii * (compliance * uniform + (1.0 + self.nu) * varying) / self.E
 
     def radial_stress(self, r: ArrayLike) -> Array:
         """Return the radial stress (...) [pressure] at radii `r` (...) [length]."""
@@ -80,26 +80,25 @@ class LameShell:
         if self.kinematics == "sphere":
             raise ModelError("a sphere has no axial stress: use radial_stress or hoop_stress")
         radii, _, uniform, _ = self._fields(r)
-        strength = 2.0 * self.nu * uniform if self.kinematics == "plane_strain" else 0.0
-        return np.full(radii.shape, strength)
+        return np.full(radii.shape, 2.0 * self.nu * uniform if self.kinematics == "plane_strain" else 0.0)
 
     def _fields(self, r: ArrayLike) -> tuple[Array, int, float, Array]:
         """Return the radii, m, C and D/r^m of the formulas in the docstring of the class."""
         radii = array("r", r)
-        slack = 1e-9 * self.outer_radius  # the coordinates of meshes are rounded
-        wrong = (radii < self.inner_radius - slack) | (radii > self.outer_radius + slack)
-        if wrong.any():
+        tolerance = 1e-9 * self.outer_radius  # the coordinates of meshes are rounded
+        outside = (radii < self.inner_radius - tolerance) | (radii > self.outer_radius + tolerance)
+        if outside.any():
             raise ModelError(
-                f"r = {radii[wrong].flat[0]:g} lies outside the body: "
+                f"r = {radii[outside].flat[0]:g} lies outside the body: "
                 f"its radii run from {self.inner_radius:g} to {self.outer_radius:g}"
             )
         m = 3 if self.kinematics == "sphere" else 2
         if self.inner_radius == 0.0:
             return radii, m, -self.outer_pressure, np.zeros_like(radii)
-        bore, rim = self.inner_radius**m, self.outer_radius**m
-        uniform = (self.inner_pressure * bore - self.outer_pressure * rim) / (rim - bore)
-        varying = (self.inner_pressure - self.outer_pressure) * bore / ((m - 1) * (rim - bore))
-        return radii, m, uniform, varying * rim / radii**m
+        a_m, b_m = self.inner_radius**m, self.outer_radius**m
+        uniform = (self.inner_pressure * a_m - self.outer_pressure * b_m) / (b_m - a_m)
+        varying = (self.inner_pressure - self.outer_pressure) * a_m / ((m - 1) * (b_m - a_m))
+        return radii, m, uniform, varying * b_m / radii**m
 
 
 def thick_cylinder(
@@ -117,7 +116,7 @@ def thick_cylinder(
     Parameters
     ----------
     E, nu, inner_radius, outer_radius, inner_pressure, outer_pressure
-        Described as attributes of `LameShell`.
+        See `LameShell`.
     kinematics : {"plane_strain", "plane_stress"}
         Plane stress is for thin discs and for long cylinders with free ends.
 
@@ -150,7 +149,7 @@ def thick_sphere(
     Parameters
     ----------
     E, nu, inner_radius, outer_radius, inner_pressure, outer_pressure
-        Described as attributes of `LameShell`.
+        See `LameShell`.
 
     Returns
     -------
@@ -216,7 +215,7 @@ def press_fit_cylinders(
     interference : float
         Radius of the inner cylinder minus the radius of the hole, before assembly [length].
     inner_radius : float
-        Radius of the bore of the inner cylinder; 0 for a solid shaft [length].
+        Radius [length] of the bore of the inner cylinder; 0 for a solid shaft.
     kinematics : {"plane_strain", "plane_stress"}
         Plane stress is for thin discs and for long cylinders with free ends.
 
@@ -252,7 +251,7 @@ def press_fit_spheres(
     Parameters
     ----------
     E_inner, nu_inner, E_outer, nu_outer, interface_radius, outer_radius, interference, inner_radius : float
-        The corresponding quantities of spheres, described for `press_fit_cylinders`.
+        As for `press_fit_cylinders`, for spheres.
 
     Returns
     -------
@@ -276,7 +275,7 @@ def _pair(
     inner: tuple[float, float], outer: tuple[float, float], radii: tuple[float, float, float], interference: float,
     kinematics: str,
 ) -> PressFit:  # fmt: skip
-    """Return the press fit of an inner and an outer body, each with (E, nu), whose radii are `radii` in ascending order."""
+    """Return the press fit of an inner and an outer body with E and nu, and with three `radii` in ascending order."""
     for side, (E, nu) in (("inner", inner), ("outer", outer)):
         positive(f"E_{side}", E)
         poisson(f"nu_{side}", nu)

@@ -1,4 +1,4 @@
-"""A contact problem on a finite box whose exact solution is the Hertzian field, for convergence studies.
+"""Contact problem on a finite box whose exact solution is the Hertzian field, for convergence studies.
 
 A rigid parabola is in contact with the top of the box. On the other sides the displacement that the Hertzian pressure
 causes in the half-plane or half-space is prescribed. The solution in the box is then the Hertzian field. It has the limited
@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastcontact.analytic._inputs import array, one_of, poisson, positive
+from fastcontact.analytic._inputs import array, poisson, positive
 from fastcontact.analytic.hertz_line import HertzLine, hertz_line
 from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
 from fastcontact.arrays import Array
-from fastcontact.errors import ModelError
+from fastcontact.errors import ModelError, check_known
 
 KINEMATICS = ("plane_strain", "plane_stress", "axisymmetric", "3d")
 
@@ -54,12 +54,12 @@ class HertzBox:
 
     @property
     def R(self) -> float:
-        """Radius of curvature of the rigid parabola [length]."""
+        """Radius of curvature [length] of the rigid parabola at its apex."""
         return self.hertz.R_effective
 
     @property
     def radius(self) -> float:
-        """Contact radius (half-width in the plane) [length]."""
+        """Contact radius [length], in the plane half-width."""
         return self.hertz.radius
 
     @property
@@ -69,9 +69,9 @@ class HertzBox:
 
     @property
     def force(self) -> float:
-        """Exact force of the whole contact; a plane model of x >= 0 carries half of it.
+        """Exact force of the whole contact [force], in the plane per unit length [force/length].
 
-        Full circle [force] in axisymmetry and three dimensions, per unit length [force/length] in the plane.
+        A plane model of x >= 0 carries half of it, and an axisymmetric model the force of the full circle.
         """
         return self.hertz.force
 
@@ -81,16 +81,16 @@ class HertzBox:
         return 3 if self.kinematics == "3d" else 2
 
     def obstacle(self, x: ArrayLike, y: ArrayLike = 0.0) -> Array:
-        """Return the height (...) [length] of the rigid parabola at `x` (...) [length], in 3D also `y` (...) [length].
+        """Return the height (x^2 + y^2)/(2 R) (...) [length] of the rigid parabola above the top of the box.
 
-        It is (x^2 + y^2)/(2 R) over the top.
+        `x` (...) [length], and in 3D also `y` (...) [length], are horizontal coordinates.
         """
         return (array("x", x) ** 2 + array("y", y) ** 2) / (2.0 * self.R)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
-        """Return the gap (n,) [length] under the parabola and its downward normals (n, dim) [-], as rigid obstacles do.
+        """Return the gaps (n,) [length] and the normals (n, dim) [-] at `points` (n, dim) [length], as rigid obstacles do.
 
-        At `points` (n, dim) [length]. The problem is linear: the gap is vertical, not normal to the parabola.
+        The gap is vertical rather than normal to the parabola, and the normals point downwards, since the problem is linear.
         """
         points = array("points", points)
         normal = np.zeros_like(points)
@@ -105,8 +105,8 @@ class HertzBox:
         """Return the exact displacements (..., dim) [length] at `points` (..., dim) [length], zero at the origin."""
         position, direction = self._in_plane(points)
         u = self.hertz.displacement(*position) - self.hertz.displacement(0.0, 0.0)
-        along = np.where(position[0] == 0.0, 0.0, u[..., 0])  # the symmetry is exact
-        return np.stack([*(along * cosine for cosine in direction), u[..., 1]], axis=-1)
+        u_r = np.where(position[0] == 0.0, 0.0, u[..., 0])  # exactly zero on the axis of symmetry
+        return np.stack([*(u_r * cosine for cosine in direction), u[..., 1]], axis=-1)
 
     def stress(self, points: ArrayLike) -> Array:
         """Return the exact stresses (..., 4), in 3D (..., 6) [pressure] at `points` (..., dim) [length].
@@ -124,16 +124,16 @@ class HertzBox:
         return np.stack([xx, yy, vertical, xy, shear * sine, shear * cosine], axis=-1)
 
     def _in_plane(self, points: ArrayLike) -> tuple[tuple[Array, Array], tuple[Array, ...]]:
-        """Return (distance from the axis, height), and the radial direction in the coordinates of the top."""
-        places = array("points", points)
-        if places.ndim == 0 or places.shape[-1] != self.dim:
-            raise ModelError(f"points has shape {places.shape}: it must be (..., {self.dim})")
+        """Return the distances from the axis and the heights [length], and the components of the radial direction [-]."""
+        points = array("points", points)
+        if points.ndim == 0 or points.shape[-1] != self.dim:
+            raise ModelError(f"points has shape {points.shape}: it must be (..., {self.dim})")
         if self.dim == 2:
-            return (places[..., 0], places[..., 1]), (np.ones(places.shape[:-1]),)
-        r = np.hypot(places[..., 0], places[..., 1])
-        along_x = np.divide(places[..., 0], r, out=np.ones_like(r), where=r > 0)
-        along_y = np.divide(places[..., 1], r, out=np.zeros_like(r), where=r > 0)
-        return (r, places[..., 2]), (along_x, along_y)
+            return (points[..., 0], points[..., 1]), (np.ones(points.shape[:-1]),)
+        r = np.hypot(points[..., 0], points[..., 1])
+        cosine = np.divide(points[..., 0], r, out=np.ones_like(r), where=r > 0)
+        sine = np.divide(points[..., 1], r, out=np.zeros_like(r), where=r > 0)
+        return (r, points[..., 2]), (cosine, sine)
 
 
 def hertz_box(
@@ -154,9 +154,14 @@ def hertz_box(
     Parameters
     ----------
     kinematics, E, nu, width, height
-        As the attributes of `HertzBox`.
+        See `HertzBox`.
     radius, pressure_max : float
-        Contact radius, less than `width` [length], and pressure at the centre [pressure].
+        Contact radius [length], less than `width`, and pressure at the centre [pressure].
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range.
 
     Returns
     -------
@@ -168,7 +173,7 @@ def hertz_box(
     >>> round(box.force, 6)
     27.483835
     """
-    one_of("kinematics", kinematics, KINEMATICS)
+    check_known("kinematics", kinematics, KINEMATICS, ModelError)
     E, nu, p0 = positive("E", E), poisson("nu", nu), positive("pressure_max", pressure_max)
     width, height, a = positive("width", width), positive("height", height), positive("radius", radius)
     if a >= width:

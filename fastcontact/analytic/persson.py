@@ -58,6 +58,7 @@ class PerssonPin:
 
 
 def _half_tangent(angle: float) -> float:
+    """Return the tangent of half an angle [degrees], the parameter b of Persson (1964)."""
     return math.tan(0.5 * math.radians(angle))
 
 
@@ -74,12 +75,12 @@ def _clearance_ratio(angle: float) -> float:
 
 
 def persson_limit_angle() -> float:
-    """Return half the contact angle of a pin without clearance, which does not depend on the force [degrees].
+    """Return half the contact angle of a pin without clearance, which does not depend on the force.
 
     Returns
     -------
     float
-        Angle between the middle and the end of the contact [degrees].
+        Angle [degrees] between the middle and the end of the contact.
 
     Examples
     --------
@@ -111,7 +112,7 @@ def persson_pin(
     R : float
         Radius of the hole [length].
     clearance : float
-        Radius of the hole minus the radius of the pin, at least 0 [length].
+        Radius of the hole minus the radius of the pin [length], at least 0.
     force, contact_angle : float
         Force per unit length [force/length], or half the contact angle [degrees]; give exactly one of them.
     kinematics : {"plane_stress", "plane_strain"}
@@ -150,7 +151,7 @@ def persson_pin(
     if gap == 0.0:
         return PerssonPin(R, gap, value, limit)
     ratio = modulus * gap / value
-    # The Hertzian line contact has a larger angle. Half of this angle, limited to half of `limit`, is below the root.
+    # The angle of Hertzian line contact exceeds the root. Half of this angle, at most half of `limit`, is a lower bound.
     start = min(0.5 * limit, 0.5 * math.degrees(math.sqrt(8.0 / (math.pi * ratio))))
     angle = brentq(lambda a: math.log(max(_clearance_ratio(a), 1e-300) / ratio), start, limit - 1e-12, xtol=1e-13)
     return PerssonPin(R, gap, value, float(angle))

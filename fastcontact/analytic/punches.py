@@ -1,4 +1,4 @@
-"""Contact of rigid punches: with flat or power-law profiles on a half-space, and flat on a half-plane, also with friction."""
+"""Contact of rigid punches with a flat or power-law profile on a half-space, and of flat punches on a half-plane."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class FlatPunch:
     force : float
         Normal force F [force].
     bonded : bool
-        Whether the punch adheres to the half-space instead of being frictionless.
+        True if the punch adheres to the half-space instead of being frictionless.
     """
 
     E_star: float
@@ -39,14 +39,14 @@ class FlatPunch:
 
     @property
     def stiffness(self) -> float:
-        """Normal force divided by the indentation, which does not depend on the force [force/length]."""
+        """Stiffness [force/length]: the normal force divided by the indentation, which does not depend on the force."""
         return self.force / self.approach
 
     def pressure(self, r: ArrayLike) -> Array:
         """Return the contact pressure (...) [pressure] at distances `r` (...) [length] from the axis.
 
         It is F/(2 pi a sqrt(a^2 - r^2)) under the punch, infinite at its edge and zero outside (Johnson 1985, eq. 3.34).
-        ModelError for a bonded punch, to which this formula does not apply.
+        Raises ModelError for a bonded punch, to which this formula does not apply.
         """
         self._frictionless("pressure")
         inside = self.radius**2 - array("r", r) ** 2
@@ -57,13 +57,14 @@ class FlatPunch:
     def normal_displacement(self, r: ArrayLike) -> Array:
         """Return the displacement (...) [length] of the surface along its outward normal at `r` (...) [length], at most 0.
 
-        Johnson (1985), eq. 3.38. ModelError for a bonded punch, to which this formula does not apply.
+        The formula is eq. 3.38 of Johnson (1985). Raises ModelError for a bonded punch, to which it does not apply.
         """
         self._frictionless("normal displacement")
         ratio = self.radius / np.maximum(np.abs(array("r", r)), self.radius)
         return -2.0 * self.approach / math.pi * np.arcsin(ratio)
 
     def _frictionless(self, quantity: str) -> None:
+        """Raise ModelError if the punch is bonded."""
         if self.bonded:
             raise ModelError(f"a bonded flat punch has no closed form for its {quantity}: use bonded=False")
 
@@ -128,7 +129,7 @@ class PowerLawPunch:
     def normal_displacement(self, r: ArrayLike) -> Array:
         """Return the displacement (...) [length] of the surface along its outward normal at `r` (...) [length], at most 0.
 
-        Sneddon (1965).
+        The formula is due to Sneddon (1965).
         """
         from scipy.special import hyp2f1
 
@@ -141,19 +142,17 @@ class PowerLawPunch:
         return -np.where(distance <= a, inside, outside)
 
 
-def _depth_factor(n: float) -> float:
-    """Return delta/(A a^n) = sqrt(pi) Gamma(n/2 + 1)/Gamma(n/2 + 1/2) (Sneddon 1965)."""
-    return math.sqrt(math.pi) * math.exp(math.lgamma(0.5 * n + 1.0) - math.lgamma(0.5 * n + 0.5))
-
-
 def _solve(E_star: float, A: float, n: float, name: str, value: float) -> PowerLawPunch:
     """Return the contact in which the quantity called `name` has the given value."""
-    slope = A * _depth_factor(n)
-    laws = {"radius": (1.0, 1.0), "approach": (slope, n), "force": (2.0 * E_star * slope * n / (n + 1.0), n + 1.0)}
+    # delta/(A a^n) = sqrt(pi) Gamma(n/2 + 1)/Gamma(n/2 + 1/2) (Sneddon 1965)
+    coefficient = A * (math.sqrt(math.pi) * math.exp(math.lgamma(0.5 * n + 1.0) - math.lgamma(0.5 * n + 0.5)))
+    force = 2.0 * E_star * coefficient * n / (n + 1.0), n + 1.0
+    laws = {"radius": (1.0, 1.0), "approach": (coefficient, n), "force": force}
     return PowerLawPunch(E_star, A, n, **by_power_laws(laws, name, value))
 
 
 def _modulus(E: float, nu: float) -> float:
+    """Return the plane-strain modulus E/(1 - nu^2) [pressure] from checked constants."""
     return positive("E", E) / (1.0 - poisson("nu", nu) ** 2)
 
 
@@ -199,7 +198,7 @@ def flat_punch(
     force, approach : float
         Normal force F [force] or indentation delta [length]; give exactly one of them.
     bonded : bool
-        Whether the punch adheres to the half-space, which increases the stiffness by the factor `bonded_stiffness_ratio`.
+        If true, the punch adheres to the half-space, which increases the stiffness by the factor `bonded_stiffness_ratio`.
 
     Returns
     -------
@@ -281,12 +280,12 @@ def cone_punch(
     Parameters
     ----------
     E, nu, force, approach, radius : float
-        Described for `power_law_punch`.
+        See `power_law_punch`.
     slope_angle : float, optional
-        Angle between the side of the cone and the surface, greater than 0 and less than 90 [degrees]. The solution is
-        valid for small angles.
+        Angle [degrees] between the side of the cone and the surface, greater than 0 and less than 90. The solution is valid
+        for small angles.
     slope : float, optional
-        Tangent of this angle, which can be given instead of `slope_angle` [-].
+        Tangent [-] of this angle, which can be given instead of `slope_angle`.
 
     Returns
     -------
@@ -301,8 +300,8 @@ def cone_punch(
     if name == "slope_angle" and not 0.0 < value < 90.0:
         raise ModelError(f"slope_angle is {value:g}: it must lie between 0 and 90 degrees")
     load = exactly_one(force=force, approach=approach, radius=radius)
-    rise = math.tan(math.radians(value)) if name == "slope_angle" else value
-    return _solve(_modulus(E, nu), rise, 1.0, *load)
+    tangent = math.tan(math.radians(value)) if name == "slope_angle" else value
+    return _solve(_modulus(E, nu), tangent, 1.0, *load)
 
 
 def paraboloid_punch(
@@ -319,7 +318,7 @@ def paraboloid_punch(
     Parameters
     ----------
     E, nu, force, approach, radius : float
-        Described for `power_law_punch`.
+        See `power_law_punch`.
     R : float
         Radius of curvature at the tip [length].
 
@@ -353,7 +352,7 @@ class FlatPunch2D:
     force : float
         Normal force per unit length [force/length].
     bonded : bool
-        Whether the punch adheres to the half-plane instead of being frictionless.
+        True if the punch adheres to the half-plane instead of being frictionless.
     """
 
     nu: float
@@ -404,7 +403,7 @@ def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = 
     Parameters
     ----------
     nu, half_width, force, bonded
-        Described as attributes of `FlatPunch2D`.
+        See `FlatPunch2D`.
 
     Returns
     -------
@@ -448,18 +447,18 @@ def spence_stick_ratio(*, nu: float, friction: float) -> float:
     from scipy.optimize import brentq
     from scipy.special import ellipk, ellipkm1
 
-    goal = (1.0 - 2.0 * poisson("nu", nu)) / (2.0 * (1.0 - nu)) / positive("friction", friction)
-    if goal == 0.0:
+    ratio = (1.0 - 2.0 * poisson("nu", nu)) / (2.0 * (1.0 - nu)) / positive("friction", friction)
+    if ratio == 0.0:
         return 1.0
 
-    # With the unknown ln(k/k'), k' = sqrt(1 - k^2), both ends of the interval (0, 1) are resolved; a change of its sign
-    # exchanges the two integrals.
+    # The unknown ln(k/k') with k' = sqrt(1 - k^2) resolves both ends of the interval (0, 1); a change of its sign exchanges
+    # the two integrals.
     def residual(x: float) -> float:
         m = 1.0 / (1.0 + math.exp(-2.0 * x))
         m1 = 1.0 / (1.0 + math.exp(2.0 * x))
         K = ellipkm1(m1) if m > 0.5 else ellipk(m)
         K_complement = ellipkm1(m) if m1 > 0.5 else ellipk(m1)
-        return math.log(K_complement / K) - math.log(goal)
+        return math.log(K_complement / K) - math.log(ratio)
 
     if residual(-300.0) < 0.0:
         return 0.0

@@ -1,4 +1,4 @@
-"""Elastic layer pressed on a half-plane, without friction or weight: the contact recedes as soon as a load acts."""
+"""Receding contact of an elastic layer that is pressed on a half-plane, without friction or weight."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from fastcontact.analytic._inputs import Bodies, array, in_plane, not_negative, 
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-# Terms of the Chebyshev series, with which half-width and pressure have errors below 1e-6 in the range below.
+# Number of Gauss-Chebyshev points, for which the errors of half-width and pressure are below 1e-6 within the limits below.
 _TERMS = 80
-_LARGEST_RATIO = 100.0  # largest ratio of the moduli; beyond it the contact is so wide that the layer acts as a beam
+_LARGEST_RATIO = 100.0  # largest ratio of the moduli, beyond which the contact is so wide that the layer acts as a beam
 _LARGEST_LOAD = 10.0  # largest ratio of the half-width of the load to the thickness of the layer
 
 
@@ -29,7 +29,7 @@ class RecedingLayer:
     thickness : float
         Thickness of the layer [length].
     load_half_width : float
-        Half-width of the uniform load on the top of the layer, which acts on ``|x| <= load_half_width`` [length].
+        Half-width [length] of the uniform load on the top of the layer, which acts on ``|x| <= load_half_width``.
     force : float
         Force per unit length [force/length].
     radius : float
@@ -92,20 +92,20 @@ def _series(c: float, ratio: float, a: float) -> Array:
     Gauss-Chebyshev rule of the first kind (Erdogan and Gupta 1972), reduced to one half by symmetry.
     """
     xi, weight = _wave_numbers(20 + int(5 * max(c, a)))
-    bend, squeeze = _compliances(xi)
-    half = _TERMS // 2
-    theta = (np.arange(half) + 0.5) * math.pi / _TERMS
-    t, x = np.cos(theta), np.cos(np.arange(1, half) * math.pi / _TERMS)
+    bending, compression = _compliances(xi)
+    n = _TERMS // 2
+    theta = (np.arange(n) + 0.5) * math.pi / _TERMS
+    t, x = np.cos(theta), np.cos(np.arange(1, n) * math.pi / _TERMS)
     sines = np.sin(np.outer(c * x, xi)) * weight
-    # Subtracting the contribution of the known total force keeps the kernel bounded at small wave numbers.
-    kernel = sines @ (0.5 * (bend - squeeze) * -2.0 * np.sin(0.5 * np.outer(c * t, xi)) ** 2).T
+    # Without the contribution of the total force, which is known, the kernel is bounded at small wave numbers.
+    kernel = sines @ (0.5 * (bending - compression) * -2.0 * np.sin(0.5 * np.outer(c * t, xi)) ** 2).T
     singular = 1.0 / (x[:, None] - t) + 1.0 / (x[:, None] + t)
-    right = sines @ (squeeze + 0.5 * (bend + squeeze) * (np.sinc(xi * a / math.pi) - 1.0))
+    load = sines @ (compression + 0.5 * (bending + compression) * (np.sinc(xi * a / math.pi) - 1.0))
     slopes = ((1.0 + ratio) * singular + 2.0 * c * kernel) * math.pi / _TERMS
-    force = np.full((1, half), 2.0 * c * math.pi / _TERMS)
-    values = np.linalg.solve(np.vstack([slopes, force]), np.append(right, 1.0))
-    cosines = np.cos(2.0 * np.outer(np.arange(half), theta))
-    coefficients = 2.0 / half * (cosines @ values)
+    force = np.full((1, n), 2.0 * c * math.pi / _TERMS)
+    values = np.linalg.solve(np.vstack([slopes, force]), np.append(load, 1.0))
+    cosines = np.cos(2.0 * np.outer(np.arange(n), theta))
+    coefficients = 2.0 / n * (cosines @ values)
     coefficients[0] *= 0.5
     return coefficients
 
@@ -145,7 +145,7 @@ def receding_layer(
     force : float
         Force per unit length [force/length].
     load_half_width : float
-        Half-width of the uniform load, at most ten times the thickness; 0 for a line force [length].
+        Half-width [length] of the uniform load, at most ten times the thickness; 0 for a line force.
     kinematics : {"plane_strain", "plane_stress"}
         Kinematics of both bodies.
 
@@ -182,16 +182,16 @@ def _modulus_ratio(bodies: Bodies, kinematics: str) -> float:
     """Return the ratio of the plane-strain or plane-stress moduli of layer and half-plane, 0 for a rigid half-plane."""
     if bodies.E2 is None:
         return 0.0
-    strain = kinematics == "plane_strain"
-    first = bodies.E1 / (1.0 - bodies.nu1**2 if strain else 1.0)
-    return first * (1.0 - bodies.nu2**2 if strain else 1.0) / bodies.E2
+    plane_strain = kinematics == "plane_strain"
+    modulus = bodies.E1 / (1.0 - bodies.nu1**2 if plane_strain else 1.0)
+    return modulus * (1.0 - bodies.nu2**2 if plane_strain else 1.0) / bodies.E2
 
 
 def _half_width(ratio: float, a: float) -> float:
     """Return the half-width c, relative to the thickness, for which the pressure is not singular at the edge."""
     from scipy.optimize import brentq
 
-    high = 1.0  # the half-width is 0.86 for a layer on a rigid half-plane under a line force
-    while _edge_singularity(high, ratio, a) > 0.0:
-        high *= 1.3
-    return float(brentq(_edge_singularity, high / 1.3, high, args=(ratio, a), xtol=1e-13))
+    upper = 1.0  # a layer on a rigid half-plane under a line force has the smallest half-width, 0.86
+    while _edge_singularity(upper, ratio, a) > 0.0:
+        upper *= 1.3
+    return float(brentq(_edge_singularity, upper / 1.3, upper, args=(ratio, a), xtol=1e-13))

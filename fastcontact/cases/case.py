@@ -1,4 +1,4 @@
-"""Case files: contact problems as TOML data, checked as a whole before the solution begins, and ready-made cases by name."""
+"""Case files, which describe contact problems in TOML and are checked before the solution, and the ready-made cases."""
 
 from __future__ import annotations
 
@@ -27,35 +27,42 @@ from fastcontact.model.ramp import Ramp, linear_ramp, ramp_of
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import known_units
 
+if TYPE_CHECKING:
+    from fastcontact.cases.decks.deck import Deck
+
+# Label of a quantity or a parameter of a sensitivity.
+Label = tuple[str | int, ...]
+# File suffix of input decks of Abaqus and CalculiX.
+DECK = ".inp"
 _PACKAGE = Path(__file__).resolve().parents[1]
-# Folders of the case files in an installed package and in a checkout.
+# Folders of the ready-made cases, in an installed package and in a checkout.
 _FOLDERS = (_PACKAGE / "data" / "cases", _PACKAGE.parent / "data" / "cases")
 
 
 def shipped_cases() -> dict[str, Path]:
-    """Return the case files of the package by name, in alphabetical order."""
+    """Return the files of the ready-made cases by name, in alphabetical order."""
     folder = next((folder for folder in _FOLDERS if folder.is_dir()), None)
     return {} if folder is None else {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
 def shipped_case(name: str) -> Path:
-    """Return the path of a ready-made case; CaseError with the nearest names if there is none."""
+    """Return the path of a ready-made case; CaseError, with the most similar names, if no case has the name."""
     cases = shipped_cases()
     check_known("ready-made case", name, cases, CaseError)
     return cases[name]
 
 
 def case_path(given: str | Path) -> Path:
-    """Return a path or, for the name of a ready-made case, the path of its file.
+    """Return a path unchanged, and the path of the file for the name of a ready-made case.
 
-    A file with the name takes precedence, and "-" is the standard input. Raises CaseError if `given` is neither a path nor
-    the name of a ready-made case.
+    A file of that name in the working directory takes precedence, and "-" stands for the standard input. Raises CaseError if
+    `given` is neither a path nor the name of a ready-made case.
     """
     path = Path(given)
     try:
         if path.exists() or path.suffix or path.name != str(given):
             return path
-        if path.name == "-":  # the usual notation for the standard input
+        if path.name == "-":
             return Path("/dev/stdin")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
@@ -67,7 +74,7 @@ def case_path(given: str | Path) -> Path:
 
 
 def files_named(data: dict[str, Any], folder: Path) -> Iterator[Path]:
-    """Yield the files named in the parsed data of a case file, relative to `folder`, and the files that they include."""
+    """Yield the files that the parsed data of a case file name, relative to `folder`, and the files that these include."""
     for key, value in data.items():
         entries = value if isinstance(value, list) else [value]
         for entry in entries:
@@ -79,24 +86,15 @@ def files_named(data: dict[str, Any], folder: Path) -> Iterator[Path]:
 
 
 def digest(paths: Iterator[Path]) -> str:
-    """Return the SHA-256 hash of the contents of files; files that cannot be read are hashed as missing."""
-    hash_of_all = hashlib.sha256()
+    """Return the SHA-256 hash of the contents of files; the hash depends on which of them cannot be read."""
+    combined = hashlib.sha256()
     for path in paths:
         try:
             with open(path, "rb") as file:
-                hash_of_all.update(hashlib.file_digest(file, "sha256").digest())
+                combined.update(hashlib.file_digest(file, "sha256").digest())
         except OSError:
-            hash_of_all.update(b"missing")
-    return hash_of_all.hexdigest()
-
-
-if TYPE_CHECKING:
-    from fastcontact.cases.decks.deck import Deck
-
-# Label of a quantity or a parameter of a sensitivity.
-Label = tuple[str | int, ...]
-# File suffix of input decks of Abaqus and CalculiX.
-DECK = ".inp"
+            combined.update(b"missing")
+    return combined.hexdigest()
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,12 +163,15 @@ class Case:
 
     @property
     def solution(self) -> dict[str, Any]:
-        """Keyword arguments of `solve` that the case specifies."""
-        chosen = {"linear_solver": self.linear_solver, "linear_tolerance": self.linear_tolerance}
-        return {**chosen, "criteria": self.criteria}
+        """Keyword arguments of `fastcontact.solve` that the case specifies."""
+        return {
+            "linear_solver": self.linear_solver,
+            "linear_tolerance": self.linear_tolerance,
+            "criteria": self.criteria,
+        }
 
     def finished(self, step: StepResult) -> StepResult:
-        """Return a step as it is stored in results, which for an input deck is that of `Deck.finished`."""
+        """Return a step as result files store it; the steps of an input deck are converted by `Deck.finished`."""
         return step if self.deck is None else self.deck.finished(step)
 
 
@@ -201,7 +202,7 @@ def read_case(path: str | Path) -> Case:
         with in_file(path):
             return build_case(data, name=path.stem, folder=path.parent, text=text)
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
-        # The checks by key do not cover this value, and only Python's own message describes the fault.
+        # No check covers this value, so the message of Python is the only description of the fault.
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise CaseError(f"{path}: a value is of the wrong kind or size ({reason}): see the ready-made cases") from error
 
@@ -227,7 +228,7 @@ def _case_of_deck(path: Path) -> Case:
 
 
 def files_of_case(path: str | Path) -> list[Path]:
-    """Return the paths of a case file and of all files that it names, or of a deck and its included files.
+    """Return the paths of a case file or an input deck and of all files that it names or includes.
 
     Raises CaseError or FileError if a file cannot be read.
     """
@@ -258,14 +259,12 @@ def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
 
 
 def _unreadable(path: Path, error: Exception) -> str:
-    """Return the reason why a case file cannot be read, and a remedy."""
+    """Return the reason why a case file cannot be read, with a remedy if there is one."""
     if path.is_dir():
         return "it is a folder; name a file in it"
     if not path.exists():
-        ready = (
-            f"; the ready-made case of this name needs no path: '{path.stem}'" if path.stem in shipped_cases() else ""
-        )
-        return f"it does not exist{ready}"
+        hint = f"; the ready-made case of this name needs no path: '{path.stem}'"
+        return "it does not exist" + (hint if path.stem in shipped_cases() else "")
     if isinstance(error, OSError):
         return error.strerror or type(error).__name__
     return "it is not UTF-8 text; name a TOML file, whose table [mesh] may name a mesh file"
@@ -274,10 +273,10 @@ def _unreadable(path: Path, error: Exception) -> str:
 def build_case(
     data: dict[str, Any], *, name: str, folder: str | Path = ".", text: str = "", mesh: Mesh | None = None
 ) -> Case:
-    """Build a case from the parsed data of a case file, as `tomllib` returns them.
+    """Build a case from the parsed data of a case file, as returned by `tomllib`.
 
-    Paths in the data are relative to `folder`, and `mesh` replaces the mesh of ``[mesh]``. Result files and studies store
-    `text`, which is generated from the data if it is empty. Raises CaseError if a key is unknown or a value is invalid, and
+    Paths in the data are relative to `folder`, and `mesh` replaces the mesh of the table ``[mesh]``. Result files and studies
+    store `text`; an empty text is generated from the data. Raises CaseError if a key is unknown or a value is invalid, and
     FastcontactError if the mesh or the model is invalid.
     """
     check_keys("", data, {**TOP, **dict.fromkeys(LISTS, list)})
@@ -320,7 +319,7 @@ def build_case(
 
 
 def _text(data: dict[str, Any]) -> str:
-    """Return the text of a case file with the data, from which studies build cases; empty if TOML cannot represent them."""
+    """Return the data as the text of a case file, or an empty text if TOML cannot represent them."""
     try:
         return toml_text.written(data)
     except ValueError:
@@ -328,29 +327,27 @@ def _text(data: dict[str, Any]) -> str:
 
 
 def _pairs(data: dict[str, Any], model: Model) -> dict[str, Any]:
-    """Return the table of each contact pair and obstacle; automatically detected pairs share the table ``[contacts]``."""
-    named = data.get("contact", {})
-    named = {**(named if isinstance(named, dict) else {}), **data.get("obstacle", {})}
+    """Return the tables of all contact pairs and obstacles; automatically detected pairs share the table ``[contacts]``."""
+    pairs = data.get("contact", {})
+    named = {**(pairs if isinstance(pairs, dict) else {}), **data.get("obstacle", {})}
     return {pair.name: named.get(pair.name, data.get("contacts", {})) for pair in model.contact}
 
 
 def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list[Label]]]:
-    sensitivities, entries = [], list(tables("sensitivity", data.get("sensitivity", [])))
+    """Return the quantities and the parameters of the tables ``[[sensitivity]]``."""
+    sensitivities, entries = [], tables("sensitivity", data.get("sensitivity", []))
     if entries:
         from fastcontact.analysis.sensitivities import check_labels  # imports most of the solver
     for i, entry in enumerate(entries):
         where = f"sensitivity[{i}]"
-        check_keys(where, entry, SENSITIVITY)
-        for key in SENSITIVITY:
-            if key not in entry:
-                raise CaseError(f"{where} needs '{key}'")
-        rows = [entry["quantity"], *entry["by"]]
-        if not all(isinstance(row, list) and all(type(word) in (str, int) for word in row) for row in rows):
+        check_keys(where, entry, SENSITIVITY, SENSITIVITY)
+        labels = [entry["quantity"], *entry["by"]]
+        if not all(isinstance(label, list) and all(type(part) in (str, int) for part in label) for label in labels):
             raise CaseError(
                 f"{where}: 'quantity' must be a list such as [\"pressure_max\", \"PAIR\"], and 'by' a list of lists such as "
                 '[["E", "GROUP"]]'
             )
-        quantity, *by = (tuple(row) for row in rows)
+        quantity, *by = map(tuple, labels)
         with at(where):
             check_labels(model, quantity, by)
         sensitivities.append((quantity, by))
@@ -358,6 +355,7 @@ def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list
 
 
 def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
+    """Return the mesh of the table ``[mesh]``, from a file or a generator."""
     if "file" in data:
         check_keys("mesh", data, {"file": str, "name": str})
         return read_mesh(folder / data["file"], mesh_name=data.get("name"))
@@ -370,6 +368,7 @@ def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
 
 
 def _ramp(data: dict[str, Any]) -> Ramp:
+    """Return the load steps of the table ``[ramp]``."""
     check_keys("ramp", data, RAMP)
     if "instants" not in data:
         if "table" in data:
@@ -378,14 +377,15 @@ def _ramp(data: dict[str, Any]) -> Ramp:
         return linear_ramp(data.get("steps", 20), float(data.get("end", 1.0)))
     if "steps" in data or "end" in data:
         raise CaseError("'ramp' takes either 'instants', or 'steps' and 'end', not both")
-    wrong = [t for t in data["instants"] if isinstance(t, bool) or not isinstance(t, NUMBER)]
-    if wrong:
-        raise CaseError(f"ramp.instants contains {wrong[0]!r}, which is not a number")
+    for instant in data["instants"]:
+        if type(instant) not in NUMBER:
+            raise CaseError(f"ramp.instants contains {instant!r}, which is not a number")
     instants = [float(t) for t in data["instants"]]
     return Ramp(tuple(instants), ramp_points(data["table"])) if "table" in data else ramp_of(instants)
 
 
 def _probes(mesh: Mesh, data: dict[str, Any]) -> dict[str, int]:
+    """Return the point number of each probe in the table ``[probes]``."""
     points_of_probes = {}
     for name, group in data.items():
         if not isinstance(group, str):
@@ -398,9 +398,10 @@ def _probes(mesh: Mesh, data: dict[str, Any]) -> dict[str, int]:
 def _theories(
     data: dict[str, Any], pairs: Mapping[str, Any] | None = None
 ) -> tuple[dict[str, dict[str, Any]], dict[str, float]]:
-    """Return the theories of the tables ``[theory.PAIR]`` and ``[theory.PAIR.mesh_converged]``, and approaches [length].
+    """Return the theories of the tables ``[theory.PAIR]`` and ``[theory.PAIR.mesh_converged]``, and the approaches [length].
 
-    Raises CaseError if `pairs` is given and does not contain the pair of a theory.
+    Both are in the form of `Case.theories` and `Case.approach`. Raises CaseError if `pairs` is given and does not contain the
+    pair of a theory.
     """
     theories: dict[str, dict[str, Any]] = {}
     approach = {}
@@ -423,6 +424,7 @@ def _theories(
 
 
 def _theory(where: str, data: dict[str, Any]) -> Any:
+    """Return the object of `fastcontact.analytic` that a table describes by its kind and its arguments."""
     if not isinstance(data, dict) or "kind" not in data:
         raise CaseError(f"'{where}' needs the key 'kind', one of {', '.join(analytic.THEORIES)}")
     kind, arguments = data["kind"], {key: value for key, value in data.items() if key != "kind"}
@@ -431,9 +433,9 @@ def _theory(where: str, data: dict[str, Any]) -> Any:
 
 
 def described(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the title, the theories, the approaches and the table of the ramp of a case, as in `Case`.
+    """Return the title, the theories, the approaches and the ramp table that a result file describes by its case text.
 
-    `data` is the parsed text of the case file that is stored in a result file; it may be empty.
+    `data` is the parsed text, which is empty for results without a case file.
     """
     theories, approach = _theories(data)
     return {

@@ -1,4 +1,4 @@
-"""Checks of a case: quantities of the last step compared with a theory or a documented value."""
+"""Checks of a case, which compare quantities of the last step with a theory or a documented value."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from fastcontact.results.step import ContactResult, StepResult
 
 STRESS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "yz": 4, "xz": 5}
 _AXES = {"x": 0, "y": 1, "z": 2}
+# Quantities that exist in three dimensions only.
 ONLY_IN_SPACE = ("stress.yz", "stress.xz", "displacement.z", "force.z", "moment.x", "moment.y")
-# Quantities that need an option of the pair: the option, and the message if it is missing.
-NEEDED = {
+# Quantities that require an option of the pair: the option, and the message if it is missing.
+REQUIRED_OPTIONS = {
     "torque": ("rotation", "only an obstacle with a 'rotation' has one"),
     "heat": ("conductance", "only a contact with the option 'conductance' transmits heat"),
     "wear_max": ("wear", "only a contact with the option 'wear' has one"),
@@ -27,23 +28,22 @@ NEEDED = {
 
 
 def at_point(step: StepResult, point: int) -> tuple[ContactResult, int] | None:
-    """Return the last contact whose secondary side contains a point, and the row of the point on this side, or None."""
-    contact_row = None
-    for contact in step.contact.values():
+    """Return the last contact whose secondary side has a point, with the row of the point on it; None if none has."""
+    for contact in reversed(step.contact.values()):
         rows = np.flatnonzero(contact.points == point)
         if len(rows):
-            contact_row = contact, int(rows[0])
-    return contact_row
+            return contact, int(rows[0])
+    return None
 
 
-def _middle(bracket: tuple[float, float]) -> float:
-    """Return the midpoint of the bracket of a radius [length], or its lower bound if the upper bound is infinite."""
-    inside, outside = bracket
-    return 0.5 * (inside + outside) if math.isfinite(outside) else inside
+def _bracket_midpoint(bracket: tuple[float, float]) -> float:
+    """Return the midpoint of the bounds of a radius [length], or the lower bound if the upper one is not finite."""
+    lower, upper = bracket
+    return 0.5 * (lower + upper) if math.isfinite(upper) else lower
 
 
-def _at_surface(field: str) -> Callable[[StepResult, int], float]:
-    """Return a function for the magnitude of a contact field at a point; NaN unless a secondary side has the point."""
+def _contact_field(field: str) -> Callable[[StepResult, int], float]:
+    """Return a function of step and point: the magnitude of a contact field, or NaN if no secondary side has the point."""
 
     def value(step: StepResult, point: int) -> float:
         contact, row = at_point(step, point) or (None, 0)
@@ -52,32 +52,32 @@ def _at_surface(field: str) -> Callable[[StepResult, int], float]:
     return value
 
 
-def _entry(vector: Callable[..., Any], index: int) -> Callable[..., Any]:
-    """Return a function for one entry of the result of `vector`."""
-    return lambda *of: vector(*of)[index]
+def _component(vector: Callable[..., Any], index: int) -> Callable[..., Any]:
+    """Return a function with the arguments of `vector` that returns one component of its result."""
+    return lambda *arguments: vector(*arguments)[index]
 
 
-# Quantities of a contact pair: the kind of unit and the function that evaluates the quantity, or returns None.
+# Quantities of a contact pair: the kind of unit, and the function that returns the quantity, or None if it is undefined.
 OF_PAIRS: dict[str, tuple[str, Callable[[ContactResult], Any]]] = {
     "force": ("force", lambda contact: np.linalg.norm(contact.force)),
     "pressure_max": ("pressure", lambda contact: contact.pressure_max),
-    "radius": ("length", lambda contact: _middle(contact.radius)),
-    "stick_radius": ("length", lambda contact: _middle(contact.stick_radius)),
+    "radius": ("length", lambda contact: _bracket_midpoint(contact.radius)),
+    "stick_radius": ("length", lambda contact: _bracket_midpoint(contact.stick_radius)),
     "torque": ("moment", lambda contact: contact.torque),
     "wear_max": ("length", lambda contact: None if contact.wear is None else contact.wear.max(initial=0.0)),
     "heat": ("power", lambda contact: None),  # read from the step instead
-    **{f"force.{axis}": ("force", _entry(lambda contact: contact.force, i)) for axis, i in _AXES.items()},
-    **{f"moment.{axis}": ("moment", _entry(contact_moment, i)) for axis, i in {**_AXES, "z": -1}.items()},
+    **{f"force.{axis}": ("force", _component(lambda contact: contact.force, i)) for axis, i in _AXES.items()},
+    **{f"moment.{axis}": ("moment", _component(contact_moment, i)) for axis, i in {**_AXES, "z": -1}.items()},
 }  # fmt: skip
-# Quantities of a probe, evaluated from the step and the point.
+# Quantities of a probe: the kind of unit, and the function that returns the quantity at a point in a step.
 OF_PROBES: dict[str, tuple[str, Callable[[StepResult, int], Any]]] = {
-    "pressure": ("pressure", _at_surface("pressure")),
-    "shear": ("pressure", _at_surface("shear")),
+    "pressure": ("pressure", _contact_field("pressure")),
+    "shear": ("pressure", _contact_field("shear")),
     "von_mises": ("pressure", lambda step, point: step.von_mises[point]),
     "temperature": (
         "temperature", lambda step, point: None if step.temperature is None else step.temperature[point]),
-    **{f"stress.{c}": ("pressure", _entry(lambda step, point: step.stress[point], i)) for c, i in STRESS.items()},
-    **{f"displacement.{a}": ("length", _entry(lambda step, point: step.displacement[point], i)) for a, i in _AXES.items()},
+    **{f"stress.{c}": ("pressure", _component(lambda step, p: step.stress[p], i)) for c, i in STRESS.items()},
+    **{f"displacement.{a}": ("length", _component(lambda step, p: step.displacement[p], i)) for a, i in _AXES.items()},
 }  # fmt: skip
 
 
@@ -153,21 +153,23 @@ def read_check(
     kinematics: str = "3d",
 ) -> Check:
     """Return the check that an entry of a case file describes; CaseError if a key or a value is invalid."""
-    check_keys(where, entry, CHECK)
-    for key in ("quantity", "tolerance"):
-        if key not in entry:
-            raise CaseError(f"{where} needs '{key}'")
+    check_keys(where, entry, CHECK, ("quantity", "tolerance"))
     if ("theory" in entry) == ("value" in entry):
         raise CaseError(f"{where} needs either 'theory', the name of a contact pair with a theory, or 'value'")
     owner, _, field = entry["quantity"].partition(".")
     check_known(f"contact pair or probe in {where}.quantity", owner, [*probes, *pairs], CaseError)
     _check_quantity(where, field, OF_PROBES if owner in probes else OF_PAIRS, kinematics)
-    if owner in pairs and field in NEEDED and NEEDED[field][0] not in pairs[owner]:
-        raise CaseError(f"{where}: '{owner}' has no {field}: {NEEDED[field][1]}")
-    of = field.split(".")[0] if owner in pairs else "pressure_max"
-    share = theories.get(entry.get("theory", ""), {}).get("share", 1.0) if field.split(".")[0] == "force" else 1.0
+    if owner in pairs and field in REQUIRED_OPTIONS and REQUIRED_OPTIONS[field][0] not in pairs[owner]:
+        raise CaseError(f"{where}: '{owner}' has no {field}: {REQUIRED_OPTIONS[field][1]}")
+    base = field.split(".")[0]
+    share = theories.get(entry.get("theory", ""), {}).get("share", 1.0) if base == "force" else 1.0
+    defaults = {
+        "name": entry["quantity"],
+        "of": base if owner in pairs else "pressure_max",
+        "factor": 1.0 / float(share),
+    }
     numbers = {key: float(entry[key]) for key in ("tolerance", "value", "factor") if key in entry}
-    check = Check(**{"name": entry["quantity"], "of": of, "factor": 1.0 / float(share), **entry, **numbers})
+    check = Check(**{**defaults, **entry, **numbers})
     if not 0.0 < check.tolerance < math.inf:
         raise CaseError(
             f"{where}.tolerance = {check.tolerance:g} must be a positive number, e.g. 0.01 for one per cent"
@@ -185,7 +187,7 @@ def read_check(
 
 
 def _check_quantity(where: str, field: str, allowed: Collection[str], kinematics: str) -> None:
-    """Raise CaseError if the kinematics do not define a quantity, such as a force along z in a plane model."""
+    """Raise CaseError unless `field` is allowed and defined by the kinematics; plane models have no force along z."""
     if kinematics != "3d":
         allowed = [name for name in allowed if name not in ONLY_IN_SPACE]
     if kinematics == "axisymmetric":  # moments and radial forces cancel over the circle
@@ -218,15 +220,15 @@ def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float
 
 
 def evaluated(check: Check, step: StepResult, probes: Mapping[str, int], theories: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a check with its value, its target, its relative deviation and whether it passed.
+    """Return the entry of a check in the summary: value, target, relative deviation [-], and whether the check passed.
 
-    If a mesh-converged solution is known, the deviation of the value from this solution and the deviation of this solution
-    from the theory are included.
+    If the case states a mesh-converged solution, the entry includes the deviation of the value from this solution and the
+    deviation of this solution from the theory.
     """
     theory = theories[check.theory] if check.theory else {}
     value, target = measured(check, step, probes), check.target(theory.get("theory"))
-    limit = theory.get("mesh_converged")
-    converged = check.target(limit) if limit is not None and hasattr(limit, check.of) else None
+    solution = theory.get("mesh_converged")
+    converged = check.target(solution) if hasattr(solution, check.of) else None
     return {
         "name": check.name,
         "quantity": check.quantity,

@@ -1,4 +1,4 @@
-"""Keys of case files, the types of their values, and checks of tables against them."""
+"""Keys of case files and the types of their values, with the checks of tables against both."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 import types
 import typing
 from collections import abc
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from reprlib import repr
 from typing import Any
 
@@ -17,7 +17,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.errors import CaseError, FastcontactError, unknown
 
 NUMBER = (int, float)
-# Types in a case file of numbers, of functions of the position, and of sequences.
+# TOML types of numbers, of functions of the position (tables of values by position), and of sequences.
 _TOML: dict[Any, tuple[type, ...]] = {
     float: NUMBER,
     abc.Callable: (dict,),
@@ -26,7 +26,7 @@ _TOML: dict[Any, tuple[type, ...]] = {
 
 
 def toml_types(annotation: Any) -> tuple[type, ...]:
-    """Return the types in a case file of an argument with an annotation; a function is given as a table."""
+    """Return the TOML types that the annotation of an argument admits; a case file gives a function as a table."""
     kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
     if kind in (typing.Union, types.UnionType):
         return tuple(dict.fromkeys(type_of_member for member in members for type_of_member in toml_types(member)))
@@ -36,18 +36,19 @@ def toml_types(annotation: Any) -> tuple[type, ...]:
 
 
 def keys_of(described: Callable[..., Any]) -> dict[str, tuple[type, ...]]:
-    """Return the types in a case file of the fields of a class or the arguments of a function, by name."""
+    """Return the TOML types of the fields of a class or of the arguments of a function, by name."""
     return {name: toml_types(annotation) for name, annotation in types_of(described).items()}
 
 
+# Message of `fastcontact._tools.argument_types` about an argument of a wrong type.
 _ARGUMENT = re.compile(r"the argument (?P<key>\w+) of [\w.]+ must be (?P<kinds>.*), not (?P<given>.*)")
 AXES = {"x": NUMBER, "y": NUMBER, "z": NUMBER}
 UNITS = {"length": str, "force": str, "pressure": str}
 RAMP = {"steps": int, "end": NUMBER, "instants": list, "table": list}
 SOLVE: dict[str, Any] = {"linear_solver": str, "linear_tolerance": NUMBER, **keys_of(Criteria)}
-# A rigid surface, which consists of the facets of a group in a file or in the mesh of the model.
+# Keys of a rigid surface that consists of the facets of a group, in a file or in the mesh of the model.
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
-# Rotation of a rigid obstacle or a support.
+# Keys of the rotation of a rigid obstacle or a support.
 ROTATION: dict[str, Any] = {"angle": NUMBER, "centre": list, "axis": list, "ramp": list}
 SENSITIVITY: dict[str, Any] = {"quantity": list, "by": list}
 FIELD: dict[str, Any] = {"file": str, "field": str, "over": str, "instant": NUMBER}
@@ -59,7 +60,7 @@ STUDY: dict[str, Any] = {
     **dict.fromkeys(("halve", "double", "curves", "combinations", "quantities"), list),
     **dict.fromkeys(("triangles", "quadrangles", "options", "parameters"), dict),
 }
-# Types of the entries of lists and tables in these settings, with an example of the notation.
+# Types of the entries of lists and tables in ``[study]``, and their description in messages.
 STUDY_ENTRIES: dict[str, tuple[Any, str]] = {
     **dict.fromkeys(("halve", "double"), (str, 'the name of an argument, "size"')),
     "quantities": (str, 'the name of a quantity, "PROBE.stress.yy"'),
@@ -80,8 +81,11 @@ TOP: dict[str, Any] = {
 }
 
 
-def check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
-    """Raise CaseError for a key that is not in `known`, or a value of another type; the type None admits any value."""
+def check_keys(where: str, data: Any, known: Mapping[str, Any], required: Iterable[str] = ()) -> None:
+    """Raise CaseError unless `data` is a table with the `required` keys, and with keys and types of values in `known`.
+
+    The type None admits any value.
+    """
     if not isinstance(data, dict):
         raise CaseError(f"'{where}' must be a table of keys, not {repr(data)}")
     for key, value in data.items():
@@ -94,6 +98,9 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
                 raise CaseError(f"there may be several of '{label}': write [[{label}]] in place of [{label}]")
             names = " or ".join(kind.__name__ for kind in kinds)
             raise CaseError(f"the value of '{label}' must be of type {names}, not {repr(value)}")
+    for key in required:
+        if key not in data:
+            raise CaseError(f"{where} needs '{key}'")
 
 
 def check_settings(data: Mapping[str, Any]) -> None:
@@ -104,45 +111,42 @@ def check_settings(data: Mapping[str, Any]) -> None:
     if data.get("modes", {}).get("n", 1) < 1:
         raise CaseError(f"modes.n = {data['modes']['n']}: request one mode or more")
     diameters = data.get("modes", {}).get("nodal_diameters", "all")
-    wrong = isinstance(diameters, list) and any(
-        not isinstance(d, int) or isinstance(d, bool) or d < 0 for d in diameters
-    )
-    if wrong or (isinstance(diameters, str) and diameters != "all"):
+    invalid = isinstance(diameters, list) and any(type(d) is not int or d < 0 for d in diameters)
+    if invalid or (isinstance(diameters, str) and diameters != "all"):
         raise CaseError(f'modes.nodal_diameters = {diameters!r}: write "all", or non-negative whole numbers')
     for key, (kind, form) in STUDY_ENTRIES.items():
         entries = data.get("study", {}).get(key, ())
-        for place, entry in entries.items() if isinstance(entries, dict) else enumerate(entries):
+        for index, entry in entries.items() if isinstance(entries, dict) else enumerate(entries):
             if not isinstance(entry, kind):
-                where = f"study.{key}.{place}" if isinstance(entries, dict) else f"study.{key}[{place}]"
+                where = f"study.{key}.{index}" if isinstance(entries, dict) else f"study.{key}[{index}]"
                 raise CaseError(f"'{where}' must be {form}, not {entry!r}")
 
 
 def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Any:
-    """Call `function` with the keys of a table of a case file.
+    """Return the result of `function` with the keys of the table `where` of a case file as arguments.
 
     Raises CaseError if a key is unknown or missing, or if the function rejects the type or the value of a key.
     """
     parameters = inspect.signature(function).parameters
     check_keys(where, arguments, dict.fromkeys(parameters))
-    missing = [key for key, p in parameters.items() if p.default is p.empty and key not in arguments]
-    if missing:
+    if missing := [key for key, p in parameters.items() if p.default is p.empty and key not in arguments]:
         raise CaseError(f"'{where}' needs {' and '.join(repr(key) for key in missing)}")
     for key, value in arguments.items():
-        wanted = str(parameters[key].annotation)
-        if "float" in wanted and isinstance(value, str) and "str" not in wanted:
+        annotation = str(parameters[key].annotation)
+        if "float" in annotation and isinstance(value, str) and "str" not in annotation:
             raise CaseError(f"the value of '{where}.{key}' must be a number, not {repr(value)}")
     try:
         return function(**arguments)
     except (TypeError, ValueError) as error:
-        given = ", ".join(f"{key} = {repr(value)}" for key, value in arguments.items())
-        raise CaseError(f"'{where}': {given} have invalid types ({error})") from error
+        values = ", ".join(f"{key} = {repr(value)}" for key, value in arguments.items())
+        raise CaseError(f"'{where}': {values} have invalid types ({error})") from error
     except FastcontactError as error:
         raise CaseError(_of_key(where, str(error)) or f"'{where}': {error}") from error
 
 
 @contextlib.contextmanager
 def at(where: str) -> Iterator[None]:
-    """Prefix the messages of errors raised in the block with the name of the table in the case file."""
+    """Prefix the messages of errors raised in a ``with`` block with the table of the case file that causes them."""
     try:
         yield
     except CaseError:
@@ -156,12 +160,12 @@ def at(where: str) -> Iterator[None]:
 
 
 def _of_key(where: str, text: str) -> str:
-    """Translate a message about an argument of a function into one about the key; empty for other messages."""
-    wrong = _ARGUMENT.fullmatch(text)
-    if wrong is None:
+    """Return a message about the argument of a function as one about the key, or an empty string for other messages."""
+    match = _ARGUMENT.fullmatch(text)
+    if match is None:
         return ""
-    kinds = wrong["kinds"].replace("a sequence of", "a list of").removesuffix(" or None")
-    return f"the value of '{where}.{wrong['key']}' must be {kinds}, not {wrong['given']}"
+    kinds = match["kinds"].replace("a sequence of", "a list of").removesuffix(" or None")
+    return f"the value of '{where}.{match['key']}' must be {kinds}, not {match['given']}"
 
 
 def tables(where: str, entries: Any) -> list[dict[str, Any]]:

@@ -33,44 +33,44 @@ VALUES = ("E", "nu", "G", "density", "expansion", "conductivity", "value", "coef
 
 def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
     """Add a material with the given constants; `_material_law` selects its law."""
-    kind = _material_law(constants)
+    law = _material_law(constants)
     constants.pop("law", None)
-    if kind is LinearElastic:
-        # A list contains the components along the axes. Values by cell are given by tables instead.
+    if law is LinearElastic:
+        # Here a list of numbers always holds components along the axes, although the law also takes one value per cell.
         if isinstance(constants.get("expansion"), list):
             check_expansion(constants["expansion"], 1)
         if isinstance(constants.get("conductivity"), list):
             check_conductivity(constants["conductivity"], 1)
         constants = {key: float(value) if type(value) is int else value for key, value in constants.items()}
-    model.add_material(kind(**constants), groups)
+    model.add_material(law(**constants), groups)
 
 
-def _add_temperature(model: Model, **given: Any) -> None:
-    """Add a temperature that is given by a value or by a field in files."""
-    if ("value" in given) == ("file" in given):
+def _add_temperature(model: Model, **entry: Any) -> None:
+    """Add a temperature, which an entry gives by a value or by a field in files."""
+    if ("value" in entry) == ("file" in entry):
         raise CaseError("a temperature needs either 'value', or 'file' and 'field'")
-    if "value" in given:
+    if "value" in entry:
         for key in ("field", "instant", "times"):
-            if key in given:
+            if key in entry:
                 raise CaseError(f"the key '{key}' belongs to a temperature with 'file'")
-        model.add_temperature(**given)
-    elif "field" not in given:
+        model.add_temperature(**entry)
+    elif "field" not in entry:
         raise CaseError("a temperature with 'file' needs 'field', the name of the field in the file")
     else:
-        model.add_temperature_file(**given)
+        model.add_temperature_file(**entry)
 
 
 @functools.wraps(Model.add_coupling)
-def _add_coupling(model: Model, place: Any = None, **given: Any) -> None:
-    """Add a coupling; `_with_references` has added its reference point at `place` to the mesh."""
-    model.add_coupling(**given)
+def _add_coupling(model: Model, place: Any = None, **entry: Any) -> None:
+    """Add a coupling; `_with_references` has already added its reference point, at `place`, to the mesh."""
+    model.add_coupling(**entry)
 
 
 def _material_law(entry: dict[str, Any]) -> type[Material]:
-    """Return the law of a material from its key `law` or, without it, from the other keys.
+    """Return the class of a material, which the key `law` states or, without this key, the other keys imply.
 
-    A material with `yield_stress` is elastic-plastic, a material with D is anisotropic, a material with G or with a list E or
-    nu is orthotropic, and others are isotropic.
+    A material with `yield_stress` is elastic-plastic, a material with D is anisotropic, a material with G or with lists E or
+    nu is orthotropic, and other materials are isotropic.
     """
     law = entry.get("law", "elastic_plastic" if "yield_stress" in entry else "linear_elastic")
     check_known("law", law, ["linear_elastic", *NONLINEAR], CaseError)
@@ -78,22 +78,8 @@ def _material_law(entry: dict[str, Any]) -> type[Material]:
         return NONLINEAR[law]
     if "D" in entry:
         return Anisotropic
-    return (
-        Orthotropic if "G" in entry or any(isinstance(entry.get(key), list) for key in ("E", "nu")) else LinearElastic
-    )
-
-
-def _without_default(function: Callable[..., Any]) -> list[str]:
-    """Return the required arguments of a function."""
-    return [key for key, given in inspect.signature(function).parameters.items() if given.default is given.empty]
-
-
-def _check_material(where: str, entry: dict[str, Any]) -> None:
-    """Raise CaseError for a key that the material law does not take."""
-    law = _material_law(entry)
-    for key in entry:
-        if key not in ("groups", "law") and key not in inspect.signature(law).parameters:
-            raise CaseError(f"the key '{where}.{key}' does not belong to {_LAWS[law]}")
+    along_axes = "G" in entry or any(isinstance(entry.get(key), list) for key in ("E", "nu"))
+    return Orthotropic if along_axes else LinearElastic
 
 
 # Nonlinear laws by name in case files.
@@ -111,22 +97,20 @@ _LAWS: dict[type[Material], str] = {
     Anisotropic: "an anisotropic material (D is a matrix)",
     **{law: f"a material with the law '{name}'" for name, law in NONLINEAR.items()},
 }
-# Order in which messages list the types of a value.
-_ORDER = (*NUMBER, list, dict)
 
 
 def _constants() -> dict[str, tuple[type, ...]]:
-    """Return the types of the keys of all material laws from the annotations of their fields."""
+    """Return the TOML types of the keys of all material laws, in the order in which messages list them."""
     known: dict[str, set[type]] = {}
     for law in _LAWS:
         for key, annotation in {k: v for base in reversed(law.__mro__) for k, v in types_of(base).items()}.items():
             if key in inspect.signature(law).parameters:
                 known.setdefault(key, set()).update(toml_types(annotation))
-    return {key: tuple(sorted(kinds, key=[*_ORDER, bool, str].index)) for key, kinds in known.items()}
+    return {key: tuple(sorted(kinds, key=[*NUMBER, list, dict, bool, str].index)) for key, kinds in known.items()}
 
 
 # Functions by kind of table, for the kinds whose keys are not the arguments of a method `add_KIND` of `Model`.
-_NAMED: dict[str, Callable[..., None]] = {
+_SPECIAL: dict[str, Callable[..., None]] = {
     "material": _add_material,
     "support": Model.prescribe,
     "temperature": _add_temperature,
@@ -138,7 +122,7 @@ _NAMED: dict[str, Callable[..., None]] = {
 }
 # All functions by kind of table, in the order in which the tables are added to the model.
 _ADD: dict[str, Callable[..., None]] = {
-    kind: _NAMED.get(kind) or getattr(Model, f"add_{kind}")
+    kind: _SPECIAL.get(kind) or getattr(Model, f"add_{kind}")
     for kind in (
         "material", "support", "pressure", "traction", "body_force", "gravity", "centrifugal", "temperature",
         "fixed_temperature", "heat_flux", "heat_source", "nodal_heat", "film", "initial_stress", "initial_strain", "force",
@@ -151,7 +135,10 @@ _ADD_TO_CONTACT: dict[str, Callable[..., None]] = {"fluid_pressure": Model.add_f
 
 
 def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any], list[str]]:
-    """Return the types of the keys of a table and its required keys, from the signatures of `adding`."""
+    """Return the TOML types of the keys of a table and its required keys.
+
+    The keys are the arguments of the functions `adding`, and those in `further` with their types.
+    """
     known: dict[str, Any] = {}
     required = []
     for add in adding:
@@ -167,7 +154,7 @@ def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any],
     return {**known, **further}, required
 
 
-# Types of the keys and required keys by kind of table.
+# TOML types of the keys, and the required keys, by kind of table.
 LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
     **{
         kind: _keys(add)
@@ -176,14 +163,13 @@ LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
     },
     "coupling": _keys(_add_coupling, place=list),
     "support": _keys(Model.prescribe, rotation=dict),
-    "material": (
-        {
-            **{**_constants(), "groups": (list, str), "law": str},
-            **{"D": list, "hardening": list, **dict.fromkeys(("mu", "alpha"), (*NUMBER, list))},
-        },
+    "material": (  # its required keys depend on the law
+        _constants()
+        | {"groups": (list, str), "law": str, "D": list, "hardening": list}
+        | dict.fromkeys(("mu", "alpha"), (*NUMBER, list)),
         (),
     ),
-    # A temperature is given by a value or by a file, so no key is required in both cases.
+    # A temperature is given by a value or by a file, and no key is required in both cases.
     "temperature": (_keys(Model.add_temperature, Model.add_temperature_file)[0], ()),
 }
 
@@ -208,28 +194,31 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
 
 
 def _add_lists(model: Model, data: dict[str, Any], folder: Path, adding: Mapping[str, Callable[..., None]]) -> None:
-    """Add the entries of the lists of tables of the kinds in `adding`; CaseError if one is invalid."""
+    """Add the entries of the lists of tables to a model by the functions `adding`; CaseError if an entry is invalid."""
     for kind, add in adding.items():
         known, required = LISTS[kind]
         for i, entry in enumerate(tables(kind, data.get(kind, []))):
             where = f"{kind}[{i}]"
-            check_keys(where, entry, known)
             if kind == "material":
-                _check_material(where, entry)
-            for key in _without_default(_material_law(entry)) if kind == "material" else required:
-                if key not in entry:
-                    raise CaseError(f"{where} needs '{key}'")
+                check_keys(where, entry, known)
+                law = _material_law(entry)
+                constants = inspect.signature(law).parameters
+                for key in entry:
+                    if key not in ("groups", "law") and key not in constants:
+                        raise CaseError(f"the key '{where}.{key}' does not belong to {_LAWS[law]}")
+                required = [key for key, parameter in constants.items() if parameter.default is parameter.empty]
+            check_keys(where, entry, known, required)
             with at(where):
-                given = _from_files(where, entry, model.mesh, folder) if kind == "material" else entry
-                add(model, **_arguments(where, _with_paths(folder, _changed(where, given, VALUES, _function))))
+                values = _from_files(where, entry, model.mesh, folder) if kind == "material" else entry
+                add(model, **_arguments(where, _with_paths(folder, _converted(where, values, VALUES, _tabulated))))
 
 
 def _add_contacts(model: Model, data: dict[str, Any]) -> None:
     """Add the contact pairs of a case file, and then the automatically detected pairs if the file requests them."""
-    named = data.get("contact", {})
-    if isinstance(named, str) and named != "auto":
-        raise CaseError(f"'contact' must be \"auto\" or tables [contact.NAME], not {repr(named)}")
-    for name, entry in named.items() if isinstance(named, dict) else ():
+    pairs = data.get("contact", {})
+    if isinstance(pairs, str) and pairs != "auto":
+        raise CaseError(f"'contact' must be \"auto\" or tables [contact.NAME], not {repr(pairs)}")
+    for name, entry in pairs.items() if isinstance(pairs, dict) else ():
         if not isinstance(entry, dict):
             raise CaseError(
                 f"'contact' needs a name for each pair: write [contact.NAME] above its keys instead of '{name}'"
@@ -240,7 +229,7 @@ def _add_contacts(model: Model, data: dict[str, Any]) -> None:
                 raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets{renamed}")
         with at(f"contact.{name}"):
             model.add_contact(name, **entry)
-    if named == "auto" or "contacts" in data:
+    if pairs == "auto" or "contacts" in data:
         with at("contacts"):
             model.add_contacts(**data.get("contacts", {}))
 
@@ -256,23 +245,23 @@ def _from_files(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> 
             raise CaseError(f"'{name}' needs 'field', the name of the field in the file")
         return read_field(mesh, groups=entry.get("groups"), **_with_paths(folder, value))
 
-    return _changed(where, entry, CONSTANTS, read)
+    return _converted(where, entry, CONSTANTS, read)
 
 
-def _changed(
-    where: str, entry: dict[str, Any], keys: Sequence[str], change: Callable[[str, Any], Any]
+def _converted(
+    where: str, entry: dict[str, Any], keys: Sequence[str], convert: Callable[[str, Any], Any]
 ) -> dict[str, Any]:
-    """Return an entry with `change` applied to the values of `keys`, or to each value of a list.
+    """Return an entry with `convert` applied to the values of `keys`, and to each member of a list.
 
-    `change` receives the location of the value in the case file, for messages, and the value.
+    The arguments of `convert` are the location of the value in the case file, for messages, and the value.
     """
     values = dict(entry)
     for key in (key for key in keys if key in entry):
         value = entry[key]
         if isinstance(value, list):
-            values[key] = [change(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
+            values[key] = [convert(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
         else:
-            values[key] = change(f"{where}.{key}", value)
+            values[key] = convert(f"{where}.{key}", value)
     return values
 
 
@@ -281,20 +270,20 @@ def _with_paths(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
     file = entry.get("file")
     if file is None:
         return entry
-    given = [file] if isinstance(file, str) else file
-    if not all(isinstance(name, str) for name in given):
+    names = [file] if isinstance(file, str) else file
+    if not all(isinstance(name, str) for name in names):
         raise CaseError(f"'file' must be a path or a list of paths, not {repr(file)}")
-    paths = [folder / name for name in given]
+    paths = [folder / name for name in names]
     return {**entry, "file": paths[0] if isinstance(file, str) else paths}
 
 
-def _function(where: str, value: Any) -> Any:
-    """Return the function that a table of values by position defines; other values are returned unchanged."""
+def _tabulated(where: str, value: Any) -> Any:
+    """Return the function that interpolates a table of values by position; other values are returned unchanged."""
     return called(where, Tabulated, value) if isinstance(value, dict) else value
 
 
 def _cut(mesh: Mesh, sections: Any) -> Mesh:
-    """Return the mesh cut along the pretension sections without an opposite side."""
+    """Return the mesh cut along those pretension sections that have no opposite side yet."""
     for i, entry in enumerate(tables("pretension", sections)):
         name = entry.get("section")
         if isinstance(name, str) and "opposite" not in entry and name + OPPOSITE not in mesh.group_names:
@@ -304,34 +293,34 @@ def _cut(mesh: Mesh, sections: Any) -> Mesh:
 
 
 def _with_references(mesh: Mesh, couplings: Any) -> Mesh:
-    """Return the mesh with the reference points of the couplings."""
+    """Return the mesh with the reference points of those couplings that state a `place`."""
     for i, entry in enumerate(tables("coupling", couplings)):
-        name, place = entry.get("reference"), entry.get("place")
-        if isinstance(name, str) and isinstance(place, list):
+        name, coordinates = entry.get("reference"), entry.get("place")
+        if isinstance(name, str) and isinstance(coordinates, list):
             with at(f"coupling[{i}]"):
-                mesh = with_reference_points(mesh, {name: place})
+                mesh = with_reference_points(mesh, {name: coordinates})
     return mesh
 
 
 def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
-    """Add a rigid obstacle with the `shape` of the entry; the other keys are arguments of `Model.add_obstacle`."""
+    """Add a rigid obstacle with the `shape` of an entry, whose other keys are arguments of `Model.add_obstacle`."""
     where = f"obstacle.{name}"
     if not isinstance(entry, dict) or not isinstance(entry.get("secondary"), str):
         raise CaseError(f"{where} needs 'secondary', the name of a group of facets")
-    rest = {key: value for key, value in entry.items() if key != "shape"}
+    options = {key: value for key, value in entry.items() if key != "shape"}
     shape = entry.get("shape")
-    if shape == "mesh":  # arguments of the shape may be given as keys of the obstacle
-        shape = {"kind": "mesh", **{key: rest.pop(key) for key in SURFACE if key in rest}}
+    if shape == "mesh":  # then the arguments of the shape are keys of the obstacle
+        shape = {"kind": "mesh", **{key: options.pop(key) for key in SURFACE if key in options}}
     obstacle = _obstacle(f"{where}.shape", shape, model.mesh, folder)
     for key in ("motion", "force"):
-        if key in rest:
-            check_keys(f"{where}.{key}", rest[key], AXES)
+        if key in options:
+            check_keys(f"{where}.{key}", options[key], AXES)
     with at(where):
-        model.add_obstacle(name, obstacle=obstacle, **_arguments(where, rest))
+        model.add_obstacle(name, obstacle=obstacle, **_arguments(where, options))
 
 
 def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
-    """Return the rigid shape of a table with its kind and its arguments; `mesh` is the mesh of the model."""
+    """Return the rigid shape that a table describes by its kind and its arguments; `mesh` is the mesh of the model."""
     kind = shape.get("kind", "") if isinstance(shape, dict) else shape if isinstance(shape, str) else ""
     if not isinstance(shape, dict) or kind not in (*SHAPES, "mesh"):
         raise CaseError(unknown(f"{where}.kind", str(kind), (*SHAPES, "mesh")))
@@ -347,7 +336,10 @@ def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
 
 
 def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
-    """Return an entry as arguments of a method of `Model`, with checked axes, rotation, ramp and terms."""
+    """Return the keys of an entry as arguments of a method of `Model`, with axes, rotation and ramp as objects.
+
+    Raises CaseError if one of these, or a term of a multi-point constraint, is invalid.
+    """
     arguments = dict(entry)
     if isinstance(entry.get("axes"), dict):
         arguments["axes"] = called(f"{where}.axes", CylindricalAxes, entry["axes"])
@@ -358,7 +350,7 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
         arguments["ramp"] = ramp_points(entry["ramp"], f"{where}.ramp")
     for term in entry.get("terms", []):
         kinds: list[Any] = [(str, int), str, NUMBER]
-        if not isinstance(term, list) or len(term) != 3 or not all(isinstance(v, k) for v, k in zip(term, kinds)):
+        if not isinstance(term, list) or len(term) != 3 or not all(map(isinstance, term, kinds)):
             raise CaseError(
                 f"'{where}.terms' must be a list of [group or point, component, coefficient], not {repr(term)}"
             )
@@ -366,7 +358,7 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def ramp_points(table: list[Any], where: str = "ramp.table") -> Table:
-    """Return a ramp as pairs of instant and load multiplier [-]; CaseError if it is not a list of pairs of numbers."""
+    """Return the pairs of instant and load multiplier [-] of a ramp; CaseError if `table` is not a list of such pairs."""
     pairs = isinstance(table, list) and all(
         isinstance(row, list) and len(row) == 2 and all(isinstance(v, NUMBER) for v in row) for row in table
     )

@@ -1,4 +1,4 @@
-"""The command line, with a module for each subcommand; only these modules print and parse arguments."""
+"""Command line with a module for each subcommand; no other module of the package parses arguments."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 def entry_point() -> None:
     """Run the command line and exit with its code."""
     _open_standard_files()
-    # Nearly all objects that a command creates live to its end, and searching them for cycles takes a sixth of a short run.
+    # Almost all objects of a command live to its end, and their garbage collection would take a sixth of a short run.
     gc.set_threshold(50_000)
-    # BLAS threads would spin between the small products of the package, whose loops use Numba threads.
+    # The threads of BLAS would spin between the many small products, while the loops of the package use Numba threads.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         code = main()
@@ -39,18 +39,18 @@ def entry_point() -> None:
 
     code = flushed(code)
     if code in STOPPED:
-        for stopped in STOPPED:  # later signals do not change the exit code
-            with contextlib.suppress(ValueError):  # the platform lacks this signal
-                signal.signal(stopped - 128, signal.SIG_IGN)
-        sys.unraisablehook = lambda ignored: None  # errors in finalisers of partly created objects
+        for signal_code in STOPPED:  # further signals must not change the exit code
+            with contextlib.suppress(ValueError):  # a platform without this signal
+                signal.signal(signal_code - 128, signal.SIG_IGN)
+        sys.unraisablehook = lambda ignored: None  # hides errors in finalisers of partly created objects
     else:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # all output is written, and Ctrl-C may end the process
-    gc.freeze()  # the interpreter would search them as well when it exits
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # all output is written, so that Ctrl-C may end the process
+    gc.freeze()  # excludes all objects from the garbage collection at exit
     sys.exit(code)
 
 
 def _open_standard_files() -> None:
-    """Open missing standard files 0 to 2 on the null device, since the next opened file would take their descriptors."""
+    """Open closed standard files (descriptors 0 to 2) on the null device, so that no other file takes their descriptors."""
     for number in range(3):
         try:
             os.fstat(number)

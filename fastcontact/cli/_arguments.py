@@ -1,4 +1,4 @@
-"""Tables of command-line arguments, which are converted to arguments of argparse."""
+"""Declaration of command-line arguments by tables, which are converted to arguments of argparse."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 
-# The key is the usage, such as ``"-o --output FILE"``, and the value is the help, or the kind of the argument and the help.
-# The kind is a type, a default value, or a dictionary of settings of argparse. A nested table is a group with its key as
-# title; the arguments of a group without a title are mutually exclusive.
+# A key is a usage, such as ``"-o --output FILE"``. Its value is the help, or a pair of the kind of the argument and the help,
+# where the kind is a type, a default value, or a dictionary of settings of argparse. A nested table is a group with its key
+# as title; the arguments of a group without a title are mutually exclusive.
 def declare(parser: Any, table: Mapping[str, Any], **common: Any) -> None:
     """Add the arguments of a table to a parser or to an argument group; `common` are settings of all arguments."""
     for usage, entry in table.items():
@@ -19,13 +19,13 @@ def declare(parser: Any, table: Mapping[str, Any], **common: Any) -> None:
         if not isinstance(kind, dict):
             kind = {"type": kind} if isinstance(kind, type) else {"type": type(kind), "default": kind}
         flags = [word for word in usage.split() if word.startswith("-")]
-        value = usage.split()[len(flags) :]
-        shown = {} if not flags else {"metavar": value[0]} if value else {"action": "store_true"}
-        parser.add_argument(*(flags or value), **{"help": text, **shown, **kind, **common})
+        names = usage.split()[len(flags) :]
+        form = {} if not flags else {"metavar": names[0]} if names else {"action": "store_true"}
+        parser.add_argument(*(flags or names), **{"help": text, **form, **kind, **common})
 
 
 def add_loudness(parser: Any, default: Any) -> None:
-    """Add the verbosity options, which all commands have, with the default value `default`."""
+    """Add the verbosity options, which all commands share, with the default value `default`."""
     table = {
         "-v --verbose": "report what is being done and why",
         "-q --quiet": "print nothing but errors and warnings",

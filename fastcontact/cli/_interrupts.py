@@ -1,11 +1,11 @@
-"""Handling of Ctrl-C, SIGTERM and SIGHUP, which are sent again if Python loses the exception.
+"""Handling of Ctrl-C, SIGTERM and SIGHUP, which are sent again if Python discards the exception that they raise.
 
 SIGTERM, which schedulers send, and SIGHUP, which a closing terminal sends, are handled like Ctrl-C, because by default they
-would leave incomplete files.
+would end the process and leave incomplete files.
 
 Python can raise KeyboardInterrupt at any point of a program. In a finaliser or in a callback from a C library, such as LLVM
-during the compilation of a kernel, Python prints the exception and discards it, and the command would continue. While a C
-extension module is imported, the exception may become another error.
+during the compilation of a kernel, Python prints and discards the exception, and the command would continue. During the
+import of a C extension module, another error may replace the exception.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from collections.abc import Iterator
 from types import FrameType
 from typing import Any
 
-AGAIN = 0.05  # delay before a signal is repeated [s]
-# Time in which another signal is treated as a repetition of the last one [s].
-REPEATED = 0.5
+DELAY = 0.05  # time after which a signal is sent again [s]
+# Time in which another signal is ignored as a repetition of the last one [s].
+REPETITION = 0.5
 HANDLERS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 if hasattr(signal, "SIGHUP"):
     HANDLERS[signal.SIGHUP] = signal.SIG_DFL
@@ -34,28 +34,28 @@ COMMAND_LINE = "fastcontact.cli._main"
 
 @contextlib.contextmanager
 def interruptible(raised: list[int] | None = None) -> Iterator[None]:
-    """Let Ctrl-C, SIGTERM and SIGHUP interrupt the block at a point where the exception is not lost.
+    """Let Ctrl-C, SIGTERM and SIGHUP interrupt a ``with`` block with a KeyboardInterrupt that Python does not discard.
 
-    The numbers of the signals received are appended to the list `raised`. Signals whose handler is not the default keep
-    their handler.
+    The numbers of the signals received are appended to the list `raised`. Signals with a handler other than the default one
+    keep it.
     """
-    heard: list[float] = []  # times of signals whose exception was not lost
+    times: list[float] = []  # of signals whose exception was not discarded [s]
     raised = [] if raised is None else raised
     in_main_thread = threading.current_thread() is threading.main_thread()
-    numbers = [number for number, usual in HANDLERS.items() if in_main_thread and signal.getsignal(number) == usual]
+    numbers = [number for number, default in HANDLERS.items() if in_main_thread and signal.getsignal(number) == default]
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        if heard and time.monotonic() - heard[-1] < REPEATED:
+        if times and time.monotonic() - times[-1] < REPETITION:
             return
         if _is_importing(frame):
-            _again(number)
+            _send_later(number)
         else:
             raised.append(number)
-            heard.append(time.monotonic())
+            times.append(time.monotonic())
             raise KeyboardInterrupt
 
     try:
-        with _lost_ones_come_again(raised, heard), meant(raised):
+        with _discarded_interrupts_repeated(raised, times), restoring_interrupt(raised):
             for number in numbers:
                 signal.signal(number, interrupt)
             yield
@@ -65,46 +65,50 @@ def interruptible(raised: list[int] | None = None) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def meant(raised: list[int]) -> Iterator[None]:
-    """Raise KeyboardInterrupt if a signal was `raised` and a C function has replaced the exception by another error."""
+def restoring_interrupt(raised: list[int]) -> Iterator[None]:
+    """Raise KeyboardInterrupt in place of an error by which a C function has replaced the interruption by a signal.
+
+    `raised` contains the signals received. An error that is raised while KeyboardInterrupt is handled is genuine.
+    """
     try:
         yield
     except Exception as error:
-        if raised and not isinstance(
-            error.__context__, KeyboardInterrupt
-        ):  # otherwise the exception was not lost, and the error is genuine
+        if raised and not isinstance(error.__context__, KeyboardInterrupt):
             raise KeyboardInterrupt from error
         raise
 
 
 @contextlib.contextmanager
-def _lost_ones_come_again(raised: list[int], heard: list[float]) -> Iterator[None]:
-    """Repeat an interruption that Python would discard; after a signal was `raised`, errors in finalisers are not printed."""
-    before = sys.unraisablehook
+def _discarded_interrupts_repeated(raised: list[int], times: list[float]) -> Iterator[None]:
+    """Send a signal again if Python discards its KeyboardInterrupt; hide errors in finalisers after a signal.
 
-    def lost(unraisable: sys.UnraisableHookArgs) -> None:
+    `raised` contains the signals received, and `times` the times of those whose exception was not discarded.
+    """
+    original = sys.unraisablehook
+
+    def handle(unraisable: sys.UnraisableHookArgs) -> None:
         if issubclass(unraisable.exc_type, KeyboardInterrupt):
-            heard.clear()
-            _again(raised[-1] if raised else signal.SIGINT)
+            times.clear()
+            _send_later(raised[-1] if raised else signal.SIGINT)
         elif not raised:
-            before(unraisable)
+            original(unraisable)
 
-    sys.unraisablehook = lost
+    sys.unraisablehook = handle
     try:
         yield
     finally:
-        sys.unraisablehook = before
+        sys.unraisablehook = original
 
 
 def forget(error: BaseException | None) -> None:
-    """Release the objects that an interrupted command was creating, without the messages of failing finalisers."""
-    before, sys.unraisablehook = sys.unraisablehook, lambda ignored: None
+    """Release the objects that an interrupted command was creating, and hide the messages of failing finalisers."""
+    original, sys.unraisablehook = sys.unraisablehook, lambda ignored: None
     try:
         while error is not None:
             traceback.clear_frames(error.__traceback__)
             error = error.__context__
     finally:
-        sys.unraisablehook = before
+        sys.unraisablehook = original
 
 
 def to_main_thread(number: int) -> None:
@@ -116,14 +120,15 @@ def to_main_thread(number: int) -> None:
         signal.raise_signal(number)
 
 
-def _again(number: int) -> None:
-    timer = threading.Timer(AGAIN, to_main_thread, (number,))
+def _send_later(number: int) -> None:
+    """Send a signal to the main thread after a delay."""
+    timer = threading.Timer(DELAY, to_main_thread, (number,))
     timer.daemon = True
     timer.start()
 
 
 def _is_importing(frame: FrameType | None) -> bool:
-    """Return whether a frame belongs to an import that the command has begun."""
+    """Return whether a frame belongs to the import of a module by the command."""
     while frame is not None and frame.f_globals.get("__name__") != COMMAND_LINE:
         if frame.f_globals.get("__name__") in IMPORTING:
             return True

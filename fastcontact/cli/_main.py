@@ -1,8 +1,8 @@
 """Dispatch to the subcommands, and conversion of errors to exit codes.
 
-The exit codes are 0 for success, 1 for invalid input, 2 for failed convergence, 3 for a failed check of the case
-(``run --strict``), 130 for an interruption from the keyboard, 143 for SIGTERM and 129 for SIGHUP. Invalid input is reported
-in one line. After failed convergence or an interruption, the result file contains all converged steps.
+The exit codes are 0 for success, 1 for invalid input, 2 for failed convergence or failed runs of a study, 3 for a failed
+check of the case (``run --strict``), 130 for an interruption from the keyboard, 143 for SIGTERM and 129 for SIGHUP. Invalid
+input is reported in one line. After failed convergence or an interruption, the result file contains all converged steps.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from typing import Any
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
 from fastcontact.cli._arguments import add_loudness, declare
-from fastcontact.cli._interrupts import CODES, forget, interruptible, meant
-from fastcontact.cli._terminal import encodable, say, somebody_watches, warnings_shown
+from fastcontact.cli._interrupts import CODES, forget, interruptible, restoring_interrupt
+from fastcontact.cli._terminal import encodable, say, stderr_is_terminal, warnings_shown
 from fastcontact.errors import ConvergenceError, FastcontactError, printable, unknown
 
 SHELLS = ("bash", "zsh", "tcsh")
@@ -45,11 +45,11 @@ class PrintCompletion(argparse.Action):
 
 
 def _mark_files(parser: argparse.ArgumentParser, kind: Any) -> None:
-    """Mark the arguments of a parser and its subcommands that are file names, for shtab."""
+    """Mark the arguments of a parser and its subcommands that are file names with the completion `kind` of shtab."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
-            for sub in action.choices.values():
-                _mark_files(sub, kind)
+            for subparser in action.choices.values():
+                _mark_files(subparser, kind)
         elif {action.dest, action.metavar} & {*FILES}:
             action.complete = kind  # type: ignore[attr-defined]
 
@@ -66,45 +66,45 @@ class _Printable(logging.StreamHandler[Any]):
     """A log handler that escapes the control characters that names from files may contain."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """Return the line for a record; on a terminal it overwrites the progress bar."""
+        """Return the line of a record, which overwrites the progress bar on a terminal."""
         line = encodable(printable(super().format(record)), self.stream)
-        return f"\r\x1b[K{line}" if somebody_watches() else line
+        return f"\r\x1b[K{line}" if stderr_is_terminal() else line
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser that reports errors as the library does, in one line and with exit code 1."""
+    """An argument parser that reports errors as the package does, in one line and with exit code 1."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        """Raise FastcontactError with the nearest valid choice; argparse would exit with code 2, which is in use."""
-        wrong = _CHOICE.search(message)
-        if wrong:
-            message = unknown(wrong["kind"].lower(), wrong["given"], _NAME.findall(wrong["known"]))
-            if wrong["kind"] == "COMMAND" and wrong["given"].endswith((".toml", ".inp")):
-                message += f"; to solve a file, write '{self.prog} run {wrong['given']}'"
+        """Raise FastcontactError with the most similar valid choice, since argparse would exit with code 2."""
+        choice = _CHOICE.search(message)
+        if choice:
+            message = unknown(choice["kind"].lower(), choice["given"], _NAME.findall(choice["known"]))
+            if choice["kind"] == "COMMAND" and choice["given"].endswith((".toml", ".inp")):
+                message += f"; to solve a file, write '{self.prog} run {choice['given']}'"
         message = _SEVERAL.sub(r"\g<0>, separated by blanks", message)
         raise FastcontactError(f"{message}; see '{self.prog} --help'")
 
     def print_help(self, file: Any = None) -> None:
-        """Print the help and report write errors, which argparse would ignore."""
+        """Print the help, and report write errors, which argparse ignores."""
         if file is None:
             say(self.format_help().rstrip("\n"))
         else:
             super().print_help(file)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Raise an error for an unknown flag or argument, which argparse would leave to the parent parser."""
-        options, rest = super().parse_known_args(args, namespace)
-        known = [*_FLAG.findall(self.format_usage()), "--help"] if rest else []
-        for flag in (text.partition("=")[0] for text in rest if _FLAG.match(text)):
-            self.error(unknown("option", flag, known))
-        for text in rest:
-            option = f"--{os.path.splitext(text)[1][1:].replace('rmed', 'med')}"
-            self.error(f"unexpected argument '{text}'" + f": write {option} {text}" * (option in known))
-        return options, rest
+        """Raise an error for an unknown flag or argument, for which argparse would state the usage of the parent parser."""
+        options, unparsed = super().parse_known_args(args, namespace)
+        flags = [*_FLAG.findall(self.format_usage()), "--help"] if unparsed else []
+        for flag in (text.partition("=")[0] for text in unparsed if _FLAG.match(text)):
+            self.error(unknown("option", flag, flags))
+        for text in unparsed:
+            flag = f"--{os.path.splitext(text)[1][1:].replace('rmed', 'med')}"
+            self.error(f"unexpected argument '{text}'" + f": write {flag} {text}" * (flag in flags))
+        return options, unparsed
 
 
 class PrintVersion(argparse.Action):
-    """Action of ``--version``: print the version, report write errors, which argparse would ignore, and exit."""
+    """Action of ``--version``: print the version and exit, with a report of write errors, which argparse ignores."""
 
     def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option_string: Any = None) -> None:
         """Print the version and exit."""
@@ -113,7 +113,7 @@ class PrintVersion(argparse.Action):
 
 
 def parser(command: str | None = None) -> argparse.ArgumentParser:
-    """Return the parser of the subcommand `command`, or of all subcommands if there is none with this name."""
+    """Return the parser of the subcommand `command` only, or of all subcommands if none has this name."""
     top = Parser(prog="fastcontact", description="Fast finite elements for elastic contact problems.")
     top.add_argument("--version", action=PrintVersion, nargs=0, help="show program's version number and exit")
     top.add_argument(
@@ -124,27 +124,27 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     names = [name for _, name, _ in pkgutil.iter_modules([os.path.dirname(__file__)]) if not name.startswith("_")]
     for name in [command] if command in names else names:
         module = importlib.import_module(f"{__package__}.{name}")
-        sub = commands.add_parser(name, help=module.HELP, description=module.HELP)
+        subparser = commands.add_parser(name, help=module.HELP, description=module.HELP)
         if hasattr(module, "ARGUMENTS"):
-            declare(sub, module.ARGUMENTS)
+            declare(subparser, module.ARGUMENTS)
         else:
-            module.add_generators(sub)
-        sub.set_defaults(run=module.run)
-        add_loudness(sub, default=False)
+            module.add_generators(subparser)
+        subparser.set_defaults(run=module.run)
+        add_loudness(subparser, default=False)
     return top
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     raised: list[int] = []
-    with interruptible(raised):  # covers also the output of error messages
+    with interruptible(raised):  # error messages are printed within the block as well
         return _run_with_exit_code(sys.argv[1:] if argv is None else list(argv), raised)
 
 
 def _run_with_exit_code(words: list[str], raised: list[int]) -> int:
     """Run a command, print its error and return the exit code; `raised` contains the signals received."""
     try:
-        with meant(raised):
+        with restoring_interrupt(raised):
             return _run(words)
     except ConvergenceError as error:
         say("\n".join([f"no convergence: {error}", *history_lines(error.history), *_notes(error)]), error=True)
@@ -163,11 +163,12 @@ def _run_with_exit_code(words: list[str], raised: list[int]) -> int:
 
 
 def _run(words: list[str]) -> int:
+    """Parse the arguments, set up logging, and run the subcommand; return its exit code."""
     arguments = parser(words[0] if words else None).parse_args(words or ["--help"])
     handler = _Printable()
     log.handlers[:] = [handler]
     log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
-    notify = somebody_watches() and not (arguments.quiet or arguments.verbose)  # -v writes this message to the log
+    notify = stderr_is_terminal() and not (arguments.quiet or arguments.verbose)  # -v writes this message to the log
     compiling.listeners[:] = [_say_compiling] if notify else []
     with warnings_shown():
         return int(arguments.run(arguments) or 0)
@@ -185,7 +186,7 @@ def _notes(error: BaseException) -> list[str]:
 
 
 def history_lines(history: Sequence[Mapping[str, Any]], shown: int = 10) -> list[str]:
-    """Return lines with displacement change, active constraints and residual in the last iterations of a failed step."""
+    """Return lines on the last `shown` iterations of a failed step: displacement change, active constraints, residual."""
     if not history:
         return []
     first = max(len(history) - shown, 0)

@@ -1,4 +1,4 @@
-"""Output files of commands, including pictures: checks before a computation, and writing after it."""
+"""Output files of commands, including pictures: their checks before a computation, and their writing after it."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ def check_outputs(
     files: Iterable[str | os.PathLike[str] | None],
     pictures: Iterable[str | os.PathLike[str] | None] = (),
 ) -> None:
-    """Check that output files can be written and replace neither an input file nor another output.
+    """Check that output files can be written, and that they replace neither an input file nor another output.
 
-    Each command that writes files calls this function before it opens any file. `read` are the input files, and None stands
-    for no file. Files are identified by device and inode, so that links to a file are recognised as the same file.
+    Each command that writes files calls this function before it opens any file. `read` are the input files; entries of None
+    are ignored. Files are identified by device and inode, so that links to a file are recognised as the same file.
 
     Raises FileError if a folder is missing or write-protected, if a path is a folder, an input file or another output, or
     if the format of a picture is unknown; FastcontactError if Matplotlib is missing.
     """
     from fastcontact._tools.paths import checked_target, is_stream
 
-    drawn = [str(path) for path in pictures if path]
-    sources = {_identity(Path(os.path.realpath(path))) for path in read if path}
-    seen: set[object] = set()
-    for path in [*(str(path) for path in files if path), *drawn]:
+    picture_paths = [str(path) for path in pictures if path]
+    inputs = {_identity(Path(os.path.realpath(path))) for path in read if path}
+    outputs: set[object] = set()
+    for path in [*(str(path) for path in files if path), *picture_paths]:
         if is_stream(path):
             continue
         identity = _identity(checked_target(path))
-        if identity in sources:
+        if identity in inputs:
             raise FileError(f"'{path}' is what this command reads: name another file to write")
-        if identity in seen:
+        if identity in outputs:
             raise FileError(f"two outputs are to be written to '{path}': name another file for one of them")
-        seen.add(identity)
-    if drawn:
-        _check_formats(drawn)
+        outputs.add(identity)
+    if picture_paths:
+        _check_formats(picture_paths)
 
 
 def _identity(path: Path) -> object:
-    """Return device and inode of a file; for a new file, the identity of its folder and its name."""
+    """Return the device and the inode of a file or, for a new file, the identity of its folder and its name."""
     try:
         status = path.stat()
     except OSError:
@@ -58,20 +58,21 @@ def _identity(path: Path) -> object:
 
 
 def _check_formats(paths: list[str]) -> None:
+    """Raise FileError if Matplotlib does not know the format of a picture, and FastcontactError without Matplotlib."""
     try:
         from matplotlib.backend_bases import FigureCanvasBase
     except (ImportError, ValueError) as error:
         from fastcontact.results.plot._axes import without_matplotlib
 
         raise without_matplotlib(error) from error
-    known = FigureCanvasBase.get_supported_filetypes()
+    formats = FigureCanvasBase.get_supported_filetypes()
     for path in paths:
-        if Path(path).suffix[1:].lower() not in known:
+        if Path(path).suffix[1:].lower() not in formats:
             raise FileError(f"'{path}' has a suffix that no kind of picture has: use .png, .svg or .pdf")
 
 
 def write_text(path: str, content: str) -> None:
-    """Write a string to a stream, or to a file completely or not at all; FileError if it cannot be written."""
+    """Write a string to a stream or atomically to a file; FileError if it cannot be written."""
     from fastcontact._tools.paths import replacing
 
     with replacing(path) as target:
@@ -79,7 +80,7 @@ def write_text(path: str, content: str) -> None:
 
 
 def say_written(options: Any, *paths: object) -> None:
-    """Print the names of the files written, unless ``--quiet`` is set; None means no file."""
+    """Print the names of the files written, unless ``--quiet`` is set; paths of None are ignored."""
     if not options.quiet:
         say(f"wrote {', '.join(str(path) for path in paths if path)}")
 
@@ -92,7 +93,7 @@ def write_json(path: str, numbers: Any, indent: int = 2) -> None:
 def save(axes: Any, path: str) -> None:
     """Write the figure of `axes` to `path`; FileError if it cannot be written or its format is unknown.
 
-    Warnings of Matplotlib, for example about characters missing in a font, are printed in one line each.
+    Each warning of Matplotlib, for example about a character that is missing in a font, is printed in one line.
     """
     from fastcontact._tools.paths import replacing
 
@@ -117,7 +118,7 @@ def profile_picture(case: Any, step: StepResult, path: str) -> None:
 
 
 def draw_profile(contact: ContactResult, step: StepResult, theories: dict[str, Any], path: str, title: str) -> None:
-    """Plot the pressure of a contact pair and theories, which are given by label of the legend."""
+    """Plot the pressure of a contact pair and of theories, which are given by their label in the legend."""
     from fastcontact.results import plot
     from fastcontact.results.tables import normal_stress
 

@@ -1,4 +1,4 @@
-"""Functions for commands that read result files: choice of step and contact pair, and the case stored in the file."""
+"""Common functions of commands that read result files: selection of step and contact pair, and the stored case."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.cli._terminal import say
 from fastcontact.errors import CaseError, check_known
 
-# Arguments that choose a step and a contact pair.
+# Arguments that select a step and a contact pair.
 ARGUMENTS = {
     "file": "result file (.vtkhdf)",
     "--step STEP": (-1, "number of the step, from 1; by default the last"),
@@ -33,9 +33,9 @@ def chosen_step(results: Any, number: int) -> Any:
 
 
 def chosen_contact(options: argparse.Namespace, step: Any) -> str:
-    """Return the name of the contact pair in the options, by default the first pair.
+    """Return the name of the contact pair that the options select, by default the first pair.
 
-    If the first of several pairs is chosen by default, the names of the others are printed. Raises CaseError if there is no
+    If the first of several pairs is selected by default, the names of the others are printed. Raises CaseError if there is no
     contact pair, or none with the name.
     """
     if not step.contact:
@@ -45,14 +45,14 @@ def chosen_contact(options: argparse.Namespace, step: Any) -> str:
         return str(options.contact)
     name, *others = step.contact
     if others and not options.quiet:
-        listed = ", ".join(f"'{other}'" for other in others)
-        text = f"contact '{name}', the first of {len(step.contact)}; others: {listed} (choose with --contact NAME)"
+        quoted = ", ".join(f"'{other}'" for other in others)
+        text = f"contact '{name}', the first of {len(step.contact)}; others: {quoted} (choose with --contact NAME)"
         say(text, error=True)
     return str(name)
 
 
 def case_data(results: Any) -> dict[str, Any]:
-    """Return title, theories, approaches and ramp of the case stored in the file; defaults if there is no case."""
+    """Return title, theories, approaches and ramp of the case that a result file stores; defaults if it stores none."""
     from fastcontact.cases.case import described
 
     try:
@@ -79,15 +79,15 @@ def pressure_curves(
     contact : ContactResult
         Contact to compare with.
     approach : float, optional
-        Approach of the case at load multiplier 1 [length]; None if the theory is given by a force or has no load.
+        Approach [length] of the case at load multiplier 1; None if the theory is given by a force or has no load.
     load : float
         Load multiplier of the step [-].
 
     Returns
     -------
     dict
-        Theories by label of the legend; empty if the pressure of the theory cannot be drawn. For finite half-spheres it
-        contains Hertz's theory.
+        Theories by label in the legend; empty if no pressure curve of the theory is known. For finite half-spheres these are
+        solutions of Hertz's theory.
     """
     theory: Any = theories.get("theory")
     theory = theory if pressure_curve(theory) is not None else getattr(theory, "hertz", None)
@@ -99,8 +99,8 @@ def pressure_curves(
     return compared(curve.name, theory, contact, theories["share"], approach=approach, load=load)
 
 
-def drawn(theory: Any) -> PressureCurve:
-    """Return the pressure curve of a theory from `pressure_curves`."""
+def curve_of(theory: Any) -> PressureCurve:
+    """Return the pressure curve of a theory that `pressure_curves` has returned."""
     curve = pressure_curve(theory)
     assert curve is not None
     return curve
@@ -109,10 +109,10 @@ def drawn(theory: Any) -> PressureCurve:
 def compared(
     name: str, theory: Any, contact: Any, share: float, *, approach: float | None, load: float
 ) -> dict[str, Any]:
-    """Return a theory at the approach and at the force of a contact, where these are known, by label of the legend.
+    """Return a theory at the approach and at the force of a contact, as far as these are known, by label in the legend.
 
-    `share` is the fraction of the contact that the model represents [-]. The `approach` [length] is reached at load
-    multiplier 1, and `load` is the multiplier of the step [-].
+    `share` [-] is the fraction of the contact that the model represents. The `approach` [length] is reached at load
+    multiplier 1, and `load` [-] is the multiplier of the step.
     """
     curves, force = {}, float(np.linalg.norm(contact.force)) / share
     if approach is not None and load == 1.0:

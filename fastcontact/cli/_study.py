@@ -1,4 +1,4 @@
-"""Common parts of the commands for studies: arguments, executors, interruption and output files."""
+"""Common functions of the commands for studies: arguments, executors, interruption and output files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 from fastcontact.cli._interrupts import to_main_thread
 from fastcontact.cli._outputs import check_outputs, save, write_json, write_text
-from fastcontact.cli._terminal import say, somebody_watches
+from fastcontact.cli._terminal import say, stderr_is_terminal
 from fastcontact.errors import CaseError, FastcontactError
 
 MPI_COMMAND = "mpiexec -n N python -m mpi4py.futures -m fastcontact ..."
@@ -20,9 +20,9 @@ MPI_COMMAND = "mpiexec -n N python -m mpi4py.futures -m fastcontact ..."
 
 @contextlib.contextmanager
 def executor(where: str) -> Iterator[Any]:
-    """Yield an executor, or None for local processes, and shut it down at the end.
+    """Yield the executor that ``--executor`` names, or None for local processes, and shut it down at the end.
 
-    Raises CaseError if `where` is unknown, the library is not installed, no process can be started, a process is lost, or no
+    Raises CaseError if the name is unknown, the library is not installed, no process can be started, a process is lost, or no
     scheduler answers at the address.
     """
     if where == "processes":
@@ -48,10 +48,10 @@ def executor(where: str) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _mpi() -> Iterator[Any]:
-    """Yield the executor of MPI.
+    """Yield the executor of MPI; CaseError if a process is lost.
 
-    Most launchers end all processes when a process dies. With other launchers the communication thread of mpi4py fails, and
-    the main thread would wait for the remaining runs without end.
+    Most launchers end all processes when one of them dies. With other launchers only the communication thread of mpi4py
+    fails, and without an interruption the main thread would wait for the remaining runs forever.
     """
     try:
         from mpi4py.futures import MPIPoolExecutor
@@ -75,7 +75,7 @@ def _mpi() -> Iterator[Any]:
 def _failing_threads_interrupt() -> Iterator[list[BaseException]]:
     """Interrupt the main thread when another thread fails; yield a list that collects the errors, which are not printed."""
     failures: list[BaseException] = []
-    before = threading.excepthook
+    original = threading.excepthook
 
     def failed(arguments: threading.ExceptHookArgs) -> None:
         if arguments.exc_value is not None:
@@ -86,7 +86,7 @@ def _failing_threads_interrupt() -> Iterator[list[BaseException]]:
     try:
         yield failures
     finally:
-        threading.excepthook = before
+        threading.excepthook = original
 
 
 # Arguments for output files and execution.
@@ -106,25 +106,25 @@ ARGUMENTS = {
 
 
 def check_targets(options: argparse.Namespace, *also: str | None) -> None:
-    """Check before the study that its output files can be written; errors as for `check_outputs`."""
+    """Check before a study that its output files and those in `also` can be written; errors as for `check_outputs`."""
     from fastcontact.cases.case import files_of_case
 
     check_outputs(files_of_case(options.case), [options.json, options.csv, options.html, *also], [options.png])
 
 
 def names(text: str | None) -> list[str] | None:
-    """Return the names in a comma-separated text, or None for None and an empty text."""
+    """Return the names in a comma-separated text, or None if there is no text."""
     return [name.strip() for name in text.split(",") if name.strip()] if text else None
 
 
 def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
-    """Run a study on the executor of the options and return its result.
+    """Return the result of a study, which runs on the executor of the options.
 
-    After an interruption, FastcontactError is raised with a message on how to resume.
+    An interruption raises FastcontactError with a message on how to resume.
     """
     from fastcontact.studies.execute import Runs
 
-    progress = Runs(show=somebody_watches() and not options.quiet)
+    progress = Runs(show=stderr_is_terminal() and not options.quiet)
     try:
         with executor(options.executor) as where:
             return study(executor=where, workers=options.workers, store=options.store, on_progress=progress)
@@ -140,10 +140,10 @@ def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
 def report(
     options: argparse.Namespace, result: Any, hint: str, failures: Sequence[str] = (), also: Sequence[str] = ()
 ) -> int:
-    """Write the files of the options and return the exit code.
+    """Write the files of the options, print the result and return the exit code.
 
-    The messages of failed runs, the lines of the result and the names of the files are printed. `also` are the names of files
-    written earlier. The `hint` is printed if no file was written.
+    The messages of failed runs (`failures`), the lines of the result and the names of the files are printed. `also` are the
+    names of files written earlier, and `hint` is printed if no file was written.
     """
     if options.json:
         write_json(options.json, result.as_dict())

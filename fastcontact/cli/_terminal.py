@@ -1,4 +1,4 @@
-"""Printing on terminals, warnings included, with control characters escaped.
+"""Output of text and warnings on terminals, with control characters escaped.
 
 Names and titles from files may contain escape sequences, which could change the display or the behaviour of a terminal, and
 bidirectional control characters, which could hide part of a line (Boucher and Anderson, 2023). Characters that the encoding
@@ -18,7 +18,7 @@ from typing import TextIO
 from fastcontact.errors import FastcontactWarning, FileError, printable
 
 
-def somebody_watches() -> bool:
+def stderr_is_terminal() -> bool:
     """Return whether standard error exists and is a terminal."""
     return sys.stderr is not None and sys.stderr.isatty()
 
@@ -29,7 +29,7 @@ def say(text: object, *, error: bool = False) -> None:
     Raises FileError if writing to standard output fails, and BrokenPipeError if the process that reads it has exited.
     """
     stream: TextIO | None = sys.stderr if error else sys.stdout
-    if stream is None:  # closed before the process was started
+    if stream is None:  # it was closed before the process started
         return
     try:
         print(encodable(printable(str(text)), stream), file=stream)
@@ -58,7 +58,7 @@ def flushed(code: int) -> int:
 
 
 def _unwritten(error: OSError) -> str:
-    """Return the message for a failed write to standard output, for example on a full disk."""
+    """Return the message about a failed write to standard output, for example on a full disk."""
     return f"cannot write to standard output ({error.strerror}): redirect it"
 
 
@@ -73,7 +73,7 @@ log = logging.getLogger("fastcontact")
 
 @contextlib.contextmanager
 def warnings_shown() -> Iterator[list[str]]:
-    """Log each distinct warning of the library once, in one line, when it is issued; yield a list of their texts."""
+    """Log each distinct warning of the package once, in one line, when it is issued; yield a list of the texts."""
     texts: list[str] = []
     with warnings.catch_warnings():
         warnings.simplefilter("always", FastcontactWarning)

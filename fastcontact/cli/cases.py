@@ -44,12 +44,11 @@ def _lines(path: Path) -> list[str]:
     from fastcontact.cases.summary import count
 
     case = read_case(path)
-    solid = sum(map(len, case.mesh.solids.values()))
+    n_solids = sum(map(len, case.mesh.solids.values()))
     kinematics = case.model.kinematics.replace("_", " ")
-    kinds = ", ".join(case.mesh.solids)
     return [
         f"{case.name}: {case.title}",
-        f"    {kinematics}, {solid} {kinds}, {count(len(case.ramp), 'load step')}",
+        f"    {kinematics}, {n_solids} {', '.join(case.mesh.solids)}, {count(len(case.ramp), 'load step')}",
         *(f"    checks {check.described()}" for check in case.checks),
     ]
 

@@ -1,4 +1,4 @@
-"""``fastcontact converge``: mesh-convergence study of a case, with its deviation from theory."""
+"""``fastcontact converge``: mesh-convergence study of a case, on uniform or on adaptive meshes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import dataclasses
 from functools import partial
 
 from fastcontact.cli import _study
-from fastcontact.cli._terminal import somebody_watches, warnings_shown
+from fastcontact.cli._terminal import stderr_is_terminal, warnings_shown
 from fastcontact.errors import CaseError
 
 HELP = "mesh-convergence study: orders, limits with error bars, model error and mesh error"
@@ -59,7 +59,7 @@ def _adaptive(options: argparse.Namespace) -> int:
             element=_only(options.elements, "element"),
             formulation=_only(options.formulations, "formulation"),
             max_dofs=options.max_dofs,
-            progress=somebody_watches() and not options.quiet,
+            progress=stderr_is_terminal() and not options.quiet,
         )
     if options.output:
         from fastcontact.results.writer import ResultWriter
@@ -71,6 +71,7 @@ def _adaptive(options: argparse.Namespace) -> int:
 
 
 def _only(text: str | None, option: str) -> str | None:
+    """Return the name in a text, or None if there is no text; CaseError for several names."""
     names = _study.names(text) or []
     if len(names) > 1:
         raise CaseError(f"adaptive meshes take one {option}, not {len(names)}: {text}")

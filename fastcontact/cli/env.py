@@ -8,7 +8,7 @@ import signal
 import tempfile
 import time
 
-from fastcontact.cli._terminal import say, somebody_watches
+from fastcontact.cli._terminal import say, stderr_is_terminal
 from fastcontact.errors import FastcontactError
 
 HELP = "show versions, threads and the cache folder of compiled kernels"
@@ -28,28 +28,33 @@ def run(options: argparse.Namespace) -> int:
     say(f"{'cache':<12} {getattr(files, 'folder', 'none: kernels compile in every process')}")
     if options.warmup:
         started = time.perf_counter()
-        done = _warm_up(show=somebody_watches() and not options.quiet)
+        done = _warm_up(show=stderr_is_terminal() and not options.quiet)
         say(f"{'warm-up':<12} {done} kernels, {time.perf_counter() - started:.1f} s")
     return 0
 
 
 def _warm_up(show: bool) -> int:
-    """Compile all registered kernels, with one process per thread, and return their number."""
+    """Compile all registered kernels in as many processes as there are threads, and return the number of kernels."""
     from fastcontact._jit import ahead, decorators
     from fastcontact.analysis.progress import StatusLine
 
-    total, ours, writing_end, done = len(ahead.kernels_of(())), *os.pipe(), 0
+    total, reading_end, writing_end, done = len(ahead.kernels_of(())), *os.pipe(), 0
     with tempfile.TemporaryFile("w+", encoding="utf-8") as errors:
         processes = ahead.start((), decorators.threads(), writing_end, errors.fileno())
         os.close(writing_end)
-        with open(ours, encoding="ascii") as lines, StatusLine(len("compiling kernels: 000 of 000"), show) as status:
+        with (
+            open(reading_end, encoding="ascii") as lines,
+            StatusLine(len("compiling kernels: 000 of 000"), show) as status,
+        ):
             for done, _ in enumerate(lines, start=1):
                 status.draw(f"compiling kernels: {done} of {total}")
         failed = [code for code in (process.wait() for process in processes) if code]
         errors.seek(0)
         error_lines = errors.read().split("\n")
     if failed:
-        how = f"by {signal.Signals(-failed[0]).name}" if failed[0] < 0 else f"with exit code {failed[0]}"
-        why = next(filter(None, reversed(error_lines)), "the memory may have been full")
-        raise FastcontactError(f"a process that compiles kernels ended {how}, {done} of {total} kernels begun: {why}")
+        manner = f"by {signal.Signals(-failed[0]).name}" if failed[0] < 0 else f"with exit code {failed[0]}"
+        reason = next(filter(None, reversed(error_lines)), "the memory may have been full")
+        raise FastcontactError(
+            f"a process that compiles kernels ended {manner}, {done} of {total} kernels begun: {reason}"
+        )
     return done

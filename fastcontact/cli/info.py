@@ -62,9 +62,9 @@ def _contacts(options: argparse.Namespace) -> int:
     from fastcontact.results import plot
 
     path = Path(options.file)
-    case = path.suffix.lower() == ".toml" or (path.suffix.lower() == ".inp" and _is_deck(path))
-    check_outputs(files_of_case(options.file) if case else [options.file], [], [options.png])
-    mesh = read_case(options.file).mesh if case else _mesh_of(options.file)
+    is_case = path.suffix.lower() == ".toml" or (path.suffix.lower() == ".inp" and _is_deck(path))
+    check_outputs(files_of_case(options.file) if is_case else [options.file], [], [options.png])
+    mesh = read_case(options.file).mesh if is_case else _mesh_of(options.file)
     contacts = find_contacts(mesh, distance=options.distance, angle=options.angle)
     say(str(contacts))
     if options.png:
@@ -89,12 +89,13 @@ def _is_deck(path: Path) -> bool:
     """Return whether an Abaqus file contains steps, parts or included files in addition to a mesh."""
     from fastcontact._tools.paths import existing_file
 
-    words = ("*STEP", "*PART", "*INCLUDE")
+    keywords = ("*STEP", "*PART", "*INCLUDE")
     with open(existing_file(path), encoding="utf-8", errors="replace") as file:
-        return any(line.lstrip().upper().startswith(words) for line in file)
+        return any(line.lstrip().upper().startswith(keywords) for line in file)
 
 
 def _mesh_lines(mesh: Any) -> list[str]:
+    """Return lines with the numbers of points and cells, and the groups of a mesh."""
     cells = ", ".join(f"{len(block)} {name}" for name, block in mesh.cells.items())
     rows = [f"{mesh.n_points} points in {mesh.dim}D; cells: {cells}"]
     rows += [f"  cells  {name:<16} {len(members):>8}" for name, members in mesh.cell_groups.items()]
@@ -103,6 +104,7 @@ def _mesh_lines(mesh: Any) -> list[str]:
 
 
 def _result_lines(results: Any) -> Iterator[str]:
+    """Yield lines on the versions, the completeness, the steps and the warnings of a result file."""
     versions = ", ".join(f"{name} {version}" for name, version in results.versions.items())
     yield f"{len(results)} steps, {results.kinematics}; versions: {versions}"
     if results.error:

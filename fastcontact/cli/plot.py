@@ -1,4 +1,4 @@
-"""``fastcontact plot``: plots of the deformed mesh with a field, of sections, of the contact and of its history."""
+"""``fastcontact plot``: pictures and animations of the deformed mesh, of sections, and of the contact and its history."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from fastcontact.cli._outputs import check_outputs, save, say_written
 from fastcontact.errors import CaseError
 
 HELP = "plot the deformed mesh with a field, a section, the contact, or its history over the load steps"
-# Options that draw a contact pair.
-OF_CONTACT = ("history", "axis", "zones", "map")
+# Options that plot a contact pair instead of the bodies.
+CONTACT_PLOTS = ("history", "axis", "zones", "map")
 ARGUMENTS = {
     **_results.ARGUMENTS,
     "--png FILE": "write the picture to this file",
@@ -59,10 +59,10 @@ def run(options: argparse.Namespace) -> int:
             return 0
         if options.animate:
             _animate(options, results, step, case)
-        elif any(getattr(options, name) for name in OF_CONTACT):
-            save(_of_contact(options, results, step, case), options.png)
+        elif any(getattr(options, name) for name in CONTACT_PLOTS):
+            save(_contact_plot(options, results, step, case), options.png)
         else:
-            save(_of_bodies(options, results, step, case, plane), options.png)
+            save(_body_plot(options, results, step, case, plane), options.png)
     say_written(options, options.animate or options.png)
     return 0
 
@@ -77,26 +77,27 @@ def _plane(text: str) -> tuple[int, float]:
 
 
 def _animate(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> None:
+    """Write the animation over the load steps or, with ``--phases``, over a period of vibration."""
     from fastcontact.results import plot
     from fastcontact.results.step import phases
 
-    shown = list(results) if options.phases is None else phases(step, options.phases)
+    frames = list(results) if options.phases is None else phases(step, options.phases)
     plot.animate(
-        results.mesh, shown, options.animate, field=options.field, scale=options.scale,
+        results.mesh, frames, options.animate, field=options.field, scale=options.scale,
         mirrored=options.mirrored, title=case["title"], pictures_per_second=5 if options.phases is None else 12,
     )  # fmt: skip
 
 
-def _of_bodies(
+def _body_plot(
     options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any], plane: tuple[int, float] | None
 ) -> Any:
-    """Draw the deformed mesh, or a section through it."""
+    """Return a plot of the deformed mesh, or of a section through it."""
     from fastcontact.results import plot
     from fastcontact.results.plot.shape import scale_of
 
-    at = f"section {options.section}, " if plane else ""
+    section = f"section {options.section}, " if plane else ""
     scale = scale_of(options.scale, results.mesh, [step])
-    title = f"{case['title']}\n{at}{step.instant}, displacements x {scale:g}".strip()
+    title = f"{case['title']}\n{section}{step.instant}, displacements x {scale:g}".strip()
     labels = {"field": options.field, "scale": scale, "zoom": options.zoom, "title": title}
     if plane is None:
         return plot.deformed_shape(results.mesh, step, mirrored=options.mirrored, **labels)
@@ -105,8 +106,8 @@ def _of_bodies(
     return plot.section(results.mesh, step, point, normal, **labels)
 
 
-def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
-    """Draw the map, the zones or the history of a contact pair, or the stresses on the axis below it."""
+def _contact_plot(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
+    """Return a plot of the map, the zones or the history of a contact pair, or of the stresses on the axis below it."""
     from fastcontact.results import plot
 
     labels = {"title": case["title"]}
@@ -119,17 +120,17 @@ def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict
     if options.zones:
         return plot.contact_zones(list(results), name, **labels)
     if options.history:
-        given = {"approach": case["approach"].get(name), "share": theories.get("share", 1.0)}
-        return plot.history(list(results), name, law=_results.law(theories), **given, **labels)[0]
+        reference = {"approach": case["approach"].get(name), "share": theories.get("share", 1.0)}
+        return plot.history(list(results), name, law=_results.law(theories), **reference, **labels)[0]
     labels["title"] = f"{case['title']}\nstresses on the axis, {step.instant}".strip()
     return plot.axis_stress(results.mesh, step, name, _axis_curves(theories, step, name, case), **labels)
 
 
 def _axis_curves(theories: dict[str, Any], step: Any, name: str, case: dict[str, Any]) -> dict[str, Any]:
-    """Return theories of the stresses on the axis, at equal approach and at equal force, by label of the legend."""
+    """Return theories of the stresses on the axis, at equal approach and at equal force, by label in the legend."""
     theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
     if theory is None or not hasattr(theory, "stress_on_axis"):
         return {}
-    given = {"approach": case["approach"].get(name), "load": _results.load_multiplier(case["ramp"], step)}
-    return _results.compared("theory", theory, step.contact[name], theories["share"], **given) or {"theory": theory}
+    state = {"approach": case["approach"].get(name), "load": _results.load_multiplier(case["ramp"], step)}
+    return _results.compared("theory", theory, step.contact[name], theories["share"], **state) or {"theory": theory}

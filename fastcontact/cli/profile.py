@@ -1,4 +1,4 @@
-"""``fastcontact profile``: pressure along the contact line and its theory, as a table, an XMGRACE file or a picture."""
+"""``fastcontact profile``: computed and theoretical pressure along the contact, as a table, XMGRACE file or picture."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact.cli import _results
 from fastcontact.cli._outputs import check_outputs, draw_profile, say_written
-from fastcontact.cli._results import drawn, load_multiplier, pressure_curves
+from fastcontact.cli._results import curve_of, load_multiplier, pressure_curves
 from fastcontact.cli._terminal import say
 
 HELP = "pressure along the contact line against theory: CSV, XMGRACE .agr, PNG"
@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
     theories = pressure_curves(case["theories"].get(name, {}), contact, approach=case["approach"].get(name), load=load)
     for label, theory in theories.items():
         column = f"pressure_{label.replace(', ', '_').replace(' ', '_').replace('é', 'e')}"
-        table = with_column(table, column, drawn(theory).pressure(table["radius"]))
+        table = with_column(table, column, curve_of(theory).pressure(table["radius"]))
     if options.csv:
         write_csv(options.csv, table)
     if options.agr:
@@ -52,6 +52,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _print(table: Any) -> None:
+    """Print the main columns of a table."""
     names = [name for name in table.dtype.names if name in ("point", "x", "y", "gap", "pressure", "active")]
     names += [name for name in table.dtype.names if name.startswith("pressure_")]
     say("  ".join(f"{name:>14}" for name in names))
@@ -60,6 +61,7 @@ def _print(table: Any) -> None:
 
 
 def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, Any]) -> None:
+    """Write an XMGRACE project with the computed pressure and that of theories by label."""
     from fastcontact.results.units import labelled
     from fastcontact.results.xmgrace import Curve, write_agr
 
@@ -68,7 +70,7 @@ def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theorie
     style = "line+symbols" if contact.coordinates.shape[1] == 2 else "symbols"
     curves = [Curve(position, contact.pressure[order], "computed", style=style)]
     for label, theory in theories.items():
-        curve = drawn(theory)
+        curve = curve_of(theory)
         end = min(curve.radius, float(np.abs(position).max()))
         x = np.unique(np.concatenate([position[[0, -1]], np.linspace(max(-end, min(position[0], 0.0)), end, 200)]))
         curves.append(Curve(x, curve.pressure(np.abs(x)), label))

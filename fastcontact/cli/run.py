@@ -1,4 +1,4 @@
-"""``fastcontact run``: solve a case file."""
+"""``fastcontact run``: solve a case file or an input deck."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
-from fastcontact.cli._terminal import say, somebody_watches, warnings_shown
+from fastcontact.cli._terminal import say, stderr_is_terminal, warnings_shown
 from fastcontact.errors import CaseError, ConvergenceError, FileError, ModelError, in_file, warn
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 HELP = "solve a case file or an input deck (.inp) and write the results of all steps"
 # Name of the cell field with the estimated error.
 ERROR_FIELD = "error"
-# Smallest number of mesh points for which steps are written in the background while the next step is solved.
+# Smallest number of mesh points for which a step is written in the background while the next one is solved.
 LARGE = 30_000
 ARGUMENTS = {
     "case": "case file (TOML), the name of a ready-made case (see 'fastcontact cases'), or a deck (.inp)",
@@ -87,7 +87,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _checked_study(case: Case) -> list[str]:
-    """Return the warnings from a check of the study of a case; an empty list if it has none."""
+    """Return the warnings from a check of the table ``[study]`` of a case; an empty list without this table."""
     if case.deck is not None or "study" not in case.text:
         return []
     from fastcontact.studies.checks import check_study
@@ -98,7 +98,7 @@ def _checked_study(case: Case) -> list[str]:
 
 
 def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
-    """Compute the modes that the case or the command requests, write them to their file and return them, or None."""
+    """Return the natural modes that the case or the command requests, after writing them to the file of the options."""
     arguments = {**(case.modes or {}), **_diameters(options.nodal_diameters)}
     if case.modes is None and not options.modes and not arguments:
         return None
@@ -143,21 +143,19 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int,
     ) as writer:
         _check_same(case, writer.done, output)
         last = writer.done[-1] if writer.done else None
-        done = [
-            (of_step(step), step.warnings) for step in writer.done
-        ]  # each step, which may be large, is read only once
+        done = [(of_step(step), step.warnings) for step in writer.done]  # each step, which may be large, is read once
         steps = [summary for summary, _ in done]
         _warn_of_other_steps(case, [summary["load_factor"] for summary in steps], output)
         total = len(steps) + len(remaining(case.ramp, last))
-        progress = Progress(total, show=somebody_watches() and not options.quiet, done=len(steps))
+        progress = Progress(total, show=stderr_is_terminal() and not options.quiet, done=len(steps))
         try:
-            chosen = {**case.solution, "linear_solver": options.linear or case.linear_solver}
-            for last in solve_steps(case.model, case.ramp, **chosen, resume=writer.done):
+            settings = {**case.solution, "linear_solver": options.linear or case.linear_solver}
+            for last in solve_steps(case.model, case.ramp, **settings, resume=writer.done):
                 last = case.finished(last)
                 error = {ERROR_FIELD: estimate_error(case.model, last).cells} if fields else {}
                 writer.write(dataclasses.replace(last, cell_fields=error) if fields else last)
                 steps.append(of_step(last))
-                progress.step(last, writer.n_steps)  # steps in the background thread are not counted
+                progress.step(last, writer.n_steps)  # n_steps excludes steps that are still being written
             writer.wait()
         except (ConvergenceError, KeyboardInterrupt) as error:
             _stopped(error, writer, output, options.json)
@@ -168,14 +166,14 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int,
 
 
 def _stopped(error: BaseException, writer: ResultWriter, output: Path, summary: str | None) -> None:
-    """Add the number of complete steps to an error, and write it to the summary file."""
+    """Add a note on the number of complete steps to an error, and write both to the summary file."""
     try:
         writer.wait()
     except FileError as failure:
         error.add_note(str(failure))
-    many = "one complete step" if writer.n_steps == 1 else f"all {writer.n_steps} complete steps"
-    kept = f"keeps {many}: 'fastcontact run --resume' continues from there"
-    error.add_note(f"'{output}' {kept if writer.n_steps else 'contains no complete step'}")
+    steps = "one complete step" if writer.n_steps == 1 else f"all {writer.n_steps} complete steps"
+    content = f"keeps {steps}: 'fastcontact run --resume' continues from there"
+    error.add_note(f"'{output}' {content if writer.n_steps else 'contains no complete step'}")
     if summary:  # replaces the summary of an earlier run
         write_json(summary, {"failed": str(error) or "interrupted from the keyboard", "complete_steps": writer.n_steps})
 
@@ -192,20 +190,20 @@ def _check_same(case: Any, done: Sequence[Any], output: Path) -> None:
 
 
 def _warn_of_other_steps(case: Case, done: Sequence[float], output: Path) -> None:
-    """Warn if an existing step has a load factor that is not in the case."""
-    known = case.ramp.instants
-    others = [factor for factor in done if not any(math.isclose(factor, instant, rel_tol=1e-9) for instant in known)]
+    """Warn if a step in the result file has a load factor that the ramp of the case does not contain."""
+    instants = case.ramp.instants
+    others = [factor for factor in done if not any(math.isclose(factor, t, rel_tol=1e-9) for t in instants)]
     if others:
         warn(
-            f"'{output}' contains {len(done)} steps, the case now has {len(known)}: those in the file are kept, with that at "
-            f"load factor {others[0]:g}, which is not in the case; without --resume all steps are solved again"
+            f"'{output}' contains {len(done)} steps, the case now has {len(instants)}: those in the file are kept, with that "
+            f"at load factor {others[0]:g}, which is not in the case; without --resume all steps are solved again"
         )
 
 
 def _written(output: Path, done: int, total: int, others: list[str]) -> str:
-    """Return a message on the files written and the number of earlier steps."""
+    """Return a message on the files written, with the number of steps `done` before the run."""
     if done == total:
         message = f"{output} was complete with {total} steps, no step remained to be solved"
         return "; wrote ".join([message, ", ".join(others)] if others else [message])
-    after = f" (resumed after step {done})" if done else ""
-    return f"wrote {', '.join([f'{output}{after}', *others])}"
+    resumed = f" (resumed after step {done})" if done else ""
+    return f"wrote {', '.join([f'{output}{resumed}', *others])}"

@@ -32,46 +32,47 @@ def run(options: argparse.Namespace) -> int:
     from fastcontact.studies.runs import parameter_sweep
 
     _study.check_targets(options)
-    wanted: dict[str, list[Any]] = {}
-    for name, listed in map(values, options.set):
-        if name in wanted:
+    parameters: dict[str, list[Any]] = {}
+    for name, parameter_values in map(values, options.set):
+        if name in parameters:
             raise CaseError(f"--set {name} is given twice: give all its values at once, as in {name}=1,2,5")
-        wanted[name] = listed
-    chosen = {"element": options.element, "formulation": options.formulation, "level": options.level}
-    sweep = _study.finished(options, partial(parameter_sweep, options.case, wanted, **chosen))
+        parameters[name] = parameter_values
+    model = {"element": options.element, "formulation": options.formulation, "level": options.level}
+    sweep = _study.finished(options, partial(parameter_sweep, options.case, parameters, **model))
     return _study.report(options, sweep, "--png FILE writes a picture", [text for _, text in sweep.failed])
 
 
 def values(text: str) -> tuple[str, list[Any]]:
     """Return the parameter and the values of a string ``NAME=VALUES``; CaseError for other strings."""
-    name, equals, listed = text.partition("=")
-    if not (name and equals and listed):
+    name, _, entries = text.partition("=")
+    if not (name and entries):
         raise CaseError(f"--set '{text}' must be NAME=VALUES, for example approach=0.04,0.4,4")
-    if ":" in listed:
-        return name.strip(), _range(text, listed.split(":"))
-    return name.strip(), [_value(entry.strip()) for entry in listed.split(",") if entry.strip()]
+    if ":" in entries:
+        return name.strip(), _range(text, entries.split(":"))
+    return name.strip(), [_value(entry.strip()) for entry in entries.split(",") if entry.strip()]
 
 
 def _range(text: str, fields: list[str]) -> list[float]:
+    """Return the values of a range FIRST:LAST:COUNT with or without log, given by its fields; CaseError if invalid."""
     from fastcontact.studies.checks import check_runs
 
     logarithmic = fields[-1] == "log"
     try:
         first, last, count = float(fields[0]), float(fields[1]), int(fields[2])
-        if len(fields) != 3 + logarithmic or count < 1 or (logarithmic and first * last <= 0):
+        if len(fields) != 3 + logarithmic or count < 1 or not (math.isfinite(first) and math.isfinite(last)):
             raise ValueError
-        if not (math.isfinite(first) and math.isfinite(last)):
+        if logarithmic and first * last <= 0:
             raise ValueError
     except (ValueError, IndexError):
         raise CaseError(
             f"--set '{text}': a range is FIRST:LAST:COUNT or FIRST:LAST:COUNT:log, for example approach=0.004:4:7:log"
         ) from None
     check_runs(count)
-    spread = np.geomspace if logarithmic else np.linspace
-    return [float(value) for value in spread(first, last, count)]
+    return (np.geomspace if logarithmic else np.linspace)(first, last, count).tolist()
 
 
 def _value(text: str) -> Any:
+    """Return a text as a Boolean, an integer or a number if it represents one, otherwise unchanged."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):

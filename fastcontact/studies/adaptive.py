@@ -1,4 +1,4 @@
-"""Adaptive mesh refinement: solve, estimate the error and refine in turn, until a quantity is accurate enough."""
+"""Adaptive mesh refinement: a case is solved on meshes that are refined where the error is large for a quantity."""
 
 from __future__ import annotations
 
@@ -44,17 +44,17 @@ class Round:
     n_cells : int
         Number of cells.
     values : dict of str to float
-        Value of each quantity [units of the case].
+        Value of each quantity, in the units of the case.
     theory : dict of str to float
-        Value of each quantity in the theory at equal approach [units of the case].
+        Value of each quantity in the theory at equal approach.
     reference : dict of str to float
-        Value of each quantity in the mesh-converged solution of the case [units of the case].
+        Value of each quantity in the mesh-converged solution of the case.
     energy_error : float
-        Estimated relative error of the solution in the energy norm [-].
+        Estimated relative error [-] of the solution in the energy norm.
     estimate : float
-        Estimated relative error of the quantity of interest [-]; NaN on the first two meshes.
+        Estimated relative error [-] of the quantity of interest; NaN on the first two meshes.
     seconds : float
-        Wall time of the solution and the estimate [s].
+        Wall time [s] of the solution and the estimate.
     """
 
     n_dofs: int
@@ -96,7 +96,7 @@ class AdaptiveStudy(Report):
     tolerance : float
         Requested relative error [-].
     reached : bool
-        Whether the estimated error is at most the tolerance.
+        True if the estimated error of the quantity is at most the tolerance.
     rounds : list of Round
         Results on each mesh.
     case : Case
@@ -149,6 +149,7 @@ class AdaptiveStudy(Report):
         return self.framed(numbers)
 
     def _round(self, k: int) -> dict[str, Any]:
+        """Return the results on a mesh for JSON."""
         round_, errors = self.rounds[k], {name: finite(values[k]) for name, values in self._errors().items()}
         counts = {"n_dofs": round_.n_dofs, "n_cells": round_.n_cells}
         return {**counts, **round_.values, **errors, "seconds": round_.seconds}
@@ -189,16 +190,16 @@ class AdaptiveStudy(Report):
     def _rows(self) -> Rows:
         """Return a header and a row for each mesh."""
         q, errors = self.quantity, self._errors()
-        shown = {"estimated error": "estimate", "energy error": "energy_error"}
+        headers = {"estimated error": "estimate", "energy error": "energy_error"}
         if math.isfinite(errors["true_error"][-1]):
-            shown |= {"true error": "true_error", "effectivity": "effectivity"}
+            headers |= {"true error": "true_error", "effectivity": "effectivity"}
         columns = [
             ("round", [str(k) for k in range(len(self.rounds))]),
             ("cells", [str(round_.n_cells) for round_ in self.rounds]),
             ("DOF", [str(round_.n_dofs) for round_ in self.rounds]),
             (column(q, q, self.units), [number(round_.values[q], 8) for round_ in self.rounds]),
         ]
-        return by_columns(columns + [(label, [number(v, 2) for v in errors[name]]) for label, name in shown.items()])
+        return by_columns(columns + [(label, [number(v, 2) for v in errors[name]]) for label, name in headers.items()])
 
     def sentences(self) -> list[str]:
         """See `Report`."""
@@ -208,12 +209,12 @@ class AdaptiveStudy(Report):
         text = f"{self.combination}: {value}, estimated error {last.estimate:.1e}, {verdict} the {self.tolerance:g} requested"
         if not self.reached:
             text += ": the largest number of meshes or of degrees of freedom was reached; increase it (--max-dofs)"
-        true = last.true_error(q)
-        return [
-            text + (f"; true error {true:.1e}, effectivity {self.effectivity():.2g}" if math.isfinite(true) else "")
-        ]
+        if math.isfinite(true := last.true_error(q)):
+            text += f"; true error {true:.1e}, effectivity {self.effectivity():.2g}"
+        return [text]
 
     def _draw_errors(self, ax: Any) -> None:
+        """Draw the errors of all meshes over the degrees of freedom."""
         n_dofs, errors = [round_.n_dofs for round_ in self.rounds], self._errors()
         for name, style, label in (
             ("estimate", "o-", "estimated error"),
@@ -227,25 +228,29 @@ class AdaptiveStudy(Report):
         frame(ax, f"Error of the {title(self.quantity)}", labels, scales=("plain log", "log"))
 
     def _draw_mesh(self, ax: Any) -> None:
+        """Draw the last mesh with its cells coloured by their error."""
         from matplotlib.collections import PolyCollection
         from matplotlib.colors import LogNorm
 
         mesh, cells = self.case.mesh, self.error.cells
         shapes = [polygon for name, block in mesh.solids.items() for polygon in outlines(name, mesh.points[block])]
         error = np.maximum(cells, 1e-6 * cells.max())
-        drawn = PolyCollection(shapes, array=error, norm=LogNorm(), cmap="viridis", edgecolors="white", linewidths=0.1)
-        ax.add_collection(drawn)
+        polygons = PolyCollection(
+            shapes, array=error, norm=LogNorm(), cmap="viridis", edgecolors="white", linewidths=0.1
+        )
+        ax.add_collection(polygons)
         ax.autoscale_view()
         ax.set_aspect("equal")
-        bar = ax.figure.colorbar(drawn, ax=ax)
+        bar = ax.figure.colorbar(polygons, ax=ax)
         bar.set_label("energy norm" + (f" [({work})$^{{1/2}}$]" if (work := self.units.get("moment")) else ""))
         labels = labelled("x", self.units, "length"), labelled("y", self.units, "length")
         frame(ax, f"Last mesh: {self.rounds[-1].n_cells} cells, estimated error", labels, grid=0.0)
 
 
-# Fraction of the error whose cells are refined (Dörfler, 1996). With a larger fraction there are fewer but larger meshes.
+# Fraction of the sum of the error indicators that the refined cells carry (Dörfler, 1996). With a larger fraction there are
+# fewer but larger meshes.
 BULK = 0.7
-# Factor by which the changes of a quantity decrease from round to round if the refinement converges.
+# Factor by which the changes of a quantity decrease from mesh to mesh if the refinement converges.
 SHRINKING = 3.0
 
 
@@ -265,8 +270,8 @@ def adaptive_study(
     """Refine the mesh of a case adaptively until a quantity is accurate enough.
 
     Each round solves the case, estimates the error of each cell with `estimate_error`, weights it by the influence of the
-    cell on the quantity, and divides the cells with the largest contributions in four. The error of the quantity is
-    estimated from its changes from round to round.
+    cell on the quantity, and divides each of the cells with the largest contributions into four. The error of the quantity is
+    estimated from its changes from mesh to mesh.
 
     Parameters
     ----------
@@ -276,7 +281,7 @@ def adaptive_study(
     quantity : str
         The quantity of interest, such as ``"force"``, ``"pressure_max"`` or ``"C1.stress.yy"``.
     tolerance : float
-        Relative error of the quantity at which the refinement stops [-].
+        Relative error [-] of the quantity at which the refinement stops.
     element, formulation : str, optional
         Element type and contact formulation; by default the last of ``study.combinations`` or, without these, those of the
         case.
@@ -288,7 +293,7 @@ def adaptive_study(
     on_round : callable, optional
         Function that is called with a `Round` after every round.
     progress : bool
-        Whether to show the progress on standard error, in terminals and notebooks.
+        If true, show the progress on standard error, in terminals and notebooks.
 
     Returns
     -------
@@ -337,7 +342,7 @@ def adaptive_study(
 
 
 def _first_mesh(case: Case, chosen: Settings, combination: Combination) -> tuple[Forest, list[Any]]:
-    """Return the first mesh as a forest of linear cells that can be divided, and the curves of its boundary."""
+    """Return the first mesh as a forest of linear cells, which can be refined, and the curves of its boundary."""
     mesh = case.mesh
     if chosen.by_shape and combination.element is not None:
         mesh = make_mesh(recipe(chosen, combination.element, 0), None)
@@ -346,7 +351,7 @@ def _first_mesh(case: Case, chosen: Settings, combination: Combination) -> tuple
 
 
 def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, chosen: Settings, combination: Combination) -> Case:
-    """Return the case on another mesh of linear cells, which are converted if the element type is quadratic."""
+    """Return the case on another mesh, given by linear cells, which are converted if the element type is quadratic."""
     element = combination.element
     quadratic = element is not None and elements.get(element).order == 2
     mesh = to_quadratic(linear, curves, centre_nodes=element == "quad9") if quadratic else linear
@@ -354,22 +359,24 @@ def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, chosen: Settings, 
 
 
 def _solved(
-    case: Case, quantity: str, pair: str | None, before: Sequence[Round], started: float
+    case: Case, quantity: str, pair: str | None, rounds: Sequence[Round], started: float
 ) -> tuple[StepResult, ErrorEstimate, Round]:
-    """Solve a case, estimate the errors of its cells, and evaluate its quantities; only the first round issues warnings."""
+    """Return the last step of a case, the errors of its cells, and the results of the round, which follows `rounds`.
+
+    Only the first round issues warnings.
+    """
     with warnings.catch_warnings():
-        if before:
+        if rounds:
             warnings.simplefilter("ignore", FastcontactWarning)
         last = last_step(case)
     error = estimate_error(case.model, last)
     values = quantities.measure(case, last, pair)
     check_known("quantity", quantity, values, CaseError)
     exact = quantities.by_theory(case, pair, 0.0)
-    n_cells = sum(map(len, case.mesh.solids.values()))
-    estimate = _estimate([*(round_before.values[quantity] for round_before in before), values[quantity]])
+    estimate = _estimate([*(earlier.values[quantity] for earlier in rounds), values[quantity]])
     round_ = Round(
         n_dofs=case.model.n_dofs,
-        n_cells=n_cells,
+        n_cells=sum(map(len, case.mesh.solids.values())),
         values=values,
         theory=exact["theory"],
         reference=exact["reference"],
@@ -381,10 +388,11 @@ def _solved(
 
 
 def _estimate(values: Sequence[float]) -> float:
-    """Return the estimated relative error of the last value of a quantity [-]; NaN with fewer than three values.
+    """Return the estimated relative error [-] of the last value of a quantity; NaN with fewer than three values.
 
     If changes decrease by a factor of at least two from mesh to mesh, the last change is an upper bound of the remaining
-    error. The change before it is also taken into account, because the last one may be small by chance.
+    error. The previous change, divided by `SHRINKING`, is a lower limit of the estimate, because the last change may be small
+    by chance.
     """
     if len(values) < 3 or not values[-1]:
         return float("nan")
@@ -401,8 +409,8 @@ def _indicator(case: Case, last: StepResult, error: ErrorEstimate, quantity: str
     For a value at a point the dual stress decreases with the distance d like the stress of a point force, as d^(1 - dim)
     with dim = 3 also in axisymmetry (Boussinesq, 1885; Flamant, 1892). Its error in a cell of size h decreases as h d^-dim.
     """
-    where = _place(case, last, quantity, pair)
-    if where is None:
+    position = _position(case, last, quantity, pair)
+    if position is None:
         return error.cells**2
     mesh, values = case.mesh, []
     axisymmetric = case.model.kinematics == "axisymmetric"
@@ -410,13 +418,13 @@ def _indicator(case: Case, last: StepResult, error: ErrorEstimate, quantity: str
         corners = mesh.points[block[:, : elements.get(name).n_corners]]
         h = np.linalg.norm(np.ptp(corners, axis=1), axis=1)
         centre = corners.mean(axis=1)
-        d = np.maximum(np.linalg.norm(centre - where, axis=1), 0.5 * h)
+        d = np.maximum(np.linalg.norm(centre - position, axis=1), 0.5 * h)
         volume = h**2 * (centre[:, 0] if axisymmetric else 1.0)
         values.append(h / d ** (3 if axisymmetric else 2) * np.sqrt(volume))
     return error.cells * np.concatenate(values)
 
 
-def _place(case: Case, last: StepResult, quantity: str, pair: str | None) -> Array | None:
+def _position(case: Case, last: StepResult, quantity: str, pair: str | None) -> Array | None:
     """Return the position (dim,) [length] at which a quantity is evaluated; None for quantities of the entire model."""
     probe = quantity.split(".")[0]
     if probe in case.probes:
@@ -425,19 +433,20 @@ def _place(case: Case, last: StepResult, quantity: str, pair: str | None) -> Arr
         return case.mesh.points[int(np.argmax(last.von_mises))]
     if pair is not None and quantity.startswith("pressure_"):
         contact = last.contact[pair]
-        at = np.argmin(np.abs(contact.place)) if quantity == "pressure_pole" else np.argmax(contact.pressure)
-        return contact.coordinates[int(at)]
+        row = np.argmin(np.abs(contact.place)) if quantity == "pressure_pole" else np.argmax(contact.pressure)
+        return contact.coordinates[int(row)]
     return None
 
 
 def _marked(indicator: Array, leaf: Indices, n_leaves: int) -> Mask:
-    """Return for each leaf (n_leaves,) whether to divide it.
+    """Return the leaves to refine, as a mask (n_leaves,).
 
-    The marked leaves are those of the fewest cells whose sum is the fraction `BULK` of the sum of `indicator` (n_solids,).
+    They belong to the smallest set of cells that carries the fraction `BULK` of the sum of `indicator` (n_solids,). `leaf`
+    (n_solids,) is the leaf of each cell.
     """
     order = np.argsort(-indicator, kind="stable")
-    carried = np.cumsum(indicator[order])
-    count = int(np.searchsorted(carried, BULK * carried[-1])) + 1
+    cumulative = np.cumsum(indicator[order])
+    count = int(np.searchsorted(cumulative, BULK * cumulative[-1])) + 1
     marked = np.zeros(n_leaves, bool)
     marked[leaf[order[:count]]] = True
     return marked

@@ -18,9 +18,8 @@ _LAW = re.compile(rf"\s*(?:({_NUMBER})\s*\*\s*)?value(?:\s*\^\s*({_NUMBER}))?\s*
 def substituted(data: Mapping[str, Any], parameter: str, value: Any, linked: Mapping[str, Any]) -> dict[str, Any]:
     """Return a copy of a parsed case file with a new value of a parameter.
 
-    The parameter is a path or a name in `linked`, which is the table ``[study.parameters]``. Each name in this table sets
-    several paths, each by a law ``"a*value^p"``. Raises CaseError if the path or the name does not exist, or a law is
-    invalid.
+    The parameter is a path, or a name in the table ``[study.parameters]``, which is `linked`. A name sets several paths, each
+    by a law ``"a*value^p"``. Raises CaseError if the path or the name does not exist, or if a law is invalid.
     """
     case: dict[str, Any] = copy.deepcopy(dict(data))
     if parameter not in linked:
@@ -47,6 +46,7 @@ def by_law(law: Any, value: Any, where: str) -> Any:
 
 
 def _set(data: dict[str, Any], path: str, value: Any, names: Iterable[str]) -> None:
+    """Set the value at a path of a parsed case file; messages about unknown paths suggest one of `names`."""
     keys = _keys(path)
     pairs = [
         f"{kind}.{name}" for kind in ("contact", "obstacle") if isinstance(data.get(kind), dict) for name in data[kind]
@@ -59,16 +59,17 @@ def _set(data: dict[str, Any], path: str, value: Any, names: Iterable[str]) -> N
         )
     entry: Any = data
     for key in keys[:-1]:
-        entry = _inside(entry, key, path)
+        entry = _member(entry, key, path)
     last: Any = keys[-1]
     if isinstance(last, int) or not isinstance(entry, dict):
-        _inside(entry, last, path)
+        _member(entry, last, path)
     if isinstance(entry[last] if isinstance(entry, list) else entry.get(last), (dict, list)):
         raise CaseError(f"'{path}' is a table or a list of the case: name a single value in it")
     entry[last] = value
 
 
 def _keys(path: str) -> list[str | int]:
+    """Return the keys of tables and the indices of lists in a path; CaseError if it is not a path."""
     keys: list[str | int] = []
     for key in path.split("."):
         match = _PART.match(key)
@@ -79,7 +80,8 @@ def _keys(path: str) -> list[str | int]:
     return keys
 
 
-def _inside(entry: Any, key: str | int, path: str) -> Any:
+def _member(entry: Any, key: str | int, path: str) -> Any:
+    """Return the member of a table or a list; CaseError if it does not exist."""
     if isinstance(key, int):
         if not isinstance(entry, list) or key >= len(entry):
             count = len(entry) if isinstance(entry, list) else 0

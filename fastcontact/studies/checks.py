@@ -1,4 +1,4 @@
-"""Checks before a study: the table ``[study]`` of a case file, and the number and the size of the runs."""
+"""Checks before a study, of the table ``[study]`` of a case file and of the number and the size of the runs."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from fastcontact.studies.quantities import check_names
 from fastcontact.studies.settings import Combination, Settings, make_mesh, recipe, settings, shape_of
 
 log = logging.getLogger("fastcontact")
+# Largest number of runs of a study. A larger number is treated as an error.
 MOST_RUNS = 100_000
-# Peak memory per unknown of a multigrid analysis with linear hexahedra, which needs the least memory [bytes]. It was measured
-# with `fastcontact bench contact`.
+# Peak memory per unknown [byte] of a multigrid analysis with linear hexahedra, which need the least memory, measured with
+# `fastcontact bench contact`.
 BYTES_PER_UNKNOWN = 2500
 
 
@@ -30,23 +31,23 @@ def check_runs(count: int) -> None:
 
 
 def check_levels(case: Case, chosen: Settings, members: Sequence[Combination], levels: int) -> None:
-    """Raise CaseError if the finest mesh of a study cannot fit into the memory of this machine."""
+    """Raise CaseError if the analysis of the finest mesh of a study cannot fit into the memory of this machine."""
     memory = _memory()
     for member in members:
         coarsest = make_mesh(recipe(chosen, member.element, 0), case.mesh if chosen.generator is None else None)
         unknowns = [coarsest.n_points * coarsest.dim * 2 ** (coarsest.dim * level) for level in range(levels)]
-        fitting = sum(BYTES_PER_UNKNOWN * count <= memory for count in unknowns)
-        if fitting < levels:
+        n_fitting = sum(BYTES_PER_UNKNOWN * count <= memory for count in unknowns)
+        if n_fitting < levels:
             raise CaseError(
                 f"level {levels - 1} of {member} would have about {unknowns[-1]:.2g} unknowns and take "
                 f"{BYTES_PER_UNKNOWN * unknowns[-1] / 1e9:.2g} GB of memory, of which this machine has {memory / 1e9:.2g}: "
-                f"give at most {max(fitting, 1)} levels"
+                f"give at most {max(n_fitting, 1)} levels"
             )
         log.info("%s: up to about %d unknowns on level %d", member, unknowns[-1], levels - 1)
 
 
 def _memory() -> float:
-    """Return the physical memory of this machine [bytes], or infinity if it is unknown."""
+    """Return the physical memory [byte] of this machine, or infinity if it is unknown."""
     try:
         return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, OSError, ValueError):
@@ -56,8 +57,8 @@ def _memory() -> float:
 def check_study(case: Case) -> None:
     """Raise FastcontactError if a study of a case could not start.
 
-    Quadrangle meshes are generated if ``[study]`` gives the arguments of level 0. Free triangle meshes are not generated,
-    since this takes as long as a short run.
+    Quadrangle meshes are generated for this check if ``[study]`` gives their arguments on level 0. Free triangle meshes are
+    not, since their generation takes as long as a short run.
     """
     chosen = settings(case)
     study = chosen.data.get("study", {})
@@ -77,9 +78,10 @@ def check_study(case: Case) -> None:
 
 
 def _check_finite(where: str, value: Any) -> None:
+    """Raise CaseError if a number in a table or a list is not finite."""
     if isinstance(value, float) and not math.isfinite(value):
         raise CaseError(f"{where} = {value} must be finite")
     for key, entry in value.items() if isinstance(value, dict) else ():
         _check_finite(f"{where}.{key}", entry)
-    for number, entry in enumerate(value) if isinstance(value, list) else ():
-        _check_finite(f"{where}[{number}]", entry)
+    for index, entry in enumerate(value) if isinstance(value, list) else ():
+        _check_finite(f"{where}[{index}]", entry)

@@ -1,4 +1,4 @@
-"""The result of a mesh-convergence study and its report as lines, sentences, tables, dictionary, figure and page."""
+"""Result of a mesh-convergence study, and its report as sentences, tables, dictionary and figure."""
 
 from __future__ import annotations
 
@@ -21,27 +21,28 @@ from fastcontact.studies.report import Report, Rows, by_columns, frame, marker, 
 from fastcontact.studies.series import Series, Split
 from fastcontact.studies.settings import Named
 
-# Quantities of the sentences, in their order.
+# Quantities on which there are sentences, in the order of the sentences.
 MAIN = ("pressure_max", "force")
 
 
 def sentences(series: Series) -> list[str]:
-    """Return sentences about the difference between a combination of element and formulation and theory."""
+    """Return sentences on the mesh errors of a combination of element and formulation, and on its difference from theory."""
     if not series.limits:
         return [
             f"{series.combination}: {len(series.levels)} levels were solved, and an extrapolated limit needs three."
         ]
     names = [name for name in series.shown(MAIN) if name in series.limits]
-    about = [text for name in names for text in _about_quantity(series, name)]
-    return about + _about_equal_force(series)
+    texts = [text for name in names for text in _quantity_sentences(series, name)]
+    return texts + _equal_force_sentences(series)
 
 
-def _about_quantity(series: Series, quantity: str) -> list[str]:
+def _quantity_sentences(series: Series, quantity: str) -> list[str]:
+    """Return the sentences on a quantity with a limit."""
     split, name = series.split(quantity), title(quantity)
     if split is None:
-        off = percent(series.errors(quantity)[-1])
-        text = f"{series.combination}: the mesh error of the {name} is {off} on the finest mesh."
-        return [text, *_about_settling(series, quantity, name)]
+        error = percent(series.errors(quantity)[-1])
+        text = f"{series.combination}: the mesh error of the {name} is {error} on the finest mesh."
+        return [text, *_convergence_sentences(series, quantity, name)]
     start = f"{series.combination}: " + ("" if series.exact_theory else f"{series.compared} ") + f"the {name}"
     finest = f"({series.finest.n_dofs} degrees of freedom)"
     bar = f"{100 * split.uncertainty:.2g} %"
@@ -58,11 +59,12 @@ def _about_quantity(series: Series, quantity: str) -> list[str]:
             f"{start} agrees with theory within the error bar of its limit, {percent(split.model)} +- {bar}; "
             f"{percent(split.mesh)} is mesh error on the finest mesh {finest}."
         ]
-    texts += _about_settling(series, quantity, name)
-    return texts + _about_cancelling(series, quantity, split) + _about_reference(series, quantity)
+    texts += _convergence_sentences(series, quantity, name)
+    return texts + _cancellation_sentences(series, quantity, split) + _reference_sentences(series, quantity)
 
 
-def _about_settling(series: Series, quantity: str, name: str) -> list[str]:
+def _convergence_sentences(series: Series, quantity: str, name: str) -> list[str]:
+    """Return a warning if the values of a quantity, whose title is `name`, do not converge."""
     if series.limits[quantity].converging:
         return []
     return [
@@ -74,28 +76,29 @@ def _about_settling(series: Series, quantity: str, name: str) -> list[str]:
 def _not_to_theory(series: Series, quantity: str, start: str, split: Split) -> str:
     """Return the sentence for a formulation that does not converge to a theory that is exact for the model."""
     limit = series.limits[quantity]
-    tends = f"tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)}"
     return (
-        f"{start} {tends} where the theory has {number(split.theory, 6)}. That theory is exact for the bodies of the model, "
+        f"{start} tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)} where the theory has "
+        f"{number(split.theory, 6)}. That theory is exact for the bodies of the model, "
         f"so this is not a model error: {series.combination} does not converge to it on these meshes. Compare formulations "
         "(--formulations all), or let the meshes of the two sides match."
     )
 
 
-def _about_cancelling(series: Series, quantity: str, split: Split) -> list[str]:
+def _cancellation_sentences(series: Series, quantity: str, split: Split) -> list[str]:
     """Return a warning if the mesh error of a level cancels more than half of the model error."""
-    off = series.from_theory(quantity)
-    best = min(range(len(off)), key=lambda k: abs(off[k]))
-    if series.exact_theory or not split.resolved or not abs(off[best]) < 0.5 * abs(split.model):
+    differences = series.from_theory(quantity)
+    closest = int(np.nanargmin(np.abs(differences)))
+    difference, level = differences[closest], series.levels[closest]
+    if series.exact_theory or not split.resolved or not abs(difference) < 0.5 * abs(split.model):
         return []
-    level = series.levels[best]
     return [
-        f"Level {level.number} ({level.n_dofs} degrees of freedom) lies only {percent(off[best])} from theory because its "
-        f"mesh error of {percent(off[best] - split.model)} cancels model error: the agreement does not prove a good mesh."
+        f"Level {level.number} ({level.n_dofs} degrees of freedom) lies only {percent(difference)} from theory because its "
+        f"mesh error of {percent(difference - split.model)} cancels model error: the agreement does not prove a good mesh."
     ]
 
 
-def _about_reference(series: Series, quantity: str) -> list[str]:
+def _reference_sentences(series: Series, quantity: str) -> list[str]:
+    """Return a sentence on the mesh-converged solution that the case states, if there is one."""
     reference, limit = series.reference.get(quantity), series.limits[quantity]
     if reference is None:
         return []
@@ -106,26 +109,27 @@ def _about_reference(series: Series, quantity: str) -> list[str]:
     ]
 
 
-def _about_equal_force(series: Series) -> list[str]:
-    same, equal = series.split_equal_force("pressure_max"), series.split("pressure_max")
-    if same is None or equal is None:
+def _equal_force_sentences(series: Series) -> list[str]:
+    """Return a sentence on the model errors at equal force, if they are known."""
+    at_force, at_approach = series.split_equal_force("pressure_max"), series.split("pressure_max")
+    if at_force is None or at_approach is None:
         return []
     text = (
-        f"{series.combination}: at equal force the model error of the largest pressure is {percent(same.model)} (+- "
-        f"{100 * same.uncertainty:.2g} %)"
+        f"{series.combination}: at equal force the model error of the largest pressure is {percent(at_force.model)} (+- "
+        f"{100 * at_force.uncertainty:.2g} %)"
     )
     radius = series.split_equal_force("contact_radius")
     if radius is not None:
         text += f", that of the contact radius {percent(radius.model)} (+- {100 * radius.uncertainty:.2g} %)"
-    if abs(same.model) < 0.3 * abs(equal.model) and equal.resolved:
+    if abs(at_force.model) < 0.3 * abs(at_approach.model) and at_approach.resolved:
         text += ": most of the difference at equal approach is in the force, not in its distribution"
     return [text + "."]
 
 
-# Quantities in the tables of levels. The tables of limits contain all quantities.
-IN_TABLES = ("force", "pressure_max", "contact_radius", "von_mises_max")
-# Columns of limits.
-OF_LIMITS = ("limit", "+-", "order", "theory", "model error", "mesh error", "at equal force")
+# Standard quantities in the tables of levels, while the tables of limits contain all quantities.
+TABLE_QUANTITIES = ("force", "pressure_max", "contact_radius", "von_mises_max")
+# Columns of the tables of limits.
+LIMIT_COLUMNS = ("limit", "+-", "order", "theory", "model error", "mesh error", "at equal force")
 # Mark after the error bar of a limit to which the values do not converge.
 UNSETTLED = " (unsettled)"
 
@@ -137,7 +141,7 @@ def level_rows(series: Series, units: Mapping[str, str]) -> Rows:
         (labelled("h", units, "length"), [number(h, 4) for h in series.h]),
         ("DOF", [str(level.n_dofs) for level in series.levels]),
     ]
-    for name in series.shown(IN_TABLES):
+    for name in series.shown(TABLE_QUANTITIES):
         orders = [f"{order:.2f}" if math.isfinite(order) else "-" for order in series.orders(name)]
         columns.append((column(name, name, units), [number(value, 8) for value in series.values(name)]))
         columns += [("error", list(map(percent, series.errors(name)))), ("order", orders)]
@@ -146,24 +150,25 @@ def level_rows(series: Series, units: Mapping[str, str]) -> Rows:
 
 def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
     """Return a header and a row for each quantity with a limit: limit, order, theory and errors."""
-    cells = [[column(title(name), name, units), *_cells(series, name, OF_LIMITS)] for name in series.limits]
-    shown = [any(row[index] != "-" for row in cells) for index in range(len(OF_LIMITS) + 1)]
-    return [list(itertools.compress(row, shown)) for row in (["quantity", *OF_LIMITS], *cells)]
+    cells = [[column(title(name), name, units), *_cells(series, name, LIMIT_COLUMNS)] for name in series.limits]
+    nonempty = [any(row[index] != "-" for row in cells) for index in range(len(LIMIT_COLUMNS) + 1)]
+    return [list(itertools.compress(row, nonempty)) for row in (["quantity", *LIMIT_COLUMNS], *cells)]
 
 
 def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], units: Mapping[str, str]) -> Rows:
     """Return a header and a row for each combination with the limits, mesh errors and model errors of the quantities."""
-    header, shown = ["combination", "levels", "finest DOF"], []
+    header, cells = ["combination", "levels", "finest DOF"], []
     for name in quantities:
         header += [column(name, name, units), "+-", "order", "mesh error", "model error"]
-        shown += [(name, cell) for cell in ("limit", "+-", "order alone", "mesh error", "model error")]
+        cells += [(name, ("limit", "+-", "order alone", "mesh error", "model error"))]
     if "pressure_max" in quantities:
         header.append("p at equal force")
-        shown.append(("pressure_max", "at equal force"))
-    rows = [[str(series.combination), str(len(series.levels)), str(series.finest.n_dofs)] for series in all_series]
-    for row, series in zip(rows, all_series, strict=True):
-        row += [cell for name, kind in shown for cell in _cells(series, name, (kind,))]
-    return [header, *rows]
+        cells.append(("pressure_max", ("at equal force",)))
+    rows = [header]
+    for series in all_series:
+        rows.append([str(series.combination), str(len(series.levels)), str(series.finest.n_dofs)])
+        rows[-1] += [text for name, columns in cells for text in _cells(series, name, columns)]
+    return rows
 
 
 def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
@@ -171,7 +176,7 @@ def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
     limit, split = series.limits.get(quantity), series.split(quantity)
     if limit is None:
         return ["-"] * len(columns)
-    same = series.split_equal_force(quantity) if quantity != "force" else None
+    at_force = series.split_equal_force(quantity) if quantity != "force" else None
     order = f"{limit.order:.2f}"
     texts = {
         "limit": number(limit.value, 8),
@@ -181,7 +186,7 @@ def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
         "theory": number(series.theory.get(quantity, math.nan), 8),
         "model error": percent(split.model if split else None),
         "mesh error": percent(series.mesh_error(quantity)),
-        "at equal force": percent(same.model if same else None),
+        "at equal force": percent(at_force.model if at_force else None),
     }
     return [texts[name] for name in columns]
 
@@ -230,7 +235,7 @@ def series_dict(series: Series) -> dict[str, Any]:
 
 
 def _fields(values: Limit | Split | None, **names: str) -> dict[str, Any]:
-    """Return fields of `values` by key; a field is None if it is NaN, and all fields are None if `values` is None."""
+    """Return fields of `values` by key, with None in place of NaN, and for all fields if `values` is None."""
     fields = {key: getattr(values, name, None) for key, name in names.items()}
     return {key: finite(value) if isinstance(value, float) else value for key, value in fields.items()}
 
@@ -254,42 +259,42 @@ def _quantity_dict(series: Series, name: str) -> dict[str, Any]:
     return entry
 
 
-# Largest number of curves that are drawn with error bars, which would hide more curves.
+# Largest number of curves that are drawn with error bars, which would hide a larger number of curves.
 MOST_CURVES_WITH_BARS = 3
 
 
 def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Mapping[str, str]) -> None:
-    """Draw the mesh error of a quantity over h in double logarithmic scale, with error bars, fits and slope triangles."""
-    known = [(k, series) for k, series in enumerate(all_series) if quantity in series.limits]
-    if not known:
+    """Draw the mesh error of a quantity over h with logarithmic axes, error bars, fits and slope triangles."""
+    fitted = [(k, series) for k, series in enumerate(all_series) if quantity in series.limits]
+    if not fitted:
         return message(ax, f"no limit of the {title(quantity)}:\nit needs three levels")
-    named = isinstance(all_series[0].combination, Named)
-    few = len(known) <= MOST_CURVES_WITH_BARS
-    for position, (k, series) in enumerate(known):
+    of_function = isinstance(all_series[0].combination, Named)
+    with_bars = len(fitted) <= MOST_CURVES_WITH_BARS
+    for position, (k, series) in enumerate(fitted):
         limit, h = series.limits[quantity], np.array(series.h)
         error = np.abs(np.array(series.values(quantity)) - limit.value) / abs(limit.value)
         bar = limit.uncertainty / abs(limit.value)
         color, shown = f"C{position}", error > 0
         label = f"{series.combination}: order {limit.order:.1f} $\\pm$ {limit.order_uncertainty:.1f}"
         ax.plot(h[shown], error[shown], f"{marker(k)}-", ms=5, lw=1.0, label=label, color=color)
-        if few:
+        if with_bars:
             low, high = np.maximum(error - bar, 0.3 * error), error + bar
             ax.vlines(h[shown], low[shown], high[shown], colors=color, lw=0.7)
         if math.isfinite(limit.order) and shown.sum() >= 2:
-            # The fitted power law with the geometric mean of the errors.
+            # The power law of the fitted order through the geometric mean of the errors.
             factor = np.exp(np.mean(np.log(error[shown] / h[shown] ** limit.order)))
             ax.plot(h, factor * h**limit.order, ":", lw=1.0, color=color)
-    explained = {":": "fit $C\\,h^{order}$"} | ({"|": f"error bar of the limit, {CONFIDENCE:.0%}"} if few else {})
-    for style, text in explained.items():
+    entries = {":": "fit $C\\,h^{order}$"} | ({"|": f"error bar of the limit, {CONFIDENCE:.0%}"} if with_bars else {})
+    for style, text in entries.items():
         ax.plot([], [], style, color="0.4", lw=1.0, label=text)
-    _slope_triangles(ax, quantity, [series for _, series in known])
-    along = labelled("mesh size h" if named else "facet length at the contact h", units, "length")
-    labels, size = (along, "|value - limit| / limit"), 8 if few else 6.5
+    _slope_triangles(ax, quantity, [series for _, series in fitted])
+    x_label = labelled("mesh size h" if of_function else "facet length at the contact h", units, "length")
+    labels, size = (x_label, "|value - limit| / limit"), 8 if with_bars else 6.5
     frame(ax, f"Mesh error of the {title(quantity)}", labels, scales=("plain log", "log"), legend_size=size)
     ax.grid(which="minor", alpha=0.12)
-    if few:  # Matplotlib ignores error bars when it places the legend
+    if with_bars:  # Matplotlib ignores error bars when it places the legend
         low, high = ax.get_ylim()
-        ax.set_ylim(low, high * (high / low) ** (0.02 * size * (len(known) + len(explained)) / 2.2))
+        ax.set_ylim(low, high * (high / low) ** (0.02 * size * (len(fitted) + len(entries)) / 2.2))
 
 
 def _slope_triangles(ax: Any, quantity: str, all_series: Sequence[Series]) -> None:
@@ -312,7 +317,7 @@ def _slope_triangles(ax: Any, quantity: str, all_series: Sequence[Series]) -> No
 
 
 def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]) -> None:
-    """Draw the contact pressure of all levels and of the theory over the distance from the axis or the contact centre."""
+    """Draw the contact pressure of all levels and of the theory over the distance from the middle of the contact."""
     if not series.finest.profile:
         return message(ax, "this case has no contact pair,\nso there is no contact pressure")
     from matplotlib import colormaps
@@ -339,14 +344,14 @@ def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]
 
 def _draw_theory(ax: Any, theory: Any, series: Series, x: Array) -> None:
     """Draw the pressure of a theory at equal approach and at equal force, where it is defined."""
-    curve_given = pressure_curve(theory)
-    if curve_given is None:
+    at_approach = pressure_curve(theory)
+    if at_approach is None:
         return
-    curves = [("theory" if series.exact_theory else f"theory {series.compared}", "k-", curve_given)]
+    curves = [("theory" if series.exact_theory else f"theory {series.compared}", "k-", at_approach)]
     force = series.limits.get("force")
     if force is not None and force.value > 0 and hasattr(theory, "at_force"):
-        same = pressure_curve(theory.at_force(force.value / series.share))
-        curves += [("theory at equal force", "k--", same)] if same is not None else []
+        at_force = pressure_curve(theory.at_force(force.value / series.share))
+        curves += [("theory at equal force", "k--", at_force)] if at_force is not None else []
     for name, style, curve in curves:
         ax.plot(x, curve.pressure(np.abs(x)), style, lw=1.2, label=f"{name} ($p_0$ = {curve.pressure_max:.1f})")
 
@@ -355,21 +360,21 @@ def draw_differences(
     ax: Any, all_series: Sequence[Series], best: Series, quantity: str, units: Mapping[str, str]
 ) -> None:
     """Draw the difference from theory over h, which tends to the model error as the mesh error vanishes."""
-    known = [(k, series) for k, series in enumerate(all_series) if series.split(quantity)]
-    if not known:
+    compared = [(k, series) for k, series in enumerate(all_series) if series.split(quantity)]
+    if not compared:
         return message(ax, f"no theory of the {title(quantity)}, or no limit")
-    for k, series in known:
-        off = [100 * value for value in series.from_theory(quantity)]
-        ax.plot(series.h, off, f"{marker(k)}-", ms=5, lw=1.0, label=str(series.combination))
-    best = best if best.split(quantity) else known[-1][1]
-    split, same = best.split(quantity), best.split_equal_force(quantity)
+    for k, series in compared:
+        differences = [100 * value for value in series.from_theory(quantity)]
+        ax.plot(series.h, differences, f"{marker(k)}-", ms=5, lw=1.0, label=str(series.combination))
+    best = best if best.split(quantity) else compared[-1][1]
+    split, at_force = best.split(quantity), best.split_equal_force(quantity)
     assert split is not None
     model, bar = 100 * split.model, 100 * split.uncertainty
     ax.axhline(model, color="tab:red", lw=1.2, label=f"model error {model:+.3f} % (mesh-independent)")
     ax.axhspan(model - bar, model + bar, color="tab:red", alpha=0.15, lw=0)
-    if same is not None and quantity != "force":
-        label = f"model error at equal force {100 * same.model:+.3f} %"
-        ax.axhline(100 * same.model, color="tab:green", ls="--", lw=1.2, label=label)
+    if at_force is not None and quantity != "force":
+        label = f"model error at equal force {100 * at_force.model:+.3f} %"
+        ax.axhline(100 * at_force.model, color="tab:green", ls="--", lw=1.2, label=label)
     ax.axhline(0.0, color="black", lw=1.0, label="theory")
     labels = (
         labelled("facet length at the contact h", units, "length"),
@@ -378,7 +383,7 @@ def draw_differences(
     frame(ax, f"Model and mesh error of the {title(quantity)}", labels, scales=("plain log", "linear"))
 
 
-# Quantities in figures and in the table of all combinations.
+# Standard quantities in figures and in the table of all combinations.
 COMPARED = ("force", "pressure_max")
 
 
@@ -464,28 +469,26 @@ class Study(Report):
         """See `Report`."""
         remarks = []
         for series in self.series:
-            remarks += [
-                f"warning: {text}" for text in sorted({text for level in series.levels for text in level.warnings})
-            ]
+            warnings = sorted({text for level in series.levels for text in level.warnings})
+            remarks += [f"warning: {text}" for text in warnings]
             if not series.limits:
-                remarks.append(
-                    f"no limits: {len(series.levels)} levels were solved, and an extrapolated limit needs three"
-                )
+                n_levels = len(series.levels)
+                remarks.append(f"no limits: {n_levels} levels were solved, and an extrapolated limit needs three")
             remarks += [f"level {number} failed: {text}" for number, text in series.failed.items()]
         return remarks + [f"{name} failed: {text}" for name, text in self.failed.items()]
 
     def figure(self) -> Any:
-        """Return a Matplotlib figure with errors, the pressure over the radius, and differences from theory."""
+        """Return a Matplotlib figure with the mesh errors, the contact pressure, and the differences from theory."""
         of_case = not isinstance(self.best.combination, Named)
         names = COMPARED if of_case else self.best.shown(COMPARED) or self.best.quantities[:2]
-        of_all: dict[str, Any] = {"all_series": self.series, "units": self.units}
-        drawn: list[Callable[[Any], None]] = [partial(draw_errors, quantity=name, **of_all) for name in names]
+        options: dict[str, Any] = {"all_series": self.series, "units": self.units}
+        plots: list[Callable[[Any], None]] = [partial(draw_errors, quantity=name, **options) for name in names]
         if of_case or self.best.finest.profile:
-            drawn.append(partial(draw_pressure, series=self.best, theory=self.theory, units=self.units))
+            plots.append(partial(draw_pressure, series=self.best, theory=self.theory, units=self.units))
         if of_case:
-            drawn.append(partial(draw_differences, best=self.best, quantity="pressure_max", **of_all))
-        rows, columns = (len(drawn) + 1) // 2, min(2, len(drawn))
+            plots.append(partial(draw_differences, best=self.best, quantity="pressure_max", **options))
+        rows, columns = (len(plots) + 1) // 2, min(2, len(plots))
         axes = panels(rows, columns, (6.0 * columns, 4.6 * rows), self.title)
-        for ax, draw in itertools.zip_longest(axes.flat, drawn, fillvalue=partial(message, text="")):
+        for ax, draw in itertools.zip_longest(axes.flat, plots, fillvalue=partial(message, text="")):
             draw(ax)
         return axes[0, 0].figure

@@ -1,10 +1,10 @@
-"""Errors of a finite-element solution: norms of its difference from a theory, and estimates in each cell.
+"""Errors of a finite-element solution: norms of its difference from a theory, and estimates for each cell.
 
-The norms, computed by quadrature, are for convergence studies with exact solutions such as `analytic.hertz_box`. Errors at
-the nodes often converge faster than errors within the cells, and are thus no substitute.
+The norms, which are computed by quadrature, serve convergence studies with exact solutions such as `analytic.hertz_box`.
+Errors at the nodes cannot replace them, because they often converge faster than errors within the cells.
 
-Without a theory, the smoothed stress is more accurate than the stress of the solution, so that their difference is an
-estimate of the error (Zienkiewicz and Zhu, 1987). On the contact surface the difference between the smoothed normal stress
+Estimates need no theory: the smoothed stress is more accurate than the stress of the solution, so that their difference
+estimates the error (Zienkiewicz and Zhu, 1987). On the contact surface the difference between the smoothed normal stress
 and the contact pressure is added, as in residual-based estimates (for example Wriggers and Scherf, 1998).
 """
 
@@ -32,11 +32,12 @@ from fastcontact.elasticity.smoothed_stress import smoothed_stress
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
+from fastcontact.mesh.mesh import starts_of
 from fastcontact.mesh.topology import same_facets
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
-# Number of quadrature points that are evaluated at a time, which limits the memory of the intermediate arrays.
+# Number of quadrature points that are evaluated at a time, to limit the memory of intermediate arrays.
 AT_ONCE = 100_000
 
 
@@ -59,9 +60,9 @@ class Theory(Protocol):
 class ErrorNorms:
     """Norms of the error of a solution, and of the theory with which it is compared.
 
-    The energy norm of a stress field s is the square root of the integral of s : C^-1 : s with the elastic moduli C, which
-    is twice the elastic energy. The L2 norm of a displacement field is the square root of the integral of its square. In
-    axisymmetry integrals extend over the full circle.
+    The energy norm of a stress field s is the square root of the integral of s : C^-1 : s, with the elastic moduli C; this
+    integral is twice the elastic energy. The L2 norm of a displacement field is the square root of the integral of its
+    square. In axisymmetry integrals extend over the full circle.
 
     Attributes
     ----------
@@ -122,14 +123,14 @@ def error_against(
     model : Model
         The model of the solution; only its mesh, kinematics, materials and initial states are used.
     displacement : array_like (n_points, dim)
-        Nodal displacements of the solution, such as ``fc.solve(model)[-1].displacement`` [length].
+        Nodal displacements [length] of the solution, such as ``fc.solve(model)[-1].displacement``.
     groups : sequence of str or str, optional
         Groups of solid cells over which to integrate; by default all solid cells.
     n_points : int, optional
         Number of quadrature points along each direction of a cell. By default it is the order of the element plus three, so
         that the quadrature error is negligible.
     rise : ndarray (n_points,), optional
-        Temperature rise of every point of the mesh, see `Model.temperature_rise` [temperature]. Initial stresses and strains
+        Temperature rise [temperature] of every point of the mesh, see `Model.temperature_rise`. Initial stresses and strains
         of the model act with the multiplier 1.
 
     Returns
@@ -164,10 +165,10 @@ def error_against(
     offset = model.material_field().offset(rise, [(1.0, state) for state in model.initial_states], model.mesh.n_points)
     total = np.zeros(4)
     for name, rows in solid_rows(model.mesh, names).items():
-        at_once = max(1, AT_ONCE // len(integration_rule(elements.get(name), n_points)[1]))
-        for first in range(0, len(rows), at_once):
-            total += _squares(theory, model, u, name, rows[first : first + at_once], n_points, offset)
-    return ErrorNorms(*(math.sqrt(square) for square in total))
+        n_cells = max(1, AT_ONCE // len(integration_rule(elements.get(name), n_points)[1]))
+        for first in range(0, len(rows), n_cells):
+            total += _squared_norms(theory, model, u, name, rows[first : first + n_cells], n_points, offset)
+    return ErrorNorms(*np.sqrt(total).tolist())
 
 
 def stress_in_cells(
@@ -178,7 +179,7 @@ def stress_in_cells(
     n_points: int | None,
     offset: StressOffset | None = None,
 ) -> tuple[Array, Array, Array, Array]:
-    """Return shape functions, stresses, volumes and compliances at the quadrature points of some cells of one element type.
+    """Return shape functions, stresses, volumes and compliances at the quadrature points of cells of one element type.
 
     The shape functions are (n_q, n_nodes) [-], the stresses (n_cells, n_q, n_components) [pressure], and the volumes of the
     quadrature points (n_cells, n_q) [length^dim]. The compliances are (n_cells, n_q, n_components, n_components)
@@ -198,7 +199,7 @@ def stress_in_cells(
     return N, stress, cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights, elastic
 
 
-def _squares(
+def _squared_norms(
     theory: Theory,
     model: Model,
     u: Array,
@@ -210,28 +211,28 @@ def _squares(
     """Return the squares (4,) of the norms over some cells, in the order of the attributes of `ErrorNorms`."""
     N, stress, volume, elastic = stress_in_cells(model, name, rows, u, n_points, offset)
     cells = model.mesh.cells[name][rows]
-    places = np.einsum("qa,cad->cqd", N, model.mesh.points[cells])
-    exact_u, exact = _exact(theory, places, stress.shape[2])
+    positions = np.einsum("qa,cad->cqd", N, model.mesh.points[cells])
+    exact_u, exact_stress = _exact(theory, positions, stress.shape[2])
     error_u = np.einsum("qa,cad->cqd", N, u[cells]) - exact_u
     densities = (
-        elastic_energy(stress - exact, elastic), (error_u**2).sum(axis=-1),
-        elastic_energy(exact, elastic), (exact_u**2).sum(axis=-1),
+        elastic_energy(stress - exact_stress, elastic), (error_u**2).sum(axis=-1),
+        elastic_energy(exact_stress, elastic), (exact_u**2).sum(axis=-1),
     )  # fmt: skip
     return np.array([(density * volume).sum() for density in densities])
 
 
-def _exact(theory: Theory, places: Array, n_components: int) -> tuple[Array, Array]:
-    """Return displacements and stresses (n_cells, n_q, ...) of the theory at points `places` (n_cells, n_q, dim)."""
-    points = places.reshape(-1, places.shape[2])
+def _exact(theory: Theory, positions: Array, n_components: int) -> tuple[Array, Array]:
+    """Return displacements and stresses (n_cells, n_q, ...) of a theory at `positions` (n_cells, n_q, dim) [length]."""
+    points = positions.reshape(-1, positions.shape[2])
     at_points = []
     for name, size in (("displacement", points.shape[1]), ("stress", n_components)):
         values = np.asarray(getattr(theory, name)(points), float)
         if values.shape != (len(points), size):
             raise ModelError(f"the theory's {name} has shape {values.shape} where {(len(points), size)} is needed")
         if not np.isfinite(values).all():
-            where = points[np.flatnonzero(~np.isfinite(values).all(axis=1))[0]]
-            raise ModelError(f"the theory's {name} is not finite at {where}")
-        at_points.append(values.reshape(*places.shape[:2], size))
+            first = points[np.flatnonzero(~np.isfinite(values).all(axis=1))[0]]
+            raise ModelError(f"the theory's {name} is not finite at {first}")
+        at_points.append(values.reshape(*positions.shape[:2], size))
     return at_points[0], at_points[1]
 
 
@@ -242,9 +243,9 @@ class ErrorEstimate:
     Attributes
     ----------
     cells : ndarray (n_solids,)
-        Error of each solid cell, in the order of ``mesh.solids`` [energy^(1/2)].
+        Error [energy^(1/2)] of each solid cell, in the order of ``mesh.solids``.
     contact : ndarray (n_solids,)
-        Contribution of the traction jump at the contact surface to the error of each solid cell [energy^(1/2)].
+        Contribution [energy^(1/2)] of the traction jump at the contact surface to the error of each solid cell.
     energy : float
         Energy norm of the solution [energy^(1/2)].
 
@@ -275,7 +276,7 @@ class ErrorEstimate:
 
 @typed(ModelError)
 def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
-    """Return the estimated error of a step.
+    """Estimate the error of each cell in a step, as the module describes.
 
     Parameters
     ----------
@@ -319,23 +320,23 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
 def _differences(
     model: Model, displacement: Array, name: str, smooth: Array, offset: StressOffset | None
 ) -> tuple[Array, float]:
-    """Return the squared energy norms (n_cells,) of smoothed minus computed stress, and that of the computed stress."""
+    """Return the squared energy norms of smoothed minus computed stress (n_cells,), and of the computed stress in total."""
     N, stress, volume, elastic = stress_in_cells(
         model, name, slice(None), displacement, elements.get(name).order + 1, offset
     )
-    off = np.einsum("qa,cai->cqi", N, smooth) - stress
-    squares = (elastic_energy(off, elastic) * volume).sum(axis=1)
+    difference = np.einsum("qa,cai->cqi", N, smooth) - stress
+    squares = (elastic_energy(difference, elastic) * volume).sum(axis=1)
     return squares, float((elastic_energy(stress, elastic) * volume).sum())
 
 
 def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], contact: Array) -> None:
-    """Add h / E times the squared difference between pressure and smoothed normal stress to the cells of the facets."""
+    """Add h / E times the squared difference between pressure and smoothed normal stress to `contact` (n_solids,)."""
     mesh = model.mesh
     pair = next(pair for pair in model.contact if pair.name == result.name)
     nodal = np.zeros(mesh.n_points)
     nodal[result.points] = result.pressure
-    first = np.cumsum([0, *(len(block) for block in mesh.solids.values())])
-    stiffness, material = np.array([law.young[0] for law, _ in model.materials]), model.material_field().number
+    starts = starts_of(mesh.solids)
+    E, material = np.array([law.young[0] for law, _ in model.materials]), model.material_field().number
     for block in surface(mesh, pair.secondary).blocks:
         xi, weights = fine_rule(block.element)
         reference = elements.get(block.element)
@@ -343,30 +344,26 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
         area = facet_measure(block.facets, block.element, mesh.points, xi, model.kinematics == "axisymmetric") * weights
         normals = area_vectors(mesh.points[block.facets], reference.gradient(xi))
         normals /= np.linalg.norm(normals, axis=2, keepdims=True)
-        for number, name in enumerate(mesh.solids):
-            facet, cell, local = _owners(name, mesh.cells[name], block.facets)
+        for name in mesh.solids:
+            facet, cell, local = _cells_of_facets(name, mesh.cells[name], block.facets)
             if not len(facet):
                 continue
             at_nodes = smooth[name][cell[:, None], local]
             tensor = np.einsum("qa,fai->fqi", N, at_nodes)[..., PAIRS[mesh.dim]]
             traction = (tensor * normals[facet][..., None, :]).sum(axis=-1)
             p = nodal[block.facets[facet]] @ N.T
-            off = traction + p[:, :, None] * normals[facet]
-            length = area[facet].sum(axis=1)
-            size = np.linalg.norm(np.ptp(mesh.points[block.facets[facet]], axis=1), axis=1)
-            value = (
-                size
-                / stiffness[material[name][cell]]
-                * ((off * normals[facet]).sum(axis=2) ** 2 * area[facet]).sum(axis=1)
-            )
-            np.add.at(contact, first[number] + cell, np.where(length > 0, value, 0.0))
+            jump = ((traction + p[:, :, None] * normals[facet]) * normals[facet]).sum(axis=2)
+            h = np.linalg.norm(np.ptp(mesh.points[block.facets[facet]], axis=1), axis=1)
+            square = h / E[material[name][cell]] * (jump**2 * area[facet]).sum(axis=1)
+            np.add.at(contact, starts[name] + cell, np.where(area[facet].sum(axis=1) > 0, square, 0.0))
 
 
-def _owners(name: str, cells: Numbers, facets: Numbers) -> tuple[Indices, Indices, Indices]:
+def _cells_of_facets(name: str, cells: Numbers, facets: Numbers) -> tuple[Indices, Indices, Indices]:
     """Return the facets that belong to cells of one element type, these cells, and the local nodes of the facets."""
-    near = np.flatnonzero(np.isin(cells, facets).sum(axis=1) >= facets.shape[1])
+    adjacent = np.flatnonzero(np.isin(cells, facets).sum(axis=1) >= facets.shape[1])
     sides = [list(side) for side in elements.get(name).facets if len(side) == facets.shape[1]]
-    rows = np.array([same_facets(facets, cells[near][:, side]) for side in sides], np.intp).reshape(-1, len(near))
+    rows = np.array([same_facets(facets, cells[adjacent][:, side]) for side in sides], np.intp)
+    rows = rows.reshape(-1, len(adjacent))
     cell, side = np.nonzero(rows.T >= 0)
-    owners, row = cells[near[cell]], rows[side, cell]
-    return row, near[cell], np.argmax(owners[:, None] == facets[row][:, :, None], axis=2)
+    nodes, row = cells[adjacent[cell]], rows[side, cell]
+    return row, adjacent[cell], np.argmax(nodes[:, None] == facets[row][:, :, None], axis=2)

@@ -29,7 +29,7 @@ from fastcontact.studies.job import Run, run
 
 
 class Runs(StatusLine):
-    """Status line of a study with the last run, the number of remaining runs, and the remaining time."""
+    """Status line of a study: the last run, the number of remaining runs, and the estimated remaining time."""
 
     def __init__(self, show: bool) -> None:
         super().__init__(100, show)
@@ -44,13 +44,13 @@ class Runs(StatusLine):
         self._stored += progress.stored
         solved = progress.done - self._stored
         outcome = "failed" if progress.error else "found in the store" if progress.stored else "done"
-        each, count = (time.perf_counter() - self._started) / max(solved, 1), len(progress.left)
-        left = f", {count} left: about {each * count:.0f} s" if solved and count else ""
+        seconds, n_left = (time.perf_counter() - self._started) / max(solved, 1), len(progress.left)
+        left = f", {n_left} left: about {seconds * n_left:.0f} s" if solved and n_left else ""
         self.draw(f"{progress.done}/{progress.total} {progress.label} {outcome}{left}")
 
 
 Result = dict[str, Any]
-# NumPy and Numba read these variables when they are imported, so they must be set before a worker process starts.
+# Environment variables that NumPy and Numba read on import, and which therefore must be set before a worker process starts.
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -69,7 +69,7 @@ class Progress:
     left : tuple of str
         Labels of the remaining runs.
     seconds : float
-        Wall time of the run [s]; 0 if its result is from the store.
+        Wall time [s] of the run; 0 if its result is from the store.
     error : str
         Reason of the failure of the run; empty if it succeeded.
     stored : bool
@@ -97,11 +97,11 @@ def run_all(
 
     Raises CaseError if the number of workers is invalid, and FastcontactError if no worker process can start.
     """
-    kept = None if store is None else Store(store)
-    results = {i: stored_result for i, job in enumerate(jobs) if kept and (stored_result := kept.get(job)) is not None}
+    storage = None if store is None else Store(store)
+    results = {i: stored for i, job in enumerate(jobs) if storage and (stored := storage.get(job)) is not None}
     waiting = {index: job.label for index, job in enumerate(jobs)}
 
-    def ended(index: int, stored: bool = False) -> None:
+    def report(index: int, stored: bool = False) -> None:
         label, result = waiting.pop(index), results[index]
         if on_progress is not None:
             seconds = 0.0 if stored else float(result.get("seconds", 0.0))
@@ -109,12 +109,12 @@ def run_all(
             on_progress(Progress(label, len(jobs) - len(left), len(jobs), left, seconds, error, stored))
 
     for index in list(results):
-        ended(index, stored=True)
-    for index, result in _run_rest(jobs, list(waiting), executor, workers):
-        if kept is not None and "error" not in result:
-            kept.put(jobs[index], result)
+        report(index, stored=True)
+    for index, result in _run_jobs(jobs, list(waiting), executor, workers):
+        if storage is not None and "error" not in result:
+            storage.put(jobs[index], result)
         results[index] = result
-        ended(index)
+        report(index)
     return [results[index] for index in range(len(jobs))]
 
 
@@ -123,16 +123,16 @@ def run_study(
 ) -> list[Result]:
     """Return the results of `run_all`, with a status line if `progress` is true.
 
-    If all runs fail, the first error is raised again with `name` before its message.
+    If all runs fail, the error of the first one is raised, with `name` before its message.
     """
     with Runs(progress) as line:
 
-        def ended(progress: Progress) -> None:
+        def report(progress: Progress) -> None:
             line(progress)
             if on_progress is not None:
                 on_progress(progress)
 
-        results = run_all(jobs, on_progress=ended, **options)
+        results = run_all(jobs, on_progress=report, **options)
     if all("error" in result for result in results):
         kind = getattr(errors, str(results[0].get("kind")), CaseError)
         raise kind(f"{name}; {jobs[0].label}: {results[0]['error']}")
@@ -166,49 +166,50 @@ class Store:
         return result if isinstance(result, dict) and "values" in result else None
 
     def put(self, job: Run, result: Result) -> None:
-        """Store the result of a run; the file is written completely or not at all."""
+        """Store the result of a run in a file that is written atomically."""
         text = json.dumps({"label": job.label, "case": job.name, "marks": job.marks, "result": result}, default=str)
         with replacing(self.path(job)) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def _run_rest(
-    jobs: Sequence[Run], rest: list[int], executor: Executor | None, workers: int | None
+def _run_jobs(
+    jobs: Sequence[Run], indices: list[int], executor: Executor | None, workers: int | None
 ) -> Iterator[tuple[int, Result]]:
+    """Run the jobs with the given `indices`; yield the index and the result of each job as it ends."""
     if workers is not None and workers < 1:
         raise CaseError(f"workers = {workers} must be at least 1, the number of processes")
-    count = min(workers or _processors(), len(rest))
+    count = min(workers or _processors(), len(indices))
     if executor is not None:
-        yield from on_executor(executor, jobs, rest)
+        yield from on_executor(executor, jobs, indices)
     elif count <= 1:
-        for index in rest:
+        for index in indices:
             yield index, run(jobs[index])
     else:
-        yield from on_processes(count, jobs, rest)
+        yield from on_processes(count, jobs, indices)
 
 
-def on_processes(count: int, jobs: Sequence[Run], rest: list[int]) -> Iterator[tuple[int, Result]]:
+def on_processes(count: int, jobs: Sequence[Run], indices: list[int]) -> Iterator[tuple[int, Result]]:
     """Run jobs in `count` local processes; yield the index and the result of each job as it ends.
 
-    If a worker process dies, each remaining job runs again in a separate process.
+    If a worker process dies, each job that has not ended runs again in a separate process.
     """
     if sys.modules.get("__mp_main__") not in (None, sys.modules["__main__"]):
-        # This process is a worker that imports the script of its parent, which calls the study outside
-        # "if __name__ == '__main__'"; the parent process reports the error.
+        # This process is a worker that imports the script of its parent, which calls the study without
+        # "if __name__ == '__main__'". The parent process reports the error.
         raise SystemExit(1)
-    left = list(rest)
+    left = list(indices)
     try:
         with started_pool(count) as pool:
-            for index, result in on_executor(pool, jobs, rest):
+            for index, result in on_executor(pool, jobs, indices):
                 left.remove(index)
                 yield index, result
     except BrokenProcessPool:
         for index in left:
-            yield index, _alone(jobs[index])
+            yield index, _run_alone(jobs[index])
 
 
 class Worker(SpawnProcess):
-    """A process whose start cannot be interrupted, since a partly started process would print an error."""
+    """A process whose start cannot be interrupted, because a partly started process would print an error."""
 
     def start(self) -> None:
         """Start the process, with signals deferred until it is started."""
@@ -230,24 +231,24 @@ class Spawning(SpawnContext):
 
 
 class Workers(ProcessPoolExecutor):
-    """A pool of processes that can be terminated during their work and that end with this process."""
+    """A pool of processes that can be terminated during their work, and that end when this process ends."""
 
     def __init__(self, count: int) -> None:
         self.context = Spawning()
-        heard, self.line = self.context.Pipe(duplex=False)
-        super().__init__(count, self.context, initializer=end_with_parent, initargs=(heard,))
+        receiver, self.line = self.context.Pipe(duplex=False)
+        super().__init__(count, self.context, initializer=end_with_parent, initargs=(receiver,))
 
     def end(self) -> None:
         """Terminate the processes; otherwise Python would wait for their current work before it exits."""
         self.line.close()
         for process in self.context.processes:
-            if process.is_alive():  # a process that is still importing does not read from the pipe
+            if process.is_alive():  # a process that is still importing modules does not read from the pipe
                 process.terminate()
 
 
 @contextlib.contextmanager
 def started_pool(count: int) -> Iterator[Workers]:
-    """Yield a pool of processes after one of them has answered; an error in the block terminates the processes.
+    """Yield a pool of processes, one of which has answered; an error in the ``with`` block terminates the processes.
 
     Raises FastcontactError if no process can start.
     """
@@ -262,7 +263,7 @@ def started_pool(count: int) -> Iterator[Workers]:
                 "or use workers=1"
             ) from None
         yield pool
-        pool.shutdown()  # all work is done, so the processes end normally
+        pool.shutdown()  # all work is done, and the processes end normally
     except BrokenProcessPool:
         raise
     except BaseException:
@@ -272,7 +273,8 @@ def started_pool(count: int) -> Iterator[Workers]:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _alone(job: Run) -> Result:
+def _run_alone(job: Run) -> Result:
+    """Return the result of a job that runs in a separate process, or an error if the process dies."""
     try:
         with started_pool(1) as pool:
             return pool.submit(run, job, 1).result()
@@ -288,7 +290,7 @@ def _processors() -> int:
     return os.cpu_count() or 1
 
 
-def on_executor(executor: Executor, jobs: Sequence[Run], rest: list[int]) -> Iterator[tuple[int, Result]]:
+def on_executor(executor: Executor, jobs: Sequence[Run], indices: list[int]) -> Iterator[tuple[int, Result]]:
     """Run jobs on any executor; yield the index and the result of each job as it ends.
 
     If a job raises an exception, the other jobs are cancelled.
@@ -298,12 +300,12 @@ def on_executor(executor: Executor, jobs: Sequence[Run], rest: list[int]) -> Ite
         # Threads share the environment of this process, which must not change while they compile.
         with contextlib.nullcontext() if isinstance(executor, ThreadPoolExecutor) else _worker_settings():
             # The largest jobs start first, so that no long job runs alone at the end.
-            for index in sorted(rest, key=lambda index: -jobs[index].size):
+            for index in sorted(indices, key=lambda index: -jobs[index].size):
                 futures[executor.submit(run, jobs[index], 1)] = index
         for future in as_completed(futures):
             yield futures[future], future.result()
     except BaseException as error:
-        # A broken or ended pool notifies waiting threads itself and fails for cancelled futures.
+        # A pool that is broken or has been shut down sets its futures itself, which fails if they are cancelled.
         if not isinstance(executor, Workers) and not isinstance(error, BrokenExecutor):
             for future in futures:
                 future.cancel()
@@ -324,11 +326,11 @@ def end_with_parent(line: Connection) -> None:
 
 @contextlib.contextmanager
 def _worker_settings() -> Iterator[None]:
-    """Let processes started in the block use one thread each and ignore Ctrl-C, which this process handles.
+    """Let processes started in a ``with`` block use one thread each and ignore Ctrl-C, which this process handles.
 
-    A terminal sends Ctrl-C to all processes, and each would print a traceback.
+    A terminal sends Ctrl-C to all processes, each of which would print a traceback.
     """
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
+    original = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
     masks = hasattr(signal, "pthread_sigmask")
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masks else None
@@ -337,7 +339,7 @@ def _worker_settings() -> Iterator[None]:
     finally:
         if blocked is not None:
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-        for name, old in before.items():
+        for name, value in original.items():
             os.environ.pop(name, None)
-            if old is not None:
-                os.environ[name] = old
+            if value is not None:
+                os.environ[name] = value

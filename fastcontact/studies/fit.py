@@ -1,14 +1,14 @@
-r"""Fit the limit of a quantity under mesh refinement and its order of convergence, with error bars.
+r"""Fit of the limit of a quantity under mesh refinement and of its order of convergence, with error bars.
 
 The model of the values on meshes of size :math:`h_i` is
 
 .. math:: v_i = L + C h_i^p (1 + s e_i)
 
-with the limit L, the order p, a constant C and independent standard normal variables :math:`e_i`: the mesh error has a
-relative scatter s. For each order p the parameters L, C and s are integrated out (Bayesian linear regression with weights
-:math:`h^{-2p}`; Zellner 1971, chapter 3), and the results are averaged with the evidence of the orders. The prior of p is
-log-normal. The prior of s^2 has the weight of one and a half meshes, so that a chance agreement of few meshes does not make
-the error bar too small. The first k meshes may be too coarse for a single power of h; each further mesh has the prior
+with the limit L, the order p, a constant C and independent standard normal variables :math:`e_i`, so that s is the relative
+scatter of the mesh error. For each order p the parameters L, C and s are integrated out (Bayesian linear regression with
+weights :math:`h^{-2p}`; Zellner 1971, chapter 3), and the results are averaged with the evidence of the orders. The prior of
+p is log-normal. The prior of s^2 has the weight of one and a half meshes, so that a chance agreement of few meshes does not
+make the error bar too small. The first k meshes may be too coarse for a single power of h; each further mesh has the prior
 probability 1/2, as long as three meshes remain. The error bar is the distance from the median of L to the farther end of its
 95 % interval. The reasons for these choices are given in docs/theory/convergence.md.
 """
@@ -27,7 +27,9 @@ from fastcontact.round_off import ROUND_OFF
 
 CONFIDENCE = 0.95
 ORDERS = np.geomspace(0.4, 6.0, 81)
+# Median of the prior of the order, and standard deviation of its logarithm.
 PRIOR_ORDER, PRIOR_SPREAD = 1.6, 0.35
+# Relative scatter in the prior, and its weight in meshes.
 PRIOR_NOISE, PRIOR_WEIGHT = 0.2, 1.5
 # Factor by which the scatter of meshes that are too coarse is larger, and the prior probability of each further such mesh.
 COARSE_NOISE, COARSE_PROBABILITY = 10.0, 0.5
@@ -72,9 +74,9 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
     Parameters
     ----------
     h : array_like (n,)
-        Mesh sizes, which must be positive and distinct, n >= 3 [length].
+        Mesh sizes [length] in any order, which must be positive and distinct, with n >= 3.
     values : array_like (n,)
-        Value of the quantity on each mesh [unit of the quantity]; values that are not finite are omitted.
+        Value of the quantity on each mesh, in the unit of the quantity; values that are not finite are omitted.
 
     Returns
     -------
@@ -117,6 +119,7 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
 
 
 def _checked(h: ArrayLike, values: ArrayLike) -> tuple[Array, Array]:
+    """Return the mesh sizes in descending order with their finite values; CaseError if they are invalid or too few."""
     size, value = np.asarray(h, np.float64), np.asarray(values, np.float64)
     if size.shape != value.shape or size.ndim != 1:
         raise CaseError(f"mesh sizes and values must be lists of equal length, not {size.shape} and {value.shape}")
@@ -134,7 +137,8 @@ def _checked(h: ArrayLike, values: ArrayLike) -> tuple[Array, Array]:
 def _regressions(x: Array, y: Array, floor: float, coarse: int) -> Array:
     """Return location and scale of the Student distribution of the limit, and the logarithm of the evidence (3, n_orders).
 
-    The first `coarse` meshes are assumed to be too coarse for a single power of the mesh size.
+    `x` (n,) and `y` (n,) are normalised mesh sizes and values [-], and `floor` is added to the sum of squares. The first
+    `coarse` meshes are assumed to be too coarse for a single power of the mesh size.
     """
     result = np.empty((3, len(ORDERS)))
     dof = len(x) - 2 + PRIOR_WEIGHT
@@ -154,12 +158,12 @@ def _regressions(x: Array, y: Array, floor: float, coarse: int) -> Array:
 
 
 def _quantiles(centre: Array, width: Array, weight: Array, dof: float) -> list[float]:
-    """Return lower bound, median and upper bound of the central interval of a mixture of Student distributions."""
+    """Return lower bound, median and upper bound of the central 95 % interval of a mixture of Student distributions."""
     from scipy.optimize import brentq
     from scipy.special import stdtr
 
-    def excess(value: float, wanted: float) -> float:
-        return float(weight @ stdtr(dof, (value - centre) / width)) - wanted
+    def excess(value: float, probability: float) -> float:
+        return float(weight @ stdtr(dof, (value - centre) / width)) - probability
 
     reach = 1e3 * width.max()
     low, high = centre.min() - reach, centre.max() + reach
@@ -168,10 +172,10 @@ def _quantiles(centre: Array, width: Array, weight: Array, dof: float) -> list[f
 
 
 def step_orders(h: Sequence[float], values: Sequence[float], limit: float) -> list[float]:
-    """Return the observed order of convergence from the previous to each mesh (n,) [-]; the first is NaN.
+    """Return the observed order of convergence (n,) [-] from the previous to each mesh; the first is NaN.
 
-    `h` (n,) [length] contains the mesh sizes; `values` (n,) and `limit` are in the unit of the quantity. These orders are
-    sensitive to the scatter of the values.
+    `h` (n,) [length] contains the mesh sizes; `values` (n,) and `limit` are in the unit of the quantity. In contrast to the
+    fitted order, these orders are sensitive to the scatter of the values.
     """
     error = np.abs(np.asarray(values, np.float64) - limit)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""A run of a study, whose input and output are plain data, so that a process on any machine can execute it."""
+"""Runs of a study, which can be sent to processes on any machine and return their results as plain data."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from fastcontact.results.units import known_units
 from fastcontact.studies import quantities
 from fastcontact.studies.settings import Combination, Recipe, Settings, make_mesh, recipe
 
-# Keys of contact pairs and obstacles that do not depend on the formulation.
+# Keys of contact pairs and obstacles that are valid for all formulations, in addition to `SHARED_OPTIONS`.
 KEYS = {
     *("secondary", "primary", "formulation", "friction", "shape", "motion", "force", "rotation", "ramp"),
     *("file", "group", "flip", "crease"),
@@ -53,10 +53,10 @@ class Run:
     label: str  # for messages
     name: str  # name of the case or of the model function
     marks: dict[str, Any]  # values that distinguish the runs of a study, for example the level
-    size: float = 0.0  # amount of work, in a common unit of the runs of a study
+    size: float = 0.0  # measure of the work by which the runs of a study are ordered
 
     def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
-        """Return the case of this run, if it is known, and all steps or only the last step."""
+        """Return the case of this run, or None if it is unknown, and all steps of its solution or only the last one."""
         raise NotImplementedError
 
     def measured(self) -> dict[str, Any]:
@@ -90,7 +90,7 @@ class Run:
 
     @property
     def key(self) -> str:
-        """Name of the run in a store, a hash of all its inputs; CaseError if the inputs are unknown."""
+        """Name of the run in a store, which is a hash of all its inputs; CaseError if the inputs are unknown."""
         raise CaseError("a store is for case files, since the inputs of a function are not known: leave out 'store'")
 
 
@@ -104,7 +104,7 @@ class Job(Run):
     base: Mesh | None  # mesh of the case, if it is read from a file
     folder: Path = Path()  # folder to which file names in the case are relative
 
-    @cached_property  # hash of the files at the start of a study
+    @cached_property  # the contents of the files are hashed once, at the start of a study
     def key(self) -> str:
         """Hash of all inputs of the run: the case, its mesh, the contents of the files in the case, and the version."""
         data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}
@@ -133,7 +133,7 @@ Function = Callable[..., Any]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FunctionRun(Run):
-    """A run that calls a function which returns a model or the steps of its solution."""
+    """A run that calls a function, which returns a model or the steps of its solution."""
 
     function: Function
     positional: tuple[Any, ...]  # positional arguments
@@ -142,25 +142,25 @@ class FunctionRun(Run):
 
     def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
         """See `Run`."""
-        made = self._result()
-        if isinstance(made, Model):
-            case = Case(self.name, self.name, "", made.mesh, made, linear_ramp(), units=known_units(made.units))
-            return case, solve(made, case.ramp)
-        if isinstance(made, StepResult):
-            return None, [made]
-        if isinstance(made, Sequence) and len(made) and isinstance(made[-1], StepResult):
-            return None, made
+        result = self._call()
+        if isinstance(result, Model):
+            case = Case(self.name, self.name, "", result.mesh, result, linear_ramp(), units=known_units(result.units))
+            return case, solve(result, case.ramp)
+        if isinstance(result, StepResult):
+            return None, [result]
+        if isinstance(result, Sequence) and len(result) and isinstance(result[-1], StepResult):
+            return None, result
         raise CaseError(
-            f"the function {self.name} must return a Model, or what fc.solve returns, not {type(made).__name__}: end it with "
-            "'return'"
+            f"the function {self.name} must return a Model, or what fc.solve returns, not {type(result).__name__}: end it "
+            "with 'return'"
         )
 
     def further(self, steps: Sequence[StepResult]) -> dict[str, float]:
         """See `Run`."""
         return {name: _number(name, measure, steps) for name, measure in self.measures.items()}
 
-    def _result(self) -> Any:
-        """Return the result of the function; CaseError with the line of the error if it fails."""
+    def _call(self) -> Any:
+        """Return the result of the function; CaseError, with the line of the error, if it fails."""
         try:
             return self.function(*self.positional, **self.named)
         except FastcontactError:
@@ -172,7 +172,7 @@ class FunctionRun(Run):
 
 
 def _number(name: str, measure: Measure, steps: Sequence[StepResult]) -> float:
-    """Return the value of a quantity that a function of the caller evaluates; CaseError if the function fails."""
+    """Return the value of a quantity that the caller has given as a function; CaseError if the function fails."""
     try:
         return float(measure(steps if first_parameter(measure) == STEPS else steps[-1]))
     except Exception as error:
@@ -193,7 +193,7 @@ def first_parameter(function: Function) -> str:
 
 @contextlib.contextmanager
 def recorded() -> Iterator[list[str]]:
-    """Yield a list that contains, after the block, the messages of the warnings that the package issues in the block."""
+    """Yield a list to which the messages of the warnings of the package in a ``with`` block are added at its end."""
     texts: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FastcontactWarning)
@@ -204,7 +204,7 @@ def recorded() -> Iterator[list[str]]:
 def job_of(
     case: Case, chosen: Settings, member: Combination, level: int, *, label: str, marks: dict[str, Any], size: float
 ) -> Job:
-    """Return the job of a case with an element and a formulation on the mesh of a level."""
+    """Return the job of a case with the element and the formulation of `member` on the mesh of a level."""
     data, mesh = case_data(chosen, member), recipe(chosen, member.element, level)
     base = case.mesh if chosen.generator is None else None
     return Job(
@@ -222,9 +222,10 @@ def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
     formulation, pairs = combination.formulation, data.get("contact", {})
     if formulation:
         if pairs == "auto" or "contacts" in data:
-            _exchange(data.setdefault("contacts", {}), formulation, settings, settings.own.formulation or "")
+            original = settings.case_combination.formulation or ""
+            _set_formulation(data.setdefault("contacts", {}), formulation, settings, original)
         for name, entry in {**(pairs if isinstance(pairs, dict) else {}), **data.get("obstacle", {})}.items():
-            _exchange(entry, formulation, settings, settings.formulations[name])
+            _set_formulation(entry, formulation, settings, settings.formulations[name])
     if settings.load_steps is not None:
         ramp, steps = data.setdefault("ramp", {}), settings.load_steps
         if "instants" in ramp:
@@ -234,18 +235,18 @@ def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
     return data
 
 
-def _exchange(entry: dict[str, Any], formulation: str, settings: Settings, name: str) -> None:
-    """Replace the formulation `name` in the table of a contact pair or an obstacle by another formulation."""
+def _set_formulation(entry: dict[str, Any], formulation: str, settings: Settings, name: str) -> None:
+    """Set the formulation and its options in the table of a contact pair or an obstacle, whose formulation was `name`."""
     if formulation != name:
-        known = {f.name for f in dataclasses.fields(FORMULATIONS[formulation])} | KEYS | set(SHARED_OPTIONS)
-        for key in [key for key in entry if key not in known]:
+        valid = {f.name for f in dataclasses.fields(FORMULATIONS[formulation])} | KEYS | set(SHARED_OPTIONS)
+        for key in [key for key in entry if key not in valid]:
             del entry[key]
         entry["formulation"] = formulation
     entry.update(settings.options.get(formulation, {}))
 
 
 def run(job: Run, threads: int | None = None) -> dict[str, Any]:
-    """Execute a run and return its results; an error is not raised but returned under the key ``"error"``.
+    """Execute a run and return its result; errors are not raised but returned under the key ``"error"``.
 
     `threads` is the number of threads of the parallel kernels in this process. The result contains ``h`` [length],
     ``n_dofs``, ``seconds`` [s], ``iterations``, ``warnings``, ``profile``, ``units`` and, by quantity, ``values``,
@@ -259,24 +260,24 @@ def run(job: Run, threads: int | None = None) -> dict[str, Any]:
     except FastcontactError as error:
         return {"error": str(error), "kind": type(error).__name__}
     except Exception as error:
-        # The failure of a run must not end the study.
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        return {"error": f"{error} ({where.name}, line {where.lineno})", "kind": type(error).__name__}
+        # An unexpected failure of one run must not end the study.
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        return {"error": f"{error} ({frame.name}, line {frame.lineno})", "kind": type(error).__name__}
 
 
 def fields_of(kind: type, result: dict[str, Any]) -> dict[str, Any]:
-    """Return the entries of a result that are fields of a dataclass."""
+    """Return the entries of a result that are fields of the dataclass `kind`."""
     fields = {field.name: result[field.name] for field in dataclasses.fields(kind) if field.name in result}
     return {**fields, "warnings": tuple(fields["warnings"])}
 
 
 def last_step(case: Case) -> StepResult:
-    """Solve a case and return its last step; earlier steps are not kept in memory."""
+    """Solve a case and return its last step, without keeping earlier steps in memory."""
     return deque(solve_steps(case.model, case.ramp, **case.solution), maxlen=1).pop()
 
 
 def profile(last: StepResult, pair: str | None) -> dict[str, list[float]]:
-    """Return ``r`` [length] and ``pressure`` [pressure] along the contact of a 2D model; empty for other models."""
+    """Return ``r`` [length] and ``pressure`` [pressure] along the contact of a plane or axisymmetric model; else nothing."""
     if pair is None or last.displacement.shape[1] != 2:
         return {}
     contact = last.contact[pair]

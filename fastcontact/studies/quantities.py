@@ -1,4 +1,4 @@
-"""Quantities of interest: their values in the last step of a run and in a theory, their titles and units."""
+"""Quantities of interest: their values in the last step of a run and in a theory, and their titles and units."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from fastcontact.results.units import labelled
 
 # Theories that are exact for the bodies of the model, unlike theories of half-spaces or beams.
 EXACT_THEORIES = (PressFit, HertzBox)
-# Title and kind of unit (empty for ratios) of the standard quantities, which studies show if they have values.
+# Title and kind of unit (empty for ratios) of the standard quantities.
 LABELS = {
     "force": ("contact force", "force"),
     "pressure_max": ("largest pressure", "pressure"),
@@ -39,39 +39,40 @@ LABELS = {
 
 
 def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
-    """Return the quantities of interest of a solved case [units of the case]; those of contact only if `pair` is given."""
-    values_measured = {} if pair is None else _of_contact(case, last.contact[pair], pair)
-    values_measured["von_mises_max"], where = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
+    """Return the quantities of interest of a solved case, in its units; those of contact only if `pair` is given."""
+    quantities = {} if pair is None else _contact_quantities(case, last.contact[pair], pair)
+    quantities["von_mises_max"], position = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
     if pair is not None:
-        values_measured["von_mises_depth"] = _depth(case, pair, where)
+        quantities["von_mises_depth"] = _depth(case, pair, position)
     for probe, point in case.probes.items():
         of_probe = {f"{probe}.{kind}": OF_PROBES[kind][1](last, point) for kind in _kinds(case)}
-        values_measured |= {k: float(v) for k, v in of_probe.items() if v is not None and np.isfinite(v)}
-    return values_measured
+        quantities |= {name: float(v) for name, v in of_probe.items() if v is not None and np.isfinite(v)}
+    return quantities
 
 
 def check_names(case: Case, names: Iterable[str]) -> None:
-    """Raise CaseError if a name is not that of a quantity of the case that `measure` may return."""
+    """Raise CaseError if a name is not that of a quantity that `measure` may return for the case."""
     of_probes = [f"{probe}.{kind}" for probe in case.probes for kind in _kinds(case)]
     for name in names:
         check_known("quantity", name, [*LABELS, *of_probes], CaseError)
 
 
 def _kinds(case: Case) -> list[str]:
-    """Return the quantities that probes of a case have."""
+    """Return the quantities of the probes of a case, without their probe."""
     return [kind for kind in OF_PROBES if kind != "shear" and (case.mesh.dim == 3 or kind not in ONLY_IN_SPACE)]
 
 
 def of_contacts(last: StepResult) -> dict[str, float]:
-    """Return the quantities of the first contact pair of a step that do not depend on a model.
+    """Return the quantities of the first contact pair of a step that can be evaluated without its model.
 
     They may be NaN if the pair is open, and the dictionary is empty if there is no pair.
     """
     contact = next(iter(last.contact.values()), None)
-    return {} if contact is None else _of_pressure(contact)
+    return {} if contact is None else _pressure_quantities(contact)
 
 
-def _of_pressure(contact: ContactResult) -> dict[str, float]:
+def _pressure_quantities(contact: ContactResult) -> dict[str, float]:
+    """Return the quantities of a contact pair that do not depend on the case."""
     quantities = {
         "force": contact.normal_force if contact.cancels else float(np.linalg.norm(contact.force)),
         "pressure_max": contact.pressure_max,
@@ -83,15 +84,16 @@ def _of_pressure(contact: ContactResult) -> dict[str, float]:
     return quantities
 
 
-def _of_contact(case: Case, contact: ContactResult, pair: str) -> dict[str, float]:
-    quantities = _of_pressure(contact)
+def _contact_quantities(case: Case, contact: ContactResult, pair: str) -> dict[str, float]:
+    """Return the finite quantities of a contact pair, with the errors of the pressure in 2D if there is a theory."""
+    quantities = _pressure_quantities(contact)
     theory: Any = case.theories.get(pair, {}).get("theory")
     if case.mesh.dim == 2 and pressure_curve(theory) is not None:
         side = secondary(case, pair)
         quantities["pressure_error"] = pressure_error(case, side, contact, theory)
         if hasattr(theory, "at_force") and quantities["force"] > 0:
-            same = theory.at_force(quantities["force"] / case.theories[pair]["share"])
-            quantities["pressure_error_equal_force"] = pressure_error(case, side, contact, same)
+            at_force = theory.at_force(quantities["force"] / case.theories[pair]["share"])
+            quantities["pressure_error_equal_force"] = pressure_error(case, side, contact, at_force)
     return {name: value for name, value in quantities.items() if np.isfinite(value)}
 
 
@@ -101,34 +103,34 @@ def secondary(case: Case, pair: str) -> Surface:
 
 
 def contact_radius(contact: ContactResult) -> float:
-    """Return the distance from the contact centre at which the pressure vanishes [length]; NaN if the contact is open.
+    """Return the distance [length] from the contact centre at which the pressure vanishes; NaN if the contact is open.
 
     Near the edge of a smooth contact, the square of the pressure is linear in the square of the distance; in Hertzian
-    contact it is linear everywhere. A line is fitted to the closed nodes beyond 0.4 of the radius, except for the last two,
-    where the edge divides a facet. The radius is the zero of this line, limited to the bracket between the outermost closed
-    node and the first open node. If the pressure does not decrease towards the edge, as below a punch, the radius is the
-    upper bound of the bracket. With fewer than three such nodes, it is the midpoint of the bracket.
+    contact it is linear everywhere. A line is fitted to the closed nodes beyond 0.4 of the radius, except for the last two
+    (if there are at least five), where the edge divides a facet. The radius is the zero of this line, limited to the bracket
+    between the outermost closed node and the first open node. If the pressure does not decrease towards the edge, as below a
+    punch, the radius is the upper bound of the bracket. With fewer than three such nodes, it is the midpoint of the bracket.
     """
-    inside, outside = contact.radius
-    if not np.isfinite(inside):
+    lower, upper = contact.radius
+    if not np.isfinite(lower):
         return float("nan")
-    outside = outside if np.isfinite(outside) else inside
+    upper = upper if np.isfinite(upper) else lower
     r = np.abs(contact.across)
-    used = np.flatnonzero(contact.active & (contact.pressure > 0) & (r > 0.4 * inside) & (r < outside))
-    used = used[np.argsort(r[used])]
-    if len(used) < 3:
-        return float(0.5 * (inside + outside))
-    fitted = used[:-2] if len(used) >= 5 else used
-    slope, start = np.polyfit((r[fitted] / outside) ** 2, (contact.pressure[fitted] / contact.pressure.max()) ** 2, 1)
+    nodes = np.flatnonzero(contact.active & (contact.pressure > 0) & (r > 0.4 * lower) & (r < upper))
+    nodes = nodes[np.argsort(r[nodes])]
+    if len(nodes) < 3:
+        return float(0.5 * (lower + upper))
+    nodes = nodes[:-2] if len(nodes) >= 5 else nodes
+    slope, intercept = np.polyfit((r[nodes] / upper) ** 2, (contact.pressure[nodes] / contact.pressure.max()) ** 2, 1)
     if slope >= 0:
-        return float(outside)
-    return float(np.clip(outside * np.sqrt(max(-start / slope, 0.0)), inside, outside))
+        return float(upper)
+    return float(np.clip(upper * np.sqrt(max(-intercept / slope, 0.0)), lower, upper))
 
 
 def pressure_error(case: Case, side: Surface, contact: ContactResult, theory: Any) -> float:
-    """Return the relative error of the pressure in the L2 norm over the undeformed secondary surface [-].
+    """Return the error [-] of the pressure in the L2 norm over the undeformed secondary surface, relative to the theory.
 
-    The error is relative to the L2 norm of the theory; it is NaN if this norm is zero.
+    The error is NaN if the norm of the theory is zero.
     """
     curve = pressure_curve(theory)
     assert curve is not None
@@ -139,22 +141,22 @@ def pressure_error(case: Case, side: Surface, contact: ContactResult, theory: An
         axisymmetric = case.model.kinematics == "axisymmetric"
         area = facet_measure(block.facets, block.element, case.mesh.points, xi, axisymmetric) * weights
         exact = curve.pressure(np.abs(contact.place[block.local] @ shape.T))
-        off = contact.pressure[block.local] @ shape.T - exact
-        squares, total = squares + float((area * off**2).sum()), total + float((area * exact**2).sum())
+        error = contact.pressure[block.local] @ shape.T - exact
+        squares, total = squares + float((area * error**2).sum()), total + float((area * exact**2).sum())
     return float(np.sqrt(squares / total)) if total else float("nan")
 
 
 def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
     """Return the maximum of a nodal field (n_points,), interpolated between nodes, and its position (dim,) [length].
 
-    On the axis, a quartic is fitted to the nodes of the axis with at least 97 % of the largest value, if there are at least
-    eight. Otherwise, in 2D, a quadratic function, which on the axis is even in the radius, is fitted to the nodes around the
-    node with the largest value. The result is the vertex of this function if it is a maximum close to these nodes, and
-    otherwise the node.
+    If the node with the largest value is on the axis, a quartic is fitted to the surrounding nodes of the axis with at least
+    97 % of this value, if there are at least eight. Otherwise, in 2D, a quadratic function, which on the axis is even in the
+    radius, is fitted to the nodes of the adjacent cells. The result is the maximum of the fitted function if it exists and is
+    close to these nodes, and otherwise the node.
     """
     top = int(np.argmax(values))
     on_axis = axisymmetric and abs(mesh.points[top, 0]) <= 1e-9 * np.abs(mesh.points).max()
-    on_axis_peak = _along_axis(mesh, values, top) if on_axis else None
+    on_axis_peak = _peak_on_axis(mesh, values, top) if on_axis else None
     if on_axis_peak is not None:
         return on_axis_peak
     ring = np.unique(np.concatenate([block[(block == top).any(axis=1)].ravel() for block in mesh.solids.values()]))
@@ -166,8 +168,8 @@ def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
     return vertex[0], mesh.points[top] + size * vertex[1]
 
 
-def _along_axis(mesh: Mesh, values: Array, top: int) -> tuple[float, Array] | None:
-    """Return the maximum of a quartic fitted to nodes of the axis near node `top`, in the body of the node.
+def _peak_on_axis(mesh: Mesh, values: Array, top: int) -> tuple[float, Array] | None:
+    """Return the maximum, and its position, of a quartic fitted to nodes of the axis near node `top`, in its body.
 
     The result is None if there are fewer than eight nodes, if they end next to `top`, or if the quartic has no maximum.
     """
@@ -176,24 +178,28 @@ def _along_axis(mesh: Mesh, values: Array, top: int) -> tuple[float, Array] | No
     line = line[body[line] == body[top]]
     line = line[np.argsort(mesh.points[line, 1])]
     low = values[line] < 0.97 * values[top]
-    here = int(np.flatnonzero(line == top)[0])
-    first = int(np.flatnonzero(low[:here])[-1]) + 1 if low[:here].any() else 0
-    last = here + int(np.flatnonzero(low[here:])[0]) if low[here:].any() else len(line)
-    near = line[first:last]
-    if len(near) < 8 or not first <= here - 2 or not here + 2 < last:
+    row = int(np.flatnonzero(line == top)[0])
+    first = int(np.flatnonzero(low[:row])[-1]) + 1 if low[:row].any() else 0
+    last = row + int(np.flatnonzero(low[row:])[0]) if low[row:].any() else len(line)
+    nodes = line[first:last]
+    if len(nodes) < 8 or not first <= row - 2 or not row + 2 < last:
         return None
-    y, size = mesh.points[near, 1] - mesh.points[top, 1], np.ptp(mesh.points[near, 1])
-    curve = np.polynomial.Polynomial.fit(y / size, values[near], 4)
-    turning = curve.deriv().roots()
-    inside = turning[np.isreal(turning)].real
-    inside = inside[(inside > (y / size).min()) & (inside < (y / size).max())]
-    if not len(inside):
+    y, size = mesh.points[nodes, 1] - mesh.points[top, 1], np.ptp(mesh.points[nodes, 1])
+    quartic = np.polynomial.Polynomial.fit(y / size, values[nodes], 4)
+    roots = quartic.deriv().roots()
+    extrema = roots[np.isreal(roots)].real
+    extrema = extrema[(extrema > (y / size).min()) & (extrema < (y / size).max())]
+    if not len(extrema):
         return None
-    best = inside[np.argmax(curve(inside))]
-    return float(curve(best)), mesh.points[top] + np.array([0.0, best * size])
+    highest = extrema[np.argmax(quartic(extrema))]
+    return float(quartic(highest)), mesh.points[top] + np.array([0.0, highest * size])
 
 
 def _vertex(x: Array, v: Array, on_axis: bool) -> tuple[float, Array] | None:
+    """Return the maximum of a quadratic function fitted to values v (n,) at x (2, n) [-], and its position (2,).
+
+    The result is None if the fit is ill-conditioned, or if the function has no maximum close to the positions and the values.
+    """
     a, b = x
     terms = [np.ones_like(a), b, b * b, a * a] if on_axis else [np.ones_like(a), b, b * b, a * a, a, a * b]
     system = np.column_stack(terms)
@@ -213,28 +219,27 @@ def _vertex(x: Array, v: Array, on_axis: bool) -> tuple[float, Array] | None:
     return value, vertex
 
 
-def _depth(case: Case, pair: str, where: Array) -> float:
-    """Return the distance between a position and the nearest node of a contact pair [length]."""
+def _depth(case: Case, pair: str, position: Array) -> float:
+    """Return the distance [length] between a position (dim,) [length] and the nearest node of a contact pair."""
     sides = next((p.secondary, *filter(None, [p.primary])) for p in case.model.contact if p.name == pair)
     nodes = np.concatenate([case.mesh.points[case.mesh.points_of(side)] for side in sides])
-    return float(np.linalg.norm(nodes - where, axis=1).min())
+    return float(np.linalg.norm(nodes - position, axis=1).min())
 
 
 def mesh_size(case: Case, pair: str | None) -> float:
-    """Return the shortest edge of the facets of the secondary surface, or of the mesh if there is no contact [length]."""
+    """Return the shortest edge [length] of the facets of the secondary surface, or of the mesh if there is no contact."""
     if pair is None:
         return quality(case.mesh).shortest_edge
     shortest = np.inf
     for block in secondary(case, pair).blocks:
-        kind, corners = elements.get(block.element), case.mesh.points[block.facets]
-        ends = kind.edges if kind.dim == 2 else ((0, 1),)
-        for a, b in ends:
-            shortest = min(shortest, float(np.linalg.norm(corners[:, b] - corners[:, a], axis=1).min()))
+        facet, points = elements.get(block.element), case.mesh.points[block.facets]
+        for a, b in facet.edges if facet.dim == 2 else ((0, 1),):
+            shortest = min(shortest, float(np.linalg.norm(points[:, b] - points[:, a], axis=1).min()))
     return shortest
 
 
 def of_theory(theory: Any, share: float = 1.0) -> dict[str, float]:
-    """Return the quantities of interest of a theory [its units]; `share` is the modelled fraction of its force [-]."""
+    """Return the quantities of interest of a theory; `share` [-] is the fraction of its force in the model."""
     names = {"force": "force", "pressure_max": "pressure_max", "contact_radius": "radius"}
     quantities = {key: float(getattr(theory, name)) for key, name in names.items() if hasattr(theory, name)}
     if "force" in quantities:
@@ -243,25 +248,25 @@ def of_theory(theory: Any, share: float = 1.0) -> dict[str, float]:
     if curve is not None:
         quantities |= {"pressure_max": curve.pressure_max, "pressure_pole": float(curve.pressure(0.0))}
     if hasattr(theory, "von_mises_maximum"):
-        greatest = theory.von_mises_maximum()
-        quantities |= {"von_mises_max": greatest.value, "von_mises_depth": greatest.depth}
+        maximum = theory.von_mises_maximum()
+        quantities |= {"von_mises_max": maximum.value, "von_mises_depth": maximum.depth}
     return {quantity: value for quantity, value in quantities.items() if np.isfinite(value) and value > 0}
 
 
 def by_theory(case: Case | None, pair: str | None, force: float) -> dict[str, dict[str, float]]:
     """Return the quantities of a pair in its theory and in its mesh-converged solution.
 
-    The keys are ``theory`` for the theory at equal approach, ``reference`` for the mesh-converged solution and
-    ``equal_force`` for the theory at the contact force `force` [force]. Their values are empty if there is no case.
+    The keys are ``theory`` for the theory at equal approach, ``reference`` for the mesh-converged solution, and
+    ``equal_force`` for the theory at the contact force `force` [force]. Their values are empty without a case.
     """
     theories = {} if case is None else case.theories.get(pair or "", {})
     theory: Any = theories.get("theory")
     share = theories.get("share", 1.0)
-    same = theory.at_force(force / share) if force > 0 and hasattr(theory, "at_force") else None
+    at_force = theory.at_force(force / share) if force > 0 and hasattr(theory, "at_force") else None
     return {
         "theory": of_theory(theory, share),
         "reference": of_theory(theories.get("mesh_converged"), share),
-        "equal_force": of_theory(same, share),
+        "equal_force": of_theory(at_force, share),
     }
 
 
@@ -271,18 +276,18 @@ def title(quantity: str) -> str:
 
 
 def unit(quantity: str, units: Mapping[str, str]) -> str:
-    """Return the name of the unit of a quantity; empty for ratios and if the unit is unknown."""
+    """Return the name of the unit of a quantity, or an empty string for ratios and unknown units."""
     return units.get(_kind(quantity) or "", "")
 
 
 def _kind(quantity: str) -> str | None:
-    """Return the kind of unit of a quantity: length, force or pressure, empty for ratios, and None if it is unknown."""
+    """Return the kind of unit of a quantity (length, force or pressure), an empty string for ratios, or None if unknown."""
     if quantity in LABELS:
         return LABELS[quantity][1]
     return None if "." not in quantity else "length" if ".displacement." in quantity else "pressure"
 
 
 def column(label: str, quantity: str, units: Mapping[str, str]) -> str:
-    """Return the header of a column or an axis: a label with the unit of the quantity, if known, and ``[1]`` for ratios."""
+    """Return the header of a column or an axis: a label with the unit of the quantity, if known, or ``[1]`` for a ratio."""
     kind = _kind(quantity)
     return f"{label} [1]" if kind == "" else labelled(label, units, kind or "")

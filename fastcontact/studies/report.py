@@ -1,4 +1,4 @@
-"""Reports of studies: tables of text, panels of axes, HTML pages, and their base class."""
+"""Reports of studies: tables of text, panels of axes, HTML pages, and the base class of results."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def percent(value: float | None, uncertainty: float | None = None) -> str:
 
 
 def by_columns(columns: Sequence[tuple[str, Sequence[str]]]) -> Rows:
-    """Return the rows of a table whose columns are given as headers and strings; the first row contains the headers."""
+    """Return the rows of a table from its columns, which are pairs of header and entries; the first row is the header."""
     return [[name for name, _ in columns], *map(list, zip(*(texts for _, texts in columns), strict=True))]
 
 
@@ -56,7 +56,7 @@ MARKERS = "osD^v<>ph*"
 
 
 def marker(number: int) -> str:
-    """Return the marker of a curve, counted from 0."""
+    """Return the marker of the curve with a number, counted from 0."""
     return MARKERS[number % len(MARKERS)]
 
 
@@ -72,10 +72,10 @@ def panels(
 
     `widths` are the relative widths of the columns [-]; by default all columns have the same width.
     """
-    made = new_panels(rows, columns, size, 130, width_ratios=widths)
+    axes = new_panels(rows, columns, size, 130, width_ratios=widths)
     if title:
-        made[0, 0].figure.suptitle(title, **style)
-    return made
+        axes[0, 0].figure.suptitle(title, **style)
+    return axes
 
 
 def message(ax: Any, text: str) -> None:
@@ -94,7 +94,7 @@ def frame(
     title_size: float | str = "large",
     legend_size: float = 8,
 ) -> None:
-    """Set the scales, the title, the labels, the grid and, if curves have labels, the legend of axes.
+    """Set the scales, the title, the labels and the grid of axes, and add a legend if curves have labels.
 
     Parameters
     ----------
@@ -116,13 +116,13 @@ def frame(
         if scale != "linear":
             setter("log")
         if scale == "plain log":
-            _plain(axis)
+            _label_with_decimals(axis)
     ax.set(xlabel=labels[0], ylabel=labels[1])
     ax.set_title(title, fontsize=title_size)
     if scales[1] == "linear":
         ax.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 7))
         low, high = ax.dataLim.intervaly
-        if 0.0 <= high - low < 1e-6 * max(abs(low), abs(high)):  # round-off is not a trend
+        if 0.0 <= high - low < 1e-6 * max(abs(low), abs(high)):  # differences are round-off
             ax.set_ylim(sorted((0.9 * low, 1.1 * low)))
     if grid:
         ax.grid(which="major", alpha=grid)
@@ -130,13 +130,13 @@ def frame(
         ax.legend(fontsize=legend_size)
 
 
-def _plain(axis: Any) -> None:
+def _label_with_decimals(axis: Any) -> None:
     """Label a logarithmic axis with a few decimal numbers instead of powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = axis.get_data_interval()
-    many = low > 0 and high > 30.0 * low
-    axis.set_major_locator(LogLocator(subs=(1.0,) if many else (1.0, 2.0, 5.0)))
+    wide = low > 0 and high > 30.0 * low
+    axis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.10g}"))
     axis.set_minor_formatter(NullFormatter())
 
@@ -161,8 +161,8 @@ def page(heading: str, blocks: Sequence[str], case_text: str) -> str:
     blocks = list(blocks)
     if case_text:
         blocks += [section("The case"), f"<pre>{html.escape(case_text)}</pre>"]
-    made = ", ".join(f"{name} {version}" for name, version in versions().items())
-    blocks.append(f"<footer>Made with {html.escape(made)}.</footer>")
+    software = ", ".join(f"{name} {version}" for name, version in versions().items())
+    blocks.append(f"<footer>Made with {html.escape(software)}.</footer>")
     return (
         "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>"
         "<meta name='viewport' content='width=device-width, initial-scale=1'>"
@@ -179,7 +179,7 @@ def section(heading: str) -> str:
 
 def paragraph(text: str) -> str:
     """Return a string as an HTML paragraph."""
-    return f"<p class='say'>{_signs(html.escape(text))}</p>"
+    return f"<p class='say'>{_plus_minus_signs(html.escape(text))}</p>"
 
 
 def failure(text: str) -> str:
@@ -189,7 +189,7 @@ def failure(text: str) -> str:
 
 def table(rows: Sequence[Sequence[str]], caption: str = "") -> str:
     """Return rows of strings as an HTML table; the first row is the header."""
-    return f"<div class='wide'>{_signs(html_table(rows[1:], rows[0], caption, style=''))}</div>"
+    return f"<div class='wide'>{_plus_minus_signs(html_table(rows[1:], rows[0], caption, style=''))}</div>"
 
 
 def image(figure: Any, description: str) -> str:
@@ -198,7 +198,8 @@ def image(figure: Any, description: str) -> str:
     return f"<p><img alt='{html.escape(description, quote=True)}' src='data:image/png;base64,{data}'></p>"
 
 
-def _signs(text: str) -> str:
+def _plus_minus_signs(text: str) -> str:
+    """Return HTML with plus-minus signs in place of ``+-``."""
     return text.replace("+-", "&plusmn;")
 
 
@@ -283,7 +284,7 @@ class Report:
 
     @staticmethod
     def structured_known(columns: Mapping[str, Sequence[Any]]) -> AnyArray:
-        """Return columns (n_rows,) as a structured array (n_rows,), without columns that contain only NaN."""
+        """Return a structured array (n_rows,) of the columns (n_rows,) that do not contain only NaN."""
         return structured({name: values for name, values in columns.items() if any(v == v for v in values)})
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -312,6 +313,6 @@ class Report:
         )
 
     def framed(self, numbers: dict[str, Any]) -> dict[str, Any]:
-        """Return the numbers of a study with its case and the versions of the software, as ``--json`` writes them."""
+        """Return the numbers of a study with the name of its case and the versions of the software, as ``--json`` does."""
         case = {"case": self.name, "title": self.title, "units": dict(self.units)}
         return {**case, **numbers, "versions": versions()}

@@ -1,4 +1,4 @@
-"""Studies of many runs: mesh convergence with extrapolated limits, and sweeps over the values of parameters."""
+"""Studies of many runs: mesh convergence with extrapolated limits, and sweeps over values of parameters."""
 
 from __future__ import annotations
 
@@ -60,9 +60,9 @@ def convergence_study(
     """Solve a case or a Python model on successively finer meshes, and fit limits and orders of convergence.
 
     The limits give the mesh error of every quantity and, if a theory is known, the model error. The meshes of a case are
-    made by its mesh generator, with sizes that are halved from level to level, or by uniform refinement of its mesh file, in
-    which new nodes on circular boundaries are placed on the circle. The table ``[study]`` of a case file contains the
-    settings. A function makes its meshes itself.
+    generated with sizes that are halved from level to level, or result from uniform refinement of its mesh file, in which new
+    nodes on circular boundaries are placed on the circle. The table ``[study]`` of a case file contains the settings. A
+    function generates its meshes itself.
 
     Parameters
     ----------
@@ -70,9 +70,8 @@ def convergence_study(
         A case, the path of a case file, or a function. The function receives the mesh size and returns a `Model`, which is
         solved in 20 equal steps, or the result of `solve`.
     levels : int or sequence of float
-        For a case the number of meshes. At least three are required for a limit, and five for a reliable error bar. For a
-        function the mesh sizes, passed to it in descending order. They may be any lengths that are proportional to the mesh
-        size [length].
+        For a case, the number of meshes: at least three for a limit, and five for a reliable error bar. For a function, the
+        mesh sizes [length], which are passed to it in descending order and may be any lengths proportional to the edges.
     elements, formulations : sequence of str, optional
         Element types and contact formulations of a case, which are compared in all combinations; ``["all"]`` selects every
         supported one. By default those of ``[study]`` or, without this table, those of the case.
@@ -85,7 +84,8 @@ def convergence_study(
         Theoretical values of quantities of a function, by their names. A case has its theory in the table ``[theory.PAIR]``.
     executor : concurrent.futures.Executor, optional
         Executor of the runs, for example ``Client.get_executor()`` of Dask or an ``MPIPoolExecutor`` of mpi4py; it is not
-        shut down. By default the runs are executed in processes on this machine.
+        shut down. By default the runs of a case are executed in processes on this machine, those of a function in the
+        calling process.
     workers : int, optional
         Number of processes; by default one for each processor, and 1 for a function. With 1 all runs are executed in the
         calling process. Several processes import the calling script, which must therefore call this function under
@@ -95,7 +95,7 @@ def convergence_study(
     on_progress : callable, optional
         Function that is called with a `Progress` after every run.
     progress : bool
-        Whether to show the progress on standard error, in terminals and notebooks.
+        If true, show the progress on standard error, in terminals and notebooks.
 
     Returns
     -------
@@ -128,7 +128,7 @@ def convergence_study(
     options: dict[str, Any] = {"executor": executor, "workers": workers, "store": store}
     options |= {"on_progress": on_progress, "progress": progress}
     if callable(case):
-        refuse({"elements": elements, "formulations": formulations})
+        refuse_case_options({"elements": elements, "formulations": formulations})
         return _of_function(case, levels, quantities, theory or {}, options)
     if not isinstance(levels, int | np.integer) or isinstance(quantities, Mapping) or theory is not None:
         raise CaseError(
@@ -145,15 +145,15 @@ def convergence_study(
     check_levels(case, chosen, members, levels)
     jobs = [level_job(case, chosen, member, level) for level in range(levels) for member in members]
     results = run_study(jobs, "no level could be solved", **options)
-    return gathered(case, jobs, results, [*chosen.quantities, *quantities])
+    return study_of_runs(case, jobs, results, [*chosen.quantities, *quantities])
 
 
 def _of_function(
-    function: Function, sizes: int | Sequence[float], wanted: Quantities, theory: Mapping[str, float], options: Any
+    function: Function, sizes: int | Sequence[float], quantities: Quantities, theory: Mapping[str, float], options: Any
 ) -> Study:
-    """Return the study of a function that returns models; `options` are passed to `run_functions`."""
+    """Return the convergence study of a function that returns models; `options` are passed to `run_functions`."""
     for quantity, value in theory.items():
-        check_known("quantity", quantity, [*LABELS, *wanted], CaseError, "theory: ")
+        check_known("quantity", quantity, [*LABELS, *quantities], CaseError, "theory: ")
         if not np.isfinite(value):
             raise CaseError(f"theory: the value {value} of '{quantity}' is not a finite number: leave it out")
     if isinstance(sizes, int | np.integer):
@@ -161,7 +161,7 @@ def _of_function(
     descending = sorted(map(float, sizes), reverse=True)
     if not descending or len({*descending}) < len(descending) or not (descending[-1] > 0 and descending[0] < np.inf):
         raise CaseError(f"the mesh sizes must be positive and all different, not {[*sizes]}")
-    name, measures = function_name(function), measures_of(wanted)
+    name, measures = function_name(function), measures_of(quantities)
     argument = first_parameter(function)
     runs = [
         FunctionRun(
@@ -173,7 +173,7 @@ def _of_function(
     results = run_functions(runs, "no size could be solved", **options)
     solved = [(level, {**result, "h": descending[level], "theory": {**theory}}) for level, result in enumerate(results)]
     series = _series(
-        Named(None, None, name), solved, [*wanted], (), (None, 1.0, "under the given load"), asked=tuple(wanted)
+        Named(None, None, name), solved, [*quantities], (), (None, 1.0, "under the given load"), asked=tuple(quantities)
     )
     for coarse, fine in pairwise(series.levels):
         if fine.n_dofs <= coarse.n_dofs:
@@ -192,10 +192,10 @@ def level_job(case: Case, chosen: Settings, member: Combination, level: int) -> 
     return job_of(case, chosen, member, level, label=f"{member} level {level}", marks=marks, size=level)
 
 
-def gathered(case: Case, jobs: Sequence[Job], results: Sequence[Result], wanted: Sequence[str]) -> Study:
+def study_of_runs(case: Case, jobs: Sequence[Job], results: Sequence[Result], further: Sequence[str]) -> Study:
     """Return the study of finished runs.
 
-    The quantities in `wanted` are fitted in addition to the standard quantities and to those of the checks of the case.
+    The quantities in `further` are fitted in addition to the standard quantities and to those of the checks of the case.
     """
     by_combination: dict[Combination, list[tuple[int, Result]]] = {}
     for job, result in zip(jobs, results, strict=True):
@@ -210,32 +210,33 @@ def gathered(case: Case, jobs: Sequence[Job], results: Sequence[Result], wanted:
         if all("error" in result for _, result in runs):
             failed[str(member)] = str(runs[0][1]["error"])
         else:
-            series.append(_series(member, runs, [*wanted], checked, (theory, share, compared)))
+            series.append(_series(member, runs, further, checked, (theory, share, compared)))
     return Study(**of_case(case), series=series, failed=failed, theory=theory)
 
 
 def _series(
     member: Combination,
     results: list[tuple[int, Result]],
-    wanted: Sequence[str],
+    further: Sequence[str],
     checked: Sequence[str],
     theory: tuple[Any, float, str],
     asked: tuple[str, ...] = (),
 ) -> Series:
     """Return the series of one element type and formulation with its limits.
 
-    Quantities in `checked` are fitted if the results contain them. `theory` consists of the theory of the contact pair, the
-    fraction of the contact that the model represents, and the condition of the comparison (see `Series.compared`).
+    The quantities in `further` must be in the results; those in `checked` are fitted if they are. `theory` consists of the
+    theory of the contact pair, the fraction of the contact that the model represents, and the condition of the comparison
+    (see `Series.compared`).
     """
     solved = [(number, result) for number, result in results if "error" not in result]
     levels = [Level(number=number, **fields_of(Level, result)) for number, result in solved]
-    known = levels[-1].values
-    for name in wanted:
-        check_known("quantity", name, known, CaseError)
-    names = tuple(dict.fromkeys(name for name in (*LABELS, *checked, *wanted) if name in known))
+    finest = levels[-1].values
+    for name in further:
+        check_known("quantity", name, finest, CaseError)
+    names = tuple(dict.fromkeys(name for name in (*LABELS, *checked, *further) if name in finest))
     limits = {name: limit for name in names if (limit := _limit(levels, name)) is not None}
     failed = {number: str(result["error"]) for number, result in results if "error" in result}
-    at_force, spread = _at_force(*theory[:2], limits.get("force"))
+    at_force, spread = _theory_at_force(*theory[:2], limits.get("force"))
     last = {key: solved[-1][1][key] for key in ("theory", "reference")}
     return Series(
         member, levels, failed, **last, equal_force=at_force, equal_force_spread=spread, quantities=names, limits=limits,
@@ -243,25 +244,26 @@ def _series(
     )  # fmt: skip
 
 
-def _at_force(theory: Any, share: float, force: Limit | None) -> tuple[dict[str, float], dict[str, float]]:
+def _theory_at_force(theory: Any, share: float, force: Limit | None) -> tuple[dict[str, float], dict[str, float]]:
     """Return the values of the theory at the limit of the force, and their variation within the error bar of the force."""
     if force is None or not force.value > force.uncertainty or not hasattr(theory, "at_force"):
         return {}, {}
-    middle, upper = (of_theory(theory.at_force((force.value + off) / share), share) for off in (0.0, force.uncertainty))
-    return middle, {name: abs(upper[name] - value) for name, value in middle.items()}
+    forces = force.value, force.value + force.uncertainty
+    values, upper = (of_theory(theory.at_force(value / share), share) for value in forces)
+    return values, {name: abs(upper[name] - value) for name, value in values.items()}
 
 
 def _limit(levels: Sequence[Level], quantity: str) -> Limit | None:
-    """Return the limit of a quantity; None if fewer than three levels have it, or if mesh sizes coincide."""
-    known = [(level.h, level.values[quantity]) for level in levels if quantity in level.values]
-    if len({h for h, _ in known}) < max(3, len(known)):
+    """Return the limit of a quantity, or None if it is known on fewer than three levels or if mesh sizes coincide."""
+    values = [(level.h, level.values[quantity]) for level in levels if quantity in level.values]
+    if len({h for h, _ in values}) < max(3, len(values)):
         return None
-    return fit_limit(*zip(*known, strict=True))
+    return fit_limit(*zip(*values, strict=True))
 
 
-# Default refinement level of the meshes of a sweep. Its mesh errors are usually smaller than the trends of interest.
+# Default refinement level of the meshes of a sweep, whose mesh errors are usually smaller than the trends of interest.
 LEVEL = 2
-# Number of points at which a theory is evaluated for a curve.
+# Number of points of a curve of the theory.
 CURVE = 60
 
 
@@ -330,7 +332,7 @@ def parameter_sweep(
     options: dict[str, Any] = {"executor": executor, "workers": workers, "store": store}
     options |= {"on_progress": on_progress, "progress": progress}
     if callable(case):
-        refuse({"element": element, "formulation": formulation, "level": level})
+        refuse_case_options({"element": element, "formulation": formulation, "level": level})
         return _sweep_of_function(case, parameters, quantities, options)
     if not isinstance(parameters, Mapping) or isinstance(quantities, Mapping):
         raise CaseError(
@@ -341,7 +343,7 @@ def parameter_sweep(
     names = tuple(dict.fromkeys((*settings(case).quantities, *quantities)))
     check_names(case, names)
     jobs = [_job(case, choice, element, formulation, level) for choice in choices]
-    # Building one case in advance finds unknown keys, because of which every run would fail.
+    # The first case is built in advance, since an invalid key would cause every run to fail.
     build_case(jobs[0].data, name=case.name, folder=case.folder, mesh=case.mesh)
     results = run_study(jobs, "no point of the sweep could be solved", **options)
     return Sweep(
@@ -357,13 +359,13 @@ def parameter_sweep(
 def _sweep_of_function(
     function: Function,
     parameters: Mapping[str, Sequence[Value]] | Sequence[Value],
-    wanted: Quantities,
+    quantities: Quantities,
     options: dict[str, Any],
 ) -> Sweep:
     """Return the sweep of a function that returns models; `options` are passed to `run_functions`."""
     named = isinstance(parameters, Mapping)
     by_name = parameters if isinstance(parameters, Mapping) else {first_parameter(function): [*parameters]}
-    choices, name, measures = _choices(by_name), function_name(function), measures_of(wanted)
+    choices, name, measures = _choices(by_name), function_name(function), measures_of(quantities)
     runs = [
         FunctionRun(
             label=label_of(choice), name=name, marks=choice, function=function,
@@ -373,14 +375,11 @@ def _sweep_of_function(
     ]  # fmt: skip
     results = run_functions(runs, "no point of the sweep could be solved", **options)
     points = _points(by_name, choices, results)
-    return Sweep(**of_function(function, results), **points, combination=name, asked=tuple(wanted), compared="")
+    return Sweep(**of_function(function, results), **points, combination=name, asked=tuple(quantities), compared="")
 
 
 def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]]:
-    """Return all combinations of the values, in which the last parameter varies fastest.
-
-    CaseError if there are no combinations, or too many.
-    """
+    """Return all combinations of the values, in which the last parameter varies fastest; CaseError for none or too many."""
     if not parameters or not all(len(values) for values in parameters.values()):
         raise CaseError("a sweep needs at least one parameter with at least one value")
     check_runs(prod(len(values) for values in parameters.values()))
@@ -400,7 +399,7 @@ def _points(
 
 
 def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: str | None) -> tuple[TheoryCurve, ...]:
-    """Return curves of the theory of a contact pair against the first parameter, one for each choice of the other parameters.
+    """Return curves of the theory of a contact pair over the first parameter, one for each choice of the other parameters.
 
     There are none if the values of the first parameter are not numbers or are all equal.
     """
@@ -413,12 +412,11 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
     data = data_of(case)
     linked = data.get("study", {}).get("parameters", {})
     curves = []
-    for choice in itertools.product(*(values_of_other for _, values_of_other in others)):
-        rest = dict(zip((name for name, _ in others), choice, strict=True))
-        rows = [_theory_at(data, {first: float(value), **rest}, linked, pair) for value in x]
-        known = [name for name in rows[0] if all(name in row for row in rows)]
-        columns = {name: np.array([row[name] for row in rows]) for name in known}
-        curves.append(TheoryCurve(label_of(rest), x, columns))
+    for combination in itertools.product(*(other_values for _, other_values in others)):
+        choice = dict(zip((name for name, _ in others), combination, strict=True))
+        rows = [_theory_at(data, {first: float(value), **choice}, linked, pair) for value in x]
+        names = [name for name in rows[0] if all(name in row for row in rows)]
+        curves.append(TheoryCurve(label_of(choice), x, {name: np.array([row[name] for row in rows]) for name in names}))
     return tuple(curves)
 
 
@@ -443,11 +441,11 @@ def _job(case: Case, choice: dict[str, Value], element: str | None, formulation:
         data = substituted(data, parameter, value, linked)
     chosen = settings(case, data)
     member = one_combination(chosen, element, formulation)
-    finer = (LEVEL if chosen.by_shape else 0) if level is None else level
-    # The runs with the largest meshes start first. With a generator, the size of a run is the number of points on level 0.
+    level = (LEVEL if chosen.by_shape else 0) if level is None else level
+    # Runs with the largest meshes start first, which the number of points on level 0 determines.
     size = make_mesh(recipe(chosen, member.element, 0), None).n_points if chosen.generator is not None else 0
-    marks = {**choice, "combination": f"{member}, level {finer}"}
-    return job_of(case, chosen, member, finer, label=label_of(choice), marks=marks, size=size)
+    marks = {**choice, "combination": f"{member}, level {level}"}
+    return job_of(case, chosen, member, level, label=label_of(choice), marks=marks, size=size)
 
 
 def function_name(function: Function) -> str:
@@ -456,10 +454,7 @@ def function_name(function: Function) -> str:
 
 
 def of_function(function: Function, results: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the fields of a `Report` on a function.
-
-    The text is the source of the function if it is available, and the units are those of the models in the `results`.
-    """
+    """Return the fields of a `Report` that describe a function, whose text is its source, with the units of the `results`."""
     try:
         text = inspect.getsource(function)
     except (OSError, TypeError):
@@ -469,11 +464,11 @@ def of_function(function: Function, results: Sequence[dict[str, Any]]) -> dict[s
     return {"name": name, "title": title, "text": text, "units": known_units(units or {})}
 
 
-def measures_of(wanted: Quantities) -> dict[str, Measure]:
-    """Return the quantities that are given as functions; CaseError if `wanted` contains an unknown name instead."""
-    if isinstance(wanted, Mapping):
-        return dict(wanted)
-    for name in wanted:
+def measures_of(quantities: Quantities) -> dict[str, Measure]:
+    """Return the quantities that are given as functions; CaseError if an unknown name is given instead."""
+    if isinstance(quantities, Mapping):
+        return dict(quantities)
+    for name in quantities:
         if name not in LABELS:
             raise CaseError(
                 unknown("quantity", name, LABELS)
@@ -482,9 +477,9 @@ def measures_of(wanted: Quantities) -> dict[str, Measure]:
     return {}
 
 
-def refuse(of_cases: Mapping[str, Any]) -> None:
-    """Raise CaseError if one of the options in `of_cases`, which only apply to case files, is not None."""
-    for name, value in of_cases.items():
+def refuse_case_options(options: Mapping[str, Any]) -> None:
+    """Raise CaseError if one of these options, which only apply to case files, is not None."""
+    for name, value in options.items():
         if value is not None:
             raise CaseError(
                 f"leave out '{name}', which is only for case files: a function defines its mesh and its contact itself"
@@ -494,13 +489,13 @@ def refuse(of_cases: Mapping[str, Any]) -> None:
 def run_functions(
     runs: Sequence[FunctionRun], name: str, *, executor: Executor | None, workers: int | None, **options: Any
 ) -> list[dict[str, Any]]:
-    """Return the results of `run_study`; by default the runs are sequential in this process."""
+    """Return the results of `run_study`; by default the runs are executed one after the other in this process."""
     if (executor is not None or (workers or 1) > 1) and not isinstance(executor, ThreadPoolExecutor):
-        _check_sendable(runs[0])
+        _check_picklable(runs[0])
     return run_study(runs, name, executor=executor, workers=workers or 1, **options)
 
 
-def _check_sendable(run: FunctionRun) -> None:
+def _check_picklable(run: FunctionRun) -> None:
     """Raise CaseError if a function cannot be sent to another process or cannot be imported there."""
     try:
         if any(function.__module__ == "__main__" for function in (run.function, *run.measures.values())):

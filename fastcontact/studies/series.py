@@ -13,7 +13,7 @@ from fastcontact.cases.summary import finite
 from fastcontact.studies.fit import Limit, step_orders
 from fastcontact.studies.settings import Combination
 
-# Relative differences below this value are attributed to straight facets and tolerances, not to the formulation [-].
+# Relative difference [-] from an exact theory up to which it is attributed to straight facets and solver tolerances.
 EXACT = 1e-4
 
 
@@ -86,7 +86,7 @@ class Measured:
     Attributes
     ----------
     h : float
-        Shortest facet of the secondary surface; without contact the shortest edge; NaN if unknown [length].
+        Shortest edge [length] of the facets of the secondary surface or, without contact, of the mesh; NaN if unknown.
     n_dofs : int
         Number of degrees of freedom.
     values : dict of str to float
@@ -108,7 +108,7 @@ class Measured:
     warnings: tuple[str, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return sizes, quantities, duration and warnings for JSON; NaN becomes None, and an unknown mesh size is omitted."""
+        """Return sizes, quantities, duration and warnings for JSON, with None for NaN and without an unknown mesh size."""
         size = {} if math.isnan(self.h) else {"h": self.h}
         values = {name: finite(value) for name, value in self.values.items()}
         return {**size, "n_dofs": self.n_dofs, **values, "seconds": self.seconds, "warnings": list(self.warnings)}
@@ -132,7 +132,7 @@ class Series:
     levels : list of Level
         Results of the meshes on which the case could be solved, the coarsest first.
     failed : dict of int to str
-        Reason of the failure of each other mesh, by number of the level.
+        Reason of the failure on each other mesh, by the number of its level.
     theory : dict of str to float
         Values of the theory at equal approach, by quantity.
     reference : dict of str to float
@@ -142,7 +142,7 @@ class Series:
     equal_force_spread : dict of str to float
         Variation of the values in `equal_force` within the error bar of the force, by quantity.
     quantities : tuple of str
-        Quantities that are fitted if there are at least three levels.
+        Quantities with a limit, if there are at least three levels.
     limits : dict of str to Limit
         Limits of mesh refinement by quantity; empty with fewer than three levels.
     exact_theory : bool
@@ -170,7 +170,7 @@ class Series:
     asked: tuple[str, ...] = ()
 
     def shown(self, standard: Sequence[str]) -> list[str]:
-        """Return the quantities to show: the requested quantities, then the known ones among `standard`."""
+        """Return the names of the quantities to show: the requested ones, and then those of `standard` that are known."""
         return [name for name in dict.fromkeys((*self.asked, *standard)) if name in self.quantities]
 
     @property
@@ -219,7 +219,7 @@ class Series:
         limit, theory = self.limits.get(quantity), self.equal_force.get(quantity)
         if not (limit and theory):
             return None
-        # The uncertainty of the force causes an uncertainty of the value of the theory.
+        # The theory is evaluated at the limit of the force, whose uncertainty adds to that of the quantity.
         error_bar = math.hypot(limit.uncertainty, self.equal_force_spread.get(quantity, 0.0))
         return split(self.values(quantity)[-1], dataclasses.replace(limit, uncertainty=error_bar), theory)
 
@@ -261,7 +261,7 @@ class Point(Measured):
         quantity : str
             Name of the quantity.
         to : {"theory", "reference", "equal_force"}
-            Attribute with the denominator.
+            Attribute that contains the denominator.
 
         Returns
         -------
@@ -274,16 +274,16 @@ class Point(Measured):
 
 @dataclass(frozen=True, eq=False)
 class TheoryCurve:
-    """Theory of a case over the first parameter of a sweep.
+    """Theory of a case as a function of the first parameter of a sweep.
 
     Attributes
     ----------
     label : str
         Text with the values of the other parameters.
     x : ndarray (n,)
-        Values of the first parameter [unit of the parameter].
+        Values of the first parameter, in its unit.
     values : dict of str to ndarray (n,)
-        Values of the theory by quantity [units of the case].
+        Values of the theory by quantity, in the units of the case.
     """
 
     label: str

@@ -1,4 +1,4 @@
-"""Settings of a study from the table ``[study]`` of its case file, and recipes of its meshes by level."""
+"""Settings of a study from the table ``[study]`` of its case file, and the recipes of its meshes on all levels."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from fastcontact.mesh import elements, generate
 from fastcontact.mesh.generate import GENERATORS, Circle, circles, linearised, refined, to_quadratic
 from fastcontact.mesh.mesh import Mesh
 
+# Elements by the shape of their cells.
 SHAPES = {"triangles": ("tri3", "tri6"), "quadrangles": ("quad4", "quad8", "quad9")}
 # Elements that "all" selects.
 ALL_ELEMENTS = ("quad4", "quad8", "tri3", "tri6")
@@ -23,7 +24,10 @@ ALL_ELEMENTS = ("quad4", "quad8", "tri3", "tri6")
 
 @dataclass(frozen=True)
 class Combination:
-    """An element and a contact formulation; `element` is None for a mesh with several element types."""
+    """An element and a contact formulation.
+
+    `element` is None for a mesh with several element types, and `formulation` is None without contact.
+    """
 
     element: str | None
     formulation: str | None
@@ -33,7 +37,7 @@ class Combination:
 
     @property
     def rank(self) -> tuple[int, int, int]:
-        """Sort key of the expected accuracy: formulations with a pressure field, quadratic cells, quadrangles."""
+        """Sort key of the expected accuracy, by formulation (node-to-segment last), order and shape of the cells."""
         order = elements.get(self.element).order if self.element else 0
         return int(self.formulation != "node_to_segment"), order, int((self.element or "").startswith("quad"))
 
@@ -53,7 +57,7 @@ class Settings:
     """Checked settings of a study."""
 
     data: dict[str, Any]  # parsed case file
-    own: Combination  # element and formulation of the case
+    case_combination: Combination  # element and formulation of the case
     pair: str | None  # contact pair to evaluate
     formulations: dict[str, str]  # formulations of the contact pairs and obstacles of the case, by name
     generator: str | None  # mesh generator; None if the mesh of the case is read from a file
@@ -74,7 +78,7 @@ class Settings:
 
 
 def data_of(case: Case) -> dict[str, Any]:
-    """Return the data of a case file, which studies modify; CaseError if the case is not from a case file."""
+    """Return the parsed data of a case file; CaseError if the case is not from a case file."""
     try:
         data = tomllib.loads(case.text) if case.deck is None else {}
     except ValueError:
@@ -88,7 +92,7 @@ def data_of(case: Case) -> dict[str, Any]:
 
 
 def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
-    """Return the checked settings of the studies of a case; `data` replaces the data of its case file.
+    """Return the checked settings of the studies of a case; if given, `data` replaces the data of its case file.
 
     Raises CaseError if the table ``[study]`` has an invalid value or the case is not from a case file.
     """
@@ -106,7 +110,7 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
     curves = tuple(_circle(i, entry) for i, entry in enumerate(study.get("curves", ())))
     return Settings(
         data=data,
-        own=combination,
+        case_combination=combination,
         pair=pair,
         formulations=formulations,
         generator=generator,
@@ -117,11 +121,12 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
         load_steps=study.get("load_steps"),
         options=study.get("options", {}),
         quantities=tuple(study.get("quantities", ())),
-        combinations=tuple(_combination(entry) for entry in study.get("combinations", ())) or (combination,),
+        combinations=tuple(_parsed_combination(entry) for entry in study.get("combinations", ())) or (combination,),
     )
 
 
 def _generator(data: dict[str, Any], study: dict[str, Any]) -> tuple[str | None, dict[str, dict[str, Any]]]:
+    """Return the fields `generator` and `arguments` of `Settings`; CaseError if they are inconsistent."""
     by_shape = {shape: dict(study[shape]) for shape in SHAPES if shape in study}
     generator = study.get("generator", data["mesh"].get("generator"))
     if generator is not None:
@@ -131,15 +136,14 @@ def _generator(data: dict[str, Any], study: dict[str, Any]) -> tuple[str | None,
     if not by_shape and "generator" in study and study["generator"] != data["mesh"].get("generator"):
         raise CaseError("'study.generator' needs the arguments of level 0 in [study.triangles] or [study.quadrangles]")
     for shape, arguments in by_shape.items():
-        known = dict.fromkeys(inspect.signature(GENERATORS[str(generator)]).parameters)
-        check_keys(f"study.{shape}", arguments, known)
+        check_keys(f"study.{shape}", arguments, dict.fromkeys(inspect.signature(GENERATORS[str(generator)]).parameters))
     if by_shape or generator is None:
         return generator, by_shape
-    kept = {key: value for key, value in data["mesh"].items() if key not in ("generator", "element")}
-    return generator, {"": kept}
+    return generator, {"": {key: v for key, v in data["mesh"].items() if key not in ("generator", "element")}}
 
 
 def _circle(index: int, entry: Any) -> Circle:
+    """Return the circle that an entry of ``study.curves`` describes; CaseError if it is invalid."""
     try:
         return Circle(tuple(entry["centre"]), float(entry["radius"]), entry.get("group"))
     except (TypeError, KeyError, ValueError) as error:
@@ -147,14 +151,16 @@ def _circle(index: int, entry: Any) -> Circle:
         raise CaseError(f"study.curves[{index}] must be {form}, not {entry!r}") from error
 
 
-def _combination(entry: Any) -> Combination:
+def _parsed_combination(entry: Any) -> Combination:
+    """Return the combination that an entry such as ``"quad8 mortar"`` names; CaseError if it is invalid."""
     words = entry.split() if isinstance(entry, str) else list(entry)
     if len(words) != 2:
         raise CaseError(f"an entry of study.combinations must name an element and a formulation, not {entry!r}")
-    return _checked(words[0], words[1].replace("-", "_"))
+    return _checked_combination(words[0], words[1].replace("-", "_"))
 
 
-def _checked(element: str | None, formulation: str | None) -> Combination:
+def _checked_combination(element: str | None, formulation: str | None) -> Combination:
+    """Return a combination; CaseError if its element or its formulation is unknown."""
     if element is not None:
         check_known("element", element, elements.ELEMENTS, CaseError)
     if formulation is not None:
@@ -165,40 +171,40 @@ def _checked(element: str | None, formulation: str | None) -> Combination:
 def combinations(
     settings: Settings, names: Sequence[str] | None, formulations: Sequence[str] | None
 ) -> tuple[Combination, ...]:
-    """Return the combinations of each element with each formulation, or by default the combinations of the case.
+    """Return all combinations of the elements `names` and the `formulations`, by default those of the settings.
 
     Raises CaseError if an element or a formulation is unknown, or if the case has no contact pair.
     """
     if names is None and formulations is None:
         return settings.combinations
-    chosen = [settings.own.element] if names is None else list(names)
-    if names is not None and list(names) == ["all"]:
-        chosen = [name for name in ALL_ELEMENTS if makeable(settings, name)]
+    selected = [settings.case_combination.element] if names is None else list(names)
+    if selected == ["all"]:
+        selected = [name for name in ALL_ELEMENTS if makeable(settings, name)]
     if formulations is None:
-        return tuple(_checked(element, settings.own.formulation) for element in chosen)
+        return tuple(_checked_combination(element, settings.case_combination.formulation) for element in selected)
     if settings.pair is None:
         raise CaseError("this case has no contact pair, so there are no formulations to compare")
-    named = [name.replace("-", "_") for name in formulations]
-    every = list(FORMULATIONS) if named == ["all"] else named
-    return tuple(_checked(element, formulation) for element in chosen for formulation in every)
+    compared = [name.replace("-", "_") for name in formulations]
+    compared = list(FORMULATIONS) if compared == ["all"] else compared
+    return tuple(_checked_combination(element, formulation) for element in selected for formulation in compared)
 
 
 def one_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
     """Return the last combination of ``[study]`` with an element and a formulation, or a new combination of them."""
     formulation = formulation.replace("-", "_") if formulation else None
-    for known in reversed(settings.combinations):
-        if element in (None, known.element) and formulation in (None, known.formulation):
-            return known
+    for combination in reversed(settings.combinations):
+        if element in (None, combination.element) and formulation in (None, combination.formulation):
+            return combination
     last = settings.combinations[-1]
-    return _checked(element or last.element, formulation or last.formulation)
+    return _checked_combination(element or last.element, formulation or last.formulation)
 
 
 def makeable(settings: Settings, element: str) -> bool:
     """Return whether meshes of an element can be made for the case."""
     if settings.by_shape:
         return shape_of(element) in settings.arguments
-    present = settings.own.element
-    return elements.get(present).linear == elements.get(element).linear if present else settings.generator is not None
+    original = settings.case_combination.element
+    return elements.get(original).linear == elements.get(element).linear if original else settings.generator is not None
 
 
 def shape_of(element: str) -> str:
@@ -214,48 +220,52 @@ Recipe = dict[str, Any]
 class Rule:
     """Rule by which the arguments of a generator change from one level to the next."""
 
-    defaults: Arguments = field(default_factory=dict)  # values of arguments that the case does not give
+    defaults: Arguments = field(default_factory=dict)  # values on level 0 of arguments that the case does not give
     halve: tuple[str, ...] = ()  # arguments that are halved
     double: tuple[str, ...] = ()  # arguments that are doubled
     root: tuple[str, ...] = ()  # ratios of neighbouring edges, which are replaced by their square roots
 
 
-def _spheres(element: str, arguments: Mapping[str, Any]) -> Rule:
+def _sphere_rule(element: str, arguments: Mapping[str, Any]) -> Rule:
+    """Return the rule of half-spheres and discs of radius R."""
     R = float(arguments.get("R", 50.0))
     if shape_of(element) == "triangles":
         return Rule({"size": R / 25}, ("size", "contact_size"))
     return Rule({"arc_sizes": (R / 250, R / 25), "segments": 15}, ("arc_sizes", "radial_sizes"), ("segments",))
 
 
-def _round(arguments: Mapping[str, Any], coarse: int, fine: int, *further: str) -> Rule:
-    """Return the rule of a body of radius R with edges of R / `coarse`, in contact of R / `fine`, on level 0."""
+def _round_body_rule(arguments: Mapping[str, Any], coarse: int, fine: int, *further: str) -> Rule:
+    """Return the rule of a body of radius R, whose edges on level 0 are R / `coarse`, and R / `fine` at the contact."""
     R = float(arguments.get("R", 50.0))
     size = float(arguments.get("size", R / coarse))
     return Rule({"size": size, "contact_size": min(R / fine, size)}, ("size", "contact_size", *further))
 
 
-def _half_space(element: str, arguments: Mapping[str, Any]) -> Rule:
+def _half_space_rule(element: str, arguments: Mapping[str, Any]) -> Rule:
+    """Return the rule of a block that represents a half-space."""
     width = float(arguments.get("width", 10.0))
-    radius, coarse = float(arguments.get("contact_radius", width / 10)), float(arguments.get("size", width / 4))
-    least = min(radius, float(arguments.get("contact_radius_y", radius)))
-    return Rule({"size": coarse, "contact_size": min(least / 10, coarse)}, ("size", "contact_size", "growth"))
+    radius, size = float(arguments.get("contact_radius", width / 10)), float(arguments.get("size", width / 4))
+    smallest = min(radius, float(arguments.get("contact_radius_y", radius)))
+    return Rule({"size": size, "contact_size": min(smallest / 10, size)}, ("size", "contact_size", "growth"))
 
 
-# Along a graded line, the length of the edges grows by `growth` times the distance, independently of the smallest edge.
+# Rules of the generators, as functions of the element and the arguments on level 0. A `growth` that is the increase of the
+# edge length per distance is halved; of a `growth` that is the ratio of neighbouring edges, the square root is taken.
 RULES: dict[str, Callable[[str, Mapping[str, Any]], Rule]] = {
-    "half-spheres": _spheres,
-    "quarter-disc": _spheres,
-    "cylinder-on-block": lambda element, given: _round(given, 10, 100),
-    "block-on-block": lambda element, given: Rule(double=("divisions_lower", "divisions_upper")),
-    "block": lambda element, given: Rule(double=("divisions",)),
-    "box": lambda element, given: Rule(double=("divisions",)),
-    "rings": lambda element, given: Rule(double=("divisions_inner", "divisions_outer")),
-    "graded-block": _half_space,
-    "punched-block": lambda element, given: Rule(
-        {"edge_size": float(given.get("punch_radius", 1.0)) / 200}, ("edge_size",), root=("growth",)
+    "half-spheres": _sphere_rule,
+    "quarter-disc": _sphere_rule,
+    "cylinder-on-block": lambda _, arguments: _round_body_rule(arguments, 10, 100),
+    "block-on-block": lambda *_: Rule(double=("divisions_lower", "divisions_upper")),
+    **dict.fromkeys(("block", "box"), lambda *_: Rule(double=("divisions",))),
+    "rings": lambda *_: Rule(double=("divisions_inner", "divisions_outer")),
+    "graded-block": _half_space_rule,
+    "punched-block": lambda _, arguments: Rule(
+        {"edge_size": float(arguments.get("punch_radius", 1.0)) / 200}, ("edge_size",), root=("growth",)
     ),
-    "crowned-blocks": lambda element, given: Rule(halve=("contact_size",), root=("growth",)),
-    **dict.fromkeys(("sphere-on-block", "sphere-octant"), lambda element, given: _round(given, 4, 50, "growth")),
+    "crowned-blocks": lambda *_: Rule(halve=("contact_size",), root=("growth",)),
+    **dict.fromkeys(
+        ("sphere-on-block", "sphere-octant"), lambda _, arguments: _round_body_rule(arguments, 4, 50, "growth")
+    ),
 }
 
 
@@ -271,33 +281,34 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
         return {"refinements": level, "element": element, "curves": curves}
     element = element or str(_default_element(settings.generator))
     shape = shape_of(element)
-    # Arguments of level 0 by shape are for quadratic cells. Linear cells have half their size and so the same nodes.
-    finer = level + int(settings.by_shape and elements.get(element).order == 1)
+    # Arguments on level 0 by shape are those of quadratic cells. Linear cells of half the size have the same nodes.
+    n_halvings = level + int(settings.by_shape and elements.get(element).order == 1)
     level_0 = settings.arguments.get(shape, settings.arguments.get("", {}))
     # Triangles are refined, because the pattern of a new free triangulation would change the largest pressure at random.
-    halvings, refinements = (0, finer) if shape == "triangles" else (finer, 0)
-    arguments = _finer(settings, element, level_0, halvings)
+    halvings, refinements = (0, n_halvings) if shape == "triangles" else (n_halvings, 0)
+    arguments = _refined_arguments(settings, element, level_0, halvings)
     return {"generator": settings.generator, "arguments": arguments, "refinements": refinements}
 
 
 def _default_element(generator: str) -> Any:
     """Return the default element of a generator, or tri3 if the generator is unknown."""
-    maker = generate.GENERATORS.get(generator)
-    return inspect.signature(maker).parameters["element"].default if maker is not None else "tri3"
+    function = generate.GENERATORS.get(generator)
+    return inspect.signature(function).parameters["element"].default if function is not None else "tri3"
 
 
 def _not_makeable(settings: Settings, element: str) -> str:
-    present = settings.own.element or "mixed cells"
+    """Return the message that an element cannot be made from the mesh of the case, with a remedy."""
+    original = settings.case_combination.element or "mixed cells"
     if settings.by_shape:
         shape = shape_of(element) or "triangles"
         return f"there are no meshes of {element} in this study: give the arguments of level 0 in [study.{shape}]"
     return (
-        f"meshes of {element} cannot be made from the case's {present}: give a generator and its arguments of level 0 in "
+        f"meshes of {element} cannot be made from the case's {original}: give a generator and its arguments of level 0 in "
         "[study], or choose an element on the same corners"
     )
 
 
-def _finer(settings: Settings, element: str, level_0: Mapping[str, Any], level: int) -> Arguments:
+def _refined_arguments(settings: Settings, element: str, level_0: Mapping[str, Any], level: int) -> Arguments:
     """Return the arguments of the generator with sizes halved and counts doubled `level` times.
 
     Raises CaseError if an argument is unknown, or if it is not known which arguments make the mesh finer.
@@ -308,7 +319,7 @@ def _finer(settings: Settings, element: str, level_0: Mapping[str, Any], level: 
     for key in (*level_0, *settings.halve, *settings.double):
         check_known(f"argument of the generator {name} in [study]", key, signature, CaseError)
     rule = RULES[name](element, level_0) if name in RULES else Rule()
-    own_rule = bool(settings.halve or settings.double)  # the ratios of the rule may not apply
+    explicit = bool(settings.halve or settings.double)  # then the rule for `growth` may not apply
     halve, double = settings.halve or rule.halve, settings.double or rule.double
     if not (halve or double):
         raise CaseError(
@@ -321,12 +332,13 @@ def _finer(settings: Settings, element: str, level_0: Mapping[str, Any], level: 
             value = arguments.get(key, signature[key].default if key in signature else None)
             if value is not None:
                 arguments[key] = _scaled(value, factor)
-    for key in () if own_rule else rule.root:
+    for key in () if explicit else rule.root:
         arguments[key] = arguments.get(key, signature[key].default) ** (0.5**level)
     return {key: list(value) if isinstance(value, tuple) else value for key, value in arguments.items()}
 
 
 def _scaled(value: Any, factor: float) -> Any:
+    """Return a number or the entries of a sequence times a factor."""
     return [entry * factor for entry in value] if isinstance(value, (list, tuple)) else value * factor
 
 
@@ -342,8 +354,9 @@ def make_mesh(recipe: Recipe, base: Mesh | None) -> Mesh:
 
 
 def _from_file(recipe: Recipe, base: Mesh) -> Mesh:
-    given, element = recipe["curves"], recipe["element"]
-    curves = circles(base) if given is None else [Circle(tuple(c), radius, group) for c, radius, group in given]
+    """Return the refined mesh of a case, with cells of the order of the element in the recipe."""
+    entries, element = recipe["curves"], recipe["element"]
+    curves = circles(base) if entries is None else [Circle(tuple(c), radius, group) for c, radius, group in entries]
     order, orders = element and elements.get(element).order, {elements.get(name).order for name in base.solids}
     mesh = linearised(base) if order == 1 and orders != {1} else base
     mesh = _refined(mesh, recipe["refinements"], curves)

@@ -1,4 +1,4 @@
-"""The result of a parameter sweep and its report as lines, table, dictionary, figure and page."""
+"""Result of a parameter sweep, and its report as tables, dictionary and figure."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fastcontact.studies.quantities import column, title
 from fastcontact.studies.report import Report, Rows, by_columns, frame, marker, message, number, panels, percent
 from fastcontact.studies.series import Point, TheoryCurve, Value
 
-# Smallest ratio between the largest and the smallest parameter value for which axes are logarithmic.
+# Smallest ratio between the largest and the smallest value of a parameter for which axes are logarithmic.
 WIDE = 9.0
 # Title and kind of unit, empty for ratios, by the last word of the path of a parameter.
 MEANINGS = {
@@ -43,44 +43,27 @@ def parameter_label(parameter: str, units: Mapping[str, str]) -> str:
     >>> parameter_label("contact.hertz.friction", {})
     "friction coefficient of contact 'hertz' [-]"
     """
-    last = parameter.rsplit(".", 1)[-1]
-    if last not in MEANINGS:
+    key = parameter.rsplit(".", 1)[-1]
+    if key not in MEANINGS:
         return parameter
-    words, kind = MEANINGS[last]
+    label, kind = MEANINGS[key]
     match = _TABLE.match(parameter)
     if match is not None:
-        words += f" of {match['table']} " + (f"'{match['name']}'" if match["name"] else str(int(match["number"]) + 1))
+        label += f" of {match['table']} " + (f"'{match['name']}'" if match["name"] else str(int(match["number"]) + 1))
     elif "." in parameter:
-        words += f" of the {parameter.split('.', 1)[0]}"
+        label += f" of the {parameter.split('.', 1)[0]}"
     unit = units.get(kind, "") if kind else "-"
-    return f"{words} [{unit}]" if unit else words
+    return f"{label} [{unit}]" if unit else label
 
 
 class Drawing:
-    """Plots of a sweep over its first parameter, with a curve for each choice of the other parameters.
+    """Plots of a sweep over its first parameter, with a curve for each choice of the other parameters."""
 
-    Parameters
-    ----------
-    parameters : dict of str to sequence
-        Values by parameter.
-    points : list of Point
-        Points of the sweep.
-    theories : list of TheoryCurve
-        Theory over the first parameter.
-    units : dict of str to str
-        Names of units.
-    compared : str
-        Condition of the comparison with theory, as in `Sweep`.
-    """
-
-    def __init__(
-        self, parameters: Mapping[str, Sequence[Value]], points: Sequence[Point], theories: Sequence[TheoryCurve],
-        units: Mapping[str, str], compared: str,
-    ) -> None:  # fmt: skip
-        self.first, *self.others = parameters
-        self.points, self.theories, self.units = points, theories, units
-        self.theory = f"theory {compared}".strip()
-        values = parameters[self.first]
+    def __init__(self, sweep: Sweep) -> None:
+        self.first, *self.others = sweep.parameters
+        self.points, self.theories, self.units = sweep.points, sweep.theories, sweep.units
+        self.theory = f"theory {sweep.compared}".strip()
+        values = sweep.parameters[self.first]
         numbers = [float(v) for v in values if not isinstance(v, (str, bool))]
         wide = len(numbers) == len(values) and min(numbers) > 0 and max(numbers) >= WIDE * min(numbers)
         self.scale = "plain log" if wide else "linear"
@@ -113,30 +96,31 @@ class Drawing:
         """Return a note if the theory does not depend on the first parameter, and otherwise an empty string."""
         curves = [points for _, _, points in self._curves()]
         values = [{point.theory[quantity] for point in points if quantity in point.theory} for points in curves]
-        same = all(len(of_curve) == 1 for of_curve in values) and any(len(points) > 1 for points in curves)
-        return f"\n(the same for every {self.first})" if same else ""
+        constant = all(len(of_curve) == 1 for of_curve in values) and any(len(points) > 1 for points in curves)
+        return f"\n(the same for every {self.first})" if constant else ""
 
     def draw_ratios(self, ax: Any, quantity: str) -> None:
         """Draw the ratios of a quantity to theory, at equal approach and at equal force, over the first parameter."""
         styles = {"theory": ("-", self.theory), "equal_force": ("--", "theory at equal force")}
-        drawn = 0
+        n_lines = 0
         for k, (label, x, points) in enumerate(self._curves()):
             for other, (style, name) in styles.items():
                 ratios = [point.ratio(quantity, other) for point in points]
                 if np.isfinite(ratios).any() and (other, quantity) != ("equal_force", "force"):
                     name = f"to {name}" + (f"\n{label}" if label else "")
-                    color = f"C{k if self.others else drawn}"
+                    color = f"C{k if self.others else n_lines}"
                     ax.plot(x, ratios, f"{marker(k)}{style}", ms=4, lw=1.0, label=name, color=color)
-                    drawn += 1
-        if not drawn:
+                    n_lines += 1
+        if not n_lines:
             return message(ax, f"no theory of the {title(quantity)}")
         ax.axhline(1.0, color="black", lw=0.8)
         self._frame(ax, f"{title(quantity)}: ratio to theory{self._unmoved(quantity)}", "computed / theory [-]")
 
     def _frame(self, ax: Any, heading: str, y_label: str, y_scale: str = "linear") -> None:
+        """Set scales, title, labels and legend; the legend is beside the axes if there are several curves."""
         labels = parameter_label(self.first, self.units), y_label
         frame(ax, heading, labels, scales=(self.scale, y_scale), title_size=10)
-        if self.others:  # curves may be everywhere
+        if self.others:
             ax.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
     def _curves(self) -> list[tuple[str, Sequence[Any], list[Point]]]:
@@ -147,19 +131,19 @@ class Drawing:
         curves: list[tuple[str, Sequence[Any], list[Point]]] = []
         for label, points in by_label.items():
             x = [point.parameters[self.first] for point in points]
-            plain = all(isinstance(value, (int, float)) for value in x)
-            curves.append((label, x if plain else list(map(str, x)), points))
+            numeric = all(isinstance(value, (int, float)) for value in x)
+            curves.append((label, x if numeric else list(map(str, x)), points))
         return curves
 
 
 def label_of(parameters: Mapping[str, Value], others: Sequence[str] | None = None) -> str:
-    """Return the label of a point with the values of the parameters `others`, by default of all parameters."""
+    """Return a label with the values of the parameters in `others`, by default of all parameters."""
     values = ((name, parameters[name]) for name in (parameters if others is None else others))
     return ", ".join(f"{name} = {f'{value:.6g}' if isinstance(value, float) else value}" for name, value in values)
 
 
-# Quantities shown in tables and figures.
-MAIN = ("force", "pressure_max", "contact_radius")
+# Standard quantities in tables and figures.
+STANDARD = ("force", "pressure_max", "contact_radius")
 # Attributes of points with values for comparison, and the names of the relative differences in JSON and CSV.
 DIFFERENCES = {"theory": "from_theory", "equal_force": "from_theory_at_equal_force", "reference": "from_reference"}
 
@@ -236,20 +220,20 @@ class Sweep(Report):
     def remarks(self) -> list[str]:
         """See `Report`."""
         warnings = sorted({text for point in self.points for text in point.warnings})
-        choices = [(", ".join(f"{k} = {_shown(v)}" for k, v in choice.items()), text) for choice, text in self.failed]
+        failures = [(label_of(choice), text) for choice, text in self.failed]
         return [
-            *(f"warning: {text}" for text in warnings), *(f"{choice} failed: {text}" for choice, text in choices),
+            *(f"warning: {text}" for text in warnings), *(f"{label} failed: {text}" for label, text in failures),
             *self._same_theory(),
         ]  # fmt: skip
 
     def _same_theory(self) -> list[str]:
         """Return a remark if no parameter changes the theory, although values change."""
-        kept = [
-            name for name in self._main()
-            if len({point.theory.get(name) for point in self.points} - {None}) == 1
+        constant = any(
+            len({point.theory.get(name) for point in self.points} - {None}) == 1
             and len({point.values.get(name) for point in self.points}) > 1
-        ]  # fmt: skip
-        if not kept or len(self.points) < 2:
+            for name in self._main_quantities()
+        )
+        if not constant:
             return []
         return ["the theory is the same for all points: a parameter in [study.parameters] can change its keys, too"]
 
@@ -258,30 +242,31 @@ class Sweep(Report):
 
         There is a curve for each choice of the other parameters.
         """
-        names, drawing = self._main(), Drawing(self.parameters, self.points, self.theories, self.units, self.compared)
-        known = any(name in point.theory for point in self.points for name in names)
-        legend_width = 1.7 * (1 + known) * (len(self.parameters) > 1)  # legends
-        size = ((8.8 if known else 5.2) + legend_width, 0.5 + 3.1 * len(names))
-        heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # title and name are equal for a function
-        axes = panels(len(names), 1 + known, size, heading, fontsize=11)
+        names, drawing = self._main_quantities(), Drawing(self)
+        with_theory = any(name in point.theory for point in self.points for name in names)
+        legend_width = 1.7 * (1 + with_theory) * (len(self.parameters) > 1)  # [inch]
+        size = ((8.8 if with_theory else 5.2) + legend_width, 0.5 + 3.1 * len(names))
+        heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # for a function both may be its name
+        axes = panels(len(names), 1 + with_theory, size, heading, fontsize=11)
         for row, name in zip(axes, names, strict=True):
             drawing.draw_values(row[0], name)
-            if known:
+            if with_theory:
                 drawing.draw_ratios(row[1], name)
         return axes[0, 0].figure
 
-    def _main(self) -> list[str]:
-        shown = dict.fromkeys((*MAIN, *self.asked))
-        return [name for name in shown if name in self.quantities] or self.quantities[:3]
+    def _main_quantities(self) -> list[str]:
+        """Return the names of the standard and the requested quantities that were evaluated, or of the first three others."""
+        names = dict.fromkeys((*STANDARD, *self.asked))
+        return [name for name in names if name in self.quantities] or self.quantities[:3]
 
     def _rows(self) -> Rows:
         """Return a header and a row for each point with parameters, DOF, main quantities and differences from theory."""
-        columns = [(name, [_shown(point.parameters[name]) for point in self.points]) for name in self.parameters]
+        columns = [(name, [_value_text(point.parameters[name]) for point in self.points]) for name in self.parameters]
         columns.append(("DOF", [str(point.n_dofs) for point in self.points]))
-        for name in self._main():
-            known = any(name in point.theory for point in self.points)
-            compared = {"theory": "from theory"} if known else {}
-            compared |= {"equal_force": "at equal force"} if known and name != "force" else {}
+        for name in self._main_quantities():
+            compared = {}
+            if any(name in point.theory for point in self.points):
+                compared = {"theory": "from theory"} | ({"equal_force": "at equal force"} if name != "force" else {})
             values = [number(point.values.get(name, math.nan), 7) for point in self.points]
             columns.append((column(name, name, self.units), values))
             for other, label in compared.items():
@@ -290,12 +275,14 @@ class Sweep(Report):
 
 
 def _point_dict(point: Point) -> dict[str, Any]:
+    """Return the results of a point for JSON."""
     entry: dict[str, Any] = {"parameters": dict(point.parameters), **point.as_dict()}
     for other, key in DIFFERENCES.items():
-        off = {name: point.ratio(name, other) - 1.0 for name in getattr(point, other)}
-        entry[key] = {name: value for name, value in off.items() if math.isfinite(value)}
+        differences = {name: point.ratio(name, other) - 1.0 for name in getattr(point, other)}
+        entry[key] = {name: value for name, value in differences.items() if math.isfinite(value)}
     return entry
 
 
-def _shown(value: Value) -> str:
+def _value_text(value: Value) -> str:
+    """Return the value of a parameter as text."""
     return number(value) if isinstance(value, float) else str(value)

@@ -206,7 +206,7 @@ def test_an_interruption_of_a_run_alone_ends_its_process(monkeypatch):
 
     monkeypatch.setattr(execute, "Workers", lambda count: Pool())
     with pytest.raises(KeyboardInterrupt):
-        execute._alone(None)
+        execute._run_alone(None)
     assert ended == [True, {"wait": False, "cancel_futures": True}]
 
 

@@ -1,11 +1,11 @@
-"""The assembly of a deck: points, elements, and the points and elements of sets, surfaces and distributed loads."""
+"""Assembly of a deck: its points and elements, and those of its sets, surfaces and distributed loads."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -16,17 +16,17 @@ from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Pa
 from fastcontact.cases.decks.element_types import ElementType, element_type
 from fastcontact.mesh import elements
 
-# Number of set names that a message lists, and length to which a name is cut.
+# Number of set names that a message lists, and length to which it cuts a name.
 SHOWN = 12
 LONGEST = 80
 
 
 @dataclass(eq=False, slots=True)
 class Element:
-    """An element of an instance with its cell in the deck and its points.
+    """An element of an instance (`scope`) with its cell in the deck and its points.
 
-    `type` is None unless the element is a solid. `row` is its index among the solids with the same type of mesh element, and
-    `section` assigns its material.
+    `type` is None unless the element is a solid. `row` is its index among the solids with the same type of mesh element.
+    `section` assigns its material once the sections are read.
     """
 
     scope: str
@@ -44,8 +44,8 @@ class Element:
         return self.type
 
     @property
-    def given_section(self) -> Section:
-        """The section of a solid, which exists once the sections are checked."""
+    def assigned_section(self) -> Section:
+        """The section of a solid, after the check that all solids have one."""
         assert self.section is not None
         return self.section
 
@@ -64,7 +64,7 @@ class Assembly:
     points : ndarray (n_points, 3)
         Coordinates in the assembly [length].
     index : dict of str to dict of int to int
-        Point number by instance and node number. The instance is empty for nodes outside all parts.
+        Point number by instance and node number. The name of the instance is empty for nodes outside all parts.
     elements : dict of str to dict of int to Element
         Elements by instance and element number.
     resolved : dict of (str, str, str) to list
@@ -72,7 +72,7 @@ class Assembly:
     surfaces : dict of str to list of (Element, int)
         Faces of the surfaces resolved so far.
     open : list of (str, str, str)
-        Sets that are being resolved, from which a set that contains itself is detected.
+        Sets that are being resolved, which reveal a set that contains itself.
     """
 
     content: Content
@@ -99,10 +99,10 @@ class Assembly:
         return [element for elements in self.elements.values() for element in elements.values() if element.type is None]
 
     def part(self, scope: str) -> Part:
-        """Return the part of an instance, or the content outside all parts if `scope` is empty."""
+        """Return the part of an instance, or the nodes and elements outside all parts if `scope` is empty."""
         return self.content.instances[scope].part if scope else self.content.root
 
-    def turned(self, scope: str) -> bool:
+    def is_rotated(self, scope: str) -> bool:
         """Return whether an instance is rotated."""
         return bool(scope and self.content.instances[scope].rotation)
 
@@ -111,7 +111,7 @@ class Assembly:
         """Names of all instances in the form used for lookup, preceded by the empty name."""
         return ["", *self.content.instances]
 
-    def place_of(self, name: str) -> tuple[str, str]:
+    def split_name(self, name: str) -> tuple[str, str]:
         """Split a name into its instance, which may be empty, and the rest: ``Part-1.17`` is node 17 of Part-1."""
         text = folded(name)
         for scope in self.content.instances:
@@ -121,18 +121,21 @@ class Assembly:
 
     def members(self, kind: str, name: str, location: Location) -> list[Any]:
         """Return the points or the elements, by `kind`, of a set or a number; CaseError if it is not defined."""
-        scope, rest = self.place_of(name)
+        scope, rest = self.split_name(name)
         if rest.isdecimal():
             return [self._existing(kind, scope, int(rest[:19]), location)]
         return self.members_of(kind, scope, rest, location, name)
 
     def members_of(self, kind: str, scope: str, name: str, location: Location, shown: str = "") -> list[Any]:
-        """Return the points or elements of a set of an instance; nested sets are resolved, and CaseError if not defined."""
+        """Return the points or elements of a set of an instance, including those of nested sets; CaseError if undefined.
+
+        Messages call the set `shown`.
+        """
         part, label = self.part(scope), (kind, scope, name)
         sets = part.node_sets if kind == "node" else part.element_sets
         if name not in sets:
-            known = sorted({part.set_names[key] for key in sets})
-            listed = ", ".join(known[:SHOWN]) + (", ..." if len(known) > SHOWN else "") or "none"
+            names = sorted({part.set_names[key] for key in sets})
+            listed = ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "") or "none"
             raise location.refuse(f"set '{(shown or name)[:LONGEST]}' is not defined; {kind} sets: {listed}")
         if label not in self.resolved:
             if label in self.open:
@@ -144,6 +147,7 @@ class Assembly:
         return self.resolved[label]
 
     def _entry(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
+        """Return the points or elements of one entry of a set; numbers of a range that are undefined are ignored."""
         scope = entry.instance or scope
         if scope:
             defined("instance", scope, self.content.instances, entry)
@@ -153,13 +157,14 @@ class Assembly:
         if not isinstance(numbers, range):
             return (items[n] if n in items else self._existing(kind, scope, n, entry.location) for n in numbers)
         candidates = numbers if len(numbers) <= len(items) else sorted(items)
-        known = [n for n in candidates if n in items and n in numbers]
-        if len(known) < len(numbers):
-            absent = f"{len(numbers) - len(known)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
-            self.content.note(entry, f"{absent} are not {kind}s and are ignored")
-        return (items[n] for n in known)
+        existing = [n for n in candidates if n in items and n in numbers]
+        if len(existing) < len(numbers):
+            missing = f"{len(numbers) - len(existing)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
+            self.content.note(entry, f"{missing} are not {kind}s and are ignored")
+        return (items[n] for n in existing)
 
     def _named(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
+        """Return the points or elements of a set that is an entry of a set; a node set may contain an element set."""
         if not scope and any(entry.name.upper().startswith(name) for name in self.content.instances):
             return self.members(kind, entry.name, entry.location)
         part, name = self.part(scope), folded(entry.name)
@@ -170,10 +175,11 @@ class Assembly:
         return self.members_of(kind, scope, name, entry.location, entry.name)
 
     def _items_of(self, kind: str, scope: str) -> Mapping[int, Any]:
-        """Return the points or elements of an instance by their number."""
+        """Return the points or elements of an instance by number."""
         return self.index.get(scope, {}) if kind == "node" else self.elements.get(scope, {})
 
     def _existing(self, kind: str, scope: str, number: int, location: Location) -> Any:
+        """Return the point or element with a number; CaseError if there is none."""
         item = self._items_of(kind, scope).get(number)
         if item is None:
             where = f" in instance '{self.content.instances[scope].name}'" if scope else ""
@@ -181,11 +187,11 @@ class Assembly:
         return item
 
     def nodes(self, name: str, location: Location) -> list[int]:
-        """Return the points of a node set or a single node; errors as for `members`."""
+        """Return the points of a node set or of a single node; errors as for `members`."""
         return self.members("node", name, location)
 
     def elements_of(self, name: str, location: Location) -> list[Element]:
-        """Return the elements of an element set or a single element; errors as for `members`."""
+        """Return the elements of an element set, or a single element; errors as for `members`."""
         return self.members("element", name, location)
 
     def node(self, name: str, location: Location) -> int:
@@ -196,17 +202,17 @@ class Assembly:
         return nodes[0]
 
     def faces(self, name: str, location: Location) -> list[Face]:
-        """Return the faces of a surface, each as an element and the index of a facet; CaseError if it has no faces."""
+        """Return the faces of a surface, each as an element and the index of its facet; CaseError if it has no faces."""
         definition, scope = self.surface(name, location)
         if definition.of_nodes:
-            whole, _, left = self.faces_of_nodes(definition, scope)
-            if left:
+            complete, _, remaining = self.faces_of_nodes(definition, scope)
+            if remaining:
                 raise definition.refuse(
-                    f"the nodes of surface '{definition.name}' do not form whole faces: {len(left)} belong to none "
-                    f"(first: node {self.number_of(left[0])}), and *{location.keyword} in line {location.line} "
+                    f"the nodes of surface '{definition.name}' do not form whole faces: {len(remaining)} belong to none "
+                    f"(first: node {self.number_of(remaining[0])}), and *{location.keyword} in line {location.line} "
                     "needs faces, TYPE=ELEMENT"
                 )
-            return whole
+            return complete
         if (label := folded(name)) not in self.surfaces:
             faces: dict[Face, None] = {}
             for face in definition.faces:
@@ -223,53 +229,54 @@ class Assembly:
 
     def surface(self, name: str, location: Location) -> tuple[SurfaceDefinition, str]:
         """Return the definition of a surface and the instance that contains it; CaseError if it is not defined."""
-        scope, rest = self.place_of(name)
+        scope, label = self.split_name(name)
         surfaces = self.part(scope).surfaces
-        if rest not in surfaces:
-            known = ", ".join(sorted(other.name for other in surfaces.values())) or "none"
-            raise location.refuse(f"surface '{name[:80]}' is not defined; surfaces: {known}")
-        if not surfaces[rest].faces:
-            raise surfaces[rest].refuse(f"surface '{surfaces[rest].name[:80]}' has no faces")
-        return surfaces[rest], scope
+        if label not in surfaces:
+            names = ", ".join(sorted(surface.name for surface in surfaces.values())) or "none"
+            raise location.refuse(f"surface '{name[:80]}' is not defined; surfaces: {names}")
+        if not surfaces[label].faces:
+            raise surfaces[label].refuse(f"surface '{surfaces[label].name[:80]}' has no faces")
+        return surfaces[label], scope
+
+    def _type_of_solid(self, element: Element, location: Location) -> ElementType:
+        """Return the type of an element with faces; CaseError if it is not a solid."""
+        if element.type is None:
+            raise location.refuse(f"element {element.number} is not a solid, so it has no faces")
+        return element.type
 
     def facet(self, element: Element, label: int, location: Location) -> int:
         """Return the index of the facet of an element with a face label, counted from 1; CaseError if there is none."""
-        if element.type is None:
-            raise location.refuse(f"element {element.number} is not a solid, so it has no faces")
-        faces = element.type.faces
-        if not 1 <= label <= len(faces):
+        solid = self._type_of_solid(element, location)
+        if not 1 <= label <= len(solid.faces):
             raise location.refuse(
-                f"element {element.number} of type {element.type.name} has no face {label}, only 1 to {len(faces)}"
+                f"element {element.number} of type {solid.name} has no face {label}, only 1 to {len(solid.faces)}"
             )
-        return matching(element.type.element)[label - 1]
+        return facets_of_faces(solid.element)[label - 1]
 
     def _free_faces(self, element: Element, location: Location) -> Iterator[Face]:
         """Yield the faces of an element that no other solid shares."""
-        if element.type is None:
-            raise location.refuse(f"element {element.number} is not a solid, so it has no faces")
-        facets = matching(element.type.element)
-        for label in np.flatnonzero(self.free[element.type.element][element.row]).tolist():
-            yield element, facets[label]
+        name = self._type_of_solid(element, location).element
+        for face in np.flatnonzero(self.free_faces[name][element.row]).tolist():
+            yield element, facets_of_faces(name)[face]
 
     @cached_property
-    def free(self) -> dict[str, Mask]:
+    def free_faces(self) -> dict[str, Mask]:
         """Masks (n_elements, n_faces), by type of mesh element, of the faces that no other solid shares."""
         corners, shapes = [], {}
-        for name, members in self.by_kind.items():
+        for name, members in self.solids_by_type.items():
             points = np.array([element.points for element in members], np.int32)
             faces = members[0].solid.faces
             shapes[name] = len(members), len(faces)
-            neighbours = np.full((len(members), len(faces), 4), -1, np.int32)
-            for label, face in enumerate(faces):
-                neighbours[:, label, : len(face)] = np.sort(points[:, list(face)], axis=1)
-            corners.append(neighbours.reshape(-1, 4))
+            of_type = np.full((len(members), len(faces), 4), -1, np.int32)
+            for k, face in enumerate(faces):
+                of_type[:, k, : len(face)] = np.sort(points[:, list(face)], axis=1)
+            corners.append(of_type.reshape(-1, 4))
         _, inverse, count = np.unique(np.concatenate(corners), axis=0, return_inverse=True, return_counts=True)
-        ends = np.cumsum([n * m for n, m in shapes.values()])
-        parts = np.split(count[inverse.ravel()] == 1, ends[:-1])
-        return {name: part.reshape(shapes[name]) for name, part in zip(shapes, parts, strict=True)}
+        masks = np.split(count[inverse.ravel()] == 1, np.cumsum([n * m for n, m in shapes.values()])[:-1])
+        return {name: mask.reshape(shapes[name]) for name, mask in zip(shapes, masks, strict=True)}
 
     @cached_property
-    def by_kind(self) -> dict[str, list[Element]]:
+    def solids_by_type(self) -> dict[str, list[Element]]:
         """The solids by type of mesh element, each at index `row`."""
         elements: dict[str, list[Element]] = {}
         for element in self.solids:
@@ -277,27 +284,30 @@ class Assembly:
         return elements
 
     @cached_property
-    def outer(self) -> dict[int, list[tuple[Face, frozenset[int]]]]:
+    def outer_faces(self) -> dict[int, list[tuple[Face, frozenset[int]]]]:
         """The outer faces at each point, with their corner points."""
-        by_part: dict[int, list[tuple[Face, frozenset[int]]]] = {}
-        for name, members in self.by_kind.items():
-            facets, faces = matching(name), members[0].solid.faces
-            for row, label in np.argwhere(self.free[name]).tolist():
-                face = members[row], facets[label]
-                corners = frozenset(members[row].points[i] for i in faces[label])
+        by_point: dict[int, list[tuple[Face, frozenset[int]]]] = {}
+        for name, members in self.solids_by_type.items():
+            facets, faces = facets_of_faces(name), members[0].solid.faces
+            for row, k in np.argwhere(self.free_faces[name]).tolist():
+                face = members[row], facets[k]
+                corners = frozenset(members[row].points[i] for i in faces[k])
                 for point in facet_points(*face):
-                    by_part.setdefault(point, []).append((face, corners))
-        return by_part
+                    by_point.setdefault(point, []).append((face, corners))
+        return by_point
+
+    def _faces_at(self, points: set[int]) -> Iterable[tuple[Face, frozenset[int]]]:
+        """Return the outer faces with a point in `points`, with their corner points."""
+        return dict.fromkeys(face for point in sorted(points) for face in self.outer_faces.get(point, ()))
 
     def faces_within(self, points: set[int]) -> list[Face]:
         """Return the outer faces whose corners are all in `points`."""
-        near = dict.fromkeys(face for point in sorted(points) for face in self.outer.get(point, ()))
-        return [face for face, corners in near if corners <= points]
+        return [face for face, corners in self._faces_at(points) if corners <= points]
 
     def surface_nodes(self, definition: SurfaceDefinition, scope: str) -> list[int]:
         """Return the points of a node-based surface without repetition."""
-        given = [(face.of if not scope else f"{scope}.{face.of}", face.location) for face in definition.faces]
-        return list(dict.fromkeys(point for name, location in given for point in self.nodes(name, location)))
+        entries = [(face.of if not scope else f"{scope}.{face.of}", face.location) for face in definition.faces]
+        return list(dict.fromkeys(point for name, location in entries for point in self.nodes(name, location)))
 
     def number_of(self, point: int) -> str:
         """Return the label in the deck of the node at a point, with its instance."""
@@ -308,19 +318,23 @@ class Assembly:
         return "of a rotation"
 
     def faces_of_nodes(self, definition: SurfaceDefinition, scope: str) -> tuple[list[Face], list[Face], list[int]]:
-        """Return the faces within a node-based surface, the faces that cover its remaining nodes best, and these nodes."""
-        chosen = set(self.surface_nodes(definition, scope))
-        whole: list[tuple[Face, set[int]]] = []
-        others: list[tuple[Face, set[int]]] = []
-        for face, corners in dict.fromkeys(face for point in sorted(chosen) for face in self.outer.get(point, ())):
-            points = chosen.intersection(facet_points(*face))
-            (whole if corners <= chosen else others).append((face, points))
-        left = chosen.difference(*(points for _, points in whole))
-        most: dict[int, int] = {}
-        for _, points in others:
-            most.update((point, max(len(points), most.get(point, 0))) for point in points & left)
-        further = [face for face, points in others if any(most[p] == len(points) for p in points & left)]
-        return [face for face, _ in whole], further, sorted(left)
+        """Return the complete faces of a node-based surface, incomplete faces around its remaining nodes, and these nodes.
+
+        All corners of a complete face are on the surface. Around each node that belongs to no complete face, the faces with
+        the largest number of nodes on the surface are returned.
+        """
+        nodes = set(self.surface_nodes(definition, scope))
+        complete: list[tuple[Face, set[int]]] = []
+        incomplete: list[tuple[Face, set[int]]] = []
+        for face, corners in self._faces_at(nodes):
+            shared = nodes.intersection(facet_points(*face))
+            (complete if corners <= nodes else incomplete).append((face, shared))
+        remaining = nodes.difference(*(shared for _, shared in complete))
+        largest: dict[int, int] = {}
+        for _, shared in incomplete:
+            largest.update((point, max(len(shared), largest.get(point, 0))) for point in shared & remaining)
+        further = [face for face, shared in incomplete if any(largest[p] == len(shared) for p in shared & remaining)]
+        return [face for face, _ in complete], further, sorted(remaining)
 
 
 def facet_points(element: Element, facet: int) -> tuple[int, ...]:
@@ -328,30 +342,24 @@ def facet_points(element: Element, facet: int) -> tuple[int, ...]:
     return tuple(element.points[i] for i in elements.get(element.solid.element).facets[facet])
 
 
-MATCHING: dict[str, tuple[int, ...]] = {}
-
-
-def matching(element: str) -> tuple[int, ...]:
-    """Return the index of the facet of an element for each face label 1, 2, ..."""
-    if element not in MATCHING:
-        kind = ElementType("", element, "")
-        facets = [frozenset(facet) for facet in elements.get(element).facets]
-        MATCHING[element] = tuple(
-            next(i for i, facet in enumerate(facets) if facet >= frozenset(face)) for face in kind.faces
-        )
-    return MATCHING[element]
+@cache
+def facets_of_faces(element: str) -> tuple[int, ...]:
+    """Return, for each face label 1, 2, ... of decks, the index of the facet of a mesh element."""
+    facets = [frozenset(facet) for facet in elements.get(element).facets]
+    faces = ElementType("", element, "").faces
+    return tuple(next(i for i, facet in enumerate(facets) if facet >= frozenset(face)) for face in faces)
 
 
 def assemble(assembly: Assembly) -> None:
     """Add the points and elements of all instances to an assembly; CaseError if an element uses an undefined node."""
-    content, total, counts = assembly.content, 0, {}  # type: Content, int, dict[str, int]
-    places = []
+    content, n_points, counts = assembly.content, 0, {}  # type: Content, int, dict[str, int]
+    coordinates = []
     for scope in assembly.scopes:
         part = assembly.part(scope)
-        places.append(_placed(part, content.instances.get(scope)))
-        index = {number: total + row for number, row in part.nodes.items()} if total else part.nodes
+        coordinates.append(_coordinates_in_assembly(part, content.instances.get(scope)))
+        index = {number: n_points + row for number, row in part.nodes.items()} if n_points else part.nodes
         assembly.index[scope] = index
-        total += len(index)
+        n_points += len(index)
         elements = assembly.elements[scope] = {}
         for number, cell in part.cells.items():
             points = tuple(index.get(node, -1) for node in cell.nodes)
@@ -362,10 +370,10 @@ def assemble(assembly: Assembly) -> None:
             if kind is not None:
                 counts[kind.element] += 1
             elements[number] = Element(scope, number, cell, kind, points, row)
-    assembly.points = np.concatenate(places) if len(places) > 1 else places[0]
+    assembly.points = np.concatenate(coordinates) if len(coordinates) > 1 else coordinates[0]
 
 
-def _placed(part: Part, instance: Instance | None) -> Array:
+def _coordinates_in_assembly(part: Part, instance: Instance | None) -> Array:
     """Return the coordinates (n, 3) of the nodes of a part in the assembly [length]."""
     points = np.asarray(part.coordinates).reshape(-1, 3)
     if instance is None:
@@ -383,7 +391,7 @@ def _placed(part: Part, instance: Instance | None) -> Array:
     return points
 
 
-# For each keyword, the letter of loads on faces, and the loads on elements with the number of their additional entries.
+# For each keyword, the letter of its loads on faces, and its loads on elements with the number of their further entries.
 BODY_FORCES = {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}
 ON_ELEMENTS: dict[str, tuple[str, dict[str, int]]] = {
     "DLOAD": ("P", BODY_FORCES),
@@ -397,7 +405,8 @@ ON_SURFACES = {"DSLOAD": "P", "DSFLUX": "S", "SFILM": "F"}
 class Target:
     """Keyword, kind and target of a distributed load, which is a face or some elements.
 
-    `numbers` contains the direction or the axis of a body force, or the coefficient of a film.
+    `numbers` contains the direction [-] of gravity, two vectors for the axis of rotation of centrifugal forces (origin
+    [length] and direction [-]), or the film coefficient [power / (area temperature)].
     """
 
     keyword: str
@@ -408,7 +417,7 @@ class Target:
 
 
 def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> list[Target]:
-    """Return the targets of a line of a distributed load; CaseError if the load is not supported."""
+    """Return the targets of a line of a distributed load, with these `numbers` on faces; CaseError if not supported."""
     keyword, label = row.location.keyword, row.text(1).upper()
     load = "load " if keyword.endswith("LOAD") else ""
     if keyword in ON_SURFACES:
@@ -424,8 +433,8 @@ def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> li
         faces = [(element, assembly.facet(element, int(label[1:]), row.location)) for element in elements]
         return [Target(keyword, letter, face, (), numbers) for face in faces]
     if label not in of_elements:
-        known = ", ".join([f"{letter}1", f"{letter}2", "...", *of_elements])
-        raise row.refuse(f"{load}{label[:40]} is not supported; expected one of {known}")
+        labels = ", ".join([f"{letter}1", f"{letter}2", "...", *of_elements])
+        raise row.refuse(f"{load}{label[:40]} is not supported; expected one of {labels}")
     vector = tuple(row.number(3 + i, 0.0) for i in range(of_elements[label]))
     if vector and not any(vector[-3:]):
         raise row.refuse(f"the direction of {label} is missing")

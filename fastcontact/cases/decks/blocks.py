@@ -1,4 +1,4 @@
-"""Keyword blocks of a deck, with its included files: keywords, parameters and data lines, and errors with file and line."""
+"""Keyword blocks of a deck and its included files, with their parameters and data lines, and errors with file and line."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from typing import Any, NamedTuple, TypeVar
 
 from fastcontact.errors import CaseError, FastcontactError, FileError
 
-# Largest size in bytes and largest number of files of a deck with all included files; a larger deck is treated as an error.
+# Largest size [byte] and largest number of files of a deck with all included files. A larger deck is treated as an error.
 LARGEST = 1 << 28
 MOST_FILES = 200
 # Largest number of characters of a line, or of a keyword with its continuation lines. Abaqus and CalculiX allow far fewer.
 LONGEST_LINE = 1 << 16
 _TOO_LONG = f"the line has more than {LONGEST_LINE} characters: break it between two entries"
-LONGEST_QUOTED = 80
-LARGEST_WHOLE = 1 << 53  # all integers up to this one are exact in double precision
+LONGEST_QUOTED = 80  # length to which messages cut names and entries
+LARGEST_WHOLE = 1 << 53  # every integer up to this one is exact in double precision
 Entry = TypeVar("Entry")
 
 
@@ -61,10 +61,10 @@ class Item(Located):
 
 @dataclass(frozen=True, slots=True)
 class Row(Item):
-    """A data line with its entries, without surrounding blanks; `goes_on` is true if the line ends with a comma."""
+    """A data line: its entries without surrounding blanks, and whether the line ends with a comma (`continued`)."""
 
     entries: tuple[str, ...]
-    goes_on: bool = False
+    continued: bool = False
 
     def text(self, index: int) -> str:
         """Return an entry, or an empty string if the line has fewer entries."""
@@ -96,7 +96,7 @@ class Row(Item):
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """The data lines of a keyword: bytes `begin` to `end` of a file, from which an iterator makes one row at a time."""
+    """The data lines of a keyword as bytes `begin` to `end` of a file, from which iteration yields one row at a time."""
 
     location: Location
     contents: bytes = field(repr=False)
@@ -106,18 +106,15 @@ class Lines:
     def __iter__(self) -> Iterator[Row]:
         for line in _lines(self.contents, self.begin, self.end, self.location.line):
             if not line.text.startswith("**"):
-                location, goes_on = (
-                    Location(self.location.file, line.number, self.location.keyword),
-                    line.text.endswith(","),
-                )
-                yield Row(location, tuple(_parts(line.text[:-1] if goes_on else line.text)), goes_on)
+                location = Location(self.location.file, line.number, self.location.keyword)
+                yield Row(location, tuple(_entries(line.text.removesuffix(","))), line.text.endswith(","))
 
 
 @dataclass(frozen=True, slots=True)
 class Block(Item):
     """A keyword with its parameters and its data lines.
 
-    The names of parameters are in upper case, and the value of a parameter without a value is None.
+    The names of parameters are in upper case. The value of a parameter without an equals sign is None.
     """
 
     parameters: dict[str, str | None]
@@ -141,15 +138,15 @@ class Block(Item):
         """Return the numbers in all data lines; CaseError if an entry is not a number."""
         return [row.number(i) for row in self.each() for i, text in enumerate(row.entries) if text]
 
-    def only(self, why: str = "") -> Row:
+    def only(self, variable: str = "") -> Row:
         """Return the only data line; CaseError unless there is exactly one.
 
-        If `why` is given, the message adds that constants that depend on `why` are not supported.
+        If `variable` is given, the message adds that constants that depend on it are not supported.
         """
         rows = self.rows
         if len(rows) != 1:
             text = f"{len(rows)} data lines, but one is needed"
-            raise self.refuse(text + (f": constants that depend on {why} are not supported" if why else ""))
+            raise self.refuse(text + (f": constants that depend on {variable} are not supported" if variable else ""))
         return rows[0]
 
     def get(self, name: str, default: str = "") -> str:
@@ -174,7 +171,7 @@ class Block(Item):
 
 @dataclass
 class Source:
-    """State of reading a deck: its folder, size and paths of the files read, and open files."""
+    """State of reading a deck: its folder, the size [byte] and the paths of the files read so far, and the open files."""
 
     folder: Path
     size: int = 0
@@ -183,7 +180,7 @@ class Source:
 
 
 def as_number(location: Location, text: str) -> float:
-    """Return the finite number in `text`, also in Fortran notation (1.D5); CaseError if it is not a finite number."""
+    """Return the number that `text` states, also in Fortran notation (1.D5); CaseError unless it is a finite number."""
     try:
         value = float(text.upper().replace("D", "E")) if text[:1].upper() not in "IN" else float("nan")
     except ValueError:
@@ -194,7 +191,7 @@ def as_number(location: Location, text: str) -> float:
 
 
 def unquoted(text: str) -> str:
-    """Return a name without its quotation marks."""
+    """Return a name without the quotation marks around it."""
     return text[1:-1] if len(text) > 1 and text[0] == text[-1] == '"' else text
 
 
@@ -204,7 +201,7 @@ def folded(name: str) -> str:
 
 
 def read_blocks(path: Path) -> Iterator[Block]:
-    """Return an iterator over the blocks of a deck, with the blocks of included files at their *INCLUDE.
+    """Return an iterator over the blocks of a deck, in which the blocks of a file replace its *INCLUDE.
 
     Raises
     ------
@@ -225,7 +222,7 @@ def files_of_deck(path: Path) -> list[Path]:
 
 
 class _Line(NamedTuple):
-    """A line without surrounding blanks, with its number and the byte offsets of its start and of the next line."""
+    """A line: its number, the byte offsets of its start and of the next line, and its text without surrounding blanks."""
 
     number: int
     begin: int
@@ -249,13 +246,13 @@ def _contents(path: Path, source: Source) -> bytes:
 def _lines(contents: bytes, begin: int, end: int, number: int = 1) -> Iterator[_Line]:
     """Yield the lines between two byte offsets; a list of all lines would take several times the memory of the file."""
     while begin < end:
-        after = contents.find(b"\n", begin, end) + 1 or end
-        yield _Line(number, begin, after, contents[begin:after].decode("utf-8", "replace").strip())
-        number, begin = number + 1, after
+        next_begin = contents.find(b"\n", begin, end) + 1 or end
+        yield _Line(number, begin, next_begin, contents[begin:next_begin].decode("utf-8", "replace").strip())
+        number, begin = number + 1, next_begin
 
 
 def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
-    """Yield the blocks of a file and of its included files; CaseError for data lines before the first keyword."""
+    """Yield the blocks of a file and of its included files; CaseError if data precede the first keyword."""
     source.open.append(path.resolve())
     current: Block | None = None
     contents = _contents(path, source)
@@ -285,7 +282,7 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
 
 
 def _with_lines(block: Block, contents: bytes, last: _Line, end: int) -> Block:
-    """Return a block with the data lines between the last line of its keyword and the offset `end`."""
+    """Return a block with its data lines, from `last`, the last line of its keyword, to the byte offset `end`."""
     if last.end >= end:
         return block
     location = Location(block.location.file, last.number + 1, block.keyword)
@@ -295,41 +292,43 @@ def _with_lines(block: Block, contents: bytes, last: _Line, end: int) -> Block:
 def _continued(location: Location, line: _Line, lines: Iterator[_Line]) -> _Line:
     """Return a keyword line joined with its continuation lines, which follow a line that ends with a comma."""
     while line.text.endswith(","):
-        more = next(lines, None)
-        if more is None:
+        following = next(lines, None)
+        if following is None:
             break
-        further = "" if more.text.startswith("**") else f" {more.text}"
-        line = _Line(more.number, line.begin, more.end, line.text + further)
+        added = "" if following.text.startswith("**") else f" {following.text}"
+        line = _Line(following.number, line.begin, following.end, line.text + added)
         if len(line.text) > LONGEST_LINE:
             raise location.refuse(_TOO_LONG)
-        if not more.text:
+        if not following.text:
             break
     return line
 
 
 def _keyword(line: str) -> str:
+    """Return the keyword of a line in upper case, without its asterisk."""
     return " ".join(line[1:].partition(",")[0].upper().split())[:LONGEST_QUOTED]
 
 
-def _parts(line: str) -> list[str]:
-    """Return the comma-separated entries of a line, without surrounding blanks; commas within quotes do not separate."""
+def _entries(line: str) -> list[str]:
+    """Return the entries of a line without surrounding blanks, which commas outside quotation marks separate."""
     if '"' not in line:
-        return [part.strip() for part in line.split(",")]
-    parts = [""]
+        return [entry.strip() for entry in line.split(",")]
+    entries = [""]
     for number, piece in enumerate(line.split('"')):
-        if number % 2:  # inside quotation marks
-            parts[-1] += f'"{piece}"'
+        if number % 2:  # between quotation marks
+            entries[-1] += f'"{piece}"'
         else:
             first, *others = piece.split(",")
-            parts[-1] += first
-            parts += others
-    return [part.strip() for part in parts]
+            entries[-1] += first
+            entries += others
+    return [entry.strip() for entry in entries]
 
 
 def _parameters(location: Location, line: str) -> dict[str, str | None]:
+    """Return the parameters of a keyword line; CaseError if a parameter is repeated."""
     parameters: dict[str, str | None] = {}
-    for part in _parts(line)[1:]:
-        key, equal, value = part.partition("=")
+    for entry in _entries(line)[1:]:
+        key, equal, value = entry.partition("=")
         key = " ".join(key.upper().split())
         if key in parameters:
             raise location.refuse(f"the parameter {key} is given twice")
@@ -340,11 +339,11 @@ def _parameters(location: Location, line: str) -> dict[str, str | None]:
 
 def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
     """Yield the blocks of the file of an *INCLUDE; CaseError unless the file exists in the folder of the deck or below."""
-    given = block.required("INPUT")
+    file_name = block.required("INPUT")
     for parameter in block.parameters:
         if parameter != "INPUT":
             raise block.refuse(f"the parameter {parameter} is not supported")
-    shown, path = given[:LONGEST_QUOTED], source.folder / given.replace("\\", "/")
+    shown, path = file_name[:LONGEST_QUOTED], source.folder / file_name.replace("\\", "/")
     try:
         target = path.resolve()
         inside = target.is_relative_to(source.folder)
@@ -360,22 +359,22 @@ def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
     if target in source.open:
         target_name = "the deck" if target == source.open[0] else f"'{shown}'"
         raise block.refuse(f"{target_name} includes itself")
-    yield from _blocks(target, given, source)
+    yield from _blocks(target, file_name, source)
 
 
 @contextmanager
 def refusing(at: Location | Located, about: str = "") -> Iterator[None]:
-    """Re-raise errors of the package as CaseError at a location of the deck; `about` precedes the message."""
+    """Convert errors of the package in a ``with`` block to CaseError at a location; `about` precedes the message."""
     try:
         yield
-    except CaseError:  # its message has a location
+    except CaseError:  # its message already names a location
         raise
     except FastcontactError as error:
         raise at.refuse(f"{about}{error}") from error
 
 
 def registered(kind: str, name: str, table: dict[str, Entry], entry: Entry, at: Location | Located) -> Entry:
-    """Add an entry to a table by its name and return the entry; CaseError if the table contains the name."""
+    """Add an entry to a table by its name and return the entry; CaseError if the table already has the name."""
     if folded(name) in table:
         raise at.refuse(f"{kind} '{name}' is defined twice")
     table[folded(name)] = entry
@@ -383,8 +382,8 @@ def registered(kind: str, name: str, table: dict[str, Entry], entry: Entry, at: 
 
 
 def defined(kind: str, name: str, table: Mapping[str, Any], at: Location | Located) -> Any:
-    """Return the entry of a table with a name; otherwise raise CaseError with the names of all entries."""
+    """Return the entry of a table with a name; CaseError, with the names of all entries, if there is none."""
     if folded(name) not in table:
-        known = ", ".join(entry.name for entry in table.values()) or "none"
-        raise at.refuse(f"{kind} '{name}' is not defined; {kind.rpartition(' ')[2]}s: {known}")
+        names = ", ".join(entry.name for entry in table.values()) or "none"
+        raise at.refuse(f"{kind} '{name}' is not defined; {kind.rpartition(' ')[2]}s: {names}")
     return table[folded(name)]

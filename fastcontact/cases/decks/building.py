@@ -1,4 +1,4 @@
-"""The model and the ramp built from the content of a deck."""
+"""Construction of the model and the ramp from the content of a deck."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
 from fastcontact.cases.decks.histories import ByShape, Histories
 from fastcontact.cases.decks.local_axes import axes_by_cell, local_axes, orientation_of
 from fastcontact.cases.decks.materials import law_of, strain_of
-from fastcontact.cases.decks.meshing import begun, group_of_surface, secondary_group
+from fastcontact.cases.decks.meshing import deck_mesh_of, group_of_surface, secondary_group
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections
-from fastcontact.cases.decks.stepping import MOST_PARTS
+from fastcontact.cases.decks.stepping import MOST_INCREMENTS
 from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
@@ -35,6 +35,7 @@ from fastcontact.model.relation_rows import along
 
 # Largest gap between the undeformed sides that counts as closed, relative to the size of the model.
 TOUCHING = 1e-6
+# Largest number of instants of a ramp. A larger number is treated as an error.
 LONGEST_RAMP = 100_000
 
 
@@ -54,31 +55,31 @@ class Building:
     thickness : float
         Thickness of a plane model [length]. The forces in the model are per unit thickness.
     links : list of MultiPointConstraint
-        Constraints that are not supports.
+        Multi-point constraints that are not supports.
     local_supports : list of MultiPointConstraint
-        Supports that are constraints, because they act along local axes or not in all steps.
+        Supports that are expressed as constraints, because they act along local axes or not in all steps.
     linearised : str
-        Reason why small strains are used although a step has NLGEOM; otherwise empty.
+        Reason why small strains are assumed although a step has NLGEOM; otherwise empty.
     driven : dict of (int, int) to Table
-        Prescribed motions of nodes of gap elements that belong to no solid, by point and component [length].
+        Prescribed motions [length] of nodes of gap elements that belong to no solid, by point and component.
     gap_ends : dict of str to dict of int to int
-        Node opposite to each node of a contact made of gap elements, by the name of the contact.
+        Second node of a gap element by its first node, for each contact that consists of gap elements and an obstacle.
     """
 
     def __init__(self, content: Content, case_text: str) -> None:
         self.content = content
-        self.assembly = begun(content)
-        alone = content.heat == "alone"
-        if not alone:
+        self.assembly = deck_mesh_of(content)
+        only_heat = content.heat == "alone"
+        if not only_heat:
             make_rotations(self.assembly)
         materials, self.thickness = self._materials()
         conditions = Conditions(self.assembly)
-        self._check_pairs()
+        self._check_contact_pairs()
         conditions.run()
         pressures = self._pressures(conditions)
         heat = conditions.heat.loads(self.thickness)
-        gaps = [] if alone else gap_groups(self.assembly)
-        mesh = self.assembly.mesh() if alone else cut_sections(self.assembly, self.assembly.mesh())
+        gaps = [] if only_heat else gap_groups(self.assembly)
+        mesh = self.assembly.mesh() if only_heat else cut_sections(self.assembly, self.assembly.mesh())
         strain, self.linearised = strain_of(content, [law for law, _ in materials])
         reference = conditions.heat.reference
         self.model = Model(mesh, self.assembly.kinematics, case_text, strain=strain, reference_temperature=reference)
@@ -87,7 +88,7 @@ class Building:
         self.local_supports: list[MultiPointConstraint] = []
         self.driven: dict[tuple[int, int], Table] = {}
         self.links: list[MultiPointConstraint] = []
-        if alone:
+        if only_heat:
             self.model.fix(self._point_group("held", range(mesh.n_points)), "xyz"[: mesh.dim])
             add_sectors(self.model, self.assembly)
         else:
@@ -116,7 +117,7 @@ class Building:
         self._springs()
 
     def _materials(self) -> tuple[list[tuple[Any, str]], float]:
-        """Return the materials with their groups of solids, and the thickness; CaseError if a solid has no section."""
+        """Return the materials with their groups of solids, and the thickness [length]; CaseError for missing sections."""
         thickness: float | None = None
         for scope in self.assembly.scopes:
             for section in self.assembly.part(scope).sections:
@@ -135,34 +136,33 @@ class Building:
                             f"element {element.number} has a section already, in line {element.section.location.line}"
                         )
                     element.section = section
-        without = [element for element in self.assembly.solids if element.section is None]
-        if without:
-            cell = without[0].cell
-            many = "1 element" if len(without) == 1 else f"{len(without)} elements"
-            named = f" of set '{cell.set}'" if cell.set else ""
-            raise cell.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
+        if missing := [element for element in self.assembly.solids if element.section is None]:
+            cell = missing[0].cell
+            count = f"{len(missing)} element" + "s" * (len(missing) > 1)
+            of_set = f" of set '{cell.set}'" if cell.set else ""
+            raise cell.refuse(f"{count} ({missing[0].number}){of_set} has no section, so no material")
         by_material: dict[tuple[str, str, bool], list[Any]] = {}
         for element in self.assembly.solids:
-            given = element.given_section
-            key = (folded(given.material), folded(given.orientation), element.solid.modes)
+            section = element.assigned_section
+            key = (folded(section.material), folded(section.orientation), element.solid.modes)
             by_material.setdefault(key, []).append(element)
         materials = []
-        for (name, turned, modes), members in by_material.items():
+        for (name, orientation, modes), members in by_material.items():
             material = self.content.materials[name]
-            axes = self._axes(members[0].given_section, members)
-            group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
+            axes = self._axes(members[0].assigned_section, members)
+            group = f"material {material.name}" + (f" along {orientation.lower()}" if orientation else "")
             group += " with incompatible modes" if modes else ""
             law = law_of(self.content, material, axes, modes)
             materials.append((law, self.assembly.add_solids(group, members)))
         return materials, thickness or 1.0
 
     def _axes(self, section: Section, members: Sequence[Element]) -> Any:
-        """Return the material axes of a section with its elements, or None for the axes of the mesh."""
+        """Return the material axes of the elements `members` of a section, or None for the global axes."""
         if not section.orientation:
             return None
         axes = orientation_of(self.content, section.orientation, section.location)
         for element in members:
-            if axes.part is not self.content.root and self.assembly.turned(element.scope):
+            if axes.part is not self.content.root and self.assembly.is_rotated(element.scope):
                 raise axes.refuse(
                     "axes of a part whose instance is rotated are not supported: give them in the assembly"
                 )
@@ -174,13 +174,14 @@ class Building:
         return tuple(tuple(row) for row in local_axes(axes, np.zeros(3)).tolist())
 
     def _material(self, section: Section) -> Material:
+        """Return the material of a section; CaseError if it is undefined or lacks elastic constants."""
         material: Material = defined("material", section.material, self.content.materials, section)
         if material.law is None and self.content.heat != "alone":
             raise material.refuse(f"material '{material.name}' has no *ELASTIC")
         return material
 
-    def _check_pairs(self) -> None:
-        """Raise CaseError if a pair is given twice or has an undefined surface or interaction."""
+    def _check_contact_pairs(self) -> None:
+        """Raise CaseError if a pair is defined twice or has an undefined surface or interaction."""
         seen: set[str] = set()
         for pair in self.content.pairs:
             secondary_group(self.assembly, pair.secondary, pair.location)
@@ -193,45 +194,45 @@ class Building:
 
     def _pressures(self, conditions: Conditions) -> list[Callable[[Model], None]]:
         """Make groups of facets whose pressures have the same history; return functions that add the pressures to a model."""
-        alike = ByShape[tuple[str, str]]()
+        by_shape = ByShape[tuple[str, str]]()
         for table, names in conditions.loads.alike():
             for name in names:
                 for cell, rows in self.assembly.facet_rows([name.face] if name.face else []).items():
-                    alike.add((name.keyword, cell), table, rows)
+                    by_shape.add((name.keyword, cell), table, rows)
         pressures: list[Callable[[Model], None]] = []
-        for number, ((_, cell), facets, value, table) in enumerate(alike, start=1):
+        for number, ((_, cell), facets, value, table) in enumerate(by_shape, start=1):
             self.assembly.groups[group := f"pressure {number}"] = {cell: facets.tolist()}
             if any(factor for _, factor in table):
                 pressures.append(partial(Model.add_pressure, group=group, value=value, ramp=table))
         return pressures
 
     def _point_group(self, kind: str, points: Iterable[int]) -> str:
-        """Return the name of the group of some points of the mesh; a new group is created if there is none."""
-        before = len(self.assembly.point_groups)
-        name = self.assembly.add_points(f"{kind} {before}", points)
+        """Return the name of a group of points of the mesh; the group is created unless one with these points exists."""
+        name = self.assembly.add_points(f"{kind} {len(self.assembly.point_groups)}", points)
         if name not in self.model.mesh.point_groups:
             self.model.mesh = self.model.mesh.with_groups(points={name: self.assembly.point_groups[name]})
         return name
 
     def _supports(self, conditions: Conditions) -> None:
-        mesh, alike = self.model.mesh, ByShape[int]()
+        """Add the supports, and record the prescribed motions of nodes that belong to gap elements only."""
+        mesh, by_shape = self.model.mesh, ByShape[int]()
         temporary = conditions.temporary()
         self._temporary_supports(conditions, temporary)
-        at_times = {name for name, _ in temporary}
+        temporary_names = {name for name, _ in temporary}
         ends = {e.points[1] for e in self.assembly.discrete if e.cell.type == "GAPUNI"}
-        alone = ends - self.assembly.of_solids if ends else ends
+        free_ends = ends - self.assembly.of_solids if ends else ends
         for table, names in conditions.supports.alike():
-            for name in (name for name in names if name not in at_times):
+            for name in (name for name in names if name not in temporary_names):
                 point, axis, local = name
-                if point in alone:
+                if point in free_ends:
                     self.driven[point, axis] = table
                 elif local:
                     label = f"the support of {conditions.named(name)} on local axes"
                     row = self._support_row(conditions, name)
                     self.local_supports.append(MultiPointConstraint(label, row, 1.0, table))
                 else:
-                    alike.add(axis, table, [point])
-        for axis, points, value, table in alike:
+                    by_shape.add(axis, table, [point])
+        for axis, points, value, table in by_shape:
             group = self._point_group("support", points)
             if callable(value) or any(factor for _, factor in table):
                 self.model.prescribe(group, ramp=table, **{"xyz"[axis]: value})
@@ -241,7 +242,7 @@ class Building:
             self.model.fix(self._point_group("rotation", self.assembly.rotations.values()), "y")
 
     def _temporary_supports(self, conditions: Conditions, temporary: Sequence[tuple[Component, Acting]]) -> None:
-        """Add the supports that do not act in all steps; supports with the same period and history share a constraint."""
+        """Add the supports that do not act in all steps; those with the same period and history share a constraint."""
         alike: dict[tuple[Acting, Table], list[Component]] = {}
         for name, acting in (entry for entry in temporary if entry[1].begins < entry[1].ends):
             alike.setdefault((acting, conditions.supports.table(name)), []).append(name)
@@ -260,23 +261,24 @@ class Building:
         return along(np.array([point]), direction, self.model.n_dofs)
 
     def _forces(self, conditions: Conditions) -> None:
-        alike = ByShape[int]()
+        """Add the nodal forces; those along local axes are resolved into their global components."""
+        by_shape = ByShape[int]()
         for table, names in conditions.forces.alike():
-            along: dict[tuple[int, float], list[int]] = {}
+            by_cosine: dict[tuple[int, float], list[int]] = {}
             for point, axis, local in names:
                 direction = conditions.directions[point][axis] if local else np.eye(3)[axis]
                 for k in np.flatnonzero(np.abs(direction[: self.assembly.dim]) > 1e-12).tolist():
-                    along.setdefault((k, float(direction[k])), []).append(point)
-            for (k, cosine), points in along.items():
-                scaled = tuple((t, v * cosine / self.thickness) for t, v in table)
-                alike.add(k, scaled, points)
-        for axis, nodes, value, table in alike:
+                    by_cosine.setdefault((k, float(direction[k])), []).append(point)
+            for (k, cosine), points in by_cosine.items():
+                by_shape.add(k, tuple((t, v * cosine / self.thickness) for t, v in table), points)
+        for axis, nodes, value, table in by_shape:
             if any(factor for _, factor in table):
                 group = self._point_group("force", nodes)
                 self.model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: value})
 
     def _body_forces(self, conditions: Conditions) -> None:
-        alike = ByShape[tuple[str, tuple[float, ...], str]]()
+        """Add the body forces, weights and centrifugal forces as forces per volume."""
+        by_shape = ByShape[tuple[str, tuple[float, ...], str]]()
         for table, names in conditions.loads.alike():
             for name in (name for name in names if name.face is None):
                 by_density: dict[tuple[str, float], list[int]] = {}
@@ -286,19 +288,20 @@ class Building:
                         by_density.setdefault((cell, density), []).append(self.model.mesh.offsets[cell] + element.row)
                 for (cell, density), cells in by_density.items():
                     scaled = tuple((time, density * value) for time, value in table)
-                    alike.add((name.kind, name.numbers, cell), scaled, cells)
-        loads = [(f"load {number}", *load) for number, load in enumerate(alike, start=1)]
+                    by_shape.add((name.kind, name.numbers, cell), scaled, cells)
+        loads = [(f"load {number}", *load) for number, load in enumerate(by_shape, start=1)]
         self.model.mesh = self.model.mesh.with_groups(cells={group: cells for group, _, cells, _, _ in loads})
         for group, (kind, vector, _), _, value, table in loads:
             self.model.add_body_force(group, ramp=table, **_body_force(kind, vector, value, self.assembly.dim))
 
-    def _density(self, element: Element, name: Target, conditions: Conditions) -> float:
-        if name.kind[0] == "B":
+    def _density(self, element: Element, load: Target, conditions: Conditions) -> float:
+        """Return the factor of a body force at an element: the density of its material, or 1 for a force per volume."""
+        if load.kind[0] == "B":
             return 1.0
-        material = self._material(element.given_section)
+        material = self._material(element.assigned_section)
         if material.density is None:
-            location = conditions.loads.tracks[name].location
-            raise location.refuse(f"material '{material.name}' has no *DENSITY, which {name.kind} requires")
+            location = conditions.loads.tracks[load].location
+            raise location.refuse(f"material '{material.name}' has no *DENSITY, which {load.kind} requires")
         return material.density
 
     def _springs(self) -> None:
@@ -313,13 +316,13 @@ class Building:
         for pair in self.content.pairs:
             secondary, primary = (group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary))
             with refusing(pair):
-                options = self._options(pair)
+                options = self._pair_options(pair)
                 if secondary in self.assembly.loose:
-                    options.update(self._at_nodes(pair, secondary))
+                    options.update(self._node_based_options(pair, secondary))
                 self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
 
-    def _at_nodes(self, pair: Pair, secondary: str) -> dict[str, Any]:
-        """Return the options that exclude from contact the nodes of the facets that are not in a node-based surface."""
+    def _node_based_options(self, pair: Pair, secondary: str) -> dict[str, Any]:
+        """Return the options that exclude nodes from contact which are on the facets but not in the node-based surface."""
         options: dict[str, Any] = {"excluded": self._point_group("without contact", self.assembly.loose[secondary])}
         if all(map(all_nodes_carry, self.assembly.groups[secondary])):
             options["formulation"] = "node_to_segment"
@@ -329,19 +332,24 @@ class Building:
         )  # fmt: skip
         return options
 
-    def _options(self, pair: Pair) -> dict[str, Any]:
-        alone = self.content.heat == "alone"
+    def _pair_options(self, pair: Pair) -> dict[str, Any]:
+        """Return the options of a contact pair or a tie; CaseError if its interaction is not supported."""
+        only_heat = self.content.heat == "alone"
         if pair.tied:
-            kind: dict[str, Any] = {"kind": "gap_only" if alone else "tied"}
+            options: dict[str, Any] = {"kind": "gap_only" if only_heat else "tied"}
             if self.content.heat:
-                kind["conductance"] = interactions.perfect_conductance(self.content, self.model, pair.location)
-            return kind
+                options["conductance"] = interactions.perfect_conductance(self.content, self.model, pair.location)
+            return options
         law = self.content.interactions[folded(pair.interaction)]
-        options: dict[str, Any] = interactions.conductance_of(self.content, law) if self.content.heat else {}
-        if alone:
-            return {**options, "kind": "gap_only", **self._fitted(pair)}
+        options = interactions.conductance_of(self.content, law) if self.content.heat else {}
+        if only_heat:
+            return {**options, "kind": "gap_only", **self._clearance_option(pair)}
         if law.cohesion:
-            return {**options, **interactions.cohesion_of(self.content, law), **self._fitted(pair, glued=True)}
+            return {
+                **options,
+                **interactions.cohesion_of(self.content, law),
+                **self._clearance_option(pair, glued=True),
+            }
         if law.kind != "unilateral":
             if law.friction or law.changes:
                 raise law.refuse(f"friction with {law.kind} contact is not supported")
@@ -351,59 +359,57 @@ class Building:
         options.update(interactions.friction_of(law, len(self.content.steps)))
         if "friction" in options and self.content.heat:
             options.update(interactions.friction_heat_of(self.content, law))
-        return {**options, **self._fitted(pair)}
+        return {**options, **self._clearance_option(pair)}
 
-    def _fitted(self, pair: Pair, glued: bool = False) -> dict[str, Any]:
-        """Return the option `clearance` that ADJUST or *CLEARANCE requires; an empty dictionary if it is zero.
+    def _clearance_option(self, pair: Pair, glued: bool = False) -> dict[str, Any]:
+        """Return the option `clearance` that ADJUST or *CLEARANCE requires, or an empty dictionary if none is required.
 
-        Raises CaseError if *CLEARANCE is given for sides whose distance varies, and if `glued` sides have a gap, across
-        which the cohesive layer would not act.
+        Raises CaseError if *CLEARANCE is given for sides whose distance varies, or if `glued` sides have a gap, across which
+        the cohesive layer would not act.
         """
         if not (pair.adjust or glued) and pair.clearance is None:
             return {}
         secondary, primary = (group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary))
-        gaps, places = nodal_gaps(self.model, secondary, primary, self.assembly.loose.get(secondary, []))
-        size = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
+        gaps, positions = nodal_gaps(self.model, secondary, primary, self.assembly.loose.get(secondary, []))
+        tolerance = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
         if glued:
-            if gaps.max() > size or pair.clearance is not None:
+            if gaps.max() > tolerance or pair.clearance is not None:
                 raise pair.refuse(f"a cohesive layer between sides that are {gaps.max():.6g} apart is not supported")
             return {}
         if pair.clearance is not None:
-            if np.ptp(gaps) > size:
+            if np.ptp(gaps) > tolerance:
                 raise pair.refuse(
                     f"*CLEARANCE is supported between sides at a uniform distance only, and these are {gaps.min():.6g} to "
                     f"{gaps.max():.6g} apart"
                 )
             return {"clearance": pair.clearance - float(gaps.mean())}
         try:
-            within = float(pair.adjust)
+            adjusted_distance = float(pair.adjust)
         except ValueError:
             raise pair.refuse(f"ADJUST={pair.adjust[:40]}: only a distance is supported") from None
-        moved = gaps[(gaps <= within) & (np.abs(gaps) > size)]
-        if not len(moved):
+        closed = gaps[(gaps <= adjusted_distance) & (np.abs(gaps) > tolerance)]
+        if not len(closed):
             return {}
-        distance = (
-            f"{gaps.mean():.6g}"
-            if np.ptp(gaps) <= size
-            else f"of {moved.min():.6g} to {moved.max():.6g} at {len(moved)} nodes"
-        )
+        uniform = np.ptp(gaps) <= tolerance
+        varying = f"of {closed.min():.6g} to {closed.max():.6g} at {len(closed)} nodes"
+        distance = f"{gaps.mean():.6g}" if uniform else varying
         self.content.note(pair, f"ADJUST: the distance {distance} of the sides is taken as zero")
-        if np.ptp(gaps) <= size:
+        if uniform:
             return {"clearance": -float(gaps.mean())}
-        closing = -np.where(gaps <= within, gaps, 0.0)
-        return {"clearance": lambda points: closing[nearest(places, points)[1]]}
+        clearances = -np.where(gaps <= adjusted_distance, gaps, 0.0)
+        return {"clearance": lambda points: clearances[nearest(positions, points)[1]]}
 
     def _ramp(self, conditions: Conditions) -> Ramp:
-        """Return the ramp with the ends of all steps and the corners of all histories.
+        """Return the ramp, whose instants are the ends of all steps and the corners of all histories.
 
-        Models with friction, cohesive contact or elastic-plastic bodies also have the ends of the increments of each step.
+        In path-dependent models (friction, cohesive contact, elastic-plastic bodies) each step is divided into increments.
         """
         steps = self.content.steps
         instants = {float(number) for number in range(1, len(steps) + 1)}
         yields = any(isinstance(law, ElasticPlastic) for law, _ in self.model.materials)
         if yields or any(pair.options.get("friction") or "cohesion" in pair.options for pair in self.model.contact):
             for number, step in enumerate(steps):
-                count = max(1, round(min(MOST_PARTS, step.period / min(step.increment, step.period))))
+                count = max(1, round(min(MOST_INCREMENTS, step.period / min(step.increment, step.period))))
                 instants.update(number + k / count for k in range(1, count))  # ends of equal increments
         mechanical: tuple[Histories[Any], ...] = (conditions.supports, conditions.forces, conditions.loads)
         for histories in (*mechanical, conditions.temperatures, *conditions.heat.histories):
@@ -415,7 +421,7 @@ class Building:
 
 
 def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> dict[str, Any]:
-    """Return the components of a body force at a history of 1, multiplied by the factor `value` of the cells."""
+    """Return the components of a body force for a load multiplier of 1, times the factor `value` of the cells."""
 
     def times(component: Any) -> Any:
         if not callable(value):
@@ -437,16 +443,16 @@ def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> d
     return {"xyz"[k]: times(partial(outward, k)) for k in range(dim) if abs(axis[k]) < 1.0}
 
 
-def nodal_gaps(model: Model, secondary: str, primary: str, without: Sequence[int]) -> tuple[Array, Array]:
+def nodal_gaps(model: Model, secondary: str, primary: str, excluded: Sequence[int]) -> tuple[Array, Array]:
     """Return the gaps (n,) [length] of the secondary nodes that face the primary side, and their positions (n, dim) [length].
 
-    Nodes in `without` are left out. Without any such node, the result is a gap of zero at the first point.
+    Nodes in `excluded` are left out. If no node remains, the result is a gap of zero at the first point.
     """
     from fastcontact.contact.configuration import Configuration
     from fastcontact.model.contact_pair import ContactPair
 
     pair = ContactPair("gaps", secondary, primary, "continuous", {})
-    formulation, places = model.bind(pair), model.mesh.points
-    gaps, _ = formulation.nodal_gap(Configuration.undeformed(places))
-    faced = np.isfinite(gaps) & ~np.isin(formulation.secondary.points, without)
-    return (gaps[faced], places[formulation.secondary.points[faced]]) if faced.any() else (np.zeros(1), places[:1])
+    formulation, points = model.bind(pair), model.mesh.points
+    gaps, _ = formulation.nodal_gap(Configuration.undeformed(points))
+    facing = np.isfinite(gaps) & ~np.isin(formulation.secondary.points, excluded)
+    return (gaps[facing], points[formulation.secondary.points[facing]]) if facing.any() else (np.zeros(1), points[:1])

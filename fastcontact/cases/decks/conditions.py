@@ -1,4 +1,4 @@
-"""Supports and loads of all steps: histories of displacement components, nodal forces, pressures and body forces."""
+"""Supports and loads of a deck over all steps, as histories of displacements, nodal forces, pressures and body forces."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ import numpy as np
 from fastcontact.cases.decks.assembled import Target, targets
 from fastcontact.cases.decks.blocks import Block, Location, Row
 from fastcontact.cases.decks.content import Given
-from fastcontact.cases.decks.fields import OF_HEAT, HeatConditions, by_point, initial_temperatures
+from fastcontact.cases.decks.fields import OF_HEAT, HeatConditions, initial_temperatures, temperatures_of_block
 from fastcontact.cases.decks.histories import Histories
 from fastcontact.cases.decks.local_axes import local_directions
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.sections import Locks
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
+# Components that the named supports of *BOUNDARY prescribe.
 NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}
-# Point and component, counted from 0; supports on local axes have True as a third entry.
+# Point, component counted from 0, and whether the component is along a local axis.
 Component = tuple[int, int, bool]
 
 
@@ -29,11 +30,11 @@ class Acting:
     Attributes
     ----------
     location : Location or None
-        Line of a support that begins after the first step.
+        Line of a support that begins after the start of the first step; otherwise None.
     begins, ends : float
-        Load factors between which the support acts [-].
+        Load factors [-] between which the support acts.
     keeps : bool
-        Whether the support holds the displacement at its start.
+        True if the support holds the displacement at the start of the period (FIXED).
     """
 
     location: Location | None
@@ -46,18 +47,18 @@ ALWAYS = Acting(None, 0.0)
 
 
 class Conditions:
-    """Supports and loads of a deck with their histories."""
+    """Supports and loads of a deck with their histories, and the periods of the supports that do not act in all steps."""
 
     def __init__(self, assembly: DeckMesh) -> None:
         self.assembly, content = assembly, assembly.content
         self.supports: Histories[Component] = Histories(content)
         self.forces: Histories[Component] = Histories(content)
         self.loads: Histories[Target] = Histories(content)
-        initial = initial_temperatures(assembly, content.initial)
+        initial = initial_temperatures(assembly, content.initial_temperatures)
         self.temperatures: Histories[int] = Histories(content, rest=initial)
-        self.acting: dict[Component, Acting] = {}  # supports that do not act from the start
-        self.over: list[tuple[Component, Acting]] = []
-        self.keeping: set[Component] = set()
+        self.periods: dict[Component, Acting] = {}  # of supports that begin after the first step, or with FIXED
+        self.ended: list[tuple[Component, Acting]] = []
+        self.fixed_now: set[Component] = set()  # supports with FIXED in the current step
         self.heat = HeatConditions(assembly, initial)
         self.locks = Locks(assembly)
         self.directions = local_directions(assembly)
@@ -69,7 +70,7 @@ class Conditions:
             self._supports(given, before=True)
         self.supports.begin()
         self.heat.temperatures.begin()
-        self.acting.update((name, replace(ALWAYS, keeps=True)) for name in self.keeping)
+        self.periods.update((name, replace(ALWAYS, keeps=True)) for name in self.fixed_now)
         for number, step in enumerate(content.steps, start=1):
             self.locks.begin(number, [g for g in step.given if g.block.keyword == "BOUNDARY"], self.assembly)
             for given in step.given:
@@ -79,9 +80,10 @@ class Conditions:
                 advancing.advance(number, step)  # type: ignore[attr-defined]
 
     def _take(self, given: Given) -> None:
+        """Record a block of supports or loads of the current step."""
         keyword, block = given.block.keyword, given.block
         if keyword == "TEMPERATURE":
-            self.temperatures.take(given, by_point(self.assembly, given.block))
+            self.temperatures.take(given, temperatures_of_block(self.assembly, given.block))
         elif keyword in OF_HEAT:
             self.heat.take(given)
         elif keyword == "BOUNDARY":
@@ -95,16 +97,17 @@ class Conditions:
     def _change(self, number: int) -> None:
         """Record the supports that begin or end at the start of step `number`."""
         begin, changing = number - 1.0, self.supports.changing
-        kept = (name for name in self.acting if name in changing and name not in self.keeping)
-        moved = dict.fromkeys(name for name in kept if self._acts(name) and self.acting[name].keeps)
-        for name in (*self.supports.dying, *moved):
-            self.over.append((name, replace(self.acting.pop(name, ALWAYS), ends=begin)))
+        # A value in this step ends the period of a support with FIXED, and begins another one.
+        valued = (name for name in self.periods if name in changing and name not in self.fixed_now)
+        released = dict.fromkeys(name for name in valued if self._acts(name) and self.periods[name].keeps)
+        for name in (*self.supports.dying, *released):
+            self.ended.append((name, replace(self.periods.pop(name, ALWAYS), ends=begin)))
         begun: dict[tuple[Location | None, bool], Acting] = {}
         for name in changing:
-            if name in moved or not self._acts(name):
-                key = changing.get(name)[2] if begin else None, name in self.keeping
-                self.acting[name] = begun.setdefault(key, Acting(key[0], begin, keeps=key[1]))
-        self.keeping.clear()
+            if name in released or not self._acts(name):
+                key = changing.get(name)[2] if begin else None, name in self.fixed_now
+                self.periods[name] = begun.setdefault(key, Acting(key[0], begin, keeps=key[1]))
+        self.fixed_now.clear()
 
     def _acts(self, name: Component) -> bool:
         """Return whether a support acts at the end of the steps recorded so far."""
@@ -113,16 +116,17 @@ class Conditions:
 
     def temporary(self) -> list[tuple[Component, Acting]]:
         """Return the supports that do not act in all steps, with their periods."""
-        return [*self.over, *((name, acting) for name, acting in self.acting.items() if acting.begins > 0.0)]
+        return [*self.ended, *((name, acting) for name, acting in self.periods.items() if acting.begins > 0.0)]
 
     def named(self, component: Component) -> str:
-        """Return a string that names a displacement component in the deck, for messages."""
+        """Return the description of a displacement component in terms of the deck, for messages."""
         point, axis, _ = component
         if point >= sum(map(len, self.assembly.index.values())):
             return f"rotation {axis + 1} of a reference node"
         return f"component {axis + 1} of node {self.assembly.number_of(point)}"
 
     def _supports(self, given: Given, before: bool = False) -> None:
+        """Record a block *BOUNDARY, which stands in the current step or, if `before` is true, before all steps."""
         block = given.block
         kind = block.get("TYPE", "DISPLACEMENT").upper()
         if kind != "DISPLACEMENT":
@@ -136,16 +140,16 @@ class Conditions:
                 self.heat.prescribe(given, row)
                 continue
             points = self.assembly.nodes(row.text(0), row.location)
-            named = NAMED.get(row.text(1).upper())
+            components, value = NAMED.get(row.text(1).upper()), 0.0
             if row.text(1).upper() in ("XASYMM", "YASYMM", "ZASYMM"):
                 raise row.refuse(f"{row.text(1)} is not supported: give the components")
-            first = 1 if named else row.whole(1)
-            last = first if named else row.whole(2, first)
-            value = 0.0 if named else row.number(3, 0.0)
-            if not 1 <= first <= last <= 6:
-                raise row.refuse(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
+            if components is None:
+                first = row.whole(1)
+                last, value = row.whole(2, first), row.number(3, 0.0)
+                if not 1 <= first <= last <= 6:
+                    raise row.refuse(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
+                components = tuple(range(first, last + 1))
             driven = driven or bool(before and value)
-            components = named or tuple(range(first, last + 1))
             for point in points:
                 for component in components:
                     self._support(given, row, point, component, value)
@@ -153,6 +157,7 @@ class Conditions:
             self.assembly.content.note(block, "a displacement before the first step is reached in that step")
 
     def _support(self, given: Given, row: Row, point: int, component: int, value: float) -> None:
+        """Record a support of a point; CaseError if the component does not exist and the value is not zero."""
         name = self._component(point, component)
         if name is None:
             if value:
@@ -164,14 +169,14 @@ class Conditions:
         if point in self.directions and component <= 3:
             name, sign = self._local(point, component)
         if "FIXED" in given.block.parameters:
-            self.keeping.add(name)
+            self.fixed_now.add(name)
             if self._acts(name):
                 self.supports.hold(name, row.location)
                 return
         self.supports.give(name, sign * value, given.amplitude, row.location)
 
     def _component(self, point: int, component: int) -> Component | None:
-        """Return the component of a point, or of the point that carries its rotation; None if it does not exist."""
+        """Return a component of a point or, for rotations, of the point that represents them; None if it does not exist."""
         dim = self.assembly.dim
         if component <= dim:
             return point, component - 1, False
@@ -181,7 +186,7 @@ class Conditions:
         return None
 
     def _local(self, point: int, component: int) -> tuple[Component, float]:
-        """Return the component along a local axis and its sign; a global component if the axis is parallel to it."""
+        """Return the component along a local axis and 1.0, or a parallel global component and the sign between both."""
         direction = self.directions[point][component - 1]
         axis = int(np.argmax(np.abs(direction)))
         if abs(abs(direction[axis]) - 1.0) < LENGTH_ROUND_OFF and axis < self.assembly.dim:
@@ -189,6 +194,7 @@ class Conditions:
         return (point, component - 1, True), 1.0
 
     def _forces(self, block: Block) -> Iterator[tuple[Component, float, Location]]:
+        """Yield the component, the value [force] and the location of each force of a *CLOAD."""
         for row in block.each():
             component, value = row.whole(1), row.number(2)
             for point in self.assembly.nodes(row.text(0), row.location):

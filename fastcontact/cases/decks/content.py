@@ -1,4 +1,4 @@
-"""Content of a deck before the model is built: parts with nodes, elements, sets and surfaces, properties and steps."""
+"""Content of a deck before the model is built: parts with nodes, elements, sets and surfaces; properties; and steps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fastcontact.cases.decks.blocks import Block, Item, Located, Location, folde
 
 @dataclass(frozen=True, slots=True)
 class Cell(Located):
-    """An element: its type, the numbers of its nodes, the location of its keyword, and its line."""
+    """An element: its type, the numbers of its nodes, the location of its *ELEMENT, its line, and the set of the block."""
 
     type: str
     nodes: Sequence[int]
@@ -28,9 +28,9 @@ class Cell(Located):
 
 @dataclass(frozen=True, slots=True)
 class Members(Item):
-    """Entries of a set: numbers, or the name of another set.
+    """Entries of a set: node or element numbers, or the name of another set.
 
-    They refer to an instance, or to the instance of the definition if `instance` is empty.
+    Both belong to `instance` or, if this is empty, to the instance in which the set is defined.
     """
 
     numbers: Sequence[int] = ()
@@ -40,7 +40,7 @@ class Members(Item):
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """An entry of a surface: an element set or number with the label of a face, or a node set or number."""
+    """An entry of a surface: `of` is an element set or number, with the label of a face, or a node set or number."""
 
     location: Location
     of: str
@@ -49,7 +49,7 @@ class Face:
 
 @dataclass
 class SurfaceDefinition(Located):
-    """The definition of a surface in the deck."""
+    """A surface of element faces or, if `of_nodes` is true, of nodes."""
 
     name: str
     location: Location
@@ -59,7 +59,7 @@ class SurfaceDefinition(Located):
 
 @dataclass(frozen=True)
 class Section(Item):
-    """Material, orientation and thickness (None if not given) of the elements of a set."""
+    """Material, thickness [length] (None if not given) and orientation of the elements of a set."""
 
     elements: str
     material: str
@@ -71,7 +71,7 @@ class Section(Item):
 class Part:
     """Nodes, elements, sets and surfaces of a part, of the assembly, or of a deck without parts.
 
-    `nodes` contains the row of each node number in `coordinates`, which has three numbers for each row.
+    `nodes` contains the row of each node number in `coordinates` [length], which has three numbers for each row.
     """
 
     name: str = ""
@@ -95,7 +95,7 @@ class Part:
 class Instance:
     """A part placed in the assembly.
 
-    A translation [length] precedes a rotation, which is given by two points of its axis [length] and an angle [degree].
+    The rotation, which follows the translation [length], consists of two points on its axis [length] and an angle [degree].
     """
 
     name: str
@@ -106,7 +106,7 @@ class Instance:
 
 @dataclass
 class Material(Located):
-    """A material of the deck; `law` returns the material of the model for material axes, or None for those of the mesh."""
+    """A material of the deck; `law` returns the material of the model for given material axes (None: those of the mesh)."""
 
     name: str
     location: Location
@@ -129,7 +129,7 @@ class Interaction(Located):
     cohesion: dict[str, Block] = field(default_factory=dict)
     conductance: list[Block] = field(default_factory=list)
     friction_heat: tuple[Location, float] | None = None
-    changes: list[tuple[int, Interaction]] = field(default_factory=list)  # number of preceding steps, and friction
+    changes: list[tuple[int, Interaction]] = field(default_factory=list)  # number of preceding steps, and new friction
 
 
 @dataclass
@@ -169,22 +169,14 @@ class Sectors(Item):
 
 @dataclass(frozen=True)
 class Equation(Item):
-    """A linear equation: node, component and coefficient of each term."""
+    """A linear multi-point constraint: node, component and coefficient of each term."""
 
     terms: tuple[tuple[str, int, float], ...]
 
 
 @dataclass(frozen=True)
-class Pin(Item):
-    """Two nodes, or the nodes of two sets in pairs, with the same displacement: `first` follows `second`."""
-
-    first: str
-    second: str
-
-
-@dataclass(frozen=True)
 class MultiPoint(Item):
-    """Nodes that stay in a plane or on a line, or whose mean rotation is prescribed at the last node."""
+    """A multi-point constraint of a kind of *MPC except BEAM, with its nodes or node sets."""
 
     kind: str
     nodes: tuple[str, ...]
@@ -192,7 +184,7 @@ class MultiPoint(Item):
 
 @dataclass(frozen=True)
 class Link(Item):
-    """A reference node with the nodes that follow it (rigid, kinematic) or whose mean motion it has (distributing)."""
+    """A reference node and the nodes that follow it (rigid, kinematic) or whose mean motion it has (distributing)."""
 
     reference: str
     group: str
@@ -205,7 +197,7 @@ class Link(Item):
 
 @dataclass(frozen=True)
 class PretensionSection(Item):
-    """A pretension section of a bolt: its surface, the node whose displacement is its shortening, and its normal."""
+    """A pretension section of a bolt: its surface, the node whose displacement is the shortening, and its normal [-]."""
 
     surface: str
     node: str
@@ -229,7 +221,7 @@ class Axes(Item):
 
 @dataclass(frozen=True)
 class Amplitude:
-    """Times and values of an amplitude, in step time or in total time."""
+    """Times and values of an amplitude, in total time if `total` is true, otherwise in step time."""
 
     location: Location
     name: str
@@ -257,7 +249,7 @@ class Step(Located):
     increment: float = 1.0
     static: bool = False
     perturbation: bool = False
-    heat: str = ""  # "alone", "coupled" with displacements, or empty if temperatures are not computed
+    heat: str = ""  # "alone"; "coupled" with displacements; empty if temperatures are not computed
     modes: int = 0
     given: list[Given] = field(default_factory=list)
 
@@ -276,25 +268,24 @@ class Content:
     sector_ends: list[SectorEnds] = field(default_factory=list)
     sectors: list[Sectors] = field(default_factory=list)
     equations: list[Equation] = field(default_factory=list)
-    pins: list[Pin] = field(default_factory=list)
     multi_points: list[MultiPoint] = field(default_factory=list)
     links: list[Link] = field(default_factory=list)
     axes: list[Axes] = field(default_factory=list)
-    pretensions: list[PretensionSection] = field(default_factory=list)
+    pretension_sections: list[PretensionSection] = field(default_factory=list)
     orientations: dict[str, Axes] = field(default_factory=dict)
     distributions: dict[str, Block] = field(default_factory=dict)
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
     gaps: dict[str, tuple[Location, float, tuple[float, ...]]] = field(default_factory=dict)
     springs: dict[str, tuple[Location, float]] = field(default_factory=dict)
     supports: list[Given] = field(default_factory=list)
-    initial: list[Block] = field(default_factory=list)
-    stresses: list[Block] = field(default_factory=list)
+    initial_temperatures: list[Block] = field(default_factory=list)
+    initial_stresses: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
-    heat: str = ""  # `heat` of its steps
+    heat: str = ""  # as in `Step`, common to all steps
     modes: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
     outputs: list[Location] = field(default_factory=list)
 
     def note(self, at: Location | Located, text: str) -> None:
-        """Add a note on how a line is interpreted."""
+        """Add a note on the interpretation of a line."""
         self.notes.append(f"{at}: {text}")

@@ -1,4 +1,4 @@
-"""`read_deck`: a deck of Abaqus or CalculiX as a model with its steps."""
+"""Input decks of Abaqus and CalculiX, which `read_deck` converts to a model with load steps."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fastcontact.analysis.result_warnings import largest_rotation
 from fastcontact.analysis.resultants import multipliers
 from fastcontact.analysis.run import solve_steps
 from fastcontact.arrays import Array, Numbers
-from fastcontact.cases.decks.blocks import Location, read_blocks
+from fastcontact.cases.decks.blocks import Location, folded, read_blocks
 from fastcontact.cases.decks.building import Building
 from fastcontact.cases.decks.content import Content
 from fastcontact.cases.decks.keywords import read_content
@@ -47,13 +47,13 @@ class Deck:
     criteria : Criteria
         Convergence criteria.
     notes : tuple of str
-        Notes on keywords and parameters that have no effect or differ from Abaqus or CalculiX.
+        Notes on keywords and parameters that have no effect, or whose meaning differs from Abaqus or CalculiX.
     thickness : float
         Thickness of a plane model [length]. `solve` returns forces for the whole thickness.
     modes : dict, optional
         Arguments of `fastcontact.modes` at the last step, from ``*FREQUENCY``; None without it.
     building : Building
-        Model under construction, with the relation between the deck and the model.
+        Correspondence between the nodes, supports and gap elements of the deck and those of the model.
 
     Examples
     --------
@@ -89,14 +89,15 @@ class Deck:
         Returns
         -------
         Steps
-            Load steps; step k of the deck ends at load factor k. Displacements are along the global axes. Reactions are the
-            forces of supports, without those of equations and couplings. Forces of plane models are for the whole thickness.
+            Load steps; step k of the deck ends at load factor k. Displacements are along the global axes. Reactions [force]
+            are those of supports, without the forces of equations and couplings. Forces of plane models are for the whole
+            thickness.
 
         Warns
         -----
         FastcontactWarning
-            If the deck requests NLGEOM but small strains are used. The warning states the largest strain and rotation, whose
-            squares linear kinematics neglect. Other warnings and errors are those of `fastcontact.solve`.
+            If the deck requests NLGEOM but small strains are assumed. The warning states the largest strain and rotation,
+            whose squares linear kinematics neglect. Other warnings, and all errors, are those of `fastcontact.solve`.
         """
         steps = Steps()
         for step in self.solve_steps(**options):
@@ -116,18 +117,15 @@ class Deck:
         Parameters
         ----------
         name : str
-            Name of the set, in any case of letters; ``Instance.set`` for a set of a part.
+            Name of the set, whose case is ignored; ``Instance.set`` for a set of a part.
 
         Raises
         ------
         MeshError
             If the set does not exist.
         """
-        wanted = name.replace('"', "").strip().upper()
-        for group in self.model.mesh.point_groups:
-            if group.upper() == wanted:
-                return self.model.mesh.points_of(group)
-        return self.model.mesh.points_of(name)
+        names = {group.upper(): group for group in reversed(self.model.mesh.point_groups)}
+        return self.model.mesh.points_of(names.get(folded(name), name))
 
     def point(self, number: int | str) -> int:
         """Return the point number of a node of the deck.
@@ -143,86 +141,85 @@ class Deck:
             If the node does not exist.
         """
         assembly = self.building.assembly
-        scope, rest = assembly.place_of(str(number))
+        scope, rest = assembly.split_name(str(number))
         if not rest.isdecimal() or int(rest[:19]) not in assembly.index[scope]:
             raise MeshError(f"node '{number}' is not defined in '{self.path.name}'")
         return assembly.index[scope][int(rest[:19])]
 
     def finished(self, step: StepResult) -> StepResult:
-        """Return a step of the model with the reactions of supports only and with forces for the whole thickness."""
-        reaction = self._supports_alone(step.reaction, float(np.nextafter(step.load_factor, -np.inf)))
+        """Return a step of the model as a step of the deck, with the reactions and forces that `solve` describes."""
+        reaction = self._support_reactions(step.reaction, float(np.nextafter(step.load_factor, -np.inf)))
         for name, ends in self.building.gap_ends.items():
             contact = step.contact[name]
             for point, force in zip(contact.points.tolist(), contact.force_vectors, strict=True):
                 reaction[ends[point]] += force
         displacement = step.displacement.copy()
-        for at, table in self.building.driven.items():
-            displacement[at] = table_value(table, step.load_factor)
+        for component, table in self.building.driven.items():
+            displacement[component] = table_value(table, step.load_factor)
         step = replace(step, displacement=displacement)
         if self.building.content.steps and step.load_factor == self.ramp.instants[-1]:
             self._warn_of_large_strains(step)
         t = self.thickness
         if t == 1.0:
             return replace(step, reaction=reaction)
-        whole = {
+        contacts = {
             name: replace(
                 c, force=t * c.force, force_vectors=t * c.force_vectors, dissipation=t * c.dissipation,
                 primary_force_vectors=t * c.primary_force_vectors,
             )
             for name, c in step.contact.items()
         }  # fmt: skip
-        sums = {name: _times(t, step.iterations[name]) for name in ("work", "heat") if step.iterations.get(name)}
+        sums = {name: _scaled(t, step.iterations[name]) for name in ("work", "heat") if step.iterations.get(name)}
         heat = None if step.heat_reaction is None else t * step.heat_reaction
         return replace(
-            step, reaction=t * reaction, contact=whole, iterations=step.iterations | sums, heat_reaction=heat
+            step, reaction=t * reaction, contact=contacts, iterations=step.iterations | sums, heat_reaction=heat
         )
 
-    def _supports_alone(self, reaction: Array, instant: float) -> Array:
-        """Return the reactions (n_points, dim) [force] of supports, without the forces of other constraints.
+    def _support_reactions(self, reaction: Array, instant: float) -> Array:
+        """Return the reactions (n_points, dim) [force] at supports, without the forces of multi-point constraints.
 
-        The forces of the constraints follow from the reactions at components without a support.
+        The Lagrange multipliers of the constraints follow from the reactions at components without a support.
         """
         links = self.building.links
         if not links:
             return reaction.copy()
-        held = self.model.prescribed()[0].ravel()
+        supported = self.model.prescribed()[0].ravel()
         for support in self.building.local_supports:
             if not isinstance(support, TemporaryConstraint) or support.acts_from(instant):
-                held[support.rows.indices] = True
+                supported[support.rows.indices] = True
         rows = [link.rows for link in links]
-        forces = multipliers(reaction.ravel(), rows, held)
-        linked = sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(held.size))
-        return reaction - linked.reshape(reaction.shape)
+        forces = multipliers(reaction.ravel(), rows, supported)
+        of_constraints = sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(supported.size))
+        return reaction - of_constraints.reshape(reaction.shape)
 
     def _largest_strain(self, step: StepResult) -> float:
-        """Return the largest equivalent strain of the solid cells, computed from nodal stresses [-]."""
+        """Return the largest equivalent strain [-] of the solid cells, computed from nodal stresses."""
         field, largest = self.model.material_field(), 0.0
-        for name, block in self.model.mesh.solids.items():
-            strains = np.einsum("cij,cnj->cni", field.compliance[field.rows[name]], step.stress[block])
-            largest = max(
-                largest, float(recovery.equivalent_strain(strains.reshape(-1, strains.shape[2])).max(initial=0.0))
-            )
+        for name, cells in self.model.mesh.solids.items():
+            strains = np.einsum("cij,cnj->cni", field.compliance[field.rows[name]], step.stress[cells])
+            equivalent = recovery.equivalent_strain(strains.reshape(-1, strains.shape[2]))
+            largest = max(largest, float(equivalent.max(initial=0.0)))
         return largest
 
     def _warn_of_large_strains(self, step: StepResult) -> None:
-        """Warn with the largest strain and rotation if the deck has NLGEOM but small strains were solved."""
-        for asked in (s for s in self.building.content.steps if s.nonlinear and self.building.linearised):
-            strain = self._largest_strain(step)
+        """Warn, with the largest strain and rotation, if the deck has NLGEOM but small strains were assumed."""
+        if self.building.linearised:
+            nonlinear = next(s for s in self.building.content.steps if s.nonlinear)
             angle, _ = largest_rotation(self.model.mesh, step.displacement)
             warn(
-                f"{asked.location}: NLGEOM, but small strains and rotations were assumed; the equivalent strain is up to "
-                f"{strain:.3g} and the rotation up to {angle:.3g} radian, whose squares linear kinematics neglect"
+                f"{nonlinear.location}: NLGEOM, but small strains and rotations were assumed; the equivalent strain is up to "
+                f"{self._largest_strain(step):.3g} and the rotation up to {angle:.3g} radian, whose squares linear "
+                "kinematics neglect"
             )
-            return
 
 
 @typed(FileError)
 def read_deck(path: PathLike) -> Deck:
     """Read an input deck of Abaqus or CalculiX.
 
-    Static steps of elastic, plastic and hyperelastic bodies in contact are supported. Each keyword and parameter is
-    translated, listed in a note because it has no effect, or rejected with an error. Included files must be in the folder of
-    the deck or below.
+    Supported are static and steady heat transfer steps of elastic, elastic-plastic and hyperelastic bodies in contact, and a
+    final step with natural frequencies. Each keyword and parameter is translated, listed in a note because it has no effect,
+    or rejected with an error. Included files must be in the folder of the deck or below.
 
     Parameters
     ----------
@@ -246,7 +243,7 @@ def read_deck(path: PathLike) -> Deck:
     Warns
     -----
     FastcontactWarning
-        If a step has NLGEOM but small strains are used, for example because of couplings.
+        If a step has NLGEOM but small strains are assumed, for example because of couplings.
 
     Examples
     --------
@@ -281,15 +278,16 @@ def read_deck(path: PathLike) -> Deck:
     )
 
 
-def _times(factor: float, sums: Mapping[str, Any]) -> dict[str, Any]:
-    """Return sums of work or power, which may be nested by name, times a factor; counts are unchanged."""
+def _scaled(factor: float, sums: Mapping[str, Any]) -> dict[str, Any]:
+    """Return sums of work or power, which may be nested by name, times a factor; the count `exchanges` is unchanged."""
     return {
-        name: _times(factor, value) if isinstance(value, dict) else value if name == "exchanges" else factor * value
+        name: _scaled(factor, value) if isinstance(value, dict) else value if name == "exchanges" else factor * value
         for name, value in sums.items()
     }
 
 
 def _notes(content: Content, thickness: float) -> tuple[str, ...]:
+    """Return the notes of a deck without repetition, with those on output requests and on the thickness."""
     notes = list(dict.fromkeys(content.notes))
     requests = {location.keyword for location in content.outputs}
     if output := sorted(requests - {"CONTROLS"}):

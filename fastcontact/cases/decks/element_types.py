@@ -1,10 +1,11 @@
-"""Element types of decks: the element of the mesh, the kinematics and the corner nodes of each face."""
+"""Element types of decks with their mesh elements and kinematics, and the corner nodes of each face."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
 
+# Corners of the faces 1, 2, ... of Abaqus and CalculiX.
 TETRAHEDRON = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
 HEXAHEDRON = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
 WEDGE = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
@@ -14,10 +15,10 @@ SHAPES = {"tet": TETRAHEDRON, "hex": HEXAHEDRON, "wed": WEDGE, "tri": TRIANGLE, 
 SOLIDS = {"4": "tet4", "6": "wedge6", "8": "hex8", "10": "tet10", "15": "wedge15", "20": "hex20"}
 PLANES = {"3": "tri3", "4": "quad4", "6": "tri6", "8": "quad8"}
 FAMILIES = {"CPE": "plane_strain", "CPS": "plane_stress", "CAX": "axisymmetric"}
-# Families of heat conduction elements, and the families of deformable elements with the same shape.
+# Families of heat transfer elements, and the families of deformable elements of the same shape.
 CONDUCTING = {"DC3D": "C3D", "DC2D": "CPE", "DCAX": "CAX"}
-# Kinds of elements that are not solids, by the beginning of their type name.
-OTHERS = {
+# Kinds of unsupported elements, by the beginning of their type name.
+UNSUPPORTED = {
     "S": "shell", "STRI": "shell", "B": "beam", "T": "truss", "M": "membrane", "CPEG": "generalised plane strain",
     "DC": "convective heat transfer", "R": "rigid", "SC": "continuum shell", "C3D8P": "pore pressure", "CONN": "connector",
     "DASHPOT": "dashpot", "MASS": "mass", "F3D": "network", "D": "network", "U": "user", "COH": "cohesive",
@@ -38,11 +39,11 @@ class ElementType:
     kinematics : str
         Kinematics of the model.
     note : str
-        Difference between the element of the deck and that of the package; empty if there is none.
+        Difference between the element of the deck and that of the package, or an empty string.
     modes : bool
-        Whether the element has incompatible modes.
+        True if the element has incompatible modes.
     conducts : bool
-        Whether the element conducts heat and has no displacements.
+        True if the element conducts heat and has no displacements.
     """
 
     name: str
@@ -60,19 +61,19 @@ class ElementType:
 
 @cache
 def element_type(name: str) -> ElementType | None:
-    """Return the translation of an element type of a deck, in upper case, or None unless it is a supported solid."""
+    """Return the translation of an element type of a deck, given in upper case; None unless it is a supported solid."""
     conducts = name[:4] in CONDUCTING
     base = CONDUCTING[name[:4]] + name[4:] if conducts else name.removesuffix("T")
     note, modes = "", False
-    for ending, meaning in (
+    for suffix, difference in (
         ("MH", "an ordinary quadratic one here"),
         ("RH", "integrated fully, without hybrid pressure"), ("IH", "without hybrid pressure"),
         ("R", "integrated fully here"), ("I", ""),
         ("H", "without hybrid pressure: nearly incompressible materials have a mean dilatation"),
         ("M", "an ordinary quadratic one here"),
     ):  # fmt: skip
-        if base.endswith(ending) and not conducts:
-            base, note, modes = base[: -len(ending)], meaning, ending[0] == "I"
+        if base.endswith(suffix) and not conducts:
+            base, note, modes = base.removesuffix(suffix), difference, suffix[0] == "I"
             break
     table, kinematics = (SOLIDS, "3d") if base[:3] == "C3D" else (PLANES, FAMILIES.get(base[:3], ""))
     element = table.get(base[3:])
@@ -82,6 +83,6 @@ def element_type(name: str) -> ElementType | None:
 
 
 def described(name: str) -> str:
-    """Return the kind of an unsupported element type in parentheses, or an empty string if it is unknown."""
-    fitting = [key for key in OTHERS if name.startswith(key)]
-    return f" ({OTHERS[max(fitting, key=len)]})" if fitting else ""
+    """Return the kind of an unsupported element type in parentheses, or an empty string for an unknown type."""
+    beginnings = [beginning for beginning in UNSUPPORTED if name.startswith(beginning)]
+    return f" ({UNSUPPORTED[max(beginnings, key=len)]})" if beginnings else ""

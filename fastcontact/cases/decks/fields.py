@@ -1,4 +1,4 @@
-"""Temperatures and initial stresses of a deck, and heat conduction with fluxes, films and prescribed temperatures."""
+"""Temperatures, initial stresses and thermal loads of a deck: prescribed temperatures, heat flows, fluxes and films."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ def initial_conditions(content: Content, block: Block) -> None:
     kind = " ".join(block.required("TYPE").upper().split())
     if kind not in ("TEMPERATURE", "STRESS"):
         raise block.refuse(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
-    (content.initial if kind == "TEMPERATURE" else content.stresses).append(block)
+    (content.initial_temperatures if kind == "TEMPERATURE" else content.initial_stresses).append(block)
 
 
 def initial_temperatures(assembly: Assembly, blocks: Iterable[Block]) -> dict[int, float]:
-    """Return the initial temperatures by point; the last of several values at a point is used."""
-    return {point: value for block in blocks for point, value, _ in by_point(assembly, block)}
+    """Return the initial temperatures by point; the last of several values at a point applies."""
+    return {point: value for block in blocks for point, value, _ in temperatures_of_block(assembly, block)}
 
 
-def by_point(assembly: Assembly, block: Block) -> Iterator[tuple[int, float, Location]]:
+def temperatures_of_block(assembly: Assembly, block: Block) -> Iterator[tuple[int, float, Location]]:
     """Yield each point of a block with its temperature and the location of the data line."""
     for row in block.each():
         if any(row.entries[2:]):
@@ -42,55 +42,55 @@ def by_point(assembly: Assembly, block: Block) -> Iterator[tuple[int, float, Loc
 
 
 def add_temperatures(model: Model, histories: Histories[int]) -> None:
-    """Add temperatures relative to the initial temperatures to a model.
+    """Add temperature changes from the initial temperatures to a model.
 
-    Histories that differ by a factor only share a temperature field. If there are fewer times at which the histories have
-    corners than such fields, one field for each of these times is added instead.
+    Histories that differ only by a factor share a field. If the histories have corners at fewer times than there are such
+    fields, one field for each of these times is added instead.
     """
-    rises_of = (
+    changes = (
         (tuple((time, value - table[0][1]) for time, value in table), points) for table, points in histories.alike()
     )
-    fields = list(ByShape.of(rises_of))
+    fields = list(ByShape.of(changes))
     times = sorted({time for *_, table in fields for time, _ in table})
     if len(fields) <= len(times):
-        for _, points, sizes, table in fields:
-            rises = np.zeros(model.mesh.n_points)
-            rises[points] = sizes(points) if callable(sizes) else sizes
-            _add(model, rises, table)
+        for _, points, values, table in fields:
+            change = np.zeros(model.mesh.n_points)
+            change[points] = values(points) if callable(values) else values
+            _add_field(model, change, table)
         return
-    for k, time in enumerate(times):  # fewer corners than shapes: one field for each corner
+    for k, time in enumerate(times):
         corners = sorted({times[0], *times[max(k - 1, 0) : k + 2], times[-1]})
-        rises = np.zeros(model.mesh.n_points)
-        for _, points, sizes, table in fields:
-            instants, factors = zip(*table, strict=True)
-            factor = np.interp(time, instants, factors)
-            rises[points] = factor * (sizes(points) if callable(sizes) else sizes)
-        _add(model, rises, tuple((corner, float(corner == time)) for corner in corners))
+        change = np.zeros(model.mesh.n_points)
+        for _, points, values, table in fields:
+            factor = np.interp(time, *zip(*table, strict=True))
+            change[points] = factor * (values(points) if callable(values) else values)
+        _add_field(model, change, tuple((corner, float(corner == time)) for corner in corners))
 
 
-def _add(model: Model, rises: Array, ramp: Table) -> None:
-    for section in model.pretensions:  # the opposite nodes of a section are not in the deck
-        rises[section.opposite] = rises[section.nodes]
-    if rises.any() and any(factor for _, factor in ramp):
-        model.add_temperature(rises, reference=0.0, ramp=ramp)
+def _add_field(model: Model, change: Array, ramp: Table) -> None:
+    """Add a field (n_points,) of temperature changes, unless it or its ramp is zero."""
+    for section in model.pretensions:  # the deck does not contain the opposite nodes of a section
+        change[section.opposite] = change[section.nodes]
+    if change.any() and any(factor for _, factor in ramp):
+        model.add_temperature(change, reference=0.0, ramp=ramp)
 
 
-# Components in the order of a data line, by the dimension of the mesh.
+# Stress components in the order of a data line, by the dimension of the mesh.
 ORDER = {2: ("xx", "yy", "zz", "xy"), 3: ("xx", "yy", "zz", "xy", "xz", "yz")}
 
 
 def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
-    """Add the initial stresses to a model; the last of several lines for an element is used.
+    """Add the initial stresses to a model; the last of several lines for an element applies.
 
     Raises CaseError if a line does not have exactly one value per component, or if an element is not a solid or has an
     orientation.
     """
     content, names = deck_mesh.content, ORDER[deck_mesh.dim]
-    if not content.stresses:
+    if not content.initial_stresses:
         return
     starts = starts_of(model.mesh.solids)
     values = np.zeros((sum(map(len, model.mesh.solids.values())), len(names)))
-    for block in content.stresses:
+    for block in content.initial_stresses:
         for row in block.each():
             if len(row.entries) != 1 + len(names):
                 raise row.refuse(
@@ -113,12 +113,12 @@ def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
 
 # Keywords of heat loads.
 OF_HEAT = ("CFLUX", "DFLUX", "DSFLUX", "FILM", "SFILM")
-# Number of the temperature degree of freedom.
+# Number of the degree of freedom of the temperature.
 TEMPERATURE = 11
 
 
 def check_steps(content: Content) -> None:
-    """Set whether the steps compute temperatures, alone or with displacements; CaseError if the steps are inconsistent."""
+    """Set `content.heat` from the steps; CaseError if the procedures or the loads of the steps are inconsistent."""
     first = next((step for step in content.steps if step.heat), None)
     content.heat = first.heat if first else ""
     for number, step in enumerate(content.steps):
@@ -141,27 +141,27 @@ def check_steps(content: Content) -> None:
 
 
 class Spans(Generic[Name]):
-    """Intervals of the load factor in which loads act, derived from the steps that apply and remove the loads."""
+    """Intervals of the load factor in which loads act, from the steps that apply and remove the loads."""
 
     def __init__(self) -> None:
         self._begun: dict[Name, float] = {}
         self._ended: dict[Name, list[tuple[float, float]]] = {}
 
     def advance(self, history: Histories[Name], begin: float) -> None:
-        """Advance to the step that begins at the load factor `begin`. Call this before `history.advance`."""
+        """Record the loads that begin or end at the load factor `begin`; to be called before `history.advance`."""
         for name in history.dying:
             self._ended.setdefault(name, []).append((self._begun.pop(name), begin))
-        for name in (*history.changing, *history.first):
+        for name in (*history.changing, *history.initial):
             self._begun.setdefault(name, begin)
 
     def of(self, names: Iterable[Name]) -> dict[tuple[float, float], list[Name]]:
-        """Return the names of loads by the interval of load factors in which the loads act."""
-        alike: dict[tuple[float, float], list[Name]] = {}
+        """Return the names of loads by the interval of load factors in which they act."""
+        by_span: dict[tuple[float, float], list[Name]] = {}
         for name in names:
-            last = [(self._begun[name], np.inf)] if name in self._begun else []
-            for span in (*self._ended.get(name, ()), *last):
-                alike.setdefault(span, []).append(name)
-        return {(begin, end): members for (begin, end), members in alike.items() if begin < end}
+            unlimited = [(self._begun[name], np.inf)] if name in self._begun else []
+            for span in (*self._ended.get(name, ()), *unlimited):
+                by_span.setdefault(span, []).append(name)
+        return {(begin, end): members for (begin, end), members in by_span.items() if begin < end}
 
 
 class HeatConditions:
@@ -171,8 +171,8 @@ class HeatConditions:
         self.assembly, content = assembly, assembly.content
         self.reference = _reference(assembly, initial) if content.heat else 0.0
         self.rest: dict[Target, float] = {}
-        of_points = dict.fromkeys(range(len(assembly.points)), self.reference) if content.heat else {}
-        self.temperatures: Histories[int] = Histories(content, rest=of_points)
+        uniform = dict.fromkeys(range(len(assembly.points)), self.reference) if content.heat else {}
+        self.temperatures: Histories[int] = Histories(content, rest=uniform)
         self.powers: Histories[int] = Histories(content)
         self.fluxes: Histories[Target] = Histories(content)
         self.films: Histories[Target] = Histories(content, rest=self.rest)
@@ -187,17 +187,17 @@ class HeatConditions:
         return self.temperatures, self.powers, self.fluxes, self.films
 
     def prescribe(self, given: Given, row: Row) -> None:
-        """Prescribe the temperature of nodes as a line of *BOUNDARY requires."""
+        """Record the prescribed temperature of nodes in a line of *BOUNDARY."""
         if not self.assembly.content.heat:
             raise row.refuse(
                 "degree of freedom 11 (temperature) is not within 1 to 6: in static steps use *TEMPERATURE"
             )
         if "FIXED" in given.block.parameters:
             raise row.refuse("FIXED is not supported for temperatures: give their values")
-        for point in self._of_solids(row):
+        for point in self._points_of_solids(row):
             self.temperatures.give(point, row.number(3, 0.0), given.amplitude, row.location)
 
-    def _of_solids(self, row: Row) -> list[int]:
+    def _points_of_solids(self, row: Row) -> list[int]:
         """Return the points of the node set in a line; CaseError if a point belongs to no solid."""
         points = self.assembly.nodes(row.text(0), row.location)
         for point in points:
@@ -206,17 +206,17 @@ class HeatConditions:
         return points
 
     def take(self, given: Given) -> None:
-        """Store the values of a block of heat loads for the current step."""
+        """Record a block of heat loads of the current step."""
         keyword = given.block.keyword
-        by: dict[str, Histories[Any]] = {"CFLUX": self.powers, "FILM": self.films, "SFILM": self.films}
-        history = by.get(keyword, self.fluxes)
+        histories: dict[str, Histories[Any]] = {"CFLUX": self.powers, "FILM": self.films, "SFILM": self.films}
+        history = histories.get(keyword, self.fluxes)
         if given.new:
             history.forget(lambda name: getattr(name, "keyword", keyword) == keyword)
         for row in given.block.each():
             if keyword == "CFLUX":
                 if row.whole(1, TEMPERATURE) not in (0, TEMPERATURE):
                     raise row.refuse(f"degree of freedom {row.text(1)} is not 11, the temperature")
-                for point in self._of_solids(row):
+                for point in self._points_of_solids(row):
                     self.powers.give(point, row.number(2), given.amplitude, row.location)
                 continue
             film = history is self.films
@@ -224,19 +224,19 @@ class HeatConditions:
                 raise row.refuse(f"the film coefficient {row.number(3):g} must not be negative")
             for target in targets(self.assembly, row, (row.number(3),) if film else ()):
                 if film:
-                    self._in_place_of_others(target, row)
+                    self._replace_film(target, row)
                 history.give(target, row.number(2), given.amplitude, row.location)
 
-    def _in_place_of_others(self, film: Target, row: Row) -> None:
-        """Replace an earlier film with another coefficient on the same face; CaseError if this step has applied it."""
+    def _replace_film(self, film: Target, row: Row) -> None:
+        """Remove an earlier film with another coefficient from the face of a film; CaseError if both are in this step."""
         self.rest[film] = self.reference
-        before = self.film_of.get((film.keyword, film.face))
-        if before is not None and before != film:
-            if before in self.films.changing:
-                (new,), (old,) = film.numbers, before.numbers
+        earlier = self.film_of.get((film.keyword, film.face))
+        if earlier is not None and earlier != film:
+            if earlier in self.films.changing:
+                (new,), (old,) = film.numbers, earlier.numbers
                 raise row.refuse(f"{new:g} is the second film coefficient of this face in one step, after {old:g}")
-            if before in self.films.tracks and self.films.tracks[before].alive:
-                self.films.dying[before] = None
+            if earlier in self.films.tracks and self.films.tracks[earlier].alive:
+                self.films.dying[earlier] = None
         self.film_of[film.keyword, film.face] = film
 
     def advance(self, number: int, step: Step) -> None:
@@ -244,22 +244,25 @@ class HeatConditions:
         begin = float(number - 1) if self.begun else -np.inf
         self.temperature_spans.advance(self.temperatures, begin)
         self.film_spans.advance(self.films, begin)
-        for other in self.histories:
-            other.advance(number, step)
+        for history in self.histories:
+            history.advance(number, step)
         self.begun = self.begun or bool(step.heat)
 
     def loads(self, thickness: float) -> list[Callable[[Model], None]]:
-        """Make the mesh groups of all heat loads; return functions that add the loads to a model."""
+        """Make the mesh groups of all heat loads, and return functions that add the loads to a model.
+
+        `thickness` [length] converts nodal heat flows to flows per unit thickness.
+        """
         assembly, adders = self.assembly, []  # type: DeckMesh, list[Callable[[Model], None]]
         spans: list[tuple[float, float]] = []
         rises = ByShape[int]()
         for table, names in self.temperatures.alike():
             for span, points in self.temperature_spans.of(names).items():
                 spans += [span] * (span not in spans)
-                rises.add(spans.index(span), self._relative(table), points)
+                rises.add(spans.index(span), self._relative_table(table), points)
         for number, nodes, value, table in rises:
             group = assembly.add_points(f"temperature {len(adders)}", nodes)
-            fixed = {"value": _absolute(value, self.reference), "ramp": table, **_between(spans[number])}
+            fixed = {"value": _absolute(value, self.reference), "ramp": table, **_limits(spans[number])}
             adders.append(partial(Model.fix_temperature, group=group, **fixed))
         for _, nodes, value, table in ByShape.of(self.powers.alike()):
             group = assembly.add_points(f"heat {len(adders)}", nodes)
@@ -287,25 +290,25 @@ class HeatConditions:
                     faces_by_film.setdefault((table, film.numbers[0], span), []).append(film.face)
         for (table, coefficient, span), faces in faces_by_film.items():
             group = assembly.add_facets(f"film {len(adders)}", faces)
-            rise = self._relative(table)
+            rise = self._relative_table(table)
             size = max((value for _, value in rise), key=abs)
             ramp = tuple((time, value / size) for time, value in rise) if size else None
-            film_options: dict[str, Any] = {"ambient": self.reference + size, "ramp": ramp, **_between(span)}
+            film_options: dict[str, Any] = {"ambient": self.reference + size, "ramp": ramp, **_limits(span)}
             adders.append(partial(Model.add_film, group=group, coefficient=coefficient, **film_options))
         return adders
 
-    def _relative(self, table: Table) -> Table:
+    def _relative_table(self, table: Table) -> Table:
         """Return a temperature history relative to the reference temperature."""
         return tuple((time, value - self.reference) for time, value in table)
 
 
-def _between(span: tuple[float, float]) -> dict[str, float]:
+def _limits(span: tuple[float, float]) -> dict[str, float]:
     """Return the arguments `begins` and `ends` of methods of `Model` for an interval of load factors."""
-    return {name: at for name, at in zip(("begins", "ends"), span, strict=True) if np.isfinite(at)}
+    return {name: limit for name, limit in zip(("begins", "ends"), span, strict=True) if np.isfinite(limit)}
 
 
 def _absolute(value: Any, reference: float) -> Any:
-    """Return the absolute temperature for a rise `value` above the reference; both are numbers or functions of position."""
+    """Return the temperature for a rise `value` above the reference; both are numbers or functions of the position."""
 
     def absolute(points: Array) -> Array:
         return np.asarray(value(points) + reference)
@@ -322,7 +325,7 @@ def _reference(assembly: Assembly, initial: Mapping[int, float]) -> float:
     values = {initial.get(point, 0.0) for point in assembly.of_solids}
     if len(values) == 1:
         return values.pop()
-    location = content.initial[0].location
+    location = content.initial_temperatures[0].location
     if content.heat == "coupled" and any(material.expansion for material in content.materials.values()):
         raise location.refuse(
             f"initial temperatures from {min(values):g} to {max(values):g} are not supported with thermal expansion in "

@@ -1,4 +1,4 @@
-"""Gap elements and springs of a deck; gap elements become contact of faces with a rigid plane or with another body."""
+"""Gap elements and springs of a deck; gap elements become contact of facets with a rigid plane or with another body."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
-# Tolerance of distances, relative to the size of the model.
+# Tolerance of distances relative to the size of the model.
 TOUCHING = 1e-6
 
 
@@ -36,12 +36,12 @@ class GapGroup(Located):
         Initial clearance [length].
     direction : ndarray (dim,)
         Unit vector from the first node to the second node [-].
-    ends : ndarray of int (n, 2)
-        Points of the first and the second node of each element.
+    ends : ndarray (n, 2) of int
+        Point numbers of the first and the second node of each element.
     facets : str
-        Group of the facets around the first nodes.
+        Group of the facets with the first nodes.
     opposite : str
-        Group of the facets around the second nodes; empty unless all of them belong to solids.
+        Group of the facets with the second nodes; empty unless all second nodes belong to solids.
     """
 
     name: str
@@ -54,7 +54,7 @@ class GapGroup(Located):
 
 
 def gap(content: Content, block: Block) -> None:
-    """Read *GAP: the clearance and the direction of gap elements."""
+    """Read *GAP: the clearance [length] and the direction [-] of gap elements."""
     row = block.only()
     direction = tuple(row.number(i, 0.0) for i in (1, 2, 3))
     if not any(direction):
@@ -63,7 +63,7 @@ def gap(content: Content, block: Block) -> None:
 
 
 def spring(content: Content, block: Block) -> None:
-    """Read *SPRING: the stiffness of springs along their axis."""
+    """Read *SPRING: the axial stiffness [force / length] of springs."""
     rows = block.rows
     if len(rows) != 1:
         raise block.refuse("linear springs along their axis need an empty line, followed by a line with the stiffness")
@@ -72,40 +72,40 @@ def spring(content: Content, block: Block) -> None:
     content.springs[folded(block.required("ELSET"))] = (block.location, rows[0].positive(0, "stiffness"))
 
 
-def check_discrete(assembly: Assembly, kind: str, given: Mapping[str, Any], needed: str) -> None:
-    """Raise CaseError if a spring or a gap element has no properties."""
-    with_one = {element for name, entry in given.items() for element in assembly.elements_of(name, entry[0])}
+def check_discrete(assembly: Assembly, kind: str, properties: Mapping[str, Any], keyword: str) -> None:
+    """Raise CaseError if an element of the type `kind` is in none of the sets to which `keyword` gives properties."""
+    complete = {element for name, entry in properties.items() for element in assembly.elements_of(name, entry[0])}
     for element in assembly.discrete:
-        if element.cell.type == kind and element not in with_one:
-            raise element.cell.refuse(f"element {element.number} of type {kind} has no {needed}")
+        if element.cell.type == kind and element not in complete:
+            raise element.cell.refuse(f"element {element.number} of type {kind} has no {keyword}")
 
 
 def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
-    """Make groups of the facets around the nodes of gap elements; CaseError if the nodes do not fill whole facets."""
+    """Make groups of the facets with the nodes of gap elements; CaseError if the nodes do not fill whole facets."""
     groups = []
     check_discrete(deck_mesh, "GAPUNI", deck_mesh.content.gaps, "*GAP")
     for name, (location, clearance, vector) in deck_mesh.content.gaps.items():
         gap_elements = deck_mesh.elements_of(name, location)
         if any(element.cell.type != "GAPUNI" for element in gap_elements):
             raise location.refuse("acts on elements of type GAPUNI only")
-        shown = deck_mesh.content.root.set_names.get(name, name)
+        set_name = deck_mesh.content.root.set_names.get(name, name)
         ends = np.array([element.points for element in gap_elements], np.intp)
         bodies = all(point in deck_mesh.of_solids for point in ends[:, 1].tolist())
         groups.append(
             GapGroup(
-                shown, location, clearance, np.array(vector)[: deck_mesh.dim] / np.linalg.norm(vector), ends,
-                _whole(deck_mesh, f"{shown} facets", ends[:, 0], location),
-                _whole(deck_mesh, f"{shown} opposite facets", ends[:, 1], location) if bodies else "",
+                set_name, location, clearance, np.array(vector)[: deck_mesh.dim] / np.linalg.norm(vector), ends,
+                _facet_group(deck_mesh, f"{set_name} facets", ends[:, 0], location),
+                _facet_group(deck_mesh, f"{set_name} opposite facets", ends[:, 1], location) if bodies else "",
             )
         )  # fmt: skip
     return groups
 
 
-def _whole(deck_mesh: DeckMesh, group: str, points: Indices, location: Location) -> str:
+def _facet_group(deck_mesh: DeckMesh, group: str, points: Indices, location: Location) -> str:
     """Make a group of the facets whose nodes are all in `points`; CaseError if a point belongs to no such facet."""
-    chosen = set(points.tolist())
-    faces = deck_mesh.faces_within(chosen)
-    if {p for face in faces for p in facet_points(*face)} != chosen:
+    selected = set(points.tolist())
+    faces = deck_mesh.faces_within(selected)
+    if {p for face in faces for p in facet_points(*face)} != selected:
         raise location.refuse(
             "gap elements are supported on all nodes of whole faces only, from a body to another or to held nodes"
         )
@@ -115,25 +115,25 @@ def _whole(deck_mesh: DeckMesh, group: str, points: Indices, location: Location)
 def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Conditions) -> dict[str, dict[int, int]]:
     """Add the contact of gap elements to a model.
 
-    Returns the node opposite to each node of the body by the name of the contact, or an empty dictionary if the opposite
-    nodes belong to solids. Raises CaseError if the nodes are not in planes normal to the direction of the elements.
+    Returns, by the name of the contact, the second node of each first node, or an empty dictionary if the second nodes belong
+    to solids. Raises CaseError if the nodes are not in planes normal to the direction of the elements.
     """
     first, second = model.mesh.points[gap.ends[:, 0]], model.mesh.points[gap.ends[:, 1]]
     size = TOUCHING * float(np.ptp(model.mesh.points, axis=0).max())
     if np.ptp(first @ gap.direction) > size:
         raise gap.refuse("gap elements are supported if their nodes lie in a plane normal to their direction")
     if gap.opposite:
-        between = second - first
-        along = between @ gap.direction
-        off = np.abs(between - np.outer(along, gap.direction)).max()
-        if max(np.ptp(along), off, -along.mean()) > size:
+        vectors = second - first
+        distances = vectors @ gap.direction
+        tangential = np.abs(vectors - np.outer(distances, gap.direction)).max()
+        if max(np.ptp(distances), tangential, -distances.mean()) > size:
             raise gap.refuse(
                 "gap elements between bodies are supported along their direction, in planes normal to it only"
             )
         with refusing(gap):
             model.add_contact(
                 gap.name, secondary=gap.facets, primary=gap.opposite, formulation="node_to_segment",
-                clearance=gap.clearance - float(along.mean()),
+                clearance=gap.clearance - float(distances.mean()),
             )  # fmt: skip
         return {}
     history = _motion(gap, conditions)
@@ -141,26 +141,26 @@ def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Condit
         point=tuple((first @ gap.direction).mean() * gap.direction + gap.clearance * gap.direction),
         normal=tuple(-gap.direction),
     )
-    moves: dict[str, Any] = {}
+    motion: dict[str, Any] = {}
     if any(value for _, value in history):
-        moves = {"motion": dict(zip("xyz", gap.direction.tolist(), strict=False)), "ramp": history}
-    model.add_obstacle(gap.name, secondary=gap.facets, obstacle=wall, formulation="node_to_segment", **moves)
+        motion = {"motion": dict(zip("xyz", gap.direction.tolist(), strict=False)), "ramp": history}
+    model.add_obstacle(gap.name, secondary=gap.facets, obstacle=wall, formulation="node_to_segment", **motion)
     return {gap.name: dict(gap.ends.tolist())}
 
 
 def _motion(gap: GapGroup, conditions: Conditions) -> Table:
-    """Return the motion of the second nodes along the direction; CaseError unless all have the same prescribed motion."""
-    axes, supports = np.flatnonzero(gap.direction).tolist(), conditions.supports
-    temporary = {name for name, _ in conditions.temporary()}
+    """Return the motion [length] of the second nodes along the direction; CaseError unless it is prescribed and uniform."""
+    supports, temporary = conditions.supports, {name for name, _ in conditions.temporary()}
     by_axis: list[tuple[float, Array]] = []
-    for axis in axes:
+    for axis in np.flatnonzero(gap.direction).tolist():
         names = [(end, axis, False) for end in gap.ends[:, 1].tolist()]
-        tables = {supports.table(name) for name in names if name in supports.tracks and name not in temporary}
-        if len(tables) != 1 or not all(name in supports.tracks and name not in temporary for name in names):
+        prescribed = [name for name in names if name in supports.tracks and name not in temporary]
+        tables = {supports.table(name) for name in prescribed}
+        if len(tables) != 1 or len(prescribed) < len(names):
             raise gap.refuse(
                 "gap elements need second nodes that are fixed, or have the same prescribed motion, along their direction"
             )
         by_axis.append((float(gap.direction[axis]), np.array(tables.pop())))
     times = np.unique(np.concatenate([table[:, 0] for _, table in by_axis]))
-    moved = sum((cosine * np.interp(times, *table.T) for cosine, table in by_axis), np.zeros(len(times)))
-    return tuple(zip(times.tolist(), moved.tolist(), strict=True))
+    motion = sum((cosine * np.interp(times, *table.T) for cosine, table in by_axis), np.zeros(len(times)))
+    return tuple(zip(times.tolist(), motion.tolist(), strict=True))

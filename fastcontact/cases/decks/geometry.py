@@ -1,4 +1,4 @@
-"""Keywords of the geometry: nodes, elements, sets, surfaces, sections, parts and instances."""
+"""Keywords of the geometry of a deck: nodes, elements, sets, surfaces, sections, parts and instances."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from fastcontact.cases.decks.content import Cell, Content, Face, Instance, Membe
 from fastcontact.cases.decks.element_types import described, element_type
 from fastcontact.mesh import elements
 
-# Number of nodes of each supported element that is not a solid.
+# Number of nodes of the supported elements that are not solids.
 DISCRETE = {"GAPUNI": 2, "SPRINGA": 2}
-# Smallest number of nodes of elements that may continue on the next line without a comma at the end of the line.
+# Smallest number of nodes of an element whose lines may continue without a comma at their end.
 LONG = 15
 
 
@@ -27,10 +27,10 @@ def nodes(content: Content, part: Part, block: Block) -> None:
         if len(row.entries) > 4 and any(row.entries[4:]):
             raise row.refuse(f"node {number} has more than three coordinates")
         position = array("d", (row.number(1, 0.0), row.number(2, 0.0), row.number(3, 0.0)))
-        known = part.nodes.setdefault(number, len(part.nodes))
-        if 3 * known == len(part.coordinates):
+        row_of_node = part.nodes.setdefault(number, len(part.nodes))
+        if 3 * row_of_node == len(part.coordinates):
             part.coordinates.extend(position)
-        elif part.coordinates[3 * known : 3 * known + 3] != position:
+        elif part.coordinates[3 * row_of_node : 3 * row_of_node + 3] != position:
             raise row.refuse(f"node {number} is defined twice, at different positions")
         numbers.append(number)
     if block.get("NSET"):
@@ -38,7 +38,7 @@ def nodes(content: Content, part: Part, block: Block) -> None:
 
 
 def cells(content: Content, part: Part, block: Block) -> None:
-    """Read *ELEMENT: numbers and nodes of elements of one type."""
+    """Read *ELEMENT: the numbers and the nodes of elements of one type."""
     name, element_set = block.required("TYPE").upper(), block.get("ELSET")
     kind = element_type(name)
     if kind is None and name not in DISCRETE:
@@ -47,16 +47,15 @@ def cells(content: Content, part: Part, block: Block) -> None:
         raise block.refuse(
             f"element type {name[:40]}{described(name)} is not supported; {count} element{'s' * (count != 1)}{where}"
         )
-    needed = DISCRETE[name] if kind is None else elements.get(kind.element).n_nodes
+    n_nodes = DISCRETE[name] if kind is None else elements.get(kind.element).n_nodes
     if kind is not None and kind.note and f"{name}: " not in "".join(content.notes):
         content.note(block, f"{name}: {kind.note}")
     members = array("q")
-    for row, entries in _joined(block, needed):
+    for row in _joined(block, n_nodes):
         number = row.whole(0)
-        whole = Row(row.location, entries)
-        connectivity = array("q", (whole.whole(i) for i in range(1, len(entries)) if entries[i]))
-        if len(connectivity) != needed:
-            raise row.refuse(f"element {number} of type {name} has {len(connectivity)} nodes, {needed} are needed")
+        connectivity = array("q", (row.whole(i) for i, entry in enumerate(row.entries) if i and entry))
+        if len(connectivity) != n_nodes:
+            raise row.refuse(f"element {number} of type {name} has {len(connectivity)} nodes, {n_nodes} are needed")
         if number in part.cells:
             raise row.refuse(f"element {number} is defined twice, first in line {part.cells[number].location.line}")
         part.cells[number] = Cell(name, connectivity, block.location, row.location.line, element_set)
@@ -65,21 +64,17 @@ def cells(content: Content, part: Part, block: Block) -> None:
         part.add("element", element_set, [Members(block.location, members)])
 
 
-def _joined(block: Block, needed: int) -> Iterator[tuple[Row, tuple[str, ...]]]:
-    """Yield the first line and all entries of each element, which may continue on several lines."""
-    first: Row | None = None
-    entries: tuple[str, ...] = ()
+def _joined(block: Block, n_nodes: int) -> Iterator[Row]:
+    """Yield the data of each element, which may continue on several lines, as one row at the location of the first line."""
+    joined: Row | None = None
     for row in block.each():
-        if first is None:
-            first, entries = row, row.entries
-        else:
-            entries += row.entries
-        short = len(entries) < needed + 1
-        if not (short and (row.goes_on or (needed >= LONG and len(row.entries) >= 8))):
-            yield first, entries
-            first = None
-    if first is not None:
-        yield first, entries
+        joined = row if joined is None else Row(joined.location, joined.entries + row.entries)
+        incomplete = len(joined.entries) < n_nodes + 1
+        if not (incomplete and (row.continued or (n_nodes >= LONG and len(row.entries) >= 8))):
+            yield joined
+            joined = None
+    if joined is not None:
+        yield joined
 
 
 def group(content: Content, part: Part, block: Block) -> None:
@@ -93,16 +88,16 @@ def group(content: Content, part: Part, block: Block) -> None:
                 raise row.refuse(f"the range {first} to {last} by {increment} is empty: it must ascend")
             entries.append(Members(row.location, range(first, last + 1, increment), instance=instance))
             continue
-        for numbers, members_named in groupby(row.entries, lambda entry: entry.isdecimal() and len(entry) < 19):
-            if numbers:
-                entries.append(Members(row.location, array("q", map(int, members_named)), instance=instance))
+        for are_numbers, members in groupby(row.entries, lambda entry: entry.isdecimal() and len(entry) < 19):
+            if are_numbers:
+                entries.append(Members(row.location, array("q", map(int, members)), instance=instance))
             else:
-                entries += [Members(row.location, name=entry, instance=instance) for entry in members_named if entry]
+                entries += [Members(row.location, name=entry, instance=instance) for entry in members if entry]
     part.add("node" if block.keyword == "NSET" else "element", name, entries)
 
 
 def surface(content: Content, part: Part, block: Block) -> None:
-    """Read *SURFACE: faces of elements, or nodes."""
+    """Read *SURFACE: the faces of elements or the nodes of a surface."""
     name, kind = block.required("NAME"), block.choice("TYPE", ("ELEMENT", "NODE"))
     definition = SurfaceDefinition(name, block.location, kind == "NODE")
     registered("surface", name, part.surfaces, definition, block)
@@ -114,17 +109,17 @@ def surface(content: Content, part: Part, block: Block) -> None:
 
 
 def instance(content: Content, block: Block) -> Instance:
-    """Read *INSTANCE: a part placed in the assembly."""
-    name, of = block.required("NAME"), block.required("PART")
-    placed = Instance(name, defined("part", of, content.parts, block))
+    """Read *INSTANCE: a part with its translation and rotation in the assembly."""
+    name, part_name = block.required("NAME"), block.required("PART")
+    new_instance = Instance(name, defined("part", part_name, content.parts, block))
     rows = block.rows
     if rows:
-        placed.translation = tuple(rows[0].number(i, 0.0) for i in range(3))
+        new_instance.translation = tuple(rows[0].number(i, 0.0) for i in range(3))
     if len(rows) > 1:
-        placed.rotation = tuple(rows[1].number(i) for i in range(7))
+        new_instance.rotation = tuple(rows[1].number(i) for i in range(7))
     if len(rows) > 2:
         raise rows[2].refuse("an instance has at most two data lines: a translation and a rotation")
-    return registered("instance", name, content.instances, placed, block)
+    return registered("instance", name, content.instances, new_instance, block)
 
 
 def new_part(content: Content, block: Block) -> Part:
@@ -135,10 +130,7 @@ def new_part(content: Content, block: Block) -> Part:
 
 def section(content: Content, part: Part, block: Block) -> None:
     """Read *SOLID SECTION: material, orientation and thickness of the elements of a set."""
-    thickness = None
-    for row in block.rows[:1]:
-        thickness = row.positive(0, "thickness", 1.0)
-    orientation = block.get("ORIENTATION")
-    part.sections.append(
-        Section(block.location, block.required("ELSET"), block.required("MATERIAL"), thickness, orientation)
-    )
+    rows = block.rows
+    thickness = rows[0].positive(0, "thickness", 1.0) if rows else None
+    names = block.required("ELSET"), block.required("MATERIAL")
+    part.sections.append(Section(block.location, *names, thickness, block.get("ORIENTATION")))

@@ -1,4 +1,4 @@
-"""Histories of supports and loads over the steps of a deck: step k runs from load factor k - 1 to k."""
+"""Histories of supports and loads over the steps of a deck, of which step k runs from load factor k - 1 to k."""
 
 from __future__ import annotations
 
@@ -17,18 +17,19 @@ from fastcontact.cases.decks.content import Amplitude, Content, Given, Step
 from fastcontact.model.ramp import Table
 
 Name = TypeVar("Name", bound=Hashable)
-# Duration of a jump at the start of a step, relative to the duration of the step.
+# Duration of a jump, relative to the duration of a step.
 JUMP = 1e-9
-# Number of decimals to which scaled histories must agree to be merged.
-ALIKE = 12
+# Number of decimals in which scaled histories must agree to be merged.
+DECIMALS = 12
 
 
 @dataclass(slots=True)
 class Track:
-    """The common history of quantities that have always been prescribed together.
+    """The common history of quantities that have had equal values in all steps so far.
 
-    `numbers` contains load factors and values in turn. Each node may have a separate track, and a list of pairs would take
-    three times the memory. `size` is the number of quantities, and `alive` is false once a step has removed them.
+    `numbers` alternates between load factors and values, since each node may have a separate track and a list of pairs would
+    take three times the memory. `size` is the number of quantities. `alive` is false once a step has removed them. `shape` is
+    the current value with its amplitude, if that is in total time.
     """
 
     numbers: array[float]
@@ -39,20 +40,20 @@ class Track:
 
     @property
     def last(self) -> float:
-        """The value at the end of the latest step."""
+        """The value at the end of the last step so far."""
         return self.numbers[-1]
 
     @property
     def points(self) -> Table:
-        """Load factor and value of each point."""
+        """Pairs of load factor and value."""
         return tuple(zip(self.numbers[::2], self.numbers[1::2], strict=True))
 
     def add(self, points: Iterable[tuple[float, float]]) -> None:
-        """Append points; a point with the time of the last point and another value becomes a jump."""
+        """Append points; a point at the time of the last point, but with another value, makes a jump."""
         for time, value in points:
-            end, before = self.numbers[-2:]
+            end, last = self.numbers[-2:]
             if time <= end:
-                if value == before:
+                if value == last:
                     continue
                 time = end + JUMP
             self.numbers.extend((time, value))
@@ -60,16 +61,16 @@ class Track:
 
 @dataclass
 class Values(Generic[Name]):
-    """Values of a step by name, stored in columns of values, line numbers and indices of blocks.
+    """Values of a step by name, stored in columns: the values, their line numbers and the indices of their blocks.
 
-    Each node may have a separate value, and an object per value would take several times the memory of its line.
+    Each node may have a separate value, and an object for each would take several times the memory of its line in the deck.
     """
 
     rows: dict[Name, int] = field(default_factory=dict)
     values: array[float] = field(default_factory=lambda: array("d"))
     lines: array[int] = field(default_factory=lambda: array("q"))
     origins: array[int] = field(default_factory=lambda: array("q"))
-    blocks: list[tuple[str, Location]] = field(default_factory=list)  # amplitude and a line of each block
+    blocks: list[tuple[str, Location]] = field(default_factory=list)  # amplitude, and location of a line
     last: tuple[float, int, int] | None = None
     row: int = 0
 
@@ -80,7 +81,7 @@ class Values(Generic[Name]):
         return iter(self.rows)
 
     def put(self, name: Name, value: float, amplitude: str, location: Location) -> None:
-        """Store a value, which replaces an earlier value with the same name."""
+        """Store a value, which replaces an earlier value of the same name."""
         block = self.blocks[-1] if self.blocks else None
         if block is None or (amplitude, location.file, location.keyword) != (block[0], block[1].file, block[1].keyword):
             self.blocks.append((amplitude, location))
@@ -125,13 +126,13 @@ class Histories(Generic[Name]):
     dying : dict
         Names of earlier values that the current step removes.
     rest : mapping
-        Values without any load or support, by default zero.
-    first : Values
-        Values given before all steps, which are effective in the first step unless that step changes them.
+        Values in the absence of a load or support, by default zero.
+    initial : Values
+        Values given before all steps, which the first step reaches unless it changes them.
     time : float
-        Total time at the start of the current step.
-    lasting : dict
-        Tracks whose amplitudes are in total time, by the identity of the track.
+        Total time [time] at the start of the current step.
+    in_total_time : dict
+        Tracks whose amplitudes are in total time, by `id` of the track.
     """
 
     content: Content
@@ -139,94 +140,97 @@ class Histories(Generic[Name]):
     changing: Values[Name] = field(default_factory=Values)
     dying: dict[Name, None] = field(default_factory=dict)
     rest: Mapping[Name, float] = field(default_factory=dict)
-    first: Values[Name] = field(default_factory=Values)
+    initial: Values[Name] = field(default_factory=Values)
     time: float = 0.0
-    lasting: dict[int, Track] = field(default_factory=dict)
+    in_total_time: dict[int, Track] = field(default_factory=dict)
 
     def give(self, name: Name, value: float, amplitude: str, location: Location) -> None:
-        """Set a value for the current step; CaseError if this step has set a different value."""
+        """Set a value for the current step; CaseError if this step has already set a different value."""
         if name in self.changing:
-            first, other, before = self.changing.get(name)
-            if (first, other) != (value, amplitude):
+            earlier, earlier_amplitude, earlier_location = self.changing.get(name)
+            if (earlier, earlier_amplitude) != (value, amplitude):
                 raise location.refuse(
-                    f"{value:g} is the second value in this step, after {first:g} in line {before.line}, which programs "
-                    "interpret differently: give one value"
+                    f"{value:g} is the second value in this step, after {earlier:g} in line {earlier_location.line}, which "
+                    "programs interpret differently: give one value"
                 )
         self.changing.put(name, value, amplitude, location)
         self.dying.pop(name, None)
 
     def take(
-        self, given: Given, entries: Iterable[tuple[Name, float, Location]], which: Callable[[Name], bool] | None = None
+        self,
+        given: Given,
+        entries: Iterable[tuple[Name, float, Location]],
+        removed: Callable[[Name], bool] | None = None,
     ) -> None:
-        """Set the values of the lines of a block; OP=NEW removes the values of earlier steps that satisfy `which`."""
+        """Set the values of the lines of a block; OP=NEW first removes earlier values as `forget` does."""
         if given.new:
-            self.forget(which)
+            self.forget(removed)
         for name, value, location in entries:
             self.give(name, value, given.amplitude, location)
 
     def hold(self, name: Name, location: Location) -> None:
-        """Hold the value that was reached at the end of the latest step."""
+        """Hold the value at the end of the last step."""
         if name in self.tracks:
             self.changing.put(name, self.tracks[name].last, "", location)
             self.dying.pop(name, None)
 
     def begin(self) -> None:
-        """Begin the histories of values given before all steps at their rest values; the first step reaches the values."""
-        alike: dict[float, list[Name]] = {}
+        """Begin the histories of the values given before all steps, which start at their rest values."""
+        by_rest: dict[float, list[Name]] = {}
         for name in self.changing:
-            alike.setdefault(self.rest.get(name, 0.0), []).append(name)
-        for value, names in alike.items():
+            by_rest.setdefault(self.rest.get(name, 0.0), []).append(name)
+        for value, names in by_rest.items():
             track = Track(array("d", (0.0, value)), self.changing.get(names[0])[2], len(names))
             self.tracks.update((name, track) for name in names)
-        self.first, self.changing = self.changing, Values()
+        self.initial, self.changing = self.changing, Values()
 
-    def forget(self, which: Callable[[Name], bool] | None = None) -> None:
-        """Remove the values of earlier steps, by default all, or those whose names satisfy `which`."""
-        self.first = Values()
+    def forget(self, removed: Callable[[Name], bool] | None = None) -> None:
+        """Remove the values of earlier steps for whose names `removed` returns true, by default all."""
+        self.initial = Values()
         for name, track in self.tracks.items():
-            if track.alive and name not in self.changing and (which is None or which(name)):
+            if track.alive and name not in self.changing and (removed is None or removed(name)):
                 self.dying[name] = None
 
     def advance(self, number: int, step: Step) -> None:
         """Advance to the end of step `number`, counted from 1."""
         begin, start = float(number - 1), self.time
         self.time += step.period
-        given = self.first if self.first.rows else self.changing
-        if given is self.first:
-            given.update(self.changing)
-        names = [*given, *self.dying]
+        current = self.initial if self.initial.rows else self.changing
+        if current is self.initial:
+            current.update(self.changing)
+        names = [*current, *self.dying]
         rests = np.fromiter((self.rest.get(name, 0.0) for name in names), float, len(names))
-        values, amplitudes = given.columns()
+        values, amplitudes = current.columns()
         alive = np.arange(len(names)) < len(values)
         values, amplitudes = np.append(values, rests[len(values) :]), [*amplitudes, *[""] * len(self.dying)]
-        shared = np.fromiter((id(self.tracks.get(name)) for name in names), np.intp, len(names))
+        track_ids = np.fromiter((id(self.tracks.get(name)) for name in names), np.intp, len(names))
         changed = set()
-        for rows in _equal(shared, values, np.array(amplitudes), rests, alive):
+        for rows in _equal_rows(track_ids, values, np.array(amplitudes), rests, alive):
             value, amplitude = float(values[rows[0]]), amplitudes[rows[0]]
-            track = self._track([names[row] for row in rows], float(rests[rows[0]]), given)
+            track = self._track([names[row] for row in rows], float(rests[rows[0]]), current)
             changed.add(id(track))
             track.alive = bool(alive[rows[0]])
-            self.lasting.pop(id(track), None)
+            self.in_total_time.pop(id(track), None)
             track.add([(begin, track.last)])
             if amplitude:
                 shape = self.content.amplitudes[folded(amplitude)]
-                track.add(_shaped(value, shape, begin, start, step.period))
+                track.add(_amplitude_points(value, shape, begin, start, step.period))
                 if shape.total:
-                    track.shape, self.lasting[id(track)] = (value, shape), track
+                    track.shape, self.in_total_time[id(track)] = (value, shape), track
             else:
                 track.add([(begin + 1, value)])
-        for number_of_track, track in self.lasting.items():
-            if number_of_track not in changed and track.shape is not None:
-                track.add(_shaped(*track.shape, begin, start, step.period))
-        self.changing, self.first, self.dying = Values(), Values(), {}
+        for track_id, track in self.in_total_time.items():
+            if track_id not in changed and track.shape is not None:
+                track.add(_amplitude_points(*track.shape, begin, start, step.period))
+        self.changing, self.initial, self.dying = Values(), Values(), {}
 
-    def _track(self, names: list[Name], rest: float, given: Values[Name]) -> Track:
+    def _track(self, names: list[Name], rest: float, current: Values[Name]) -> Track:
         """Return a track for these names only: the existing track, a new track, or a copy of a track with more names."""
         track = self.tracks.get(names[0])
         if track is not None and track.size == len(names):
             return track
         if track is None:
-            track = Track(array("d", (0.0, rest)), given.get(names[0])[2], len(names))
+            track = Track(array("d", (0.0, rest)), current.get(names[0])[2], len(names))
         else:
             track.size -= len(names)
             track = replace(track, numbers=track.numbers[:], size=len(names))
@@ -234,11 +238,11 @@ class Histories(Generic[Name]):
         return track
 
     def distinct(self) -> list[Track]:
-        """Return all tracks without repetition."""
+        """Return each track once."""
         return list({id(track): track for track in self.tracks.values()}.values())
 
     def table(self, name: Name) -> Table:
-        """Return the history up to the end of the last step as load factors and values."""
+        """Return the history as pairs of load factor and value, up to the end of the last step of the deck."""
         points, end = self.tracks[name].points, float(len(self.content.steps))
         return points if points[-1][0] >= end else (*points, (end, points[-1][1]))
 
@@ -251,13 +255,13 @@ class Histories(Generic[Name]):
             yield self.table(names[0]), names
 
 
-def _equal(*columns: AnyArray) -> Iterator[Indices]:
-    """Yield groups of rows with equal entries in all columns (n,), in order of first occurrence."""
+def _equal_rows(*columns: AnyArray) -> Iterator[Indices]:
+    """Yield the groups of rows with equal entries in all columns (n,), in order of first occurrence."""
     order = np.lexsort(columns)
     differs = np.zeros(max(len(order) - 1, 0), bool)
     for column in columns:
-        ascending = column[order]
-        differs |= ascending[1:] != ascending[:-1]
+        ordered = column[order]
+        differs |= ordered[1:] != ordered[:-1]
     bounds = np.array([0, *(np.flatnonzero(differs) + 1), len(order)])[len(order) == 0 :]
     for group in np.argsort(order[bounds[:-1]]):
         yield order[bounds[group] : bounds[group + 1]]
@@ -266,9 +270,9 @@ def _equal(*columns: AnyArray) -> Iterator[Indices]:
 class ByShape(Generic[Name]):
     """Histories of points along axes, grouped by axis and shape, so that many nodal values become a few loads.
 
-    For body forces, points are cells and axes are kinds of force. Iteration yields the axis, the points, the value and the
-    history of each group. The value is 1 if it is uniform; otherwise it is a function that returns the values of the points,
-    which are in ascending order.
+    The points may be facets or cells, and the axis any key. Iteration yields the axis, the points, the value and the history
+    of each group. The value is 1 if all points have the same history; otherwise it is a function that returns the values of
+    the points, which are in ascending order.
     """
 
     def __init__(self) -> None:
@@ -277,14 +281,14 @@ class ByShape(Generic[Name]):
     def add(self, axis: Name, table: Table, points: Sequence[int]) -> None:
         """Add the history of some points along an axis."""
         size = max((value for _, value in table), key=abs)
-        shape = tuple((time, round(value / size, ALIKE)) for time, value in table) if size else table
+        shape = tuple((time, round(value / size, DECIMALS)) for time, value in table) if size else table
         _, sizes, members = self._members.setdefault((axis, shape), (table, array("d"), array("q")))
         sizes.extend([size] * len(points))
         members.extend(points)
 
     @staticmethod
     def of(alike: Iterable[tuple[Table, Sequence[int]]]) -> ByShape[int]:
-        """Return the histories of quantities without a direction; their axis is 0."""
+        """Return the histories of scalar quantities, whose axis is 0."""
         by_shape = ByShape[int]()
         for table, points in alike:
             by_shape.add(0, table, points)
@@ -292,27 +296,29 @@ class ByShape(Generic[Name]):
 
     def __iter__(self) -> Iterator[tuple[Name, Indices, Any, Table]]:
         for (axis, shape), (table, sizes, members) in self._members.items():
-            points, which = np.unique(members, return_inverse=True)
+            points, inverse = np.unique(members, return_inverse=True)
             if len(points) == len(members) and min(sizes) == max(sizes):
                 yield axis, np.asarray(members), 1.0, table
             else:  # several values at a point are added
-                yield axis, points, partial(given_values, np.bincount(which, sizes).astype(float)), shape
+                yield axis, points, partial(repeated_values, np.bincount(inverse, sizes).astype(float)), shape
 
 
-def given_values(values: Array, positions: Array) -> Array:
+def repeated_values(values: Array, positions: Array) -> Array:
     """Return `values` (n,), each repeated k times for k n positions; the positions (k n, dim) [length] are not used."""
     return np.repeat(values, len(positions) // len(values))
 
 
-def _shaped(value: float, shape: Amplitude, begin: float, start: float, period: float) -> list[tuple[float, float]]:
-    """Return load factors and values of an amplitude in a step that begins at the load factor `begin`.
+def _amplitude_points(
+    value: float, shape: Amplitude, begin: float, start: float, period: float
+) -> list[tuple[float, float]]:
+    """Return the pairs of load factor and value of an amplitude, times `value`, in a step.
 
-    `start` is the total time at the start of the step and `period` its duration.
+    The step begins at the load factor `begin` and at the total time `start`, and lasts the time `period`.
     """
     first = start if shape.total else 0.0
     low, high = bisect_right(shape.times, first), bisect_left(shape.times, first + period)
     times = [first, *shape.times[low:high], first + period]
-    around = slice(max(low - 1, 0), high + 1)
-    values = np.interp(times, shape.times[around], shape.values[around])
-    ends = [(t - first) / period for t in times[:-1]] + [1.0]
-    return [(begin + t, value * float(v)) for t, v in zip(ends, values, strict=True)]
+    neighbours = slice(max(low - 1, 0), high + 1)
+    values = np.interp(times, shape.times[neighbours], shape.values[neighbours])
+    fractions = [(t - first) / period for t in times[:-1]] + [1.0]
+    return [(begin + t, value * float(v)) for t, v in zip(fractions, values, strict=True)]

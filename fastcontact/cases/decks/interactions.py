@@ -1,4 +1,4 @@
-"""Surface interactions of a deck: the keywords of contact properties, and the resulting options of contact pairs."""
+"""Surface interactions of a deck: keywords of contact properties, and the resulting options of contact pairs."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from fastcontact.model.model import Model
 
 INITIATIONS = {"QUADS": "quadratic", "MAXS": "maximum"}
 MODES = {"BK": "bk", "POWER LAW": "power"}
-# Conductance of ties relative to conductivity over model size. The relative difference in temperature between the sides is
-# about its inverse.
+# Conductance of ties relative to the conductivity over the size of the model. The temperatures of the sides then differ by
+# about the inverse of this number, relative to the variation of the temperature.
 PERFECT = 1e8
-# Clearance beyond which no heat is conducted, relative to the last clearance of a table.
-BEYOND = 1.0 + 1e-9
+# Clearance at which the conductance falls to zero, relative to the last clearance of a table.
+JUST_BEYOND = 1.0 + 1e-9
 
 
 def interaction(content: Content, block: Block) -> Interaction:
-    """Read *SURFACE INTERACTION and return the new contact properties, which later keywords set."""
+    """Read *SURFACE INTERACTION and return the new contact properties, to which the following keywords belong."""
     name = block.required("NAME")
     properties = registered("surface interaction", name, content.interactions, Interaction(name, block.location), block)
     if block.rows:
@@ -36,11 +36,11 @@ def interaction(content: Content, block: Block) -> Interaction:
 
 
 def changed_interaction(content: Content, step: Step, block: Block) -> Interaction:
-    """Read *CHANGE FRICTION; a *FRICTION below it sets the friction from the start of the current step."""
+    """Read *CHANGE FRICTION; the *FRICTION below it defines the friction from the start of the current step."""
     name = block.required("INTERACTION")
-    before = defined("surface interaction", name, content.interactions, block)
-    changed = Interaction(name, block.location, friction=-1.0)  # set by *FRICTION
-    before.changes.append((len(content.steps) - 1, changed))
+    original = defined("surface interaction", name, content.interactions, block)
+    changed = Interaction(name, block.location, friction=-1.0)  # the negative value reveals a missing *FRICTION
+    original.changes.append((len(content.steps) - 1, changed))
     return changed
 
 
@@ -61,7 +61,7 @@ def behaviour(content: Content, current: Interaction, block: Block) -> None:
 
 
 def _table(block: Block) -> float | list[tuple[float, float]]:
-    """Return a table of overclosures and pressures, or its slope if it is a straight line through the origin."""
+    """Return the table of overclosures [length] and pressures, or its slope if it is a straight line from the origin."""
     points = [(row.number(1), row.number(0)) for row in block.rows]
     try:
         TabularLaw("", points)
@@ -73,7 +73,7 @@ def _table(block: Block) -> float | list[tuple[float, float]]:
 
 
 def friction(content: Content, current: Interaction, block: Block) -> None:
-    """Read *FRICTION: the coefficient of friction and, as in CalculiX, the stick slope."""
+    """Read *FRICTION: the coefficient of friction and, as in CalculiX, the stick slope [pressure / length]."""
     row = block.only()
     current.friction = row.number(0)
     if current.friction < 0:
@@ -86,12 +86,12 @@ def friction(content: Content, current: Interaction, block: Block) -> None:
 
 
 def gap_conductance(content: Content, current: Interaction, block: Block) -> None:
-    """Read *GAP CONDUCTANCE, which is interpreted after all steps are read."""
+    """Store *GAP CONDUCTANCE, whose meaning depends on the steps, which are read later."""
     current.conductance.append(block)
 
 
 def gap_heat_generation(content: Content, current: Interaction, block: Block) -> None:
-    """Read *GAP HEAT GENERATION: the fraction of the frictional work that becomes heat, half of it on each side."""
+    """Read *GAP HEAT GENERATION: the fraction of the frictional work that becomes heat, half of which enters each side."""
     row = block.rows[0] if block.rows else Row(block.location, ())
     share, secondary = row.number(0, 1.0), row.number(1, 0.5)
     if not 0.0 <= share <= 1.0:
@@ -104,26 +104,26 @@ def gap_heat_generation(content: Content, current: Interaction, block: Block) ->
 
 
 def keep(content: Content, current: Interaction, block: Block) -> None:
-    """Read *COHESIVE BEHAVIOR, *DAMAGE INITIATION or *DAMAGE EVOLUTION, which are interpreted together."""
+    """Store *COHESIVE BEHAVIOR, *DAMAGE INITIATION or *DAMAGE EVOLUTION, which are interpreted together."""
     if block.keyword in current.cohesion:
         raise block.refuse(f"surface interaction '{current.name}' has this keyword twice")
     current.cohesion[block.keyword] = block
 
 
 def friction_of(law: Interaction, n_steps: int) -> dict[str, Any]:
-    """Return the friction options of a pair, with the changes by *CHANGE FRICTION at the start of steps."""
-    table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
-    for before, changed in law.changes:
+    """Return the friction options of a pair, whose coefficient *CHANGE FRICTION changes at the start of steps."""
+    table, stick_slopes = [(0.0, law.friction)], {law.stick} if law.friction else set()
+    for n_before, changed in law.changes:
         if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
             raise changed.refuse("must be followed by *FRICTION and by no other change of the interaction")
-        table += [(float(before), table[-1][1]), (before + JUMP, changed.friction)]
-        sticks |= {changed.stick} if changed.friction else set()
+        table += [(float(n_before), table[-1][1]), (n_before + JUMP, changed.friction)]
+        stick_slopes |= {changed.stick} if changed.friction else set()
     largest = max(value for _, value in table)
     if not largest:
         return {}
-    if len(sticks) > 1:
+    if len(stick_slopes) > 1:
         raise law.changes[0][1].refuse("a change of the stick slope is not supported: repeat the earlier slope")
-    options: dict[str, Any] = {"friction": largest, "tangential_penalty": sticks.pop()}
+    options: dict[str, Any] = {"friction": largest, "tangential_penalty": stick_slopes.pop()}
     if law.changes:
         points = {**dict(table), float(n_steps): table[-1][1]}
         options["friction_ramp"] = [(time, value / largest) for time, value in sorted(points.items())]
@@ -131,13 +131,11 @@ def friction_of(law: Interaction, n_steps: int) -> dict[str, Any]:
 
 
 def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the options of a pair for its cohesive layer; an empty dictionary if the pair has no layer.
+    """Return the options of a pair for its cohesive layer; a layer without stiffness and damage is a tie.
 
-    A layer without stiffness and damage is a tie. Raises CaseError if the law of the deck is not supported.
+    Raises CaseError if the law of the deck is not supported.
     """
     blocks = law.cohesion
-    if not blocks:
-        return {}
     behaviour, initiation, evolution = (
         blocks.get(name) for name in ("COHESIVE BEHAVIOR", "DAMAGE INITIATION", "DAMAGE EVOLUTION")
     )
@@ -154,18 +152,18 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
         raise behaviour.refuse("*DAMAGE INITIATION and *DAMAGE EVOLUTION are both needed")
     strength, shear = _in_modes(initiation, "strengths")
     criterion = INITIATIONS[initiation.choice("CRITERION", tuple(INITIATIONS))]
-    given = {"strength": strength, "shear_strength": shear, "initiation": criterion}
-    given.update(_evolution(evolution, given, stiffness))
+    constants = {"strength": strength, "shear_strength": shear, "initiation": criterion}
+    constants.update(_evolution(evolution, constants, stiffness))
     if stiffness is None:
         content.note(behaviour, f"without a stiffness, damage begins at {ELASTIC:g} of the opening at which it fails")
     else:
-        given["stiffness"] = stiffness
+        constants["stiffness"] = stiffness
     content.note(behaviour, "sides that are pressed together have the stiffness of the layer, also where it is broken")
-    return {"cohesion": given}
+    return {"cohesion": constants}
 
 
 def _stiffness(block: Block) -> float | None:
-    """Return the stiffness of a layer [pressure / length], None if not given; CaseError if it depends on the direction."""
+    """Return the stiffness [pressure / length] of a layer, or None; CaseError if it depends on the direction."""
     block.choice("TYPE", ("UNCOUPLED",))
     block.choice("ELIGIBILITY", ("CURRENT CONTACTS", "ORIGINAL CONTACTS"))
     if not block.rows:
@@ -177,8 +175,8 @@ def _stiffness(block: Block) -> float | None:
     return row.positive(0, "stiffness")
 
 
-def _evolution(block: Block, given: dict[str, Any], stiffness: float | None) -> dict[str, Any]:
-    """Return the fracture energies [force / length] of a layer and its mixed-mode law."""
+def _evolution(block: Block, initiation: dict[str, Any], stiffness: float | None) -> dict[str, Any]:
+    """Return the fracture energies [force / length] and the mixed-mode law of a layer with these constants of initiation."""
     block.choice("SOFTENING", ("LINEAR",))
     block.choice("MODE MIX RATIO", ("ENERGY",))
     kind = block.choice("TYPE", ("DISPLACEMENT", "ENERGY"))
@@ -192,17 +190,17 @@ def _evolution(block: Block, given: dict[str, Any], stiffness: float | None) -> 
     value = block.only("modes or fields").positive(0, "number")
     if kind == "ENERGY":
         return {"energy": value, "shear_energy": value}
-    strength = given["strength"]
-    if given["initiation"] != "quadratic" or given["shear_strength"] != strength:
+    strength = initiation["strength"]
+    if initiation["initiation"] != "quadratic" or initiation["shear_strength"] != strength:
         raise block.refuse(
             "TYPE=DISPLACEMENT is supported only with CRITERION=QUADS and equal strengths: give energies"
         )
-    end = value / (1.0 - ELASTIC) if stiffness is None else strength / stiffness + value
-    return {"energy": 0.5 * strength * end}
+    failure_opening = value / (1.0 - ELASTIC) if stiffness is None else strength / stiffness + value
+    return {"energy": 0.5 * strength * failure_opening}
 
 
 def _in_modes(block: Block, quantity: str) -> tuple[float, float]:
-    """Return the numbers for opening and for sliding; CaseError if the two directions of sliding differ."""
+    """Return the numbers for opening and for sliding; CaseError if those of the two shear directions differ."""
     row = block.only("modes or fields")
     values = [row.positive(index, "number") for index in range(3)]
     if values[1] != values[2]:
@@ -213,8 +211,8 @@ def _in_modes(block: Block, quantity: str) -> tuple[float, float]:
 
 
 def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the option `conductance` of a pair, a number or tables by pressure or gap; an empty dictionary if not given."""
-    tables: dict[str, Any] = {}
+    """Return the option `conductance` of a pair, a number or tables by pressure and gap, or an empty dictionary."""
+    constant, tables = None, {}  # type: float | None, dict[str, Any]
     for block in law.conductance:
         rows = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
         if len({row.number(2, 0.0) for row in block.rows}) > 1:
@@ -222,29 +220,30 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
         if not rows or any(b[0] <= a[0] for a, b in pairwise(rows)):
             raise block.refuse("needs conductances with ascending pressures or clearances")
         if len(rows) == 1:
-            tables["number"] = rows[0][1]
+            constant = rows[0][1]
             continue
-        pressure = "PRESSURE" in block.parameters
-        by = "pressure" if pressure or rows[-1][1] >= rows[0][1] else "gap"
-        if not pressure:
-            meant = "depends on pressure, as in CalculiX" if by == "pressure" else "depends on clearance, as in Abaqus"
-            content.note(block, f"the conductance {meant}")
-        end = (rows[-1][0] * BEYOND, 0.0)
-        tables[by] = rows if by == "pressure" else [*rows, end]
-        if by == "pressure" and content.heat == "alone":
+        explicit = "PRESSURE" in block.parameters
+        variable = "pressure" if explicit or rows[-1][1] >= rows[0][1] else "gap"
+        if not explicit:
+            convention = "pressure, as in CalculiX" if variable == "pressure" else "clearance, as in Abaqus"
+            content.note(block, f"the conductance depends on {convention}")
+        tables[variable] = rows if variable == "pressure" else [*rows, (rows[-1][0] * JUST_BEYOND, 0.0)]
+        if variable == "pressure" and content.heat == "alone":
             content.note(block, "steps with heat alone have no pressures: closed contact conducts as at zero pressure")
-    given = tables.pop("number", None)
-    if given is not None and tables:
+    if constant is not None and tables:
         raise law.conductance[0].refuse("a constant conductance and a table are given: leave out one of them")
-    if given is None and not tables:
+    if constant is None and not tables:
         return {}
     with refusing(law.conductance[0]):
-        Conductance(law.name, tables or given)
-    return {"conductance": tables or given}
+        Conductance(law.name, tables or constant)
+    return {"conductance": tables or constant}
 
 
 def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the option for frictional heating of both sides, divided by the duration of a step, whose load factor is 1."""
+    """Return the option `friction_heat`: the fraction of the work that becomes heat, over the duration of a step.
+
+    The division converts work per unit of the load factor, by which a step advances 1, to power.
+    """
     if law.friction_heat is None:
         if law.conductance:
             content.note(law, "friction generates no heat without *GAP HEAT GENERATION, as in CalculiX")
@@ -257,7 +256,7 @@ def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
 
 
 def perfect_conductance(content: Content, model: Model, location: Location) -> Any:
-    """Return the conductance of a tie [power / (area temperature)], independent of pressure and gap."""
+    """Return the conductance of a tie [power / (area temperature)], so large that the sides have nearly one temperature."""
     largest = max(np.max(material.conductivity) for material, _ in model.materials)
     h = PERFECT * float(largest) / float(np.ptp(model.mesh.points, axis=0).max())
     content.note(

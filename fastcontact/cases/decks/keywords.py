@@ -1,4 +1,4 @@
-"""The keywords of decks with their context, their functions and their parameters, and the reader of all blocks."""
+"""Keywords of decks with their context, their reading function and their parameters, and the reader of all blocks."""
 
 from __future__ import annotations
 
@@ -29,30 +29,30 @@ ANYTHING = "*"
 class Keyword:
     """Properties of a keyword.
 
-    `place` is the context of the keyword and `read` the function that reads it. `used` and `harmless` list the parameters
-    that have an effect and those that are accepted without effect. `opens` is the attribute of `Reader` that `read` returns:
-    the object to which the next keywords belong, or None at its end.
+    `context` says where the keyword may stand, and `read` is the function that reads it. `used` lists the parameters that
+    have an effect, and `ignored` those that are accepted without effect. `opens` is the attribute of `Reader` to which the
+    result of `read` is assigned: the object to which the next keywords belong, or None for a keyword that closes it.
     """
 
-    place: Literal["deck", "part", "material", "interaction", "coupling", "property", "model", "step", "procedure"]
+    context: Literal["deck", "part", "material", "interaction", "coupling", "property", "model", "step", "procedure"]
     read: Callable[..., Any]
     used: str = ""
-    harmless: str = ""
+    ignored: str = ""
     opens: str = ""
 
     @property
     def parameters(self) -> set[str]:
         """All accepted parameters."""
-        return {*self.used.split("; "), *self.harmless.split("; ")} - {""}
+        return {*self.used.split("; "), *self.ignored.split("; ")} - {""}
 
 
 def heading(content: Content, block: Block) -> None:
-    """Read *HEADING: the title, of which the first line is used."""
+    """Read *HEADING: the title, which is the first data line."""
     content.title = " ".join(" ".join(", ".join(row.entries) for row in block.rows[:1]).split())
 
 
-def noted(text: str) -> Callable[..., None]:
-    """Return the function that reads a keyword without effect, for which `text` is noted."""
+def without_effect(text: str) -> Callable[..., None]:
+    """Return the reading function of a keyword without effect, which only records the note `text`."""
     return lambda content, *owner_and_block: content.note(owner_and_block[-1], text)
 
 
@@ -60,10 +60,10 @@ def end(content: Content, block: Block) -> None:
     """Read the end of a part, an instance or the assembly."""
 
 
-# Parameters that control the solution of steps.
-STEERING = "SOLVER; DIRECT; STABILIZE; ALLSDTOL; CONTINUE; EXPLICIT; DELTMX; MXDEM; END"
-UNUSED_OF_STEPS = "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"
-# Supported keywords.
+# Parameters of procedures and of *STEP that only control the solution.
+SOLUTION_CONTROLS = "SOLVER; DIRECT; STABILIZE; ALLSDTOL; CONTINUE; EXPLICIT; DELTMX; MXDEM; END"
+IGNORED_BY_STEPS = "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"
+# Supported keywords, by the context in which they stand.
 TRANSLATED = {
     # Keywords that open or close an object to which others belong.
     "ASSEMBLY": Keyword("deck", end, "NAME", opens="part"),
@@ -78,7 +78,7 @@ TRANSLATED = {
         "property", lambda content, block: block, "REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME", "coupling"
     ),
     **dict.fromkeys(("DISTRIBUTING", "KINEMATIC"), Keyword("coupling", relating.coupling, opens="coupling")),
-    "STEP": Keyword("step", stepping.new_step, "NLGEOM; AMPLITUDE", UNUSED_OF_STEPS, "step"),
+    "STEP": Keyword("step", stepping.new_step, "NLGEOM; AMPLITUDE", IGNORED_BY_STEPS, "step"),
     "END STEP": Keyword("step", stepping.end_step, opens="step"),
     "HEADING": Keyword("deck", heading, ANYTHING),
     # In parts, or in decks without parts.
@@ -98,14 +98,18 @@ TRANSLATED = {
     "EXPANSION": Keyword("material", materials.expansion, "TYPE", "ZERO"),
     "HYPERELASTIC": Keyword("material", materials.hyperelastic, "NEO HOOKE; MOONEY-RIVLIN; YEOH; OGDEN; N", "MODULI"),
     "PLASTIC": Keyword("material", materials.plastic, "HARDENING"),
-    "SPECIFIC HEAT": Keyword("material", noted("no effect, heat is steady, or temperatures are given"), ANYTHING),
+    "SPECIFIC HEAT": Keyword(
+        "material", without_effect("no effect, heat is steady, or temperatures are given"), ANYTHING
+    ),
     # Below *SURFACE INTERACTION.
     "COHESIVE BEHAVIOR": Keyword("interaction", interactions.keep, "TYPE; ELIGIBILITY"),
     "DAMAGE EVOLUTION": Keyword(
         "interaction", interactions.keep, "TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO", "DEGRADATION"
     ),
     "DAMAGE INITIATION": Keyword("interaction", interactions.keep, "CRITERION"),
-    "DAMAGE STABILIZATION": Keyword("interaction", noted("no effect: damage has no viscous regularisation"), ANYTHING),
+    "DAMAGE STABILIZATION": Keyword(
+        "interaction", without_effect("no effect: damage has no viscous regularisation"), ANYTHING
+    ),
     "FRICTION": Keyword("interaction", interactions.friction),
     "GAP CONDUCTANCE": Keyword("interaction", interactions.gap_conductance, "PRESSURE"),
     "GAP HEAT GENERATION": Keyword("interaction", interactions.gap_heat_generation),
@@ -119,7 +123,7 @@ TRANSLATED = {
     "GAP": Keyword("model", gaps.gap, "ELSET"),
     "INITIAL CONDITIONS": Keyword("model", fields.initial_conditions, "TYPE"),
     "MPC": Keyword("model", relating.multi_point),
-    "PHYSICAL CONSTANTS": Keyword("model", noted("no effect: there is no radiation"), ANYTHING),
+    "PHYSICAL CONSTANTS": Keyword("model", without_effect("no effect: there is no radiation"), ANYTHING),
     "PRE-TENSION SECTION": Keyword("model", sections.pretension_section, "SURFACE; NODE"),
     "RIGID BODY": Keyword("model", relating.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
     "SPRING": Keyword("model", gaps.spring, "ELSET"),
@@ -134,12 +138,12 @@ TRANSLATED = {
     # Procedures of steps.
     **dict.fromkeys(
         ("COUPLED TEMPERATURE-DISPLACEMENT", "HEAT TRANSFER", "UNCOUPLED TEMPERATURE-DISPLACEMENT"),
-        Keyword("procedure", stepping.heated, "STEADY STATE", STEERING),
+        Keyword("procedure", stepping.heated, "STEADY STATE", SOLUTION_CONTROLS),
     ),
     "FREQUENCY": Keyword("procedure", stepping.frequency, "", "EIGENSOLVER; NORMALIZATION; SOLVER; STORAGE; GLOBAL"),
-    "STATIC": Keyword("procedure", stepping.static, "", STEERING),
+    "STATIC": Keyword("procedure", stepping.static, "", SOLUTION_CONTROLS),
 }
-# Keywords without effect: output requests, because results contain all output, and convergence controls.
+# Ignored keywords: output requests, because results contain all output, and convergence controls.
 _OUTPUT = (
     "CONTACT FILE; CONTACT OUTPUT; CONTACT PRINT; EL FILE; EL PRINT; ELEMENT OUTPUT; ENERGY FILE; ENERGY OUTPUT; "
     "ENERGY PRINT; FACE PRINT; FILE FORMAT; FILE OUTPUT; MONITOR; NODE FILE; NODE OUTPUT; NODE PRINT; OUTPUT; "
@@ -177,49 +181,49 @@ REFUSED = {name: reason for reason, names in _REASONS.items() for name in names.
 _SPELLED = {name.replace(" ", ""): name for name in (*TRANSLATED, *OUTPUT, *REFUSED)}
 
 
-def spelled(block: Block) -> Block:
-    """Return a block with the standard blanks in its keyword and parameters; CalculiX accepts them without blanks."""
+def with_standard_blanks(block: Block) -> Block:
+    """Return a block with the usual blanks in its keyword and parameters, which CalculiX also accepts without blanks."""
     keyword = _SPELLED.get(block.keyword.replace(" ", ""), block.keyword)
-    known = TRANSLATED.get(keyword)
-    names = {name.replace(" ", ""): name for name in known.parameters} if known else {}
+    entry = TRANSLATED.get(keyword)
+    names = {name.replace(" ", ""): name for name in entry.parameters} if entry else {}
     parameters = {names.get(name.replace(" ", ""), name): value for name, value in block.parameters.items()}
     return replace(block, location=replace(block.location, keyword=keyword), parameters=parameters)
 
 
 def checked(block: Block, about: str) -> Keyword:
-    """Return the entry of a keyword; CaseError if the keyword or one of its parameters is unknown or unsupported.
+    """Return the properties of a keyword; CaseError if the keyword or one of its parameters is unknown or not supported.
 
-    `about` precedes messages about unsupported keywords.
+    `about` precedes messages about keywords outside the scope of the package.
     """
     keyword = block.keyword
     if keyword in REFUSED:
         raise block.refuse(f"{about}*{keyword} {REFUSED[keyword]}")
-    known = TRANSLATED.get(keyword)
-    if known is None:
-        near = difflib.get_close_matches(keyword, [*TRANSLATED, *OUTPUT, *REFUSED, "INCLUDE"], n=1, cutoff=0.6)
-        meant = f"; is *{near[0]} meant?" if near else ""
-        raise block.refuse(f"unknown keyword *{keyword}{meant}")
+    entry = TRANSLATED.get(keyword)
+    if entry is None:
+        similar = difflib.get_close_matches(keyword, [*TRANSLATED, *OUTPUT, *REFUSED, "INCLUDE"], n=1, cutoff=0.6)
+        suggestion = f"; is *{similar[0]} meant?" if similar else ""
+        raise block.refuse(f"unknown keyword *{keyword}{suggestion}")
     for name in block.parameters:
-        if known.used != ANYTHING and name not in known.parameters:
-            takes = ", ".join(sorted(known.parameters)) or "none"
-            raise block.refuse(f"the parameter {name[:40]} of *{keyword} is not supported; it takes {takes}")
-    return known
+        if entry.used != ANYTHING and name not in entry.parameters:
+            accepted = ", ".join(sorted(entry.parameters)) or "none"
+            raise block.refuse(f"the parameter {name[:40]} of *{keyword} is not supported; it takes {accepted}")
+    return entry
 
 
-# Contexts that need an open material, interaction, coupling or step, with the message if there is none.
+# Contexts that require an open material, interaction, coupling or step, with the message if none is open.
 OWNERS = {
     "material": "belongs below *MATERIAL",
     "interaction": "belongs below *SURFACE INTERACTION",
     "coupling": "belongs below *COUPLING",
     "procedure": "belongs in a step",
 }
-# Damage keywords, which are supported for cohesive layers only.
+# Damage keywords, which are supported below *SURFACE INTERACTION but not below *MATERIAL.
 COHESIVE_DAMAGE = ("DAMAGE INITIATION", "DAMAGE EVOLUTION", "DAMAGE STABILIZATION")
 
 
 @dataclass
 class Reader:
-    """State of reading a deck: the open part, instance, material, interaction, step and coupling."""
+    """State of reading a deck: its content so far, and the open part, instance, material, interaction, step and coupling."""
 
     content: Content = field(default_factory=Content)
     part: Part | None = None
@@ -230,12 +234,13 @@ class Reader:
     coupling: Block | None = None
 
     def take(self, block: Block) -> None:
-        """Read one block."""
+        """Read one block, which closes the open objects to which its keyword cannot belong."""
         keyword, content = block.keyword, self.content
         if keyword in OUTPUT:
             content.outputs.append(block.location)
             return
-        known = checked(block, f"material '{self.material.name}': " if self.material else "")
+        properties = checked(block, f"material '{self.material.name}': " if self.material else "")
+        context = properties.context
         if self.coupling is not None and keyword not in ("KINEMATIC", "DISTRIBUTING"):
             raise self.coupling.refuse("*KINEMATIC or *DISTRIBUTING must follow")
         if self.material is not None and keyword in COHESIVE_DAMAGE:
@@ -244,29 +249,29 @@ class Reader:
         owner = {
             "part": self.part or content.root, "material": self.material, "interaction": self.interaction,
             "coupling": self.coupling, "procedure": self.step, "step": self.step,
-        }.get(known.place)  # fmt: skip
-        if owner is None and known.place in OWNERS:
-            raise block.refuse(OWNERS[known.place])
-        if known.place != "material":
+        }.get(context)  # fmt: skip
+        if owner is None and context in OWNERS:
+            raise block.refuse(OWNERS[context])
+        if context != "material":
             self.material = None
-        if known.place not in ("material", "interaction"):
+        if context not in ("material", "interaction"):
             self.interaction = None
-        if known.place in ("part", "property", "model") and keyword != "AMPLITUDE" and self.step is not None:
+        if context in ("part", "property", "model") and keyword != "AMPLITUDE" and self.step is not None:
             raise block.refuse("cannot be inside a step")
-        if known.place in ("model", "step") and not (self.part is None and self.instance is None):
+        if context in ("model", "step") and not (self.part is None and self.instance is None):
             raise block.refuse("is supported for the whole assembly only, not inside a part or instance")
-        if known.place == "part" and self.instance is not None:
+        if context == "part" and self.instance is not None:
             raise block.refuse("is not supported inside an instance: put it into the part or the assembly")
-        read = known.read(content, *([] if known.place in ("deck", "property", "model") else [owner]), block)
-        if known.opens:
-            setattr(self, known.opens, read)
+        opened = properties.read(content, *([] if context in ("deck", "property", "model") else [owner]), block)
+        if properties.opens:
+            setattr(self, properties.opens, opened)
 
 
 def read_content(blocks: Iterable[Block]) -> Content:
-    """Return the content of the blocks of a deck; CaseError with file, line and keyword if it is invalid."""
+    """Return the content of a deck from its blocks; CaseError with file, line and keyword if a block is invalid."""
     reader = Reader()
     for block in blocks:
-        reader.take(spelled(block))
+        reader.take(with_standard_blanks(block))
     if reader.step is not None:
         raise reader.step.refuse("the step has no *END STEP: the deck is cut off, or the line is missing")
     if reader.coupling is not None:

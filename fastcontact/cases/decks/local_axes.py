@@ -1,4 +1,4 @@
-"""Rectangular and cylindrical local axes of a deck: *TRANSFORM of nodes, *ORIENTATION and *DISTRIBUTION of materials."""
+"""Rectangular and cylindrical local axes of a deck, of nodes (*TRANSFORM) and materials (*ORIENTATION, *DISTRIBUTION)."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembly, Element
 from fastcontact.cases.decks.blocks import Block, Location, defined, folded, registered, unquoted
 from fastcontact.cases.decks.content import Axes, Content, Part
+from fastcontact.mesh.mesh import starts_of
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 def orientation(content: Content, part: Part, block: Block) -> None:
-    """Read *ORIENTATION: material axes."""
+    """Read *ORIENTATION: local axes of materials and couplings."""
     name, system = block.required("NAME"), block.choice("SYSTEM", ("RECTANGULAR", "CYLINDRICAL"))
     block.choice("DEFINITION", ("COORDINATES",))
     rows = block.rows
@@ -36,14 +37,14 @@ def orientation(content: Content, part: Part, block: Block) -> None:
 
 
 def distribution_table(content: Content, part: Part, block: Block) -> None:
-    """Read *DISTRIBUTION TABLE: the content of distributions; only axes of elements are supported."""
+    """Read *DISTRIBUTION TABLE: the kind of a distribution; CaseError unless it consists of the axes of elements."""
     kinds = [entry.upper() for row in block.rows for entry in row.entries if entry]
     if kinds != ["COORD3D", "COORD3D"]:
         raise block.refuse(f"a distribution of {', '.join(kinds)[:80]} is not supported, only COORD3D, COORD3D of axes")
 
 
 def distribution(content: Content, part: Part, block: Block) -> None:
-    """Read *DISTRIBUTION: two points for the axes of each element; a line without an element is the default."""
+    """Read *DISTRIBUTION: two points that define the axes of each element, or of all others on a line without element."""
     block.choice("LOCATION", ("ELEMENT",))
     registered("distribution", block.required("NAME"), content.distributions, block, block)
 
@@ -66,7 +67,7 @@ def local_directions(assembly: Assembly) -> dict[int, Array]:
 
 
 def orientation_of(content: Content, name: str, location: Location) -> Axes:
-    """Return the axes of an *ORIENTATION; CaseError if it is not defined, or is used outside sections but varies."""
+    """Return the axes of an *ORIENTATION; CaseError if it is undefined, or if it varies but is not used in a section."""
     axes: Axes = defined("orientation", name, content.orientations, location)
     if axes.distribution and location.keyword != "SOLID SECTION":
         raise location.refuse(
@@ -76,15 +77,15 @@ def orientation_of(content: Content, name: str, location: Location) -> Axes:
 
 
 def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> Array:
-    """Return the material axes (n, 3, 3) [-] of all solids, with those of `members` from a *DISTRIBUTION.
+    """Return the material axes (n, 3, 3) [-] of all solids: those of `members` from a *DISTRIBUTION, others the global axes.
 
-    Other solids have the axes of the mesh. Raises CaseError if a member has no axes and there is no default.
+    Raises CaseError if a member has no axes and there is no default.
     """
     block = assembly.content.distributions.get(folded(axes.distribution))
     if block is None:
         raise axes.refuse(f"distribution '{axes.distribution[:80]}' is not defined")
     scopes = [scope for scope in assembly.scopes if assembly.part(scope) is axes.part]
-    default, given = None, {}  # type: Array | None, dict[int, Array]
+    default, frame_of = None, {}  # type: Array | None, dict[int, Array]
     for row in block.each():
         points = tuple(row.number(index) for index in range(1, 7))
         frame = local_axes(Axes(row.location, "", False, points), np.zeros(3))
@@ -93,19 +94,19 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
             continue
         for scope in scopes:
             for element in assembly.elements_of(f"{scope}.{row.text(0)}" if scope else row.text(0), row.location):
-                given[id(element)] = frame
-    first = dict(zip(assembly.by_kind, np.cumsum([0, *map(len, assembly.by_kind.values())]).tolist()))
+                frame_of[id(element)] = frame
+    starts = starts_of(assembly.solids_by_type)
     frames = np.tile(np.eye(3), (len(assembly.solids), 1, 1))
     for element in members:
-        axes_here = given.get(id(element), default)
-        if axes_here is None:
+        frame = frame_of.get(id(element), default)
+        if frame is None:
             raise block.refuse(f"element {element.number} has no axes, and there is no default line without an element")
-        frames[first[element.solid.element] + element.row] = axes_here
+        frames[starts[element.solid.element] + element.row] = frame
     return frames
 
 
 def local_axes(axes: Axes, point: Array) -> Array:
-    """Return the local axes (3, 3) [-] at a point in rows; CaseError if they are not defined at the point."""
+    """Return the local axes (3, 3) [-], in rows, at a point; CaseError if they are not defined there."""
     a, b = np.array(axes.points[:3]), np.array(axes.points[3:])
     if axes.cylindrical:
         third, first = b - a, point - a

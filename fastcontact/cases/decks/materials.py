@@ -1,4 +1,4 @@
-"""Materials of a deck: their keywords, and the materials of the model with axes, expansion and conductivity."""
+"""Materials of a deck: their keywords, and the resulting materials of the model with axes, expansion and conductivity."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ from fastcontact.elasticity.nonlinear_materials import (
     Yeoh,
 )
 
-# Number of constants of each type of elastic material.
+# Number of constants of *ELASTIC by type.
 CONSTANTS = {"ISOTROPIC": 2, "ENGINEERING CONSTANTS": 9, "ORTHOTROPIC": 9, "ANISOTROPIC": 21}
-# Poisson's ratio at small strains of hyperelastic materials whose compressibility constant D1 is zero, as in CalculiX.
-UNGIVEN = 0.475
-# Number of deviatoric constants and of compressibility constants of each law; for Ogden, of each term.
+# Poisson's ratio at small strains of a hyperelastic material whose compressibility constant D1 is zero, as in CalculiX.
+DEFAULT_POISSON_RATIO = 0.475
+# Number of deviatoric constants and of compressibility constants of each hyperelastic law; for Ogden, of each term.
 HYPERELASTIC = {"NEO HOOKE": (1, 1), "MOONEY-RIVLIN": (2, 1), "YEOH": (3, 3), "OGDEN": (2, 1)}
 # Number of coefficients of expansion and conductivity by type.
 COEFFICIENTS = {"ISO": 1, "ORTHO": 3}
-# Material of bodies in steps of heat conduction alone, whose displacements are fixed.
-HELD = LinearElastic(E=1.0, nu=0.0)
+# Elastic constants in decks of heat transfer alone; they have no effect, since all displacements are fixed.
+ARBITRARY_LAW = LinearElastic(E=1.0, nu=0.0)
 
 
 def material(content: Content, block: Block) -> Material:
-    """Read *MATERIAL and return the new material, which later keywords set."""
+    """Read *MATERIAL and return the new material, to which the following keywords belong."""
     name = block.required("NAME")
     return registered("material", name, content.materials, Material(name, block.location), block)
 
 
 def elastic(content: Content, current: Material, block: Block) -> None:
-    """Read *ELASTIC: elastic constants at one temperature."""
+    """Read *ELASTIC: elastic constants at one temperature; TYPE may be abbreviated to three letters, as in Abaqus."""
     kind = " ".join(block.get("TYPE", "ISOTROPIC").upper().split())
-    kinds = [known for known in CONSTANTS if len(kind) >= 3 and known.startswith(kind)]
+    kinds = [name for name in CONSTANTS if len(kind) >= 3 and name.startswith(kind)]
     if not kinds:
-        known = ", ".join(CONSTANTS)
-        raise block.refuse(f"material '{current.name}': TYPE={kind[:40]} is not supported; expected one of {known}")
+        names = ", ".join(CONSTANTS)
+        raise block.refuse(f"material '{current.name}': TYPE={kind[:40]} is not supported; expected one of {names}")
     if kinds[0] != "ISOTROPIC":
         _anisotropic(current, block, kinds[0])
         return
@@ -60,7 +60,7 @@ def elastic(content: Content, current: Material, block: Block) -> None:
 
 
 def _anisotropic(current: Material, block: Block, kind: str) -> None:
-    """Read the constants of an anisotropic material, which may span several lines and be followed by a temperature."""
+    """Read the constants of an anisotropic material, which may fill several lines and be followed by a temperature."""
     numbers, count = block.numbers(), CONSTANTS[kind]
     if not count <= len(numbers) <= count + 1:
         raise block.refuse(
@@ -79,22 +79,23 @@ def _anisotropic(current: Material, block: Block, kind: str) -> None:
 
 
 def _moduli(values: list[float]) -> Array:
-    """Return the moduli (6, 6) [pressure] from the upper triangle of a deck, by columns in the order 11, 22, 33, 12, 13, 23.
+    """Return the moduli (6, 6) [pressure], in the order 11, 22, 33, 12, 23, 13.
 
-    Nine values are the constants of an orthotropic material. The result is in the order 11, 22, 33, 12, 23, 13.
+    `values` [pressure] is the upper triangle by columns, in the order 11, 22, 33, 12, 13, 23, without the entries that are
+    zero in an orthotropic material if there are nine values.
     """
     D = np.zeros((6, 6))
-    places = [(i, j) for j in range(6) for i in range(j + 1)]
+    entries = [(i, j) for j in range(6) for i in range(j + 1)]
     if len(values) == CONSTANTS["ORTHOTROPIC"]:
-        places = [(i, j) for i, j in places if i == j or j < 3]
-    for (i, j), value in zip(places, values, strict=True):
+        entries = [(i, j) for i, j in entries if i == j or j < 3]
+    for (i, j), value in zip(entries, values, strict=True):
         D[i, j] = D[j, i] = value
     order = [0, 1, 2, 3, 5, 4]
     return D[np.ix_(order, order)]
 
 
 def density(content: Content, current: Material, block: Block) -> None:
-    """Read *DENSITY: the mass per unit volume."""
+    """Read *DENSITY: the mass per volume."""
     current.density = block.only().number(0)
     if not current.density > 0:
         raise block.refuse(f"material '{current.name}': the density {current.density:g} must be positive")
@@ -111,18 +112,18 @@ def plastic(content: Content, current: Material, block: Block) -> None:
         raise block.refuse("a data line with a yield stress is needed")
     if table[0][0] != 0.0:
         raise block.rows[0].refuse(f"material '{current.name}': the first plastic strain {table[0][0]:g} must be zero")
-    if any(row.text(2) for row in block.rows) and len({row.text(2) for row in block.rows}) > 1:
+    if len({row.text(2) for row in block.rows}) > 1:
         raise block.refuse(f"material '{current.name}': one temperature is supported")
-    kinematic = 0.0
+    modulus = 0.0  # of kinematic hardening
     if hardening == "KINEMATIC":
         if len(table) > 2:
             raise block.refuse(
                 f"material '{current.name}': kinematic hardening is linear: two points, not {len(table)}"
             )
-        kinematic = (table[1][1] - table[0][1]) / table[1][0] if len(table) == 2 else 0.0
+        modulus = (table[1][1] - table[0][1]) / table[1][0] if len(table) == 2 else 0.0
         table = table[:1]
     with refusing(block, f"material '{current.name}': "):
-        law = ElasticPlastic(E=elastic.E, nu=elastic.nu, yield_stress=table[0][1], hardening=table, kinematic=kinematic)
+        law = ElasticPlastic(E=elastic.E, nu=elastic.nu, yield_stress=table[0][1], hardening=table, kinematic=modulus)
     current.law = lambda axes: law
 
 
@@ -132,22 +133,24 @@ def hyperelastic(content: Content, current: Material, block: Block) -> None:
     if len(kinds) != 1:
         raise block.refuse(f"material '{current.name}': one of {', '.join(HYPERELASTIC)} is supported")
     kind, terms = kinds[0], int(block.get("N", "1")) if kinds[0] == "OGDEN" else 1
-    numbers, (first, rest) = block.numbers(), (count * terms for count in HYPERELASTIC[kind])
-    if len(numbers) < first:
-        raise block.refuse(f"material '{current.name}': {kind} has {first} constants, {len(numbers)} are given")
-    constants, compressible = numbers[:first], [*numbers[first : first + rest], *[0.0] * rest][:rest]
-    if any(compressible[1:]):
+    numbers, (n_deviatoric, n_volumetric) = block.numbers(), (count * terms for count in HYPERELASTIC[kind])
+    if len(numbers) < n_deviatoric:
+        raise block.refuse(f"material '{current.name}': {kind} has {n_deviatoric} constants, {len(numbers)} are given")
+    constants, (D1, *others) = numbers[:n_deviatoric], [*numbers[n_deviatoric:], 0.0][:n_volumetric]
+    if any(others):
         raise block.refuse(f"material '{current.name}': only the compressibility constant D1 is supported")
     mu = sum(constants[::2]) if kind == "OGDEN" else 2.0 * sum(constants[: 2 if kind == "MOONEY-RIVLIN" else 1])
-    bulk = 2.0 / compressible[0] if compressible[0] else 2.0 * mu * (1.0 + UNGIVEN) / (3.0 * (1.0 - 2.0 * UNGIVEN))
-    if not compressible[0]:
-        content.note(block, f"D1 = 0: the bulk modulus is that of nu = {UNGIVEN}")
+    nu = DEFAULT_POISSON_RATIO
+    bulk = 2.0 / D1 if D1 else 2.0 * mu * (1.0 + nu) / (3.0 * (1.0 - 2.0 * nu))
+    if not D1:
+        content.note(block, f"D1 = 0: the bulk modulus is that of nu = {nu}")
     with refusing(block, f"material '{current.name}': "):
         law = _hyperelastic(kind, constants, mu, bulk)
     current.law = lambda axes: law
 
 
 def _hyperelastic(kind: str, constants: list[float], mu: float, bulk: float) -> Any:
+    """Return a hyperelastic material from its constants, its shear modulus and its bulk modulus [pressure]."""
     if kind == "NEO HOOKE":
         return NeoHookean(E=9.0 * bulk * mu / (3.0 * bulk + mu), nu=(3.0 * bulk - 2.0 * mu) / (2.0 * (3.0 * bulk + mu)))
     if kind == "OGDEN":
@@ -157,7 +160,7 @@ def _hyperelastic(kind: str, constants: list[float], mu: float, bulk: float) -> 
 
 
 def conductivity(content: Content, current: Material, block: Block) -> None:
-    """Read *CONDUCTIVITY, which is interpreted after all steps are read."""
+    """Store *CONDUCTIVITY, whose meaning depends on the steps, which are read later."""
     current.conductivity = block
 
 
@@ -169,7 +172,7 @@ def expansion(content: Content, current: Material, block: Block) -> None:
 
 
 def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
-    """Return one coefficient, or one along each axis; CaseError if coefficients depend on the temperature."""
+    """Return the coefficient of a block, or its coefficients along the axes; CaseError if they depend on the temperature."""
     kind = block.choice("TYPE", tuple(COEFFICIENTS))
     row, count = block.only("temperatures"), COEFFICIENTS[kind]
     values = tuple(row.number(index) for index in range(count))
@@ -179,9 +182,9 @@ def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
 
 
 def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
-    """Return the material of the model for material axes; `modes` is whether its elements have incompatible modes."""
+    """Return the material of the model for material `axes`; `modes` is true if its elements have incompatible modes."""
     if content.heat == "alone":
-        return _with_axes(material, HELD, axes, conductivity=_conductivity(content, material))
+        return _with_constants(material, ARBITRARY_LAW, axes, conductivity=_conductivity(content, material))
     assert material.law is not None
     law, expansion = material.law(axes), material.expansion
     law = replace(law, density=material.density)
@@ -190,7 +193,7 @@ def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     elif modes:
         law = replace(law, incompatible_modes=True)
     if content.heat or material.conductivity is not None:
-        law = _with_axes(material, law, axes, conductivity=_conductivity(content, material))
+        law = _with_constants(material, law, axes, conductivity=_conductivity(content, material))
     heated = content.heat or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
     if expansion is None:
         if heated:
@@ -198,11 +201,11 @@ def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
         return replace(law, expansion=0.0) if heated else law
     if not heated:
         content.note(material, f"material '{material.name}': without temperatures the expansion has no effect")
-    return _with_axes(material, law, axes, expansion=expansion)
+    return _with_constants(material, law, axes, expansion=expansion)
 
 
 def _conductivity(content: Content, material: Material) -> float | tuple[float, ...] | None:
-    """Return the conductivity of a material; CaseError if temperatures are computed and it has none, or one not positive."""
+    """Return the conductivity of a material; CaseError unless it is positive if temperatures are computed."""
     block = material.conductivity
     if block is None:
         if content.heat:
@@ -217,8 +220,8 @@ def _conductivity(content: Content, material: Material) -> float | tuple[float, 
     return values
 
 
-def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any:
-    """Return a material with additional constants; it becomes orthotropic if a constant is given along each axis."""
+def _with_constants(material: Material, law: Any, axes: Any, **constants: Any) -> Any:
+    """Return a material with additional constants; an elastic one becomes orthotropic for constants along the axes."""
     if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
         if isinstance(law, NonlinearElastic):
             raise material.refuse(
@@ -231,7 +234,7 @@ def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any
 
 
 def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
-    """Return the strain measure of the model, and the reason why NLGEOM is ignored; empty if it is not."""
+    """Return the strain measure of the model, and the reason why NLGEOM is ignored, or an empty string."""
     if any("small" not in getattr(law, "strains", STRAINS) for law in laws):
         return "finite", ""
     if content.heat == "alone" or not any(step.nonlinear for step in content.steps):
@@ -241,12 +244,10 @@ def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
         "a nearly incompressible elastic material": any(
             law.averaged and not isinstance(law, ElasticPlastic) for law in laws
         ),
-        "initial stresses": bool(content.stresses),
-        "couplings, rigid bodies and multi-point constraints": bool(
-            content.links or content.pins or content.multi_points
-        ),
-        "pretension sections": bool(content.pretensions),
+        "initial stresses": bool(content.initial_stresses),
+        "couplings, rigid bodies and multi-point constraints": bool(content.links or content.multi_points),
+        "pretension sections": bool(content.pretension_sections),
         "incompatible modes": any(law.incompatible_modes for law in laws),
     }
-    present = [name for name, given in reasons.items() if given]
-    return ("small", present[0]) if present else ("finite", "")
+    reason = next((name for name, applies in reasons.items() if applies), "")
+    return ("small" if reason else "finite"), reason

@@ -1,4 +1,4 @@
-"""The mesh of a deck: solids, facets of surfaces, groups, and a point for the rotation of each reference node."""
+"""Mesh of a deck: solids, facets of surfaces, groups, and a point for the rotation of each reference node."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from fastcontact.cases.decks.content import Content, SurfaceDefinition
 from fastcontact.mesh import topology
 from fastcontact.mesh.mesh import Mesh, starts_of
 
+# Type of a facet by the dimension of the mesh and the number of its nodes.
 FACETS = {2: {2: "line2", 3: "line3"}, 3: {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8"}}
 # Largest difference in z between the points of a plane model, relative to its size.
 FLAT = 1e-9
@@ -27,8 +28,8 @@ class DeckMesh(Assembly):
     Attributes
     ----------
     rotations : dict of int to int
-        Point, for each reference point, whose displacement is the rotation of the reference point [radian]. In plane models
-        the first component is the rotation.
+        For each reference point, the point whose displacement represents its rotation [radian]. In plane models the first
+        component is the rotation.
     facets : dict of str to list of tuple of int
         Points of the distinct facets by facet type.
     rows : dict of tuple of int to int
@@ -59,39 +60,39 @@ class DeckMesh(Assembly):
         return 3 if self.kinematics == "3d" else 2
 
     def add_facets(self, group: str, faces: Iterable[Face]) -> str:
-        """Make a group of facets and return its name; a facet is given as an element and the index of its facet."""
+        """Make a group of facets, each given as an element and the index of its facet, and return its name."""
         self.groups[group] = self.facet_rows(faces)
         return group
 
     def facet_rows(self, faces: Iterable[Face]) -> dict[str, list[int]]:
-        """Return the rows of facets by type; new facets are created."""
-        members: dict[str, list[int]] = {}
+        """Return the rows of facets by facet type; facets that do not exist yet are created."""
+        rows: dict[str, list[int]] = {}
         for face in faces:
             points = facet_points(*face)
             name = FACETS[self.dim][len(points)]
-            block = self.facets.setdefault(name, [])
-            row = self.rows.setdefault(tuple(sorted(points)), len(block))
-            if row == len(block):
-                block.append(points)
-            members.setdefault(name, []).append(row)
-        return members
+            facets = self.facets.setdefault(name, [])
+            row = self.rows.setdefault(tuple(sorted(points)), len(facets))
+            if row == len(facets):
+                facets.append(points)
+            rows.setdefault(name, []).append(row)
+        return rows
 
-    def add_solids(self, group: str, chosen: Iterable[Element]) -> str:
+    def add_solids(self, group: str, solids: Iterable[Element]) -> str:
         """Make a group of solids and return its name."""
-        self.groups[group] = rows_by_type(chosen)
+        self.groups[group] = rows_by_type(solids)
         return group
 
     def add_points(self, group: str, points: Iterable[int]) -> str:
-        """Return the name of the group with these points, which is created if there is none."""
-        wanted = ascending(points)
-        for name, members in self.point_groups.items():
-            if np.array_equal(members, wanted):
+        """Return the name of an existing group with these points, or of the new group `group`."""
+        members = ascending(points)
+        for name, existing in self.point_groups.items():
+            if np.array_equal(existing, members):
                 return name
-        self.point_groups[group] = wanted
+        self.point_groups[group] = members
         return group
 
     def rotation(self, point: int) -> int:
-        """Return the point that carries the rotation of a reference point, which is created if there is none."""
+        """Return the point that represents the rotation of a reference point; it is created if it does not exist."""
         if point not in self.rotations:
             self.rotations[point] = len(self.points)
             self.points = np.concatenate([self.points, self.points[[point]]])
@@ -99,19 +100,17 @@ class DeckMesh(Assembly):
 
     def mesh(self) -> Mesh:
         """Return the mesh, with inverted solids reoriented."""
-        solids = {name: [element.points for element in members] for name, members in self.by_kind.items()}
+        solids = {name: [element.points for element in members] for name, members in self.solids_by_type.items()}
         cells = {name: np.array(block, np.int32) for name, block in {**solids, **self.facets}.items()}
-        del solids
         starts = starts_of(cells)
         groups = {
             group: np.concatenate([[], *(starts[name] + np.array(rows) for name, rows in members.items())]).astype(int)
             for group, members in self.groups.items()
         }
-        points = self.points[:, : self.dim]
-        mesh = Mesh(points, cells, groups, self.point_groups)
-        mesh, turned = topology.oriented(mesh)
-        if turned:
-            self.content.notes.append(f"{turned} elements were inverted and are reoriented")
+        mesh = Mesh(self.points[:, : self.dim], cells, groups, self.point_groups)
+        mesh, inverted = topology.oriented(mesh)
+        if inverted:
+            self.content.notes.append(f"{inverted} elements were inverted and are reoriented")
         return mesh
 
 
@@ -120,20 +119,20 @@ def ascending(points: Iterable[int]) -> Indices:
     return np.unique(points if isinstance(points, np.ndarray) else np.fromiter(points, np.intp))
 
 
-def rows_by_type(chosen: Iterable[Element]) -> dict[str, list[int]]:
-    """Return the rows of solids by cell type."""
+def rows_by_type(members: Iterable[Element]) -> dict[str, list[int]]:
+    """Return the rows of the solids among some elements, by cell type."""
     rows: dict[str, list[int]] = {}
-    for element in chosen:
+    for element in members:
         if element.type is not None:
             rows.setdefault(element.type.element, []).append(element.row)
     return rows
 
 
-def begun(content: Content) -> DeckMesh:
+def deck_mesh_of(content: Content) -> DeckMesh:
     """Return the assembly of a deck with groups for its sets and surfaces.
 
-    Raises CaseError if there are no solids, if elements of several kinematics are mixed, if elements that only conduct heat
-    are used in other steps, or if a plane model is not flat.
+    Raises CaseError if there are no solids, if kinematics are mixed, if elements without displacements are used in steps
+    other than *HEAT TRANSFER, or if a plane model is not flat.
     """
     deck_mesh = DeckMesh(content)
     assemble(deck_mesh)
@@ -154,11 +153,11 @@ def begun(content: Content) -> DeckMesh:
         raise deck_mesh.solids[0].cell.refuse(
             f"elements of type {first.name} lie in the plane z = const, but z differs"
         )
-    _name_sets(deck_mesh)
+    _add_groups(deck_mesh)
     return deck_mesh
 
 
-def _name_sets(deck_mesh: DeckMesh) -> None:
+def _add_groups(deck_mesh: DeckMesh) -> None:
     """Add groups for the sets and surfaces of the deck; groups of a part are named ``Instance.name``."""
     for scope in deck_mesh.scopes:
         part = deck_mesh.part(scope)
@@ -168,7 +167,7 @@ def _name_sets(deck_mesh: DeckMesh) -> None:
             deck_mesh.point_groups[prefix + part.set_names[name]] = ascending(points)
         for name, definition in part.surfaces.items():
             if definition.of_nodes and definition.faces:
-                _name_nodes(deck_mesh, prefix + definition.name, definition, scope)
+                _add_node_based_surface(deck_mesh, prefix + definition.name, definition, scope)
             elif definition.faces:  # an unused surface may be empty
                 faces = deck_mesh.faces(f"{scope}.{name}" if scope else name, definition.location)
                 deck_mesh.add_facets(prefix + definition.name, faces)
@@ -179,26 +178,26 @@ def _name_sets(deck_mesh: DeckMesh) -> None:
                 )
 
 
-def _name_nodes(deck_mesh: DeckMesh, group: str, definition: SurfaceDefinition, scope: str) -> None:
-    """Add a group of the facets around the nodes of a node-based surface; other points of the facets are `loose`."""
-    whole, further, left = deck_mesh.faces_of_nodes(definition, scope)
-    if not (whole or further):  # the nodes belong to no solid
+def _add_node_based_surface(deck_mesh: DeckMesh, group: str, definition: SurfaceDefinition, scope: str) -> None:
+    """Add a group of the facets around the nodes of a node-based surface; other points of these facets are `loose`."""
+    complete, further, remaining = deck_mesh.faces_of_nodes(definition, scope)
+    if not (complete or further):  # the nodes belong to no solid
         return
-    deck_mesh.add_facets(group, [*whole, *further])
-    if left:
-        points = {point for face in (*whole, *further) for point in facet_points(*face)}
+    deck_mesh.add_facets(group, [*complete, *further])
+    if remaining:
+        points = {point for face in (*complete, *further) for point in facet_points(*face)}
         deck_mesh.loose[group] = sorted(points.difference(deck_mesh.surface_nodes(definition, scope)))
 
 
 def secondary_group(deck_mesh: DeckMesh, name: str, location: Location) -> str:
-    """Return the group of a surface of faces or nodes; CaseError if a node is on no outer face of a solid."""
+    """Return the group of a surface of faces or nodes; CaseError if one of its nodes is on no outer face of a solid."""
     definition, scope = deck_mesh.surface(name, location)
     if not definition.of_nodes:
         return group_of_surface(deck_mesh, name)
-    whole, further, _ = deck_mesh.faces_of_nodes(definition, scope)
-    carried = {point for face in (*whole, *further) for point in facet_points(*face)}
+    complete, further, _ = deck_mesh.faces_of_nodes(definition, scope)
+    on_faces = {point for face in (*complete, *further) for point in facet_points(*face)}
     for point in deck_mesh.surface_nodes(definition, scope):
-        if point not in carried:
+        if point not in on_faces:
             raise definition.refuse(
                 f"node {deck_mesh.number_of(point)} of surface '{definition.name}' is on no outer face of a solid: "
                 "contact needs nodes of bodies, so leave it out"
@@ -207,6 +206,5 @@ def secondary_group(deck_mesh: DeckMesh, name: str, location: Location) -> str:
 
 
 def group_of_surface(deck_mesh: DeckMesh, name: str) -> str:
-    """Return the name of the group of a surface; the case of letters is ignored."""
-    wanted = folded(name)
-    return next(group for group in deck_mesh.groups if folded(group) == wanted)
+    """Return the name of the group of a surface, whose case is ignored."""
+    return next(group for group in deck_mesh.groups if folded(group) == folded(name))

@@ -1,6 +1,6 @@
-"""Pairs and linear constraints of a deck: pairs and ties, equations, multi-point constraints, rigid bodies, couplings.
+"""Contact pairs and ties of a deck, and its linear constraints: equations, *MPC, rigid bodies and couplings.
 
-Constraints are linear in the displacements, which must be small.
+The constraints are linear in the displacements, which must be small.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import facet_points
 from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, refusing, unquoted
-from fastcontact.cases.decks.content import Content, Equation, Link, MultiPoint, Pair, Pin, SectorEnds
+from fastcontact.cases.decks.content import Content, Equation, Link, MultiPoint, Pair, SectorEnds
 from fastcontact.cases.decks.local_axes import local_axes, local_directions, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.loads import Traction
@@ -21,14 +21,14 @@ from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows, relation, rigid_rows
 
-# Smallest number of nodes of each kind of multi-point constraint.
+# Smallest number of nodes of the kinds of *MPC that have no fixed number.
 LEAST = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
-# Tolerance of the tests for collinear points and for points at the centre, relative to squared distances.
+# Tolerance of the tests for collinear points and for points on the axis, relative to squared distances.
 FLAT = 1e-9
 
 
 def make_rotations(deck_mesh: DeckMesh) -> None:
-    """Add the rotation point of each reference node, which must precede the mesh; CaseError in axisymmetric models."""
+    """Add a point for the rotation of each reference node, before the mesh is made; CaseError in axisymmetric models."""
     for link in deck_mesh.content.links:
         point = deck_mesh.node(link.reference, link.location)
         if link.rotation:
@@ -40,11 +40,10 @@ def make_rotations(deck_mesh: DeckMesh) -> None:
 
 
 def relations_of(deck_mesh: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
-    """Return the constraints of all equations, rigid bodies and couplings."""
+    """Return the constraints of all equations and *MPC together, and those of each rigid body and coupling."""
     content = deck_mesh.content
     axes = local_directions(deck_mesh)
     rows = [_equation(deck_mesh, equation, axes) for equation in content.equations]
-    rows += [row for pin in content.pins for row in _pinned(deck_mesh, pin)]
     rows += [row for constraint in content.multi_points for row in multi_point_rows(deck_mesh, constraint)]
     constraints = [relation("the equations of the deck", rows, mesh.points.shape)] if rows else []
     for link in content.links:
@@ -54,7 +53,7 @@ def relations_of(deck_mesh: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
 
 
 def _equation(deck_mesh: DeckMesh, equation: Equation, axes: Mapping[int, Array]) -> list[Term]:
-    """Return the terms of an equation along the global axes from components along the local `axes` of points."""
+    """Return the terms of an equation along the global axes; its components are along the local `axes` of points."""
     terms: list[Term] = []
     for name, component, coefficient in equation.terms:
         point = deck_mesh.node(name, equation.location)
@@ -67,15 +66,15 @@ def _equation(deck_mesh: DeckMesh, equation: Equation, axes: Mapping[int, Array]
     return terms
 
 
-def _pinned(deck_mesh: DeckMesh, pin: Pin) -> list[list[Term]]:
+def _pin_rows(deck_mesh: DeckMesh, pin: MultiPoint) -> list[list[Term]]:
     """Return the equations of nodes with the same displacement; CaseError if the numbers of nodes do not match."""
-    first, second = (deck_mesh.nodes(name, pin.location) for name in (pin.first, pin.second))
+    first, second = (deck_mesh.nodes(name, pin.location) for name in pin.nodes)
     if len(second) == 1:
         second = second * len(first)
     if len(first) != len(second) or set(zip(first, second, strict=True)) & set(zip(second, first, strict=True)):
         raise pin.refuse(
-            f"'{pin.first}' and '{pin.second}' have {len(first)} and {len(second)} nodes: the numbers must be equal, or the "
-            "second one, and the nodes must differ"
+            f"'{pin.nodes[0]}' and '{pin.nodes[1]}' have {len(first)} and {len(second)} nodes: the numbers must be equal, or "
+            "the second one, and the nodes must differ"
         )
     return [
         [(p, axis, 1.0), (q, axis, -1.0)] for p, q in zip(first, second, strict=True) for axis in range(deck_mesh.dim)
@@ -83,7 +82,7 @@ def _pinned(deck_mesh: DeckMesh, pin: Pin) -> list[list[Term]]:
 
 
 def _points(deck_mesh: DeckMesh, link: Link) -> list[int]:
-    """Return the points that a link relates to its reference point; CaseError if there are none."""
+    """Return the points that a link relates to its reference point, in ascending order; CaseError if there are none."""
     if link.kind == "nodes":
         points = deck_mesh.nodes(link.group, link.location)
     elif link.kind == "elements":
@@ -96,17 +95,17 @@ def _points(deck_mesh: DeckMesh, link: Link) -> list[int]:
         else:
             points = [p for face in deck_mesh.faces(link.group, link.location) for p in facet_points(*face)]
     reference = deck_mesh.node(link.reference, link.location)
-    kept = sorted(set(points) - {reference, deck_mesh.rotations[reference]})
-    if not kept:
+    followers = sorted(set(points) - {reference, deck_mesh.rotations[reference]})
+    if not followers:
         raise link.refuse(f"'{link.group}' contains no nodes that could follow the reference node")
-    return kept
+    return followers
 
 
 def _link_rows(deck_mesh: DeckMesh, mesh: Mesh, link: Link) -> csr_array:
     """Return the constraint rows of a link.
 
-    Nodes follow the reference point, or, if the link is distributing, the reference point has the area-weighted mean motion
-    of a surface.
+    The nodes follow the reference point or, if the link is distributing, the reference point has the area-weighted mean
+    motion of a surface.
     """
     n_dofs = mesh.points.size
     point = deck_mesh.node(link.reference, link.location)
@@ -114,20 +113,20 @@ def _link_rows(deck_mesh: DeckMesh, mesh: Mesh, link: Link) -> csr_array:
         point, deck_mesh.rotations[point], tuple(deck_mesh.points[point][: deck_mesh.dim].tolist())
     )
     points = np.array(_points(deck_mesh, link), np.intp)
-    places = deck_mesh.points[points, : deck_mesh.dim]
+    coordinates = deck_mesh.points[points, : deck_mesh.dim]
     if not link.distributing:
         directions = np.array([_directions(deck_mesh, link, follower) for follower in points.tolist()])
-        return rigid_rows(reference, points, places, directions, n_dofs)
+        return rigid_rows(reference, points, coordinates, directions, n_dofs)
     deck_mesh.faces(link.group, link.location)
     surface = Traction(group_of_surface(deck_mesh, link.group), {0: 1.0}, None)
     areas = surface.vector(mesh, deck_mesh.kinematics)[:, 0]
     weight = areas[points] / areas[points].sum()
     with refusing(link):
-        return distributing_rows(reference, points, places, weight, _directions(deck_mesh, link, point), n_dofs)
+        return distributing_rows(reference, points, coordinates, weight, _directions(deck_mesh, link, point), n_dofs)
 
 
 def _directions(deck_mesh: DeckMesh, link: Link, point: int) -> Array:
-    """Return the directions (n, dim) [-] in which a coupling constrains a point."""
+    """Return the unit vectors (n, dim) [-] along which a coupling constrains a point."""
     axes = np.eye(3)
     if link.orientation:
         axes = local_axes(orientation_of(deck_mesh.content, link.orientation, link.location), deck_mesh.points[point])
@@ -135,53 +134,55 @@ def _directions(deck_mesh: DeckMesh, link: Link, point: int) -> Array:
 
 
 def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[Term]]:
-    """Return the equations of a multi-point constraint; CaseError if the model is plane or the nodes do not suffice."""
+    """Return the equations of a multi-point constraint; CaseError if it does not suit its nodes or a plane model."""
+    if constraint.kind in ("PIN", "TIE"):
+        return _pin_rows(deck_mesh, constraint)
     nodes = [point for name in constraint.nodes for point in deck_mesh.nodes(name, constraint.location)]
     nodes = [*dict.fromkeys(nodes[:-1] if constraint.kind == "MEANROT" else nodes), *nodes[-1:]]
     nodes = nodes if constraint.kind == "MEANROT" else nodes[:-1]
     if len(nodes) < LEAST[constraint.kind] or deck_mesh.dim == 2:
         raise constraint.refuse(f"{constraint.kind} needs {LEAST[constraint.kind]} different nodes or more, in 3D")
-    where = deck_mesh.points[nodes]
+    coordinates = deck_mesh.points[nodes]
     if constraint.kind == "MEANROT":
-        return [_mean_rotation(constraint, nodes, where)]
-    first = where[1] - where[0]
+        return [_mean_rotation(constraint, nodes, coordinates)]
+    relative = coordinates - coordinates[0]
+    first = relative[1]
     if constraint.kind == "STRAIGHT":
         if not first.any():
             raise constraint.refuse("the first two nodes of STRAIGHT coincide")
-        across = np.linalg.svd(first[None])[2][1:]
-        along = (where - where[0]) @ first / (first @ first)
+        normals = np.linalg.svd(first[None])[2][1:]
+        along = relative @ first / (first @ first)
         weights = np.column_stack([1.0 - along, along])
     else:
-        across = np.cross(first, where[2] - where[0])[None]
-        if np.linalg.norm(across) <= FLAT * (first @ first):
+        normals = np.cross(first, relative[2])[None]
+        if np.linalg.norm(normals) <= FLAT * (first @ first):
             raise constraint.refuse("the first three nodes of PLANE lie on a line")
-        edges = np.array([first, where[2] - where[0]])
-        inside = np.linalg.lstsq(edges.T, (where - where[0]).T, rcond=None)[0].T
-        weights = np.column_stack([1.0 - inside.sum(axis=1), inside])
-    k = weights.shape[1]
-    across = across / np.linalg.norm(across, axis=1, keepdims=True)
+        in_plane = np.linalg.lstsq(relative[1:3].T, relative.T, rcond=None)[0].T
+        weights = np.column_stack([1.0 - in_plane.sum(axis=1), in_plane])
+    k = weights.shape[1]  # the first k nodes determine the line or the plane
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     return [
         _terms([nodes[i], *nodes[:k]], np.outer([1.0, *-weights[i]], normal))
         for i in range(k, len(nodes))
-        for normal in across
+        for normal in normals
     ]
 
 
-def _mean_rotation(constraint: MultiPoint, nodes: list[int], where: Array) -> list[Term]:
-    """Return the equation by which the first component of the last node is the mean rotation of the other nodes.
+def _mean_rotation(constraint: MultiPoint, nodes: list[int], coordinates: Array) -> list[Term]:
+    """Return the equation that makes the first component of the last node the mean rotation of the other nodes [radian].
 
-    As in CalculiX, the mean rotation is the mean of the nodal angles about the centre, ``mean(a . (p x u) / p . p)``, with
-    the unit vector a along the axis, the offsets p from the centre normal to the axis, and the displacements u. The
-    coordinates of the last node are the direction of the axis.
+    As in CalculiX, the mean rotation is the mean of the nodal angles about the centre, ``mean(a . (p x u) / p . p)``, where a
+    is the unit vector along the axis, p are the offsets from the centre normal to the axis, and u are the displacements
+    relative to their mean. The `coordinates` (n, 3) [length] of the last node are the direction of the axis.
     """
-    axis, places = where[-1], where[:-1] - where[:-1].mean(axis=0)
+    axis, relative = coordinates[-1], coordinates[:-1] - coordinates[:-1].mean(axis=0)
     length = np.linalg.norm(axis)
     if length == 0.0:
         raise constraint.refuse(
             "the coordinates of the last node of MEANROT are the direction of the axis, which must not be zero"
         )
     axis = axis / length
-    offset = places - np.outer(places @ axis, axis)
+    offset = relative - np.outer(relative @ axis, axis)
     squared = np.einsum("nd,nd->n", offset, offset)
     if squared.min() <= FLAT * squared.max():
         raise constraint.refuse("a node of MEANROT lies on the axis through the centre, where it has no angle")
@@ -191,7 +192,7 @@ def _mean_rotation(constraint: MultiPoint, nodes: list[int], where: Array) -> li
 
 
 def _terms(points: list[int], coefficients: Array) -> list[Term]:
-    """Return the terms of an equation from coefficients (n, 3) of the displacements of points."""
+    """Return the nonzero terms of an equation with coefficients (n, 3) of the displacements of points."""
     return [
         (point, axis, value)
         for point, row in zip(points, coefficients.tolist(), strict=True)
@@ -200,12 +201,12 @@ def _terms(points: list[int], coefficients: Array) -> list[Term]:
     ]
 
 
-# Largest number of terms of an equation. Each equation couples all of its terms to each other.
+# Largest number of terms of an equation, all of which the equation couples to each other.
 MOST_TERMS = 100_000
 
 
 def contact_pair(content: Content, block: Block) -> None:
-    """Read *CONTACT PAIR; the first surface of a line is the secondary side."""
+    """Read *CONTACT PAIR; the first surface of a line is the secondary side, the second one the primary side."""
     kinds = ("NODE TO SURFACE", "SURFACE TO SURFACE", "MORTAR", "LINMORTAR", "PGLINMORTAR")
     if block.choice("TYPE", kinds) == "NODE TO SURFACE":
         content.note(block, "NODE TO SURFACE: mortar contact is used, which transmits uniform pressures on any meshes")
@@ -226,7 +227,7 @@ def _sides(block: Block, kind: str) -> Iterator[tuple[Location, str, str]]:
 
 
 def clearance(content: Content, block: Block) -> None:
-    """Read *CLEARANCE: the initial gap between the sides of a pair, which replaces that of the coordinates."""
+    """Read *CLEARANCE: the initial gap between the sides of a pair, which replaces the gap in the coordinates."""
     secondary = block.get("SLAVE") or block.get("SECONDARY")
     primary = block.get("MASTER") or block.get("MAIN")
     value = as_number(block.location, block.required("VALUE"))
@@ -262,11 +263,11 @@ def tie(content: Content, block: Block) -> None:
 def equation(content: Content, block: Block) -> None:
     """Read *EQUATION: the number of terms, then the node, component and coefficient of each term."""
     rows = block.each()
-    for head in rows:
-        count = head.whole(0)
+    for first in rows:
+        count = first.whole(0)
         terms: list[tuple[str, int, float]] = []
         if not 1 <= count <= MOST_TERMS:
-            raise head.refuse(f"an equation cannot have {count} terms")
+            raise first.refuse(f"an equation cannot have {count} terms")
         while len(terms) < count:
             row = next(rows, None)
             if row is None:
@@ -274,23 +275,23 @@ def equation(content: Content, block: Block) -> None:
             starts = (start for start in range(0, len(row.entries), 3) if row.text(start))
             terms += [(row.text(start), row.whole(start + 1), row.number(start + 2)) for start in starts]
         if len(terms) != count:
-            raise head.refuse(f"the equation has {len(terms)} terms, {count} are announced")
-        content.equations.append(Equation(head.location, tuple(terms)))
+            raise first.refuse(f"the equation has {len(terms)} terms, {count} are announced")
+        content.equations.append(Equation(first.location, tuple(terms)))
 
 
 def multi_point(content: Content, block: Block) -> None:
     """Read *MPC.
 
-    PIN and TIE give two nodes the same displacement, and BEAM is a rigid bar from the first node to the second. PLANE,
-    STRAIGHT and MEANROT continue on lines that begin with a number.
+    PIN and TIE give two nodes the same displacement, and BEAM makes the first node follow the second one like a rigid bar.
+    PLANE, STRAIGHT and MEANROT continue on lines that begin with a number.
     """
-    several: list[tuple[Row, str, list[str]]] = []
+    continuing: list[tuple[Row, str, list[str]]] = []
     for row in block.each():
         kind, nodes = row.text(0).upper(), [unquoted(entry) for entry in row.entries[1:] if entry]
-        if kind.isdecimal() and several:
-            several[-1][2].extend([*([row.text(0)] if int(kind) else []), *nodes])
+        if kind.isdecimal() and continuing:
+            continuing[-1][2].extend([*([row.text(0)] if int(kind) else []), *nodes])
         elif kind in LEAST:
-            several.append((row, kind, nodes))
+            continuing.append((row, kind, nodes))
         elif kind not in ("PIN", "TIE", "BEAM"):
             known = ", ".join(("PIN", "TIE", "BEAM", *LEAST))
             raise row.refuse(f"an MPC of type {kind[:40]} is not supported, only {known}")
@@ -299,30 +300,30 @@ def multi_point(content: Content, block: Block) -> None:
         elif kind == "BEAM":
             content.links.append(Link(row.location, nodes[1], nodes[0], "nodes"))
         else:
-            content.pins.append(Pin(row.location, nodes[0], nodes[1]))
-    content.multi_points += [MultiPoint(row.location, kind, tuple(nodes)) for row, kind, nodes in several]
+            content.multi_points.append(MultiPoint(row.location, kind, tuple(nodes)))
+    content.multi_points += [MultiPoint(row.location, kind, tuple(nodes)) for row, kind, nodes in continuing]
 
 
 def rigid_body(content: Content, block: Block) -> None:
-    """Read *RIGID BODY: nodes that move as a rigid body with a reference node."""
+    """Read *RIGID BODY: nodes or elements that move as a rigid body with a reference node."""
     kind = "elements" if block.get("ELSET") else "nodes"
     group = block.get("ELSET") or block.required("NSET")
     content.links.append(Link(block.location, block.required("REF NODE"), group, kind, rotation=block.get("ROT NODE")))
 
 
 def coupling(content: Content, block: Block, inner: Block) -> None:
-    """Read *COUPLING with its *KINEMATIC or *DISTRIBUTING, the `inner` block."""
+    """Read *COUPLING (`block`) with its *KINEMATIC or *DISTRIBUTING (`inner`)."""
     components: set[int] = set()
     for row in inner.each():
         first, last = row.whole(0), row.whole(1, row.whole(0))
         if not 1 <= first <= last <= 6:
             raise row.refuse(f"the components {first} to {last} are not within 1 to 6")
         components.update(range(first, last + 1))
-    chosen = tuple(sorted(components)) or (1, 2, 3, 4, 5, 6)
-    distributing = inner.keyword == "DISTRIBUTING"
     content.links.append(
         Link(
-            block.location, block.required("REF NODE"), block.required("SURFACE"), "surface", chosen, distributing,
+            block.location, block.required("REF NODE"), block.required("SURFACE"), "surface",
+            components=tuple(sorted(components)) or (1, 2, 3, 4, 5, 6),
+            distributing=inner.keyword == "DISTRIBUTING",
             orientation=block.get("ORIENTATION"),
         )
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Sections of bodies in a deck: pretension sections of bolts, with their locks, and the ends of cyclic sectors."""
+"""Pretension sections of bolts in a deck, with their locks, and cyclic sectors with their end surfaces."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from fastcontact.model.model import Model
 
 
 def pretension_section(content: Content, block: Block) -> None:
-    """Read *PRE-TENSION SECTION: a surface across a bolt, and the node for the shortening and the force of the bolt."""
+    """Read *PRE-TENSION SECTION: a surface across a bolt, and the node of the shortening and the force of the bolt."""
     if len(block.rows) > 1:
         raise block.refuse(f"{len(block.rows)} data lines, but one is needed, the normal")
     row = block.rows[0] if block.rows else None
     normal = None if row is None else (row.number(0), row.number(1, 0.0), row.number(2, 0.0))
     if normal is not None and not any(normal):
         raise block.refuse("the normal is zero")
-    content.pretensions.append(
+    content.pretension_sections.append(
         PretensionSection(block.location, block.required("SURFACE"), block.required("NODE"), normal)
     )
 
 
 def section_points(assembly: Assembly) -> dict[int, PretensionSection]:
-    """Return the sections by the point of their node; CaseError if the node belongs to a body or another section."""
+    """Return the sections by the point of their node; CaseError if a node belongs to a body or to two sections."""
     sections: dict[int, PretensionSection] = {}
-    for section in assembly.content.pretensions:
+    for section in assembly.content.pretension_sections:
         point = assembly.node(section.node, section.location)
         if point in assembly.of_solids:
             raise section.refuse(f"node {section.node} belongs to an element: a section needs a separate node")
@@ -49,7 +49,7 @@ class Locks:
     points : dict of int to PretensionSection
         Sections by the point of their node.
     begins : dict of int to float
-        Load factor from which the shortening of a section is constant, by the point of its node [-].
+        Load factor [-] from which the shortening of a section is constant, by the point of its node.
     number : int
         Number of the current step, counted from 1.
     """
@@ -75,7 +75,7 @@ class Locks:
                 )
 
     def take(self, point: int, component: int, fixed: bool) -> bool:
-        """Record the lock if a support locks a section, and return whether it does."""
+        """Return whether a support locks a section, and record the lock."""
         if point not in self.points or component != 1 or not fixed:
             return False
         self.begins.setdefault(point, float(self.number - 1))
@@ -83,9 +83,9 @@ class Locks:
 
 
 def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
-    """Return the mesh cut along all pretension sections; CaseError if it cannot be cut or a surface has two sections."""
+    """Return the mesh cut along all pretension sections; CaseError for an impossible cut or two sections of a surface."""
     sections: set[str] = set()
-    for section in deck_mesh.content.pretensions:
+    for section in deck_mesh.content.pretension_sections:
         deck_mesh.faces(section.surface, section.location)
         group = group_of_surface(deck_mesh, section.surface)
         if group in sections:
@@ -98,13 +98,13 @@ def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
 
 
 def add_sections(model: Model, deck_mesh: DeckMesh, locks: Locks) -> list[MultiPointConstraint]:
-    """Add the pretension sections to a model and return their constraints, including those of locked lengths."""
+    """Add the pretension sections to a model and return their constraints, including those of locked sections."""
     before, links, locked = len(model.relations), [], []
     for point, section in locks.points.items():
         group, location = group_of_surface(deck_mesh, section.surface), section.location
         normal = None if section.normal is None else section.normal[: deck_mesh.dim]
         model.add_pretension(group, group, force=0.0, locked_from=locks.begins.get(point), normal=normal)
-        row = _side(deck_mesh, section) * model.pretensions[-1].row(model.n_dofs)
+        row = _orientation_sign(deck_mesh, section) * model.pretensions[-1].row(model.n_dofs)
         node = csr_array((np.ones(1), ([0], [point * deck_mesh.dim])), shape=row.shape)
         links.append(MultiPointConstraint(f"*{location.keyword} of line {location.line}", csr_array(row - node)))
         if point in locks.begins:
@@ -113,10 +113,10 @@ def add_sections(model: Model, deck_mesh: DeckMesh, locks: Locks) -> list[MultiP
     return [*model.relations[before:], *locked]
 
 
-def _side(deck_mesh: DeckMesh, section: PretensionSection) -> float:
+def _orientation_sign(deck_mesh: DeckMesh, section: PretensionSection) -> float:
     """Return 1.0 if the normal of a section points out of the elements of its surface, and -1.0 if it points into them.
 
-    A positive force acts on these elements along the normal. It pulls the sides together only if the normal points out.
+    A positive force in the deck acts on these elements along the normal, and tightens the bolt only if the normal points out.
     """
     if section.normal is None:
         return 1.0
@@ -126,7 +126,7 @@ def _side(deck_mesh: DeckMesh, section: PretensionSection) -> float:
     return float(np.copysign(1.0, outward @ np.array(section.normal)))
 
 
-# Largest number of sectors. A larger number is treated as an error.
+# Largest number of cyclic sectors. A larger number is treated as an error.
 MOST_SECTORS = 100_000
 
 
@@ -143,7 +143,7 @@ def cyclic_symmetry_model(content: Content, block: Block) -> None:
 
 
 def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]:
-    """Add the cyclic symmetries of the deck to the model and return their constraints."""
+    """Add the cyclic symmetries of a deck to the model and return their constraints."""
     content, before = deck_mesh.content, len(model.relations)
     used: set[int] = set()
     for sectors in content.sectors:
@@ -169,9 +169,9 @@ def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]
 
 def _ends(content: Content, sectors: Sectors) -> SectorEnds:
     """Return the sector ends of a *CYCLIC SYMMETRY MODEL: those of its TIE, or the only ones of the deck."""
-    named = [ends for ends in content.sector_ends if not sectors.tie or folded(ends.name) == folded(sectors.tie)]
-    if len(named) != 1:
-        known = ", ".join(ends.name or f"that of line {ends.location.line}" for ends in content.sector_ends) or "none"
-        which = f"TIE={sectors.tie[:80]}" if sectors.tie else "TIE is not given"
-        raise sectors.refuse(f"{which}, and the ties with CYCLIC SYMMETRY are: {known}")
-    return named[0]
+    matching = [ends for ends in content.sector_ends if not sectors.tie or folded(ends.name) == folded(sectors.tie)]
+    if len(matching) != 1:
+        names = ", ".join(ends.name or f"that of line {ends.location.line}" for ends in content.sector_ends) or "none"
+        parameter = f"TIE={sectors.tie[:80]}" if sectors.tie else "TIE is not given"
+        raise sectors.refuse(f"{parameter}, and the ties with CYCLIC SYMMETRY are: {names}")
+    return matching[0]

@@ -1,4 +1,4 @@
-"""Keywords of steps: *STEP, its procedures and *AMPLITUDE, and the supports and loads of steps."""
+"""Keywords of steps: *STEP and its procedures, *AMPLITUDE, and the storage of supports and loads."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from itertools import pairwise
 from fastcontact.cases.decks.blocks import Block, defined, folded
 from fastcontact.cases.decks.content import Amplitude, Content, Given, Step
 
-# Largest number of increments of a step, in models with friction or cohesive contact.
-MOST_PARTS = 20
+# Largest number of increments into which a step of a path-dependent model is divided.
+MOST_INCREMENTS = 20
 
 
 def new_step(content: Content, step: Step | None, block: Block) -> Step:
@@ -24,7 +24,7 @@ def new_step(content: Content, step: Step | None, block: Block) -> Step:
 
 
 def static(content: Content, step: Step, block: Block) -> None:
-    """Read *STATIC: the initial increment and the duration of the step, which determine the number of increments."""
+    """Read *STATIC: the initial increment and the duration of the step, whose ratio is the number of increments."""
     if step.static:
         raise block.refuse("the step has this keyword twice")
     if step.modes:
@@ -44,7 +44,7 @@ def static(content: Content, step: Step, block: Block) -> None:
 
 
 def heated(content: Content, step: Step, block: Block) -> None:
-    """Read *HEAT TRANSFER, *COUPLED or *UNCOUPLED TEMPERATURE-DISPLACEMENT like *STATIC, with steady heat conduction."""
+    """Read *HEAT TRANSFER, *COUPLED or *UNCOUPLED TEMPERATURE-DISPLACEMENT: *STATIC with steady heat conduction."""
     if "STEADY STATE" not in block.parameters:
         raise block.refuse("only STEADY STATE is supported, not transient heat conduction")
     static(content, step, block)
@@ -54,7 +54,7 @@ def heated(content: Content, step: Step, block: Block) -> None:
 
 
 def frequency(content: Content, step: Step, block: Block) -> None:
-    """Read *FREQUENCY: the number of modes, by default 10."""
+    """Read *FREQUENCY: the number of modes, which is 10 by default."""
     if step.static or step.modes:
         raise block.refuse("a step has either *STATIC or one *FREQUENCY")
     number = block.rows[0].whole(0, 10) if block.rows else 10
@@ -64,7 +64,7 @@ def frequency(content: Content, step: Step, block: Block) -> None:
 
 
 def end_step(content: Content, step: Step | None, block: Block) -> None:
-    """Read *END STEP; a step with *FREQUENCY becomes a request for modes instead of a load step."""
+    """Read *END STEP; a step with *FREQUENCY is removed from the load steps and stored as a request for modes."""
     if step is None:
         raise block.refuse("there is no step to end")
     if not step.modes:
@@ -88,9 +88,8 @@ def end_step(content: Content, step: Step | None, block: Block) -> None:
 
 
 def given(content: Content, step: Step | None, block: Block) -> None:
-    """Store a block of supports or loads of a step, or a *BOUNDARY before all steps."""
-    name = block.get("AMPLITUDE")
-    if name:
+    """Store a block of supports or loads of a step, or a *BOUNDARY that precedes all steps."""
+    if name := block.get("AMPLITUDE"):
         defined("amplitude", name, content.amplitudes, block)
     conditions = Given(block, block.choice("OP", ("MOD", "NEW")) == "NEW", name)
     if step is not None:
@@ -102,7 +101,7 @@ def given(content: Content, step: Step | None, block: Block) -> None:
 
 
 def amplitude(content: Content, block: Block) -> None:
-    """Read *AMPLITUDE: pairs of a time and a multiplier."""
+    """Read *AMPLITUDE: pairs of time and multiplier."""
     name = block.required("NAME")
     block.choice("DEFINITION", ("TABULAR",))
     block.choice("VALUE", ("RELATIVE",))

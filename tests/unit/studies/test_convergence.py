@@ -44,7 +44,7 @@ def gathered(case, results, elements=("quad8",), wanted=("C1.stress.yy",)):
     chosen = settings(case)
     members = combinations(chosen, elements, ["continuous"])
     jobs = [convergence.level_job(case, chosen, member, k) for member in members for k in range(len(results[0]))]
-    return convergence.gathered(case, jobs, [one for levels in results for one in levels], wanted)
+    return convergence.study_of_runs(case, jobs, [one for levels in results for one in levels], wanted)
 
 
 @pytest.fixture(scope="module")

@@ -60,7 +60,7 @@ def case_of(tmp_path, generator):
 def test_every_generator_makes_meshes_half_as_fine(tmp_path, generator):
     case = case_of(tmp_path, generator)
     chosen = settings(case)
-    sizes = [make_mesh(recipe(chosen, chosen.own.element, level), case.mesh) for level in (0, 1)]
+    sizes = [make_mesh(recipe(chosen, chosen.case_combination.element, level), case.mesh) for level in (0, 1)]
     coarse, fine = (sum(map(len, mesh.solids.values())) for mesh in sizes)
     assert coarse == sum(map(len, case.mesh.solids.values()))
     dim = case.mesh.dim

@@ -285,7 +285,7 @@ def test_a_block_has_keyword_parameters_and_lines(tmp_path):
     assert found.parameters == {"TYPE": "a, b", "SMALL SLIDING": None}
     assert [row.entries for row in found.rows] == [("1", "2"), ("3",)]
     assert [row.location.line for row in found.rows] == [4, 6]
-    assert found.rows[0].goes_on
+    assert found.rows[0].continued
     assert str(found.location) == "a.inp, line 2, *CONTACT PAIR"
 
 
