@@ -202,7 +202,7 @@ class Comparison:
     def _may_lock(self, name: str) -> Mask:
         """Return which cells (n_cells,) of an element may lock."""
         numbers = self._material[name]
-        bends = incompatible_modes.asked(name, self._treatment)
+        bends = incompatible_modes.with_modes(name, self._treatment)
         treated = self._treatment[numbers] & 1 > 0 if bends is None else self._treatment[numbers] > 0
         return self._suspicious[numbers] & ((name in AT_NODES) | ~treated)
 

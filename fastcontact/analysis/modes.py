@@ -23,12 +23,11 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.inertia_loads import Densities
 from fastcontact.elasticity.mass import mass, stress_stiffness
 from fastcontact.elasticity.material_field import MaterialField
-from fastcontact.elasticity.multipoint_constraints import stacked_rows
 from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.errors import ModelError, warn
 from fastcontact.linear import choice
-from fastcontact.linear.sparse_rows import sum_of_blocks
+from fastcontact.linear.sparse_rows import stacked_rows, sum_of_blocks
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 

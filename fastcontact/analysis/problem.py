@@ -28,7 +28,6 @@ from fastcontact.elasticity.following_pressure import FollowingPressure
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
-from fastcontact.elasticity.multipoint_constraints import stacked_rows
 from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies, NonlinearBodies
 from fastcontact.elasticity.springs import stiffened, too_stiff
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
@@ -36,7 +35,7 @@ from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ContactError
 from fastcontact.linear import choice
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
-from fastcontact.linear.sparse_rows import sum_of_blocks
+from fastcontact.linear.sparse_rows import stacked_rows, sum_of_blocks
 from fastcontact.model.contact_pair import angle_at
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.model import Model

@@ -1,4 +1,4 @@
-"""Anisotropic linear elastic materials: orthotropic and general anisotropic elasticity."""
+"""Orthotropic and general anisotropic linear elastic materials."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ from fastcontact.elasticity.varying_constants import CellAxes, Varying, wrapped
 from fastcontact.errors import ModelError
 from fastcontact.round_off import ROUND_OFF
 
+# Pairs of material axes to which Poisson's ratios and shear moduli belong.
 NAMES = ("12", "13", "23")
-# Tolerance for the symmetry of the stiffness matrix, relative to its largest entry.
+# Largest difference between symmetric entries of the matrix of moduli, relative to its largest entry.
 SYMMETRIC = 1e-9
 
 
@@ -85,13 +86,13 @@ class Orthotropic(Material):
             check_type(f"{name} of Orthotropic", getattr(self, name), Any, ModelError)
         for name in ("E", "nu", "G"):
             object.__setattr__(self, name, _three(name, getattr(self, name)))
-        for value, number in zip(self.E, "123", strict=True):
-            _check_modulus(f"Young's modulus E{number}", value)
-        for value, number in zip(self.G, NAMES, strict=True):
-            _check_modulus(f"the shear modulus G{number}", value)
+        names = [f"Young's modulus E{axis}" for axis in "123"] + [f"the shear modulus G{pair}" for pair in NAMES]
+        for name, modulus in zip(names, (*self.E, *self.G), strict=True):
+            if not isinstance(modulus, Varying):
+                check_positive(name, modulus)
         if not self.graded:  # constants that vary are checked when the cells are known
             _check_ratios(self.E, self.nu)
-        _take_rest(self)
+        _set_other_properties(self)
 
     @classmethod
     def transversely_isotropic(
@@ -130,6 +131,11 @@ class Orthotropic(Material):
         Returns
         -------
         Orthotropic
+
+        Raises
+        ------
+        ModelError
+            If the elastic energy is not positive for every strain.
         """
         check_type("nu_across of a transversely isotropic material", nu_across, float, ModelError)
         check_type("E_across of a transversely isotropic material", E_across, float | Array, ModelError)
@@ -163,11 +169,11 @@ class Orthotropic(Material):
         E, nu, G = (
             np.broadcast_arrays(*map(np.atleast_1d, values)) for values in (constants.E, constants.nu, constants.G)
         )
-        fit = np.all([(v >= 1.0 / LARGEST) & (v <= LARGEST) for v in np.broadcast_arrays(*E, *G)], axis=0)
+        in_range = np.all([(v >= 1.0 / LARGEST) & (v <= LARGEST) for v in np.broadcast_arrays(*E, *G)], axis=0)
         with np.errstate(all="ignore"):  # inadmissible moduli are detected above
             nu21, nu31, nu32 = nu[0] * E[1] / E[0], nu[1] * E[2] / E[0], nu[2] * E[2] / E[1]
-            single = (nu[0] * nu21 < 1.0) & (nu[1] * nu31 < 1.0) & (nu[2] * nu32 < 1.0)
-            return fit & single & (_determinant(nu, (nu21, nu31, nu32)) > ROUND_OFF)
+            minors_positive = (nu[0] * nu21 < 1.0) & (nu[1] * nu31 < 1.0) & (nu[2] * nu32 < 1.0)
+            return in_range & minors_positive & (_determinant(nu, (nu21, nu31, nu32)) > ROUND_OFF)
 
 
 @dataclass(frozen=True)
@@ -222,23 +228,23 @@ class Anisotropic(Material):
             raise ModelError(
                 f"the moduli D must be a matrix of 6 x 6 finite numbers, not of shape {np.shape(np.asarray(self.D, object))}"
             )
-        off = np.abs(D - D.T).max()
-        if off > SYMMETRIC * np.abs(D).max():
-            i, j = np.unravel_index(np.abs(D - D.T).argmax(), D.shape)
+        asymmetry = np.abs(D - D.T)
+        if asymmetry.max() > SYMMETRIC * np.abs(D).max():
+            i, j = np.unravel_index(asymmetry.argmax(), D.shape)
             raise ModelError(f"the moduli D are not symmetric: D[{i}, {j}] = {D[i, j]:g} and D[{j}, {i}] = {D[j, i]:g}")
         D = (D + D.T) / 2.0
         least = float(np.linalg.eigvalsh(D)[0])
         if not least > 1e-14 * np.abs(D).max():
             raise ModelError(
-                f"the moduli D are not positive definite, their least eigenvalue is {least:.6g}: some strain would cost no "
-                "energy; check the order of the components, 11, 22, 33, 12, 23, 13"
+                f"the moduli D are not positive definite: their smallest eigenvalue is {least:.6g}, so that the elastic "
+                "energy is not positive for every strain; check the order of the components, 11, 22, 33, 12, 23, 13"
             )
         object.__setattr__(self, "D", tuple(tuple(row) for row in D.tolist()))
-        _take_rest(self)
+        _set_other_properties(self)
 
     @property
     def described(self) -> str:
-        """Text with the diagonal of the matrix of moduli, for messages."""
+        """Text with the diagonal of the moduli, for messages."""
         return f"D with the diagonal ({', '.join(f'{self.D[i][i]:g}' for i in range(6))})"
 
     def compliances(self, constants: Any) -> Array:
@@ -250,8 +256,8 @@ class Anisotropic(Material):
         return True
 
 
-def _take_rest(material: Orthotropic | Anisotropic) -> None:
-    """Check and normalise the axes, density, thermal expansion and conductivity of a material."""
+def _set_other_properties(material: Orthotropic | Anisotropic) -> None:
+    """Check and normalise the properties that do not determine the moduli, and the axes."""
     object.__setattr__(material, "density", wrapped(material.density))
     for name in ("expansion", "conductivity"):
         value = getattr(material, name)
@@ -261,13 +267,13 @@ def _take_rest(material: Orthotropic | Anisotropic) -> None:
     object.__setattr__(material, "axes", _axes(material.axes))
     material.check_thermal_and_density(3)
     for name in ("expansion", "conductivity"):
-        if isinstance(given := getattr(material, name), tuple):
-            along = tuple(v if isinstance(v, Varying) else float(v) for v in given)
-            object.__setattr__(material, name, along)
+        if isinstance(coefficients := getattr(material, name), tuple):
+            coefficients = tuple(v if isinstance(v, Varying) else float(v) for v in coefficients)
+            object.__setattr__(material, name, coefficients)
 
 
 def _axes(axes: Any) -> Any:
-    """Return the normalised axes of a material; ModelError if axes given for cells are not orthogonal."""
+    """Return the normalised axes of a material; ModelError if they are not orthogonal vectors."""
     if isinstance(axes, CellAxes):
         return axes
     if not isinstance(axes, np.ndarray) or axes.ndim != 3:
@@ -275,12 +281,8 @@ def _axes(axes: Any) -> Any:
     return CellAxes(frames(lambda points: axes, np.zeros((len(axes), 3)), "3d"))
 
 
-def _check_modulus(name: str, value: Any) -> None:
-    if not isinstance(value, Varying):
-        check_positive(name, value)
-
-
 def _three(name: str, values: Any) -> tuple[Any, Any, Any]:
+    """Return the three constants E, nu or G of an orthotropic material, numbers or `Varying`; ModelError otherwise."""
     try:
         a, b, c = (v if isinstance(v, Varying) else _real(v) for v in map(wrapped, values))
     except (TypeError, ValueError):
@@ -290,29 +292,29 @@ def _three(name: str, values: Any) -> tuple[Any, Any, Any]:
 
 
 def _real(value: Any) -> float:
-    """Return a real number unchanged; raise TypeError for other values, such as text and complex numbers."""
+    """Return a real number as a float; raise TypeError for other values, such as text and complex numbers."""
     if not isinstance(value, Real) or isinstance(value, bool):
         raise TypeError(value)
     return float(value)
 
 
-def _determinant(nu: Sequence[Any], back: Sequence[Any]) -> Any:
+def _determinant(nu: Sequence[Any], reciprocal: Sequence[Any]) -> Any:
     """Return the determinant of Lempriere's condition, which is positive if the strain energy is positive definite [-].
 
-    `nu` contains nu12, nu13, nu23, and `back` contains nu21, nu31, nu32.
+    `nu` contains nu12, nu13, nu23, and `reciprocal` contains nu21, nu31, nu32.
     """
-    (nu12, nu13, nu23), (nu21, nu31, nu32) = nu, back
+    (nu12, nu13, nu23), (nu21, nu31, nu32) = nu, reciprocal
     return 1.0 - nu12 * nu21 - nu23 * nu32 - nu13 * nu31 - 2.0 * nu21 * nu32 * nu13
 
 
 def _check_ratios(E: Sequence[float], nu: Sequence[float]) -> None:
     """Raise ModelError unless Poisson's ratios make the strain energy positive definite."""
-    for value, number, (i, j) in zip(nu, NAMES, ((0, 1), (0, 2), (1, 2)), strict=True):
+    for value, pair, (i, j) in zip(nu, NAMES, ((0, 1), (0, 2), (1, 2)), strict=True):
         limit = math.sqrt(E[i] / E[j])
         if not abs(value) < limit:
             raise ModelError(
-                f"Poisson's ratio nu{number} = {value:g} must be less than sqrt(E{i + 1} / E{j + 1}) = {limit:.6g} in size: "
-                f"is it nu{number[::-1]} = nu{number} E{j + 1} / E{i + 1}?"
+                f"Poisson's ratio nu{pair} = {value:g} must be less than sqrt(E{i + 1} / E{j + 1}) = {limit:.6g} in "
+                f"magnitude: is it nu{pair[::-1]} = nu{pair} E{j + 1} / E{i + 1}?"
             )
     nu12, nu13, nu23 = nu
     nu21, nu31, nu32 = nu12 * E[1] / E[0], nu13 * E[2] / E[0], nu23 * E[2] / E[1]

@@ -1,4 +1,4 @@
-"""Stresses in cells from displacements, at any points of the reference cell."""
+"""Stresses in cells, computed from the displacements at arbitrary points of the reference cell."""
 
 from __future__ import annotations
 
@@ -6,23 +6,17 @@ import numpy as np
 
 from fastcontact._jit import parallel
 from fastcontact.arrays import Array, Indices, Numbers
-from fastcontact.elasticity import (
-    dilatation,
-    dilatation_kernels,
-    element_kernels,
-    incompatible_modes,
-    incompatible_modes_kernels,
-)
+from fastcontact.elasticity import dilatation, dilatation_kernels, incompatible_modes, incompatible_modes_kernels
 from fastcontact.elasticity.initial_states import StressOffset
-from fastcontact.elasticity.stiffness import of_cells
+from fastcontact.elasticity.stiffness import LOOPS, of_cells
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-# Number of cells processed at a time if moduli vary inside them.
+# Number of cells processed at a time where moduli vary within cells, which limits the memory for local moduli.
 VARYING = 2_000
 
 
-def beside(name: str, xi: Array) -> Array:
+def interpolation(name: str, xi: Array) -> Array:
     """Return the interpolation weights (n, n_q) [-] from the quadrature points to points `xi` (n, dim) [-]."""
     element = elements.get(name)
     if xi is element.quadrature[0]:
@@ -31,7 +25,7 @@ def beside(name: str, xi: Array) -> Array:
 
 
 class CellStress:
-    """Stresses from the displacements of a mesh.
+    """Stresses in the cells of a mesh with given displacements.
 
     Parameters
     ----------
@@ -42,9 +36,9 @@ class CellStress:
         From `LinearElastic.moduli` [pressure].
     displacement : ndarray (n_points, dim)
         Displacements of all points [length].
-    averaged : ndarray of bool (n_materials,), optional
-        Materials with a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); none by
-        default.
+    averaged : ndarray of bool or uint8 (n_materials,), optional
+        Whether each material has a mean dilatation, see `dilatation`; or the codes of `MaterialField.treatment`, which also
+        state whether it has incompatible modes. By default no material has either.
     offset : StressOffset, optional
         Stresses due to temperature and initial states.
     """
@@ -66,18 +60,18 @@ class CellStress:
     def at(self, name: str, xi: Array, cells: Numbers, material: Numbers, rows: Indices) -> Array:
         """Return the stresses (n_cells, n, n_components) [pressure] at points `xi` (n, dim) [-] of cells of an element.
 
-        `cells` (n_cells, n_nodes) of int; `material` (n_cells,) or (n_cells, n_q) of int, the material number of each cell or
-        of each quadrature point; `rows` (n_cells,) of int, the numbers of the cells.
+        The integer arrays are the nodes `cells` (n_cells, n_nodes), the numbers `rows` (n_cells,) of the cells, and
+        `material`, the material number of each cell (n_cells,) or of each quadrature point (n_cells, n_q).
         """
         out = np.empty((len(cells), len(xi), self._moduli.shape[1]))
         self.fill(name, xi, cells, material, out, rows)
         return out
 
     def fill(self, name: str, xi: Array, cells: Numbers, material: Numbers, out: Array, rows: Indices) -> None:
-        """Fill `out` (n_cells, n, n_components) [pressure] in place, in parallel.
+        """Fill `out` (n_cells, n, n_components) [pressure] with the stresses, in parallel.
 
-        The points `xi` (n, dim) [-], the `cells` (n_cells, n_nodes) of int, `material` (n_cells,) of int or (n_cells, n_q),
-        and the numbers `rows` (n_cells,) of int of the cells are as for `at`.
+        The points `xi` (n, dim) [-] and the integer arrays `cells` (n_cells, n_nodes), `material` (n_cells,) or
+        (n_cells, n_q) and `rows` (n_cells,) are described for `at`.
         """
         element, split = elements.get(name), None
         if self._averaged is not None:
@@ -87,7 +81,7 @@ class CellStress:
             N, dN, _ = element.tables
         else:
             N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
-        loops, points, cells = element_kernels.loops(self._mesh.dim), self._mesh.points, parallel.read_only(cells)
+        loops, points, cells = LOOPS[self._mesh.dim], self._mesh.points, parallel.read_only(cells)
 
         def fill_rows(span: tuple[int, int]) -> None:
             portion = slice(*span)
@@ -113,13 +107,13 @@ class CellStress:
         self, at: tuple[str, Array, Array, Array], cells: Numbers, material: Numbers, moduli: Array,
         out: Array,
     ) -> None:  # fmt: skip
-        """Fill `out` if moduli vary from point to point.
+        """Fill `out` if moduli vary within cells.
 
-        At the quadrature points, the points of all cells are processed one after the other. Elsewhere strains are computed
-        first, as stresses of unit moduli; moduli are interpolated from the quadrature points.
+        If the points are the quadrature points, they are processed one after the other, each in all cells. At other points
+        the moduli are interpolated from the quadrature points, and the strains are the stresses of unit moduli.
         """
         name, xi, N, dN = at
-        loops, shared = element_kernels.loops(self._mesh.dim), (self._axisymmetric, self._displacement)
+        loops, shared = LOOPS[self._mesh.dim], (self._axisymmetric, self._displacement)
         if xi is elements.get(name).quadrature[0]:
             at_point = np.empty((len(cells), 1, out.shape[2]))
             for q in range(len(xi)):
@@ -129,12 +123,12 @@ class CellStress:
                 )
                 out[:, q] = at_point[:, 0]
             return
-        unit, first = np.eye(self._moduli.shape[1])[None], np.zeros(len(cells), np.int32)
+        unit_moduli, row_of_moduli = np.eye(self._moduli.shape[1])[None], np.zeros(len(cells), np.int32)
         strain = np.empty_like(out)
-        loops.stress(self._mesh.points, cells, N, dN, unit, first, *shared, strain)
-        weights = beside(name, xi)
-        for rows in range(0, len(cells), VARYING):
-            portion = slice(rows, rows + VARYING)
+        loops.stress(self._mesh.points, cells, N, dN, unit_moduli, row_of_moduli, *shared, strain)
+        weights = interpolation(name, xi)
+        for first_cell in range(0, len(cells), VARYING):
+            portion = slice(first_cell, first_cell + VARYING)
             local = np.einsum("nq,cqij->cnij", weights, moduli[material[portion]], optimize=True)
             out[portion] = np.einsum("cnij,cnj->cni", local, strain[portion])
 
@@ -143,31 +137,31 @@ class CellStress:
     ) -> None:
         """Add the stresses of incompatible modes."""
         name, xi, dN = at
-        bends = incompatible_modes.asked(name, self._averaged)
-        if bends is None:
+        with_modes = incompatible_modes.with_modes(name, self._averaged)
+        if with_modes is None:
             return
         numbers = material.reshape(len(cells), -1)
-        lost = np.empty((0, 0, 0))
+        subtracted = np.empty((0, 0, 0))
         if self._offset is not None:
-            here = name, elements.get(name).quadrature[0], rows
-            strain = self._stress_free(self._offset, here, cells, material)
-            lost = (self._moduli[numbers] @ strain[..., None])[..., 0]
+            quadrature_points = name, elements.get(name).quadrature[0], rows
+            strain = self._stress_free(self._offset, quadrature_points, cells, material)
+            subtracted = (self._moduli[numbers] @ strain[..., None])[..., 0]
             stress = self._offset.initial("stress", name, rows, elements.get(name).tables[0])
-            lost = lost if stress is None else lost - stress
+            subtracted = subtracted if stress is None else subtracted - stress
         incompatible_modes_kernels.add_stress(
-            self._mesh.points, cells, *incompatible_modes.tables(name), self._moduli, bends, numbers, self._displacement,
-            lost, xi, dN, beside(name, xi), out,
+            self._mesh.points, cells, *incompatible_modes.tables(name), self._moduli, with_modes, numbers,
+            self._displacement, subtracted, xi, dN, interpolation(name, xi), out,
         )  # fmt: skip
 
     @staticmethod
     def _stress_free(offset: StressOffset, at: tuple[str, Array, Indices], cells: Numbers, material: Numbers) -> Array:
-        """Return thermal and initial strains (n_cells, n, n_components) [-]."""
+        """Return the sum of thermal and initial strains (n_cells, n, n_components) [-]."""
         name, xi, rows = at
         N = elements.get(name).shape(xi)
         if material.ndim == 1:
             expansion = offset.expansion[material][:, None, :]
         else:
-            expansion = np.einsum("nq,cqi->cni", beside(name, xi), offset.expansion[material])
+            expansion = np.einsum("nq,cqi->cni", interpolation(name, xi), offset.expansion[material])
         strain = (offset.rise[cells] @ N.T)[:, :, None] * expansion
         initial = offset.initial("strain", name, rows, N)
         return strain if initial is None else strain + initial
@@ -175,7 +169,7 @@ class CellStress:
     def _add_offset(
         self, offset: StressOffset, at: tuple[str, Array, Indices], cells: Numbers, material: Numbers, out: Array
     ) -> None:
-        """Add initial stresses and subtract those of stress-free strains, whose dilatation is projected as well."""
+        """Add initial stresses, and subtract the moduli times the stress-free strains, with their dilatation projected."""
         name, xi, rows = at
         stress = offset.initial("stress", name, rows, elements.get(name).shape(xi))
         if stress is not None:
@@ -186,13 +180,14 @@ class CellStress:
         if material.ndim == 1:
             out -= strain @ moduli[material]  # moduli are symmetric
         else:
-            local = np.einsum("nq,cqij->cnij", beside(name, xi), moduli[material], optimize=True)
+            local = np.einsum("nq,cqij->cnij", interpolation(name, xi), moduli[material], optimize=True)
             out -= np.einsum("cnij,cnj->cni", local, strain)
         if split is None:
             return
         bulk = split.bulk[of_cells(material)]
-        of_bulk = bulk[:, 0] != 0.0
-        at_points = name, elements.get(name).quadrature[0], rows[of_bulk]
-        dilatations = self._stress_free(offset, at_points, cells[of_bulk], material[of_bulk])[:, :, :3].sum(axis=2)
-        parts = dilatation.projected(name, self._mesh.points[cells[of_bulk]], dilatations, xi, self._axisymmetric)
-        out[of_bulk, :, :3] -= (bulk[of_bulk][:, :, None] * parts).sum(axis=1)[:, :, None]
+        split_cells = bulk[:, 0] != 0.0
+        at_points = name, elements.get(name).quadrature[0], rows[split_cells]
+        strain = self._stress_free(offset, at_points, cells[split_cells], material[split_cells])
+        corners = self._mesh.points[cells[split_cells]]
+        mean_and_rest = dilatation.projected(name, corners, strain[:, :, :3].sum(axis=2), xi, self._axisymmetric)
+        out[split_cells, :, :3] -= (bulk[split_cells][:, :, None] * mean_and_rest).sum(axis=1)[:, :, None]

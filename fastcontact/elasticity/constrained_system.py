@@ -1,8 +1,9 @@
-"""Linear system with supports and multi-point constraints eliminated: ``u = T v + t``.
+"""Linear system from which supports and multi-point constraints are eliminated: ``u = T v + t``.
 
-T is the identity except for the displacements that multi-point constraints express in terms of others, t are the prescribed
-displacements. The matrix of the solver is ``T.T K T``. It has the size and blocks of K: in the rows and columns of eliminated
-components only the diagonal remains.
+v are the unknowns. T is the identity except for the rows of displacements that multi-point constraints express in terms of
+others, and t contains the prescribed displacements and the effect of the right-hand sides of the constraints. The matrix of
+the solver is ``T.T K T``. It has the size and blocks of K: in the rows and columns of eliminated components only the diagonal
+remains.
 """
 
 from __future__ import annotations
@@ -17,19 +18,20 @@ from scipy.sparse import bsr_array, csr_array, diags_array
 
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.elasticity.multipoint_constraints import Elimination, MultiPointConstraint, eliminate, stacked_rows
+from fastcontact.elasticity.multipoint_constraints import Elimination, MultiPointConstraint, eliminate
 from fastcontact.errors import ModelError
+from fastcontact.linear.sparse_rows import stacked_rows
 from fastcontact.round_off import ROUND_OFF
 
-# Relative tolerance of the conditions under which supports and constraints are consistent.
+# Relative tolerance of the conditions for consistent supports and constraints.
 CONFLICT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Stiffness:
-    """A stiffness matrix as the sum of `parts` (n, n) [force / length].
+    """A stiffness matrix as the sum of the matrices `parts` (n, n) [force / length].
 
-    Without multi-point constraints there are two parts: the matrix of the linear solver, and the rows and columns of
+    Without multi-point constraints there are two of them: the matrix of the linear solver, and the rows and columns of
     supports that were removed from it.
     """
 
@@ -42,12 +44,10 @@ class Stiffness:
         return total
 
     def row_sums(self, u: Array) -> Array:
-        """Return ``|K| |u|``, shape (n,), summed over the parts, which bounds the round-off of ``K u`` [force]."""
-        return np.sum([_row_sums(matrix, u) for matrix in self.parts], axis=0)
-
-
-def _row_sums(K: Any, u: Array) -> Array:
-    return np.asarray(abs(K) @ np.abs(u) if isinstance(K, csr_array | bsr_array) else K.row_sums(u))
+        """Return ``|K| |u|`` (n,), summed over the parts, to which the round-off of ``K u`` is proportional [force]."""
+        return np.sum(
+            [abs(K) @ np.abs(u) if isinstance(K, csr_array | bsr_array) else K.row_sums(u) for K in self.parts], axis=0
+        )
 
 
 class ConstrainedMotion:
@@ -56,6 +56,7 @@ class ConstrainedMotion:
     Parameters
     ----------
     fixed : ndarray of bool (n,)
+        Displacement components that are prescribed.
     relations : sequence of MultiPointConstraint
 
     Attributes
@@ -63,7 +64,7 @@ class ConstrainedMotion:
     free : ndarray of bool (n,)
         The unknowns v.
     T : csr_array (n, n) or None
-        None without multi-point constraints.
+        Transformation from unknowns to displacements [-]; None without multi-point constraints.
     """
 
     T: csr_array | None = None
@@ -80,7 +81,7 @@ class ConstrainedMotion:
         self.T = T
 
     def values(self, multiplier: Sequence[float]) -> Array:
-        """Return the right-hand sides (m,) of the constraints, given the load multiplier of each."""
+        """Return the right-hand sides (m,) of all equations, given the load multiplier of each constraint."""
         blocks = [
             np.full(relation.rows.shape[0], np.asarray(relation.value) * factor)
             for relation, factor in zip(self.relations, multiplier, strict=True)
@@ -95,24 +96,21 @@ class ConstrainedMotion:
         ModelError
             If constraints and supports contradict each other.
         """
-        known: Array = np.where(self.fixed, prescribed, 0.0)
+        held: Array = np.where(self.fixed, prescribed, 0.0)
         if not self.relations:
-            return known
-        values_of_dofs = np.concatenate([known, values])
-        off = np.abs(self._elimination.conditions @ values_of_dofs)
-        scale = np.abs(self._elimination.conditions) @ np.abs(values_of_dofs)
-        wrong = np.flatnonzero(off > CONFLICT * scale)
-        if len(wrong):
+            return held
+        conditions, known = self._elimination.conditions, np.concatenate([held, values])
+        violation = np.abs(conditions @ known)
+        violated = np.flatnonzero(violation > CONFLICT * (np.abs(conditions) @ np.abs(known)))
+        if len(violated):
+            row = self._elimination.origin[violated[0]]
+            ends = np.cumsum([relation.rows.shape[0] for relation in self.relations])
             raise ModelError(
-                f"{self._name(int(self._elimination.origin[wrong[0]]))} contradicts the supports, or constraints stated "
-                f"before it, by {off[wrong[0]]:.3g}: remove one of them"
+                f"{self.relations[int(np.searchsorted(ends, row, side='right'))].name} contradicts the supports, or "
+                f"constraints stated before it, by {violation[violated[0]]:.3g}: remove one of them"
             )
-        lift: Array = self._elimination.T @ known + self._elimination.S @ values
+        lift: Array = self._elimination.T @ held + self._elimination.S @ values
         return lift
-
-    def _name(self, row: int) -> str:
-        ends = np.cumsum([relation.rows.shape[0] for relation in self.relations])
-        return self.relations[int(np.searchsorted(ends, row, side="right"))].name
 
 
 class System(ConstrainedMotion):
@@ -161,13 +159,13 @@ class System(ConstrainedMotion):
         self._set_stiffness(K, diagonal)
 
     def renewed(self, K: bsr_array) -> System:
-        """Return the system with another stiffness K (n, n), which is modified in place, as by the constructor."""
+        """Return the system with another stiffness K (n, n) [force / length], which is modified as in the constructor."""
         system = copy.copy(self)
         system._set_stiffness(K, K.diagonal())
         return system
 
     def _set_stiffness(self, K: bsr_array, diagonal_of_K: Array) -> None:
-        """Set the stiffness K (n, n), given its diagonal (n,)."""
+        """Set the stiffness K (n, n) and what follows from it, given its diagonal (n,)."""
         self.free = self._independent.copy()
         if self.T is None:
             self.K = Stiffness(supports_apart(K, self.fixed))
@@ -178,9 +176,9 @@ class System(ConstrainedMotion):
             transformed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
             transformed.sort_indices()
             diagonal = transformed.diagonal()
-            # The transformed diagonal without the terms between different components, which may cancel.
+            # The transformed diagonal without off-diagonal terms of K, which may cancel the others.
             uncancelled = self.T.multiply(self.T).T @ diagonal_of_K
-            # Excludes points without stiffness that constraints couple only with each other.
+            # Points without stiffness that constraints couple only with each other are excluded from the unknowns.
             self.free &= (uncancelled > 0.0) | self._without_stiffness
             self.weightless = self.free & (diagonal <= ROUND_OFF * uncancelled)
             self.matrix = supports_apart(transformed, ~self.free)[0]
@@ -194,12 +192,11 @@ class System(ConstrainedMotion):
 
     def right(self, f: Array, t: Array) -> Array:
         """Return the right-hand side (n,) of the solver for forces `f` (n,) on all displacements [force]."""
-        # Without constraints t only holds displacements of supports, which load the unknowns through the removed
-        # columns.
+        # Without constraints t contains displacements of supports only, which load the unknowns through the removed columns.
         return self.reduced(f - (self.K.parts[1] if self.T is None else self.K) @ t)
 
     def reduced(self, force: Array) -> Array:
-        """Return the forces (n,) on the unknowns that do the same work as `force` (n,) on all displacements."""
+        """Return the forces (n,) on the unknowns that do the same work as `force` (n,) on all displacements [force]."""
         return self._of_unknowns(force.copy() if self.T is None else self.T.T @ force)
 
     def _of_unknowns(self, values: Array) -> Array:
@@ -208,7 +205,7 @@ class System(ConstrainedMotion):
         return values
 
     def rows(self, rows: csr_array, offset: Array, t: Array) -> tuple[csr_array, Array]:
-        """Return ``rows @ u + offset``, rows (m, n) and offset (m,), as rows and offset for the unknowns v."""
+        """Return the affine function ``rows @ u + offset`` as rows (m, n) and offset (m,) for the unknowns v."""
         offset = offset + rows @ t
         rows = rows.copy() if self.T is None else csr_array(rows @ self.T)
         rows.data[~self.free[rows.indices]] = 0.0
@@ -220,29 +217,29 @@ class System(ConstrainedMotion):
         return (v if self.T is None else self.T @ v) + t
 
     def unknowns(self, u: Array, t: Array | float = 0.0) -> Array:
-        """Return v (n,) of displacements u (n,) that satisfy the constraints."""
+        """Return the unknowns v (n,) [length] of displacements u (n,) that satisfy the constraints."""
         return self._of_unknowns(u - t)
 
     def unknowns_of(self, motions: Array) -> Array:
-        """Return the unknowns (n, k) of motions (n, k) that satisfy supports and constraints."""
+        """Return the unknowns (n, k) of motions (n, k) that satisfy homogeneous supports and constraints."""
         return np.where(self.free[:, None], motions, 0.0)
 
     def involved(self, dofs: Indices) -> Indices:
-        """Return the unknowns on which the displacements `dofs` depend, ascending."""
+        """Return the unknowns (k,) on which the displacements `dofs` (m,) depend, in ascending order."""
         if self.T is not None:
             dofs = np.unique(self.T[dofs].indices)
         return dofs[self.free[dofs]].astype(np.intp)
 
-    def balance(self, out: Array, round_off: Array | None = None) -> tuple[Array, float]:
-        """Return the forces (n,) of supports and constraints, and the residual, the largest force on an unknown.
+    def balance(self, unbalanced: Array, round_off: Array | None = None) -> tuple[Array, float]:
+        """Return the forces (n,) of supports and constraints [force], and the largest residual force on an unknown.
 
-        `out` (n,) are the internal minus all other forces [force]. Forces up to the `round_off` (n,) of `out` do not count
-        as residual.
+        The argument `unbalanced` (n,) contains internal minus all other forces [force]. The residual does not include forces
+        up to its `round_off` (n,).
         """
-        residual = self.reduced(out)
+        residual = self.reduced(unbalanced)
         if round_off is not None:
             residual = np.maximum(np.abs(residual) - (round_off if self.T is None else abs(self.T).T @ round_off), 0.0)
-        return np.where(self._reacting, out, 0.0), largest(residual)
+        return np.where(self._reacting, unbalanced, 0.0), largest(residual)
 
 
 def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
@@ -251,31 +248,31 @@ def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
     Returns
     -------
     matrix : bsr_array (n, n)
-        K without these rows and columns, except for the diagonal.
-    taken : csr_array (n, n)
-        The removed entries: the original K minus `matrix`.
+        K without these rows and columns, except for the diagonal, which is positive there.
+    removed : csr_array (n, n)
+        The original K minus `matrix`.
     """
     K = _with_diagonal(K)
     diagonal, size = K.diagonal(), K.blocksize[0]
     pivots = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0)).reshape(-1, size)
     supported, row = fixed.reshape(-1, size), np.repeat(np.arange(len(K.indptr) - 1), np.diff(K.indptr))
     on_support = np.asarray(supported.any(axis=1))
-    near = np.flatnonzero(on_support[row] | on_support[K.indices])
-    row, column, blocks = row[near], K.indices[near], K.data[near]
-    remaining, own = np.zeros_like(blocks), np.flatnonzero(row == column)
-    remaining[own[:, None], range(size), range(size)] = pivots[row[own]]
-    moves = (supported[row][:, :, None] | supported[column][:, None]) & np.not_equal(blocks, remaining)
-    block, i, j = np.nonzero(moves)
-    K.data[near[block], i, j] = remaining[moves]
+    affected = np.flatnonzero(on_support[row] | on_support[K.indices])
+    row, column, blocks = row[affected], K.indices[affected], K.data[affected]
+    remaining, diagonal_blocks = np.zeros_like(blocks), np.flatnonzero(row == column)
+    remaining[diagonal_blocks[:, None], range(size), range(size)] = pivots[row[diagonal_blocks]]
+    changes = (supported[row][:, :, None] | supported[column][:, None]) & np.not_equal(blocks, remaining)
+    block, i, j = np.nonzero(changes)
+    K.data[affected[block], i, j] = remaining[changes]
     rows = size * row[block] + i
     order = np.argsort(rows, kind="stable")
     start = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=K.shape[0]))]).astype(np.int32)
-    columns, removed = (size * column[block] + j).astype(np.int32), (blocks - remaining)[moves]
+    columns, removed = (size * column[block] + j).astype(np.int32), (blocks - remaining)[changes]
     return K, csr_array((removed[order], columns[order], start), shape=K.shape)
 
 
 def _with_diagonal(K: bsr_array) -> bsr_array:
-    """Return K with a diagonal block in every block row, zero where there was none."""
+    """Return K with a diagonal block in every block row; blocks that were not stored are zero."""
     present = np.zeros(len(K.indptr) - 1, bool)
     block_row = np.repeat(np.arange(len(present)), np.diff(K.indptr))
     present[block_row[block_row == K.indices]] = True

@@ -1,4 +1,4 @@
-"""Strain energy of stresses, with quadrature of higher order than that of the stiffness."""
+"""Strain energy of stresses, volumes and gradients at quadrature points, and a quadrature rule of higher order."""
 
 from __future__ import annotations
 
@@ -10,27 +10,29 @@ from fastcontact.mesh.elements import Element
 
 
 def elastic_energy(stress: Array, compliance: Array) -> Array:
-    """Return ``stress : strain``, twice the energy density, at points of cells (n_cells, n) [pressure].
+    """Return ``stress : strain``, twice the elastic energy density, at points of cells (n_cells, n) [pressure].
 
     Parameters
     ----------
     stress : ndarray (n_cells, n, n_components)
         Stress [pressure].
     compliance : ndarray (n_cells, m, n_components, n_components)
-        Compliance of whole cells, m = 1, or of their points, m = n, see `Material.compliance_at` [1 / pressure].
+        Compliance of cells (m = 1) or of their points (m = n), see `Material.compliance_at` [1 / pressure].
     """
     return np.asarray((stress * (compliance @ stress[..., None])[..., 0]).sum(axis=-1))
 
 
 def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Array:
-    """Return the volume (n_cells, n_q) [length^dim] per unit of the reference cell; in axisymmetry of the full circle.
+    """Return det J (n_cells, n_q), the ratio of the volume of a cell to that of the reference cell at its points.
+
+    The unit is length^dim. In axisymmetry, det J is multiplied by the circumference 2 pi r, and the unit is length^3.
 
     The arguments are the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], the shape functions
     `N` (n_q, n_nodes) [-], and their derivatives `dN` (n_q, n_nodes, dim) [-].
     """
     n_q, n_nodes, dim = dN.shape
-    slopes = corners.transpose(0, 2, 1) @ dN.transpose(1, 0, 2).reshape(n_nodes, -1)
-    volume = np.linalg.det(slopes.reshape(-1, dim, n_q, dim).transpose(0, 2, 1, 3))
+    J = corners.transpose(0, 2, 1) @ dN.transpose(1, 0, 2).reshape(n_nodes, -1)
+    volume = np.linalg.det(J.reshape(-1, dim, n_q, dim).transpose(0, 2, 1, 3))
     if axisymmetric:
         volume *= 2.0 * np.pi * np.einsum("qa,ca->cq", N, corners[:, :, 0])
     return np.asarray(volume)
@@ -42,10 +44,10 @@ def gradients_at(corners: Array, dN: Array) -> tuple[Array, Array]:
     The arguments are the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], and the derivatives of the shape
     functions `dN` (n_q, n_nodes, dim) [-].
     """
-    slopes = np.einsum("qak,cad->cqdk", dN, corners, optimize=True)
-    return np.einsum("qak,cqkd->cqad", dN, np.linalg.inv(slopes), optimize=True), np.linalg.det(slopes)
+    J = np.einsum("qak,cad->cqdk", dN, corners, optimize=True)
+    return np.einsum("qak,cqkd->cqad", dN, np.linalg.inv(J), optimize=True), np.linalg.det(J)
 
 
 def integration_rule(element: Element, n_points: int | None = None) -> quadrature.Rule:
-    """Return a product rule on the reference cell, by default with order + 3 points in each direction."""
+    """Return a product rule with `n_points` in each direction of the reference cell, by default order + 3."""
     return quadrature.product_rule(element.linear, element.order + 3 if n_points is None else n_points)

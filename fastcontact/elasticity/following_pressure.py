@@ -12,12 +12,13 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import weighted_area_vectors
 from fastcontact.mesh.mesh import Mesh
 
-# Number of quadrature points in each direction of a facet: exact on quadratic facets of a ring.
+# Number of quadrature points in each direction of a facet, with which a constant pressure on quadratic facets is integrated
+# exactly, also in axisymmetry.
 POINTS = 4
 
 
 class FollowingPressure:
-    """A pressure on deformed facets, given by its values at reference positions.
+    """A pressure along the normals of deformed facets, with the values at the reference positions.
 
     Parameters
     ----------
@@ -27,29 +28,29 @@ class FollowingPressure:
     """
 
     def __init__(self, mesh: Mesh, kinematics: str, load: Pressure) -> None:
-        self._mesh, self._turned = mesh, kinematics == "axisymmetric"
-        self._parts = [self._part(load, name, facets) for name, facets in load.cells(mesh).items()]
+        self._mesh, self._axisymmetric = mesh, kinematics == "axisymmetric"
+        self._by_element = [self._evaluate(load, name, facets) for name, facets in load.cells(mesh).items()]
 
-    def _part(self, load: Pressure, name: str, facets: Numbers) -> tuple[Numbers, Array, Array, Array]:
-        """Return facets (f, n), shape functions (q, n), derivatives (q, n, k), pressure times weight (f, q)."""
+    def _evaluate(self, load: Pressure, name: str, facets: Numbers) -> tuple[Numbers, Array, Array, Array]:
+        """Return facets (f, n), shape functions (q, n), derivatives (q, n, k), and pressure times weight (f, q)."""
         element = elements.get(name)
         xi, weights = quadrature.product_rule(element.linear, POINTS, POINTS)
         N = element.shape(xi)
-        places = np.einsum("qn,fnd->fqd", N, self._mesh.points[facets])
-        return facets, N, element.gradient(xi), evaluated(load.value, places, load.name) * weights
+        x = np.einsum("qn,fnd->fqd", N, self._mesh.points[facets])
+        return facets, N, element.gradient(xi), evaluated(load.value, x, load.name) * weights
 
     def at(self, displacement: Array) -> tuple[Array, csr_array]:
         """Return nodal forces (n_points, dim) [force] at a `displacement` (n_points, dim) [length], and the load stiffness.
 
-        The load stiffness (n_dofs, n_dofs) is minus the symmetric part of the derivative of the forces [force / length],
-        which is the full derivative if the facets enclose a volume or end at supports.
+        The load stiffness (n_dofs, n_dofs) is minus the symmetric part of the derivative of the forces [force / length].
+        The derivative is symmetric if the pressure is uniform and the facets enclose a volume or end at supports.
         """
-        moved = self._mesh.points + displacement
-        forces, entries, dim = np.zeros_like(moved), Entries(), moved.shape[1]
-        for facets, N, dN, pressure in self._parts:
-            vectors, K = weighted_area_vectors(moved[facets], N, dN, pressure, N, self._turned)
+        x = self._mesh.points + displacement
+        forces, entries, dim = np.zeros_like(x), Entries(), x.shape[1]
+        for facets, N, dN, pressure in self._by_element:
+            vectors, K = weighted_area_vectors(x[facets], N, dN, pressure, N, self._axisymmetric)
             np.add.at(forces, facets, -vectors)
             dofs = (facets[:, :, None] * dim + np.arange(dim)).reshape(len(facets), -1)
             entries.add(dofs, dofs, K.reshape(*dofs.shape, -1))
-        total = entries.matrix((moved.size, moved.size))
+        total = entries.matrix((x.size, x.size))
         return forces, csr_array(0.5 * (total + total.T))

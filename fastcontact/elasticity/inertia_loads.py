@@ -23,21 +23,18 @@ class Densities:
     ----------
     materials : sequence of Material
     number : mapping of str to ndarray of int (n_cells,)
-        Material of each cell, by solid element type.
+        Number of the material of each cell, by solid element type.
     """
 
     materials: Sequence[Material]
     number: Mapping[str, Numbers]
 
     def at(self, name: str, rows: Indices, N: Array) -> Array:
-        """Return the densities (n_rows, n) [mass / length^3] in cells of an element, NaN where there are none.
-
-        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape functions at the points.
-        """
+        """Return the densities (n_rows, n) [mass / length^3] at points of cells; see `DensityField.at`."""
         density = np.full((len(rows), len(N)), np.nan)
-        number = self.number[name][rows]
-        for index, material in enumerate(self.materials):
-            cells = np.flatnonzero(number == index)
+        number_of_row = self.number[name][rows]
+        for number, material in enumerate(self.materials):
+            cells = np.flatnonzero(number_of_row == number)
             if isinstance(material.density, Varying):
                 density[cells] = material.density.at(name, rows[cells], N).reshape(len(cells), len(N))
             elif material.density is not None:
@@ -46,7 +43,7 @@ class Densities:
 
 
 class InertiaLoad(VolumeLoad):
-    """A load that is density times acceleration."""
+    """A load per volume that is density times acceleration."""
 
     CONSTANT = True
 
@@ -58,7 +55,7 @@ class InertiaLoad(VolumeLoad):
         mesh : Mesh
         kinematics : str
         density : DensityField, optional
-            Densities, needed only by `inertia_loads`.
+            Densities of the solid cells; without them, all cells count as cells without density.
         """
         forces, missing = np.zeros((mesh.n_points, mesh.dim)), 0
         for element, rows in solid_rows(mesh, self.groups).items():
@@ -81,15 +78,15 @@ class InertiaLoad(VolumeLoad):
 
 @dataclass(frozen=True)
 class Gravity(InertiaLoad):
-    """Gravity on groups of solid cells, or on all, given by the components of the acceleration [length / time^2]."""
+    """Gravity on groups of solid cells, or on all of them, given by the components of the acceleration [length / time^2]."""
 
     KIND = "gravity"
     groups: tuple[str, ...] | None
     components: Mapping[int, float]
     ramp: Table | None = None
 
-    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
-        super()._check_place(mesh, kinematics)
+    def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
+        super()._check_groups(mesh, kinematics)
         if kinematics == "axisymmetric" and 0 in self.components:
             raise ModelError(f"{self.name} has a radial component x: in axisymmetry it can act only along the axis, y")
 
@@ -103,18 +100,18 @@ class Gravity(InertiaLoad):
 
 @dataclass(frozen=True)
 class Centrifugal(InertiaLoad):
-    """The centrifugal force of a rotation.
+    """The centrifugal force of a rotation at constant speed.
 
     Attributes
     ----------
     groups : tuple of str or None
-        Groups of solid cells; None: all.
+        Groups of solid cells; None means all solid cells.
     speed : float
         Angular speed [radian / time].
     origin, direction : (float, float, float)
         A point of the axis [length], and a vector along it [-].
     ramp : tuple, optional
-        Ramp of the force, which is proportional to the square of the speed.
+        Points (instant, multiplier) of the ramp of the force, which is proportional to the square of the speed.
     """
 
     KIND = "the centrifugal force"
@@ -129,8 +126,8 @@ class Centrifugal(InertiaLoad):
         """The speed and the parameters of the axis."""
         return [self.speed, *self.origin, *self.direction]
 
-    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
-        super()._check_place(mesh, kinematics)
+    def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
+        super()._check_groups(mesh, kinematics)
         direction, origin = np.array(self.direction), np.array(self.origin)
         if not direction.any():
             raise ModelError(f"the axis of {self.name} has no length: give a direction such as (0, 0, 1)")
@@ -144,7 +141,7 @@ class Centrifugal(InertiaLoad):
             raise ModelError(f"the axis of {self.name} has the origin z = {origin[2]:g} outside the plane of the mesh")
 
     def acceleration(self, x: Array, kinematics: str) -> Array:
-        """Return speed^2 times the arm from the axis (..., dim) [length / time^2] at positions `x` (..., dim) [length]."""
+        """Return speed^2 times the vector from the axis (..., dim) [length / time^2] at `x` (..., dim) [length]."""
         arm = np.zeros((*x.shape[:-1], 3))
         arm[..., : x.shape[-1]] = x
         arm -= self.origin

@@ -16,29 +16,29 @@ from fastcontact.errors import ModelError, check_known
 from fastcontact.round_off import ROUND_OFF
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
-# Ramp of states that act in full from the first step on.
+# Ramp of states with the multiplier 1 at all instants.
 ALWAYS: Table = ((-LARGEST, 1.0), (LARGEST, 1.0))
 
 
 @dataclass(frozen=True, eq=False)
 class InitialState:
-    """An initial stress, or strain, of groups of solid cells, or of all.
+    """An initial stress or strain of groups of solid cells, or of all of them.
 
     Attributes
     ----------
     kind : str
         ``"stress"`` or ``"strain"``.
     groups : tuple of str or None
-        Groups of solid cells; None: all.
+        Groups of solid cells; None means all solid cells.
     cells : Cells
         The cells of these groups.
     components : mapping of int to float or Varying
-        By the number of the component in `COMPONENTS`: stresses [pressure], or strains with engineering shears [-].
+        Stresses [pressure], or strains with engineering shear strains [-], by the number of the component in `COMPONENTS`.
     axes : Axes
-        Axes of the components, as for materials.
+        Axes to which the components refer, as for materials.
     kinematics : str
     ramp : tuple
-        Pairs of instant and multiplier.
+        Points (instant, multiplier) of the ramp.
     """
 
     kind: str
@@ -55,55 +55,54 @@ class InitialState:
         return f"the initial {self.kind} of {listed(self.groups)}"
 
     def values(self, name: str, rows: Indices, N: Array) -> Array:
-        """Return components (n_rows, n, n_components) [pressure] or [-] along x, y, z, in cells of the element type `name`.
+        """Return the components (n_rows, n, n_components) along x, y and z in cells of the element type `name`.
 
-        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] values of the shape functions at the
-        points. Components are zero in cells of other groups.
+        They are stresses [pressure] or strains [-], and zero in cells of other groups. `rows` (n_rows,) of int contains the
+        numbers of the cells, and `N` (n, n_nodes) [-] the shape functions at n points of a cell. ModelError if a component
+        does not exist in the kinematics.
         """
         size = 6 if self.kinematics == "3d" else 4
         inside = np.isin(rows, self.cells.rows.get(name, ()))
         members = rows[inside]
-        local = np.zeros((len(members) * len(N), 6))
+        values = np.zeros((len(members) * len(N), 6))
         for component, value in self.components.items():
-            local[:, component] = value.at(name, members, N) if isinstance(value, Varying) else value
+            values[:, component] = value.at(name, members, N) if isinstance(value, Varying) else value
         if self.axes is not None:
-            places = positions(self.cells.mesh, self.cells.mesh.cells[name][members], N)
-            turn = rotations(frames(self.axes, places, self.kinematics))
+            points = positions(self.cells.mesh, self.cells.mesh.cells[name][members], N)
+            rotation = rotations(frames(self.axes, points, self.kinematics))
             if self.kind == "strain":  # engineering strains transform by the inverse transpose
-                turn = np.asarray(np.linalg.inv(turn).transpose(0, 2, 1))
-            local = np.einsum("nij,nj->ni", turn, local)
-        out = np.abs(local[:, size:]).max(initial=0.0)
-        if out > ROUND_OFF * np.abs(local).max(initial=0.0) or self._out_of_plane(local):
+                rotation = np.asarray(np.linalg.inv(rotation).transpose(0, 2, 1))
+            values = np.einsum("nij,nj->ni", rotation, values)
+        # In plane stress zz is out of plane as well: an initial strain zz is free, but there is no stress zz.
+        excluded = [*range(size, 6), *([2] if (self.kind, self.kinematics) == ("stress", "plane_stress") else [])]
+        if np.abs(values[:, excluded]).max(initial=0.0) > ROUND_OFF * np.abs(values).max(initial=0.0):
             raise ModelError(
                 f"{self.name} has out-of-plane components, which {self.kinematics} does not have: change its axes"
             )
-        values = np.zeros((len(rows), len(N), size))
-        values[inside] = local[:, :size].reshape(len(members), len(N), size)
-        return values
-
-    def _out_of_plane(self, values: Array) -> bool:
-        """Return whether an initial stress (n, 6) [pressure] has a component zz in plane stress."""
-        largest = np.abs(values).max(initial=0.0)
-        plane = self.kind == "stress" and self.kinematics == "plane_stress"
-        return bool(plane and np.abs(values[:, 2]).max(initial=0.0) > ROUND_OFF * largest)
+        of_rows = np.zeros((len(rows), len(N), size))
+        of_rows[inside] = values[:, :size].reshape(len(members), len(N), size)
+        return of_rows
 
     def check(self) -> None:
-        """Raise ModelError if a component is not admissible."""
+        """Raise ModelError if a component is not admissible in one of the cells."""
         for element, rows, N in self.cells.samples():
             self.values(element, rows, N)
 
 
 def initial_state(
-    kind: str, groups: tuple[str, ...] | None, cells: Cells, given: Mapping[str, Any], axes: Axes, kinematics: str,
+    kind: str, groups: tuple[str, ...] | None, cells: Cells, by_name: Mapping[str, Any], axes: Axes, kinematics: str,
     ramp: Table | None,
 ) -> InitialState:  # fmt: skip
-    """Return the initial state of `kind` given by the names of its components; ModelError if it is not admissible."""
+    """Return the initial state of a `kind` with components given by their names; ModelError if it is not admissible.
+
+    The other arguments are attributes of `InitialState`.
+    """
     label = f"the initial {kind} of {listed(groups)}"
     components: dict[int, Any] = {}
-    for component in given:
+    for component in by_name:
         check_known(f"component of {label}", component, COMPONENTS, ModelError)
     for number, component in enumerate(COMPONENTS):
-        value = wrapped(given.get(component))
+        value = wrapped(by_name.get(component))
         if value is None:
             continue
         if number > 3 and kinematics != "3d":
@@ -127,11 +126,11 @@ class StressOffset:
     Attributes
     ----------
     rise : ndarray (n_points,)
-        Rise of the temperature [temperature].
+        Temperature rise over the reference temperature [temperature].
     expansion : ndarray (n_moduli, n_components)
         Thermal strains per unit of temperature [1 / temperature].
     states : sequence of (float, InitialState)
-        Initial stresses and strains, each with its factor.
+        Initial stresses and strains, each with its multiplier.
     """
 
     rise: Array
@@ -139,9 +138,9 @@ class StressOffset:
     states: Sequence[tuple[float, InitialState]] = ()
 
     def initial(self, kind: str, name: str, rows: Indices, N: Array) -> Array | None:
-        """Return the sum of initial stresses or strains (n_rows, n, n_components) [pressure] or [-]; None without any.
+        """Return the sum of initial stresses [pressure] or strains [-], (n_rows, n, n_components); None if there are none.
 
-        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] the shape functions at the points.
+        The `kind` is ``"stress"`` or ``"strain"``, and the other arguments are those of `InitialState.values`.
         """
         values = [factor * state.values(name, rows, N) for factor, state in self.states if state.kind == kind]
         return np.asarray(np.sum(values, axis=0)) if values else None

@@ -1,11 +1,10 @@
-"""Loads and their nodal forces, in the reference configuration.
+"""Loads and their nodal forces in the reference configuration.
 
-Each kind of `Load` is a class; a new class here, with an ``add_...`` of the model, is a new load.
-Nodal forces are the work-equivalent ones, the integrals of the load times the shape functions. In axisymmetry every
-force is that over the full circle.
+Each kind of load is a subclass of `Load`, with a method ``add_...`` of the model. Nodal forces are work-equivalent: the
+integrals of the load times the shape functions. In axisymmetry, forces are those over the full circle.
 
 A `Value` is a number, or a function from positions (n, dim) [length] in the reference configuration to numbers (n,) [unit of
-the load]; `Components` are values by the number of their axis.
+the load]. `Components` are values by the number of their axis.
 """
 
 from __future__ import annotations
@@ -29,14 +28,15 @@ from fastcontact.mesh.topology import outer_facets, same_facets
 
 Table = tuple[tuple[float, float], ...]
 Value = float | Callable[[Array], Array]
-# Name of the place of a load without groups, in messages and results.
+# Name of the cells of a load without groups, in messages and results.
 EVERYWHERE = "all solid cells"
-# Largest admissible number in a model: squares of products of two are still finite.
+# Largest admissible magnitude of a number in a model: the square of a product of two such numbers is finite.
 LARGEST = 1e60
 Components = Mapping[int, Value]
 
-# Number of points of the product rule in each direction, and for squares, cubes and prisms: exact to degree 7 at least,
-# sufficient for a constant load on curved quadratic cells of a ring, and for a quadratic one over straight facets.
+# Numbers of points of the product rule in each direction, and in the Cartesian directions of squares, cubes and prisms. The
+# rules are exact to degree 7 at least, that is for a constant load on curved quadratic cells in axisymmetry and for a
+# quadratic load on straight facets.
 _POINTS, _STRAIGHT = 5, 4
 
 
@@ -51,10 +51,10 @@ class DensityField(Protocol):
 
 
 class Load:
-    """A load of a model; `ramp`, points (instant, multiplier), is its history, None for that of the analysis."""
+    """Base class of the loads of a model; `ramp` contains points (instant, multiplier), None means that of the analysis."""
 
     KIND: ClassVar[str]
-    CONSTANT: ClassVar[bool] = False  # values are numbers, not functions of position
+    CONSTANT: ClassVar[bool] = False  # whether values must be numbers instead of functions of position
     group: str
     components: Components
     value: Value  # value of a load without components
@@ -62,22 +62,22 @@ class Load:
 
     @property
     def name(self) -> str:
-        """Kind of the load and where it acts, for messages."""
+        """Kind of the load and its group, for messages."""
         return f"{self.KIND} on '{self.group}'"
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Names of the groups on which it acts."""
+        """Names of the groups on which the load acts."""
         return (self.group,)
 
     @property
     def values(self) -> list[Value]:
-        """Values of all components, or the only value."""
+        """Values of all components, or the value of a load without components."""
         return [self.value] if hasattr(self, "value") else list(self.components.values())
 
     def check(self, mesh: Mesh, kinematics: str) -> None:
         """Raise MeshError or ModelError if the load cannot act on this mesh."""
-        self._check_place(mesh, kinematics)
+        self._check_groups(mesh, kinematics)
         for value in self.values:
             (check_number if self.CONSTANT else check_value)(self.name, value)
 
@@ -89,7 +89,7 @@ class Load:
         mesh : Mesh
         kinematics : str
         density : DensityField, optional
-            Only `inertia_loads` need it.
+            Densities of the solid cells, which only the loads of `inertia_loads` need.
         """
         forces = np.zeros((mesh.n_points, mesh.dim))
         self._add_to(forces, mesh, kinematics)
@@ -99,17 +99,17 @@ class Load:
         """Return the facets or solid cells (n, n_nodes) on which the load acts, by element type."""
         return facets_of(mesh, self.group)
 
-    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+    def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
         self.cells(mesh)
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
-        """Add the integrals of `_density` over all cells."""
+        """Add the integrals of `_density` times the shape functions over all cells to `forces` (n_points, dim)."""
         for element, cells in self.cells(mesh).items():
             x, N, measure = measured_points(mesh, element, cells, kinematics)
             add_density(forces, cells, N, self._density(x) * measure[:, :, None])
 
     def _density(self, x: Array) -> Array:
-        """Return the load per area or volume (c, q, dim) at positions `x` (c, q, dim)."""
+        """Return the force per area or volume (c, q, dim) at positions `x` (c, q, dim) [length]."""
         density = np.zeros(x.shape)
         for axis, value in self.components.items():
             density[:, :, axis] = evaluated(value, x, self.name)
@@ -118,7 +118,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Pressure(Load):
-    """A pressure [pressure] on a group of outer facets, > 0 in compression, along their outward normals."""
+    """A pressure [pressure] on a group of outer facets, positive in compression; it acts against their outward normals."""
 
     KIND = "the pressure"
     group: str
@@ -126,7 +126,7 @@ class Pressure(Load):
     ramp: Table | None = None
 
     def cells(self, mesh: Mesh) -> dict[str, Numbers]:
-        """Return the facets (n, n_nodes) of int by element type, oriented so that their normals point outwards."""
+        """Return the facets (n, n_nodes) of int by element type, with outward normals."""
         return {name: outward(mesh, self.group, name, block) for name, block in facets_of(mesh, self.group).items()}
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
@@ -137,7 +137,10 @@ class Pressure(Load):
 
 @dataclass(frozen=True)
 class Hydrostatic:
-    """The pressure of a liquid of a `weight` by volume [force / length^3], below its `level` along an axis [length]."""
+    """The pressure of a liquid with the specific weight `weight` [force / length^3] and its surface at `level` [length].
+
+    The `level` is a coordinate along the axis `axis`, which points upwards.
+    """
 
     weight: float
     level: float
@@ -150,7 +153,7 @@ class Hydrostatic:
 
 @dataclass(frozen=True)
 class Traction(Load):
-    """Components of a force per area [pressure] on a group of facets."""
+    """A force per area on a group of facets, given by its components [pressure]."""
 
     KIND = "the traction"
     group: str
@@ -159,31 +162,31 @@ class Traction(Load):
 
 
 class VolumeLoad(Load):
-    """A load on groups of solid cells, or on all."""
+    """A load on groups of solid cells, or on all of them."""
 
     groups: tuple[str, ...] | None
 
     @property
     def name(self) -> str:
-        """As for other loads."""
+        """Kind of the load and its groups, for messages."""
         return f"{self.KIND} on {listed(self.groups)}"
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Names of its groups."""
+        """Names of the groups on which the load acts."""
         return (EVERYWHERE,) if self.groups is None else self.groups
 
     def cells(self, mesh: Mesh) -> dict[str, Numbers]:
         """Return the solid cells (n, n_nodes) of int by element type."""
         return {name: mesh.cells[name][rows] for name, rows in solid_rows(mesh, self.groups).items()}
 
-    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+    def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
         check_solids(mesh, self.groups, f": no {self.KIND.removeprefix('the ')} can act on it")
 
 
 @dataclass(frozen=True)
 class BodyForce(VolumeLoad):
-    """Components of a force per volume [force / length^3] on groups of solid cells, or on all."""
+    """A force per volume on groups of solid cells, or on all of them, given by its components [force / length^3]."""
 
     KIND = "the body force"
     groups: tuple[str, ...] | None
@@ -193,14 +196,14 @@ class BodyForce(VolumeLoad):
 
 @dataclass(frozen=True)
 class NodalForce(Load):
-    """Components of a force [force] on every node of a group."""
+    """A force on each node of a group, given by its components [force]."""
 
     KIND = "the nodal force"
     group: str
     components: Components
     ramp: Table | None = None
 
-    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+    def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
         check_points(mesh, self.group, "no force can act on it")
         if kinematics == "axisymmetric" and 0 in self.components:
             on_axis = np.intersect1d(mesh.points_of(self.group), axis_nodes(mesh))
@@ -218,15 +221,15 @@ class NodalForce(Load):
 
 @dataclass(frozen=True)
 class TotalForce(Load):
-    """Components of a total force [force], spread as a uniform traction over a group of facets."""
+    """A force given by its components [force], which acts as a uniform traction on a group of facets."""
 
     KIND, CONSTANT = "the total force", True
     group: str
     components: Mapping[int, float]
     ramp: Table | None = None
 
-    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
-        super()._check_place(mesh, kinematics)
+    def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
+        super()._check_groups(mesh, kinematics)
         if kinematics == "axisymmetric" and 0 in self.components:
             raise ModelError(
                 f"{self.name} has a radial component x, but radial forces cancel over the full circle: "
@@ -234,22 +237,22 @@ class TotalForce(Load):
             )
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
-        shares, area = np.zeros((mesh.n_points, 1)), 0.0
+        nodal_areas, area = np.zeros((mesh.n_points, 1)), 0.0
         for element, facets in self.cells(mesh).items():
             _, N, measure = measured_points(mesh, element, facets, kinematics)
-            add_density(shares, facets, N, measure[:, :, None])
+            add_density(nodal_areas, facets, N, measure[:, :, None])
             area += float(measure.sum())
         for axis, value in self.components.items():
-            forces[:, axis] = shares[:, 0] * (value / area)
+            forces[:, axis] = nodal_areas[:, 0] * (value / area)
 
 
 def listed(groups: Sequence[str] | None) -> str:
-    """Return a description of groups of solid cells, for messages; None means all."""
+    """Return the names of groups of solid cells as text, for messages; None means all solid cells."""
     return EVERYWHERE if groups is None else ", ".join(f"'{group}'" for group in groups)
 
 
 def solid_rows(mesh: Mesh, groups: Sequence[str] | None) -> dict[str, Indices]:
-    """Return the numbers (n,) of the solid cells of groups, or of all, by element type."""
+    """Return the numbers (n,) of the solid cells of groups, or of all solid cells, by element type."""
     if groups is None:
         return {name: np.arange(len(block)) for name, block in mesh.solids.items()}
     rows = mesh.split(np.unique(np.concatenate([mesh.cell_groups[group] for group in groups])))
@@ -257,7 +260,7 @@ def solid_rows(mesh: Mesh, groups: Sequence[str] | None) -> dict[str, Indices]:
 
 
 def solid_points(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
-    """Return the points (n,) of int of the solid cells of groups, or of all, ascending."""
+    """Return the points (n,) of int of the solid cells of groups, or of all solid cells, in ascending order."""
     return np.unique(
         np.concatenate([mesh.cells[name][rows].ravel() for name, rows in solid_rows(mesh, groups).items()])
     )
@@ -277,7 +280,7 @@ def check_points(mesh: Mesh, group: str, otherwise: str) -> None:
 
 
 def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:
-    """Return the facets (n, n_nodes) of a group by element type, each once, even if the mesh contains it several times.
+    """Return the facets (n, n_nodes) of a group by element type, without duplicates.
 
     Raises MeshError if there is no such group of cells, ModelError if it has no facets.
     """
@@ -286,14 +289,14 @@ def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:
     blocks = mesh.cells_of(group, dim=mesh.dim - 1)
     if not blocks:
         raise ModelError(f"group '{group}' contains no facets (cells of dimension {mesh.dim - 1}) for a load to act on")
-    once = {name: np.unique(np.sort(block, axis=1), axis=0, return_index=True)[1] for name, block in blocks.items()}
-    return {name: block[np.sort(once[name])] for name, block in blocks.items()}
+    first = {name: np.unique(np.sort(block, axis=1), axis=0, return_index=True)[1] for name, block in blocks.items()}
+    return {name: block[np.sort(first[name])] for name, block in blocks.items()}
 
 
 def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
-    """Return the facets (n, n_nodes) of `block` (n, n_nodes), oriented so that their normals point out of the solid.
+    """Return the facets `block` (n, n_nodes) of an element type with normals that point out of the solid.
 
-    Raises ModelError if a facet does not lie on the outside of a solid.
+    Raises ModelError if a facet does not lie on the outside of a solid; the message names the `group`.
     """
     outer = outer_facets(mesh).get(element, np.empty((0, block.shape[1]), np.int32))
     rows = same_facets(outer, block)
@@ -310,7 +313,7 @@ def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
 def evaluated(value: Value, points: Array, name: str) -> Array:
     """Return the value (...) [unit of the load] at `points` (..., dim) [length].
 
-    Raises ModelError if it is a function that returns another shape, or a result is not finite.
+    Raises ModelError if a function returns an array of another shape, or numbers that are not finite or too large.
     """
     if not callable(value):
         return np.full(points.shape[:-1], float(value))
@@ -330,7 +333,7 @@ def evaluated(value: Value, points: Array, name: str) -> Array:
 
 
 def check_number(name: str, value: Any) -> None:
-    """Raise ModelError, with its `name`, if `value` is not a finite number, or is too large for arithmetic."""
+    """Raise ModelError, with its `name`, if `value` is not a finite number, or its magnitude exceeds `LARGEST`."""
     number: Any = value if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     if not abs(number) < math.inf:
         raise ModelError(f"{name} is {value!r}, which is not a finite number")
@@ -345,19 +348,19 @@ def check_value(name: str, value: Any) -> None:
 
 
 def axes_of(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, Any]:
-    """Return components given by the names of their axes, by number, without those that are None.
+    """Return the components that are not None by the number of their axis, given by the names x, y and z.
 
-    Raises ModelError if there is none, or there is no such axis.
+    Raises ModelError, which begins with `caption`, if all components are None, or an axis does not exist in `dim` dimensions.
     """
-    chosen = {name: value for name, value in components.items() if value is not None}
-    if not chosen:
+    specified = {name: value for name, value in components.items() if value is not None}
+    if not specified:
         raise ModelError(f"{caption} has no component: give for example y=-1.0")
-    for name in chosen:
+    for name in specified:
         check_known("component", name, "xyz"[:dim], ModelError, f"{caption}: ")
-    return {"xyz".index(name): value for name, value in chosen.items()}
+    return {"xyz".index(name): value for name, value in specified.items()}
 
 
-def _places(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array, Array, Array]:
+def _quadrature(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array, Array, Array]:
     """Return positions (c, q, dim), shape functions (q, n), their derivatives (q, n, cell dim) and weights (q,)."""
     reference = elements.get(element)
     xi, weights = quadrature.product_rule(reference.linear, _POINTS, _STRAIGHT)
@@ -368,35 +371,37 @@ def _places(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array, Arr
 def cell_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
     """Return positions (c, q, dim) [length], shape functions (q, n) [-] and volumes (c, q) [length^dim] in cells.
 
-    At the quadrature points of `cells` (c, n) of int of an element; in axisymmetry over the full circle.
+    They are those of the quadrature points of `cells` (c, n) of int of an element. Volumes include the weight of a point and,
+    in axisymmetry, the circumference.
     """
-    x, N, dN, weights = _places(mesh, element, cells)
+    x, N, dN, weights = _quadrature(mesh, element, cells)
     J = np.einsum("qnk,cnd->cqdk", dN, mesh.points[cells])
-    return x, N, _turned(np.linalg.det(J) * weights, x, kinematics)
+    return x, N, _over_circle(np.linalg.det(J) * weights, x, kinematics)
 
 
 def facet_points(mesh: Mesh, element: str, facets: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
     """Return positions (f, q, dim) [length], shape functions (q, n) [-] and area vectors (f, q, dim) [length^2] of facets.
 
-    At the quadrature points of `facets` (f, n) of int of an element; in axisymmetry over the full circle.
+    They are those of the quadrature points of `facets` (f, n) of int of an element. Area vectors include the weight of a
+    point and, in axisymmetry, the circumference.
     """
-    x, N, dN, weights = _places(mesh, element, facets)
+    x, N, dN, weights = _quadrature(mesh, element, facets)
     normal = area_vectors(mesh.points[facets], dN)
-    return x, N, _turned(normal * weights[:, None], x, kinematics)
+    return x, N, _over_circle(normal * weights[:, None], x, kinematics)
 
 
-def _turned(measure: Array, x: Array, kinematics: str) -> Array:
-    """Return a measure (c, q) or (c, q, dim), multiplied by the circumference in axisymmetry."""
+def _over_circle(measure: Array, x: Array, kinematics: str) -> Array:
+    """Return volumes (c, q) or area vectors (c, q, dim), in axisymmetry times the circumference at `x` (c, q, dim)."""
     if kinematics != "axisymmetric":
         return measure
-    circle = 2.0 * np.pi * x[:, :, 0]
-    return measure * (circle if measure.ndim == 2 else circle[:, :, None])
+    circumference = 2.0 * np.pi * x[:, :, 0]
+    return measure * (circumference if measure.ndim == 2 else circumference[:, :, None])
 
 
 def measured_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
     """Return positions (c, q, dim) [length], shape functions (q, n) [-] and volumes or areas (c, q) [length^dim].
 
-    Those of `cell_points`, or of `facet_points` if `cells` (c, n) of int are facets, which have areas.
+    The results are those of `cell_points`, or those of `facet_points` with areas if `cells` (c, n) of int are facets.
     """
     if elements.get(element).dim == mesh.dim:
         return cell_points(mesh, element, cells, kinematics)
@@ -407,6 +412,7 @@ def measured_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -
 def add_density(forces: Array, cells: Numbers, N: Array, density: Array) -> None:
     """Add the integrals of a density times the shape functions to nodal `forces` (n_points, dim) [force], in place.
 
-    `cells` (c, n) of int, shape functions `N` (q, n) [-], and `density` (c, q, dim) [force], times the volume of each point.
+    `density` (c, q, dim) [force] includes the volume or area of each quadrature point; `cells` (c, n) of int are the nodes
+    of the cells, and `N` (q, n) [-] the shape functions.
     """
     np.add.at(forces, cells, np.einsum("qn,cqd->cnd", N, density))

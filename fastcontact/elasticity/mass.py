@@ -1,4 +1,4 @@
-"""Consistent mass matrix and geometric (initial-stress) stiffness."""
+"""Consistent mass matrix and geometric (initial-stress) stiffness, and assembly of matrices of node pairs."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-# Number of entries of local matrices that are computed at a time.
+# Number of entries of local matrices that are computed at a time, which limits the memory.
 AT_ONCE = 2_000_000
 
 
 def mass(mesh: Mesh, kinematics: str, density: DensityField) -> bsr_array:
     """Return the consistent mass matrix (n_dofs, n_dofs) [mass] of the solid cells, in axisymmetry of the full circle.
 
-    Integrals are exact on straight cells. Raises ModelError if cells have no density.
+    Integrals are exact on straight cells with constant density. Raises ModelError if cells have no density, or all densities
+    are zero.
     """
     missing = 0
 
@@ -39,7 +40,7 @@ def mass(mesh: Mesh, kinematics: str, density: DensityField) -> bsr_array:
         volume = cell_volumes(corners, N, element.gradient(xi), kinematics == "axisymmetric") * weights
         return np.einsum("cq,qa,qb->cab", rho * volume, N, N, optimize=True)[..., None]
 
-    matrix = _block_diagonal(mesh, local)
+    matrix = _diagonal_blocks(mesh, local)
     if missing:
         raise ModelError(
             f"modes need densities, but the materials of {missing} solid cells have none: give them density=..., 0.0 for a "
@@ -75,18 +76,18 @@ def stress_stiffness(mesh: Mesh, stresses: CellStress, material: Mapping[str, An
         gradient, _ = gradients_at(corners, dN)
         weighted = cell_volumes(corners, N, dN, axisymmetric)[..., None] * weights[:, None] * stress
         tensor = weighted[..., PAIRS[mesh.dim]]
-        every = np.einsum("cqai,cqij,cqbj->cab", gradient, tensor, gradient, optimize=True)
-        out = np.repeat(every[..., None], mesh.dim, axis=3)
+        integrals = np.einsum("cqai,cqij,cqbj->cab", gradient, tensor, gradient, optimize=True)
+        by_component = np.repeat(integrals[..., None], mesh.dim, axis=3)
         if axisymmetric:
             radius = np.einsum("qa,ca->cq", N, corners[:, :, 0])
-            out[..., 0] += np.einsum("cq,qa,qb->cab", weighted[:, :, 2] / radius**2, N, N, optimize=True)
-        return out
+            by_component[..., 0] += np.einsum("cq,qa,qb->cab", weighted[:, :, 2] / radius**2, N, N, optimize=True)
+        return by_component
 
-    return _block_diagonal(mesh, local)
+    return _diagonal_blocks(mesh, local)
 
 
-def _block_diagonal(mesh: Mesh, local: Callable[[str, Indices], Array]) -> bsr_array:
-    """Return the matrix with diagonal blocks, assembled from their diagonals (n_cells, n_nodes, n_nodes, dim or 1)."""
+def _diagonal_blocks(mesh: Mesh, local: Callable[[str, Indices], Array]) -> bsr_array:
+    """Return the matrix whose nodal blocks are diagonal, with the `local` diagonals (n_cells, n_nodes, n_nodes, dim or 1)."""
     pattern, diagonals = assembled(mesh, local)
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
     data[:, range(mesh.dim), range(mesh.dim)] = diagonals
@@ -95,7 +96,11 @@ def _block_diagonal(mesh: Mesh, local: Callable[[str, Indices], Array]) -> bsr_a
 
 
 def assembled(mesh: Mesh, local: Callable[[str, Indices], Array]) -> tuple[Sparsity, Array]:
-    """Return the node pairs of a mesh, and the sums (n_pairs, k) of local matrices (n_cells, n_nodes, n_nodes, k)."""
+    """Return the sparsity of a mesh, and the sums (n_blocks, k) of the local matrices of all cells at its blocks.
+
+    The function `local` receives an element type and the numbers (n_cells,) of some cells, and returns their matrices
+    (n_cells, n_nodes, n_nodes, k).
+    """
     pattern = sparsity(mesh)
     total = np.zeros((len(pattern.indices), 1))
     for name, rows in portions(mesh):
@@ -106,7 +111,7 @@ def assembled(mesh: Mesh, local: Callable[[str, Indices], Array]) -> tuple[Spars
 
 
 def portions(mesh: Mesh) -> Iterator[tuple[str, Indices]]:
-    """Yield elements and numbers (n,) of solid cells, in portions that limit the memory."""
+    """Yield element types and numbers (n,) of solid cells, in portions that limit the memory."""
     for name, cells in mesh.solids.items():
         n_q = len(integration_rule(elements.get(name))[1])
         size = max(1, AT_ONCE // (cells.shape[1] * max(n_q, cells.shape[1])))

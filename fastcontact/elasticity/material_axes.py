@@ -1,4 +1,4 @@
-"""Material axes, which are fixed vectors, cylindrical axes, or any function of position."""
+"""Material axes: fixed vectors, cylindrical axes, or a function of position."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from fastcontact.errors import ModelError
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 Axes = Sequence[Sequence[float]] | Callable[[Array], Array] | None
-# Indices of the components xx, yy, zz, xy, yz, xz of stress and strain.
+# Indices (i, j) of the components xx, yy, zz, xy, yz, xz of stress and strain.
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 
 
 @dataclass(frozen=True)
 class CylindricalAxes:
-    """Cylindrical axes around a line: axis 1 is radial, axis 2 circumferential, and axis 3 parallel to the line.
+    """Cylindrical axes about a line: axis 1 is radial, axis 2 circumferential, and axis 3 parallel to the line.
 
-    In plane models the line is normal to the plane, at `origin`. In axisymmetry the line must be the axis of symmetry, with
+    In plane models the default direction is normal to the plane. In axisymmetry the line must be the axis of symmetry, with
     ``direction=(0, 1, 0)``.
 
     Parameters
@@ -35,7 +35,7 @@ class CylindricalAxes:
     Raises
     ------
     ModelError
-        If a vector does not have three components, or the direction is zero.
+        If a vector does not have three finite components, or the direction is zero.
 
     Examples
     --------
@@ -67,27 +67,28 @@ class CylindricalAxes:
         return not any((self.origin[0], self.origin[2], self.direction[0], self.direction[2]))
 
     def __call__(self, points: Array) -> Array:
-        """Return the axes at `points` (n, dim) [length] as unit vectors in rows (n, 3, 3) [-]."""
-        places = np.zeros((len(points), 3))
-        places[:, : points.shape[1]] = points
+        """Return the axes at `points` (n, dim) [length] as unit vectors in rows (n, 3, 3) [-]; ModelError on the line."""
+        x = np.zeros((len(points), 3))
+        x[:, : points.shape[1]] = points
         along = np.array(self.direction) / np.linalg.norm(self.direction)
-        arm = places - self.origin
+        arm = x - self.origin
         radial = arm - (arm @ along)[:, None] * along
-        length = np.linalg.norm(radial, axis=1)
-        bad = np.flatnonzero(length <= LENGTH_ROUND_OFF * np.abs(places - self.origin).max(initial=0.0))
-        if len(bad):
+        radius = np.linalg.norm(radial, axis=1)
+        on_line = np.flatnonzero(radius <= LENGTH_ROUND_OFF * np.abs(arm).max(initial=0.0))
+        if len(on_line):
             raise ModelError(
-                f"a point of a cell at {places[bad[0]]} lies on the line of the cylindrical axes, where no direction is "
+                f"a point of a cell at {x[on_line[0]]} lies on the line of the cylindrical axes, where no direction is "
                 "radial: give the cells there a material with other axes, or move a node"
             )
-        radial /= length[:, None]
+        radial /= radius[:, None]
         return np.stack([radial, np.cross(along, radial), np.broadcast_to(along, radial.shape)], axis=1)
 
 
 def checked_axes(axes: Any) -> Axes:
-    """Return three orthonormal vectors for axes that are given by vectors; return functions unchanged.
+    """Return axes given by vectors as three orthonormal vectors; return functions and None unchanged.
 
-    ModelError unless one vector in 2D, or two or three orthogonal vectors in 3D are given.
+    ModelError unless the axes are one vector with two components, or two or three orthogonal vectors with three components
+    that form a right-handed frame.
     """
     if axes is None or callable(axes):
         return axes  # type: ignore[no-any-return]
@@ -101,12 +102,12 @@ def checked_axes(axes: Any) -> Axes:
         )
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     if not lengths.min() > 0.0:
-        raise ModelError(f"the axes of a material {vectors.tolist()} have one without length")
+        raise ModelError(f"the axes of a material {vectors.tolist()} contain a zero vector")
     vectors = vectors / lengths
-    off = np.abs(vectors @ vectors.T - np.eye(len(vectors))).max()
-    if off > SINGLE_PRECISION:
+    cosine = np.abs(vectors @ vectors.T - np.eye(len(vectors))).max()
+    if cosine > SINGLE_PRECISION:
         raise ModelError(
-            f"the axes of a material {vectors.tolist()} are not at right angles: the cosine between two is {off:.3g}"
+            f"the axes of a material {vectors.tolist()} are not at right angles: the cosine between two is {cosine:.3g}"
         )
     first = vectors[0]
     second = vectors[1] - (vectors[1] @ first) * first
@@ -114,13 +115,13 @@ def checked_axes(axes: Any) -> Axes:
     third = np.cross(first, second)
     if len(vectors) == 3 and vectors[2] @ third < 0.0:
         raise ModelError(
-            f"the axes of a material {vectors.tolist()} are left-handed: turn the sign of the third, or leave it out"
+            f"the axes of a material {vectors.tolist()} are left-handed: change the sign of the third, or leave it out"
         )
     return tuple(tuple(row) for row in np.array([first, second, third]).tolist())
 
 
 def frames(axes: Axes, points: Array, kinematics: str) -> Array:
-    """Return checked axes at `points` (n, dim) [length] as unit vectors in rows (n, 3, 3) [-].
+    """Return axes from `checked_axes` at `points` (n, dim) [length] as unit vectors in rows (n, 3, 3) [-].
 
     ModelError if a function returns an array of another shape or vectors that are not orthonormal, or if the line of
     cylindrical axes is not the axis of symmetry of an axisymmetric model.
@@ -131,7 +132,7 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
         return np.broadcast_to(np.array(axes), (len(points), 3, 3))
     if kinematics == "axisymmetric" and isinstance(axes, CylindricalAxes) and not axes.around_y:
         raise ModelError(
-            f"{axes} are not around the axis of symmetry: in axisymmetry their origin is (0, 0, 0) and their direction "
+            f"{axes} are not about the axis of symmetry: in axisymmetry their origin is (0, 0, 0) and their direction "
             "(0, 1, 0)"
         )
     returned = values_at(axes, points, "the axes of a material", ModelError)
@@ -144,18 +145,21 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
             f"the function of a material's axes returned numbers of shape {frame.shape} for {len(points)} points: it must "
             f"return three vectors in rows for each, shape ({len(points)}, 3, 3)"
         )
-    off = np.abs(frame @ frame.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
-    bad = np.flatnonzero(~(off <= SINGLE_PRECISION) | np.iscomplexobj(frame))
-    if len(bad):
+    difference = np.abs(frame @ frame.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    wrong = np.flatnonzero(~(difference <= SINGLE_PRECISION) | np.iscomplexobj(frame))
+    if len(wrong):
         raise ModelError(
-            f"the function of a material's axes returned {frame[bad[0]].tolist()} at {points[bad[0]]}: these are not unit "
-            "vectors at right angles"
+            f"the function of a material's axes returned {frame[wrong[0]].tolist()} at {points[wrong[0]]}: these are not "
+            "unit vectors at right angles"
         )
     return frame
 
 
 def rotations(frame: Array) -> Array:
-    """Return the matrices (n, 6, 6) [-] that transform stresses from the axes `frame` (n, 3, 3) [-] to those of the mesh."""
+    """Return the matrices (n, 6, 6) [-] that transform stresses from the axes `frame` (n, 3, 3) [-] to the mesh axes.
+
+    The components are xx, yy, zz, xy, yz, xz.
+    """
     rotation = np.empty((len(frame), 6, 6))
     for row, (i, j) in enumerate(PAIRS):
         for column, (a, b) in enumerate(PAIRS):

@@ -1,4 +1,4 @@
-"""The materials of all solid cells: moduli, and their assignment to cells."""
+"""The materials of all solid cells: their moduli, and the assignment of moduli to cells and quadrature points."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from fastcontact.arrays import AnyArray, Array, Mask, Numbers
 from fastcontact.elasticity.incompatible_modes import MODES
 from fastcontact.elasticity.initial_states import InitialState, StressOffset
 from fastcontact.elasticity.materials import MODULI, Material
-from fastcontact.elasticity.varying_constants import middle, positions
+from fastcontact.elasticity.varying_constants import centre, positions
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
-    """Points at which the moduli of a varying material are stored.
+class EvaluationPoints:
+    """Points of one element type at which a varying material is evaluated.
 
     Attributes
     ----------
@@ -29,9 +29,9 @@ class Places:
     first : int
         Row of the first of these points in `MaterialField.moduli`.
     points : ndarray (n, dim)
-        Points at which axes are evaluated: the middles of cells, or their quadrature points [length].
+        The centres of cells, or their quadrature points [length].
     constants : SimpleNamespace
-        Result of `Material.constants_at`.
+        Result of `Material.constants_at` at these points.
     """
 
     material: int
@@ -54,20 +54,23 @@ class MaterialField:
     materials : sequence of Material
     kinematics : str
     moduli : ndarray (n_moduli, n_components, n_components)
-        Moduli of each material, then those at the `places` of varying materials [pressure].
-    places : sequence of Places
+        Moduli of each material, followed by those at the points of `evaluations` [pressure].
+    evaluations : sequence of EvaluationPoints
+        Points at which varying materials are evaluated.
     owner : ndarray of int (n_moduli,)
-        Material of each of the moduli.
+        Number of the material of each of the moduli.
     number, rows : dict of str to ndarray of int (n_cells,)
-        Material of each cell, and its row in `moduli` (at the cell centre if the material varies), by solid element type.
+        Number of the material of each cell, and its row in `moduli` (that of the cell centre if the material varies), by
+        solid element type.
     inside : dict of str to ndarray of int (n_cells, n_q)
-        Row in `moduli` of each quadrature point, by solid element type, where materials vary inside cells.
+        Row in `moduli` of each quadrature point, by solid element type; only for element types with materials that vary
+        within cells.
     """
 
     materials: Sequence[Material]
     kinematics: str
     moduli: Array
-    places: Sequence[Places]
+    evaluations: Sequence[EvaluationPoints]
     owner: Numbers
     number: dict[str, Numbers]
     rows: dict[str, Numbers]
@@ -75,13 +78,8 @@ class MaterialField:
 
     @cached_property
     def loops(self) -> dict[str, Numbers]:
-        """Rows of moduli for the element loops, by element type: `inside` if materials vary in cells, otherwise `rows`."""
+        """Rows of moduli for the element loops, by element type: `inside` if there are any, otherwise `rows`."""
         return {**self.rows, **self.inside}
-
-    @property
-    def n_materials(self) -> int:
-        """Number of materials."""
-        return len(self.materials)
 
     @cached_property
     def averaged(self) -> Mask:
@@ -91,10 +89,10 @@ class MaterialField:
 
     @cached_property
     def treatment(self) -> AnyArray:
-        """Strain treatment of elements, by moduli (n_moduli,): 1 mean dilatation, 2 incompatible modes, 0 none.
+        """Codes (n_moduli,) of the strain treatment: 1 for a mean dilatation, 2 for incompatible modes, 0 for neither.
 
-        Their sum means incompatible modes in the elements that have them, and a mean dilatation in others. Axisymmetric cells
-        have no incompatible modes.
+        3 means incompatible modes in the elements that support them, and a mean dilatation in others. In axisymmetry there
+        are no incompatible modes.
         """
         modes = np.array([material.incompatible_modes for material in self.materials], bool)[self.owner]
         treatment = self.averaged.astype(np.uint8)
@@ -104,53 +102,50 @@ class MaterialField:
 
     @cached_property
     def contrast(self) -> float:
-        """A third of the largest relative excess of a material's stiffest over its softest normal modulus, at least 1 [-].
+        """A measure of near incompressibility, at least 1 [-].
 
-        For isotropic materials it is ``nu / (1 - 2 nu)``, which grows towards incompressibility, since the eigenvalues of the
-        moduli for normal strains are ``3 lambda + 2 mu`` and ``2 mu``.
+        It is the largest ratio of the extreme eigenvalues of the moduli for normal strains, minus one, divided by three. In
+        isotropic materials these eigenvalues are ``3 lambda + 2 mu`` and ``2 mu``, and the measure is ``nu / (1 - 2 nu)``.
         """
         normal = 2 if self.kinematics == "plane_stress" else 3
         used = self.moduli[:, 0, 0] > 0.0  # unused rows of varying materials are zero
-        values = np.linalg.eigvalsh(self.moduli[used, :normal, :normal])
-        return max(1.0, float(((values[:, -1] / values[:, 0]).max() - 1.0) / 3.0))
+        eigenvalues = np.linalg.eigvalsh(self.moduli[used, :normal, :normal])
+        return max(1.0, float(((eigenvalues[:, -1] / eigenvalues[:, 0]).max() - 1.0) / 3.0))
 
     @cached_property
     def compliance(self) -> Array:
-        """Compliances (n_moduli, n_components, n_components) [1 / pressure], see `Material.compliance_at`."""
-        return self._of_materials(np.zeros_like(self.moduli), "compliance_at")
+        """Compliances (n_moduli, n_components, n_components) [1 / pressure]; see `Material.compliance_at`."""
+        return self._evaluated(np.zeros_like(self.moduli), "compliance_at")
 
     @cached_property
     def expansion(self) -> Array:
         """Thermal strains (n_moduli, n_components) [1 / temperature]; NaN for materials without expansion."""
-        return self._of_materials(np.zeros(self.moduli.shape[:2]), "expansion_at")
+        return self._evaluated(np.zeros(self.moduli.shape[:2]), "expansion_at")
 
-    def _of_materials(self, values: Array, method: str) -> Array:
-        """Fill `values` (n_moduli, ...) with the results of a method of the materials."""
+    def _evaluated(self, values: Array, method: str) -> Array:
+        """Fill `values` (n_moduli, ...) with the results of a method of the materials, and return them."""
+        arbitrary_point = np.zeros((1, 3 if self.kinematics == "3d" else 2))
         for number, material in enumerate(self.materials):
             if not material.varies:  # rows of varying materials are unused
-                values[number] = getattr(material, method)(self._anywhere, self.kinematics)[0]
-        for place in self.places:
-            at = getattr(self.materials[place.material], method)
-            values[place.rows] = at(place.points, self.kinematics, place.constants)
+                values[number] = getattr(material, method)(arbitrary_point, self.kinematics)[0]
+        for at in self.evaluations:
+            evaluate = getattr(self.materials[at.material], method)
+            values[at.rows] = evaluate(at.points, self.kinematics, at.constants)
         return values
-
-    @property
-    def _anywhere(self) -> Array:
-        return np.zeros((1, 3 if self.kinematics == "3d" else 2))
 
     def offset(
         self, rise: Array | None, states: Sequence[tuple[float, InitialState]] = (), n_points: int = 0
     ) -> StressOffset | None:
-        """Return the stress due to temperatures and initial states; None if there are none.
+        """Return the stress due to temperatures and initial states; None if there are neither.
 
         Parameters
         ----------
         rise : ndarray (n_points,), optional
-            Temperature rise [temperature].
+            Temperature rise over the reference temperature [temperature]; zero by default.
         states : sequence of (float, InitialState)
-            Factors, and initial stresses and strains.
+            Initial stresses and strains, each with its multiplier.
         n_points : int
-            Number of points of the mesh, for initial states without temperatures.
+            Number of points of the mesh, which is needed if `rise` is not given.
         """
         if rise is None and not states:
             return None
@@ -159,24 +154,22 @@ class MaterialField:
 
     def without_expansion(self, mesh: Mesh, rise: Array) -> int:
         """Return the number of cells with a temperature rise (n_points,) [temperature] and a material without expansion."""
-        unknown = np.isnan(self.expansion[:, 0])
-        count = 0
-        for name, block in mesh.solids.items():
-            heated = np.asarray(rise[block] != 0.0).any(axis=1)
-            count += int(np.count_nonzero(unknown[self.rows[name]] & heated))
-        return count
+        without = np.isnan(self.expansion[:, 0])
+        return sum(
+            int(np.count_nonzero(without[self.rows[name]] & (rise[block] != 0.0).any(axis=1)))
+            for name, block in mesh.solids.items()
+        )
 
     @cached_property
     def distinct(self) -> dict[str, Numbers]:
-        """Material (n_cells,) of every cell by element type; materials between which stress is continuous share a number.
+        """Material numbers (n_cells,) by element type, where materials between which stress is continuous share a number.
 
         Such materials have the same moduli, axes and expansion.
         """
         first: dict[object, int] = {}
-        same = np.empty(self.n_materials, np.int32)
-        for number, material in enumerate(self.materials):
-            same[number] = first.setdefault(_law(material, self.moduli[number]), number)
-        return {name: same[values] for name, values in self.number.items()}
+        laws = [_law(material, moduli) for material, moduli in zip(self.materials, self.moduli, strict=False)]
+        shared = np.array([first.setdefault(law, number) for number, law in enumerate(laws)], np.int32)
+        return {name: shared[values] for name, values in self.number.items()}
 
 
 def material_field(
@@ -190,36 +183,36 @@ def material_field(
     kinematics : str
     materials : sequence of Material
     number : mapping of str to ndarray of int (n_cells,)
-        Material of each cell, by solid element type.
+        Number of the material of each cell, by solid element type.
     """
     size = 6 if kinematics == "3d" else 4
     moduli = [np.zeros((1, size, size)) if m.varies else m.moduli(kinematics)[None] for m in materials]
     owner = [np.arange(len(materials), dtype=np.int32)]
     rows, inside = {name: values.copy() for name, values in number.items()}, {}
-    places: list[Places] = []
+    evaluations: list[EvaluationPoints] = []
 
     def added(index: int, points: Array, constants: Any) -> Numbers:
-        """Add the moduli of a material at `points`; return their numbers."""
-        places.append(Places(index, sum(map(len, moduli)), points, constants))
+        """Add the moduli of a material at `points`; return their rows."""
+        evaluations.append(EvaluationPoints(index, sum(map(len, moduli)), points, constants))
         moduli.append(materials[index].moduli_at(points, kinematics, constants))
         owner.append(np.full(len(points), index, np.int32))
-        return places[-1].first + np.arange(len(points), dtype=np.int32)
+        return evaluations[-1].first + np.arange(len(points), dtype=np.int32)
 
     for index, material in enumerate(materials):
         for name, block in mesh.solids.items() if material.varies else ():
             cells = np.flatnonzero(number[name] == index)
-            middles = mesh.points[block[cells]].mean(axis=1)
-            rows[name][cells] = added(index, middles, material.constants_at(name, cells, middle(name)))
+            centres = mesh.points[block[cells]].mean(axis=1)
+            rows[name][cells] = added(index, centres, material.constants_at(name, cells, centre(name)))
     for index, material in enumerate(materials):
         for name, block in mesh.solids.items() if material.varies_inside else ():
             cells = np.flatnonzero(number[name] == index)
             N = elements.get(name).tables[0]
             if name not in inside:
                 inside[name] = np.repeat(rows[name][:, None], len(N), axis=1)
-            index_at = added(index, positions(mesh, block[cells], N), material.constants_at(name, cells, N))
-            inside[name][cells] = index_at.reshape(len(cells), len(N))
+            at_points = added(index, positions(mesh, block[cells], N), material.constants_at(name, cells, N))
+            inside[name][cells] = at_points.reshape(len(cells), len(N))
     return MaterialField(
-        materials, kinematics, np.concatenate(moduli), places, np.concatenate(owner), dict(number), rows, inside
+        materials, kinematics, np.concatenate(moduli), evaluations, np.concatenate(owner), dict(number), rows, inside
     )
 
 
@@ -227,6 +220,6 @@ def _law(material: Material, moduli: Array) -> tuple[object, ...]:
     """Return a key that is equal for materials between which stress is continuous."""
     constants = tuple(getattr(material, name, None) for name in MODULI) if material.graded else None
     compliance = b"" if material.graded else material.local_compliance.tobytes()
-    own_axes = material.axes if material.varies else None
-    law = (constants, compliance) if material.varies else moduli.tobytes()
-    return law, id(own_axes), repr(material.expansion), material.expansion if material.varies else None
+    if not material.varies:
+        return moduli.tobytes(), repr(material.expansion)
+    return constants, compliance, id(material.axes), repr(material.expansion), material.expansion

@@ -1,4 +1,4 @@
-"""Nodes at material interfaces, where stress is discontinuous and has a nodal value for each material."""
+"""Slots for nodal stresses, of which a node at a material interface has one for each of its materials."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fastcontact.mesh.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class MaterialSides:
-    """Slots for nodal values: a slot for each node, and additional slots for the other materials at interfaces.
+    """Slots for nodal values: one for each node, and one more for each further material of a node at an interface.
 
     Attributes
     ----------
@@ -21,19 +21,16 @@ class MaterialSides:
         Slots of the nodes of each cell, by solid element type.
     node : ndarray of int (n_slots,)
         Node of each slot; slot k of the first n_points belongs to node k.
-    points : ndarray of int (k,)
-        Node of each pair of a node at an interface and one of its materials, in ascending order.
-    material : ndarray of int (k,)
-        Material number of each of these pairs.
-    place : ndarray of int (k,)
-        Slot of each of these pairs.
+    points, material, slot : ndarray of int (k,)
+        Node, material number and slot of each pair of a node at an interface and one of its materials, in ascending order of
+        the nodes.
     """
 
     cells: Mapping[str, Numbers]
     node: Numbers
     points: Numbers
     material: Numbers
-    place: Numbers
+    slot: Numbers
 
 
 def material_sides(mesh: Mesh, material: Mapping[str, Numbers]) -> MaterialSides:
@@ -49,19 +46,17 @@ def material_sides(mesh: Mesh, material: Mapping[str, Numbers]) -> MaterialSides
         none = np.empty(0, np.int32)
         return MaterialSides(dict(mesh.solids), np.arange(n, dtype=np.int32), none, none, none)
     count = int(highest.max()) + 1
-    keys = [
-        (block.astype(np.int64) * count + material[name][:, None])[shared[block]] for name, block in mesh.solids.items()
-    ]
-    rows = np.unique(np.concatenate(keys))
-    points, numbers = (rows // count).astype(np.int32), (rows % count).astype(np.int32)
+    keys = {  # of pairs of an interface node and a material
+        name: (block.astype(np.int64) * count + material[name][:, None])[shared[block]]
+        for name, block in mesh.solids.items()
+    }
+    pairs = np.unique(np.concatenate([*keys.values()]))
+    points, numbers = (pairs // count).astype(np.int32), (pairs % count).astype(np.int32)
     additional = numbers != lowest[points]
-    side = points.copy()
-    side[additional] = n + np.arange(np.count_nonzero(additional), dtype=np.int32)
-    cells = {}
+    slot = points.copy()
+    slot[additional] = n + np.arange(np.count_nonzero(additional), dtype=np.int32)
+    cells = {name: block.copy() for name, block in mesh.solids.items()}
     for name, block in mesh.solids.items():
-        here = shared[block]
-        cells[name] = block.copy()
-        wanted = (block.astype(np.int64) * count + material[name][:, None])[here]
-        cells[name][here] = side[np.searchsorted(rows, wanted)]
+        cells[name][shared[block]] = slot[np.searchsorted(pairs, keys[name])]
     node = np.concatenate([np.arange(n, dtype=np.int32), points[additional]])
-    return MaterialSides(cells, node, points, numbers, side)
+    return MaterialSides(cells, node, points, numbers, slot)

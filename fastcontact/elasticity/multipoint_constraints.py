@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array, vstack
+from scipy.sparse import csr_array, diags_array
 
 from fastcontact.arrays import Array, Indices, Mask
 
 Table = tuple[tuple[float, float], ...]
-# Coefficients below this fraction of the largest one of their row are round-off from cancellation.
+# Coefficients below this fraction of the largest coefficient in their row are round-off from cancellation.
 ZERO = 1e-10
+# Coefficients by column: first the n displacement components, then the right-hand sides.
 Row = dict[int, float]
 
 
@@ -29,7 +30,7 @@ class MultiPointConstraint:
     value : float or ndarray (m,)
         Right-hand sides at multiplier 1 of the ramp [length times the unit of the coefficients].
     ramp : tuple of (float, float), optional
-        Points (instant, multiplier) of its ramp; None: the ramp of the analysis.
+        Points (instant, multiplier) of the ramp of the right-hand side; None means the ramp of the analysis.
     """
 
     name: str
@@ -40,7 +41,7 @@ class MultiPointConstraint:
 
 @dataclass(frozen=True, eq=False)
 class TemporaryConstraint(MultiPointConstraint):
-    """A constraint that acts in the load steps between two instants, starting from the values at its beginning.
+    """A constraint that acts in the load steps between two instants, with ``rows @ u`` continuous where it begins.
 
     Parameters
     ----------
@@ -51,10 +52,10 @@ class TemporaryConstraint(MultiPointConstraint):
     value : float or ndarray (m,)
         Right-hand sides at multiplier 1 of the ramp [length times the unit of the coefficients].
     begins, ends : float
-        Instants at ends of load steps [-].
+        The two instants, at ends of load steps [-].
     keeps : bool
-        Whether the constraint keeps its initial values, ignoring `value` and `ramp`; otherwise it proceeds from them to
-        the next point of its ramp.
+        Whether ``rows @ u`` keeps its values at the beginning, without regard to `value` and `ramp`; otherwise it changes
+        linearly from them to the next point of the ramp.
     """
 
     begins: float = -np.inf
@@ -62,24 +63,27 @@ class TemporaryConstraint(MultiPointConstraint):
     keeps: bool = False
 
     def acts_from(self, begin: float) -> bool:
-        """Return whether the constraint acts in the load step that begins at an instant."""
+        """Return whether the constraint acts in the load step that begins at the instant `begin`."""
         return self.begins <= begin < self.ends
 
     def after(self, reached: Array) -> list[MultiPointConstraint]:
-        """Return the constraints that continue from `reached` (m,) [length], the values of ``rows @ u`` at the beginning."""
+        """Return the constraints that continue from `reached` (m,), the values of ``rows @ u`` at the beginning.
+
+        The unit of `reached` is length times the unit of the coefficients.
+        """
         if self.keeps:
             return [MultiPointConstraint(self.name, self.rows, reached, ((0.0, 1.0),))]
         value, table = np.broadcast_to(self.value, reached.shape), self.ramp or ()
-        later = [[(t, v * factor) for t, factor in table if t > self.begins] for v in value.tolist()]
+        later_points = [[(t, v * factor) for t, factor in table if t > self.begins] for v in value.tolist()]
         return [
             MultiPointConstraint(self.name, self.rows[[row]], 1.0, ((self.begins, start), *points))
-            for row, (start, points) in enumerate(zip(reached.tolist(), later, strict=True))
+            for row, (start, points) in enumerate(zip(reached.tolist(), later_points, strict=True))
         ]
 
 
 @dataclass(frozen=True, eq=False)
 class Elimination:
-    """``u = T w + S r``, with w zero at the pivots, satisfies ``R u = r`` for every w that satisfies the conditions.
+    """Elimination of constraints: ``u = T w + S r`` satisfies ``R u = r`` for every w that satisfies the conditions.
 
     Attributes
     ----------
@@ -90,8 +94,8 @@ class Elimination:
     S : csr_array (n, m)
         Derivatives of the pivots with respect to the right-hand sides [length / unit of r].
     conditions : csr_array (k, n + m)
-        Rows that only involve known components and right-hand sides: solutions exist if ``conditions @ (w, r) = 0``
-        [unit of R], [-].
+        Rows that only involve known components and right-hand sides: solutions exist if ``conditions @ (w, r) = 0``.
+        Coefficients of components have the unit of R, and those of right-hand sides are dimensionless.
     origin : ndarray of int (k,)
         Row of R from which each condition originates.
     """
@@ -103,15 +107,8 @@ class Elimination:
     origin: Indices
 
 
-def stacked_rows(relations: Sequence[MultiPointConstraint], n_dofs: int) -> csr_array:
-    """Return the rows of all constraints as one matrix R (m, n_dofs) [unit of the rows]."""
-    if not relations:
-        return csr_array((0, n_dofs))
-    return csr_array(vstack([relation.rows for relation in relations], format="csr"))
-
-
 def eliminate(R: csr_array, known: Mask) -> Elimination:
-    """Express one unknown component by the others for each independent row of ``R u = r``.
+    """Express one unknown component in terms of the others for each linearly independent row of ``R u = r``.
 
     Parameters
     ----------
@@ -121,7 +118,7 @@ def eliminate(R: csr_array, known: Mask) -> Elimination:
         Components that are prescribed and never become pivots.
     """
     m, n = R.shape
-    uses = np.bincount(R.indices, minlength=n)
+    n_uses = np.bincount(R.indices, minlength=n)
     expressed: dict[int, Row] = {}
     users: dict[int, set[int]] = {}
     conditions: dict[int, Row] = {}
@@ -134,50 +131,44 @@ def eliminate(R: csr_array, known: Mask) -> Elimination:
         if not unknown:
             conditions[k] = row
             continue
-        # The pivot is the component in the fewest constraints, so that few expressions depend on it.
-        pivot = min(unknown, key=lambda key: (uses[key], -abs(row[key]), key))
+        # The pivot is the component in the fewest constraints, so that few of them change by its elimination.
+        pivot = min(unknown, key=lambda key: (n_uses[key], -abs(row[key]), key))
         coefficient = row.pop(pivot)
         _express(pivot, {key: -c / coefficient for key, c in row.items()}, expressed, users)
     pivots, origin = np.array([*expressed], np.intp), np.array([*conditions], np.intp)
-    of_known = _rows(dict(enumerate(conditions.values())), (len(conditions), n + m))
-    return Elimination(pivots, *_matrices(expressed, n, m), of_known, origin)
+    kept = np.ones(n)
+    kept[pivots] = 0.0
+    of_pivots = _rows(expressed, (n, n + m))
+    T, S = csr_array(of_pivots[:, :n] + diags_array(kept)), csr_array(of_pivots[:, n:])
+    return Elimination(pivots, T, S, _rows(dict(enumerate(conditions.values())), (len(conditions), n + m)), origin)
 
 
 def _substituted(R: csr_array, k: int, expressed: dict[int, Row]) -> Row:
     """Return row `k` of R with pivots replaced by their expressions."""
     row: Row = {}
-    size = 0.0
-    for entry in range(R.indptr[k], R.indptr[k + 1]):
-        key, c = int(R.indices[entry]), float(R.data[entry])
-        size = max(size, abs(c))
+    entries = slice(R.indptr[k], R.indptr[k + 1])
+    for key, c in zip(R.indices[entries].tolist(), R.data[entries].tolist(), strict=True):
         for other, d in expressed.get(key, {key: 1.0}).items():
             row[other] = row.get(other, 0.0) + c * d
-    return {key: c for key, c in row.items() if abs(c) > ZERO * size}
+    largest = np.abs(R.data[entries]).max(initial=0.0)
+    return {key: c for key, c in row.items() if abs(c) > ZERO * largest}
 
 
-def _express(pivot: int, by: Row, expressed: dict[int, Row], users: dict[int, set[int]]) -> None:
-    """Add a new pivot, and replace it in the expressions of earlier ones."""
-    expressed[pivot] = by
-    for key in by:
+def _express(pivot: int, expression: Row, expressed: dict[int, Row], users: dict[int, set[int]]) -> None:
+    """Add a pivot, and replace it in the expressions of earlier pivots; `users` are the pivots that depend on a component."""
+    expressed[pivot] = expression
+    for key in expression:
         users.setdefault(key, set()).add(pivot)
     for other in users.pop(pivot, set()):
         row = expressed[other]
         c = row.pop(pivot)
-        for key, d in by.items():
+        for key, d in expression.items():
             row[key] = row.get(key, 0.0) + c * d
             users[key].add(other)
 
 
-def _matrices(expressed: dict[int, Row], n: int, m: int) -> tuple[csr_array, csr_array]:
-    """Return T (n, n) and S (n, m)."""
-    kept = np.ones(n)
-    kept[list(expressed)] = 0.0
-    rows = _rows(expressed, (n, n + m))
-    return csr_array(rows[:, :n] + diags_array(kept)), csr_array(rows[:, n:])
-
-
 def _rows(rows: Mapping[int, Row], shape: tuple[int, int]) -> csr_array:
-    """Return a matrix with rows, by their number, given by dictionaries."""
+    """Return the sparse matrix whose rows are given by dictionaries, by their number."""
     row = np.array([number for number, entries in rows.items() for _ in entries], np.intp)
     column = np.array([key for entries in rows.values() for key in entries], np.intp)
     values = np.array([c for entries in rows.values() for c in entries.values()], np.float64)

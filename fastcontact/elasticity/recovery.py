@@ -9,19 +9,20 @@ import numpy as np
 from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Numbers
-from fastcontact.elasticity import dilatation, element_2d_kernels, element_kernels
+from fastcontact.elasticity import dilatation, element_2d_kernels
 from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.material_sides import MaterialSides
+from fastcontact.elasticity.stiffness import LOOPS
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 Materials = dict[str, Numbers]
-# Memory for values at the points of cells that are processed together [bytes].
+# Memory for the stresses of cells that are processed together [bytes].
 BATCH = 16_000_000
-# Sampling interval of cells by which the distribution of nodes is estimated.
+# Every SAMPLED-th cell is used to estimate the distribution of node numbers.
 SAMPLED = 16
 
 
@@ -76,28 +77,28 @@ def nodal_stress(
 ) -> Array:
     """Return the stress (n_points, n_components) [pressure] at the nodes: `nodal_average` of `stress_at_points`.
 
-    Arguments are as for `stress_at_points`. Stresses at points are computed for a few cells at a time, which takes less
-    memory. With `sides` the result has a row for each of its slots (n_slots, n_components): the mean at a node over the cells
-    of one material.
+    Other arguments are as for `stress_at_points`. Stresses at points are computed for a limited number of cells at a time,
+    which takes less memory. With `sides` the result has a row for each of its slots (n_slots, n_components): the mean at a
+    node over the cells of one material.
     """
     stress = CellStress(mesh, kinematics, moduli, displacement, averaged, offset)
-    rows_of = mesh.cells if sides is None else sides.cells
+    slots = mesh.cells if sides is None else sides.cells
     average = NodalAverage(mesh.n_points if sides is None else len(sides.node), moduli.shape[1])
     for name, block in mesh.solids.items():
         element = elements.get(name)
         xi, _ = element.quadrature
-        cell = np.empty((1, len(xi), moduli.shape[1]))
-        buffer = np.empty((min(len(block), BATCH // cell.nbytes + 1), *cell.shape[1:]))
+        bytes_of_cell = 8 * len(xi) * moduli.shape[1]
+        buffer = np.empty((min(len(block), BATCH // bytes_of_cell + 1), len(xi), moduli.shape[1]))
         for first in range(0, len(block), len(buffer)):
             rows = slice(first, first + len(buffer))
             values = buffer[: len(block) - first]
             stress.fill(name, xi, block[rows], material[name][rows], values, np.arange(first, first + len(values)))
-            average.add(rows_of[name][rows], element.extrapolation, values)
+            average.add(slots[name][rows], element.extrapolation, values)
     return average.result()
 
 
 class NodalAverage:
-    """The unweighted mean, at each node, of the stresses of the adjacent cells."""
+    """Mean of the stresses of the adjacent cells at each node, all cells with the same weight."""
 
     def __init__(self, count: int, components: int) -> None:
         self._total, self._count = np.zeros((count, components)), np.zeros(count)
@@ -111,18 +112,18 @@ class NodalAverage:
         """
         arguments = parallel.read_only(cells), extrapolation, values
         sums = self._total, self._count
-        # The 2D kernel serves any dimension and number of components.
-        parallel.shared(lambda portion: element_2d_kernels.add_nodal(*arguments, *portion, *sums), self._parts(cells))
+        # The kernel is in the module for 2D, but is independent of the dimension and the number of components.
+        parallel.shared(lambda nodes: element_2d_kernels.add_nodal(*arguments, *nodes, *sums), self._node_ranges(cells))
 
-    def _parts(self, cells: Numbers) -> list[tuple[int, int]]:
+    def _node_ranges(self, cells: Numbers) -> list[tuple[int, int]]:
         """Return a range of nodes for each thread, such that all ranges have about the same number of cells."""
-        sampled = np.sort(cells[::SAMPLED, 0])
-        count = len(parallel.portions(*cells.shape)) if len(sampled) else 1
-        ends = [0, *(int(sampled[k * len(sampled) // count]) for k in range(1, count)), len(self._count)]
+        sampled_nodes = np.sort(cells[::SAMPLED, 0])
+        count = len(parallel.portions(*cells.shape)) if len(sampled_nodes) else 1
+        ends = [0, *(int(sampled_nodes[k * len(sampled_nodes) // count]) for k in range(1, count)), len(self._count)]
         return list(itertools.pairwise(ends))
 
     def result(self) -> Array:
-        """Return the average (n_points, n_components) [pressure], zero at points without cells; may be called once."""
+        """Return the mean (n_points, n_components) [pressure], zero at points without cells; call this method only once."""
         self._total /= np.maximum(self._count, 1.0)[:, None]
         return self._total
 
@@ -147,10 +148,10 @@ def nodal_average(mesh: Mesh, at_points: dict[str, Array], sides: MaterialSides 
     without a solid cell have zero stress. With `sides` the result has a row for each of its slots (n_slots, n_components):
     the mean at a node over the cells of one material.
     """
-    cells, count = (mesh.cells, mesh.n_points) if sides is None else (sides.cells, len(sides.node))
+    slots, count = (mesh.cells, mesh.n_points) if sides is None else (sides.cells, len(sides.node))
     average = NodalAverage(count, next(iter(at_points.values())).shape[2])
     for name, values in at_points.items():
-        average.add(cells[name], elements.get(name).extrapolation, values)
+        average.add(slots[name], elements.get(name).extrapolation, values)
     return average.result()
 
 
@@ -160,11 +161,10 @@ def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> 
 
     The stresses are `at_points` (n_cells, n_q, n_components) [pressure], by solid element type.
     """
-    loops, force = element_kernels.loops(mesh.dim), np.zeros((mesh.n_points, mesh.dim))
+    force, axisymmetric = np.zeros((mesh.n_points, mesh.dim)), kinematics == "axisymmetric"
     for name, values in at_points.items():
-        N, dN, weights = elements.get(name).tables
-        axisymmetric = kinematics == "axisymmetric"
-        loops.add_internal_force(mesh.points, mesh.cells[name], N, dN, weights, axisymmetric, values, force)
+        tables = elements.get(name).tables
+        LOOPS[mesh.dim].add_internal_force(mesh.points, mesh.cells[name], *tables, axisymmetric, values, force)
     return force
 
 
@@ -187,18 +187,21 @@ def principal_stress(stress: Array) -> Array:
     Components are xx, yy, zz, xy, in 3D also yz, xz.
     """
     stress = _with_components(stress)
-    full = np.concatenate([stress, np.zeros((*stress.shape[:-1], 6 - stress.shape[-1]))], axis=-1)
-    return np.asarray(np.linalg.eigvalsh(full[..., PAIRS[3]]))
+    six_components = np.concatenate([stress, np.zeros((*stress.shape[:-1], 6 - stress.shape[-1]))], axis=-1)
+    return np.asarray(np.linalg.eigvalsh(six_components[..., PAIRS[3]]))
 
 
 @typed(ModelError)
 def tresca(stress: Array) -> Array:
-    """Return the largest minus the smallest principal stress (...) [pressure] of `stress` (..., n_components) [pressure]."""
+    """Return the Tresca stress (...) [pressure] of `stress` (..., n_components) [pressure].
+
+    It is the largest minus the smallest principal stress, twice the largest shear stress.
+    """
     return np.asarray(np.ptp(principal_stress(stress), axis=-1))
 
 
 def _with_components(stress: Array) -> Array:
-    """Return stresses or strains (..., n_components) as an array; ModelError unless there are four or six components."""
+    """Return stresses or strains (..., n_components) as an array; ModelError unless they have four or six components."""
     stress = np.asarray(stress, float)
     if stress.shape[-1:] not in ((4,), (6,)):
         raise ModelError(
@@ -223,8 +226,8 @@ def equivalent_strain(strain: Array) -> Array:
 def von_mises_signed(stress: Array, equivalent: Array | None = None) -> Array:
     """Return the von Mises stress (...) [pressure] with the sign of the trace, as VMIS_SG of code_aster.
 
-    The argument `equivalent` (...) [pressure] is the von Mises stress of `stress` (..., n_components) [pressure], if it has
-    already been computed.
+    The argument `equivalent` (...) [pressure] is the von Mises stress of `stress` (..., n_components) [pressure]; it is
+    computed if it is not given.
     """
     stress = _with_components(stress)
     trace = stress[..., 0] + stress[..., 1] + stress[..., 2]

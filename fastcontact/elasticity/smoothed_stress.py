@@ -1,9 +1,9 @@
 """Recovered nodal stresses for error estimation.
 
-At the centres of linear cells, and at the reduced Gauss points of quadratic ones, stresses are more accurate than elsewhere
-(Barlow, 1976). They are extrapolated from there to the nodes and averaged over the cells of one material at each node.
-Polynomials fitted to patches of cells (Zienkiewicz and Zhu, 1992) are less accurate near the edge of a contact, where the
-pressure decreases like a square root: they smooth the decrease over two cells, and overestimate the error of quadratic cells
+Stresses are most accurate at the centres of linear cells and at the reduced Gauss points of quadratic cells (Barlow, 1976).
+They are extrapolated from these points to the nodes, and averaged at each node over the cells of one material. Polynomials
+fitted to patches of cells (Zienkiewicz and Zhu, 1992) are less accurate near the edge of a contact, where the pressure
+decreases like a square root: they smooth the decrease over two cells, and the estimated error of quadratic cells is too large
 by a factor of two to four.
 """
 
@@ -21,7 +21,8 @@ from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-# Distance of the sampling points of quadratic triangles and tetrahedra from the centre, divided by that of the corners.
+# Distance of the sampling points from the centre of quadratic triangles and tetrahedra, divided by the distance of the
+# corners; by number of corners.
 SIMPLEX_FRACTION = {3: 0.5, 4: 1.0 / math.sqrt(5.0)}
 
 
@@ -34,7 +35,7 @@ def smoothed_stress(
 ) -> dict[str, Array]:
     """Return the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each solid cell, by element type.
 
-    At a node all cells of one material have the same stress.
+    All cells of one material at a node have the same stress there.
 
     Parameters
     ----------
@@ -49,29 +50,32 @@ def smoothed_stress(
     """
     components = field.moduli.shape[1]
     stress = CellStress(mesh, kinematics, field.moduli, displacement, field.treatment, offset)
-    by_kind = {name: np.empty((*block.shape, components)) for name, block in mesh.solids.items()}
+    at_nodes = {name: np.empty((*block.shape, components)) for name, block in mesh.solids.items()}
     material = field.distinct
     for number in np.unique(np.concatenate([*material.values()])):
         average = recovery.NodalAverage(mesh.n_points, components)
-        rows = {name: np.flatnonzero(material[name] == number) for name in by_kind}
-        for name, chosen in rows.items():
+        rows_of_material = {name: np.flatnonzero(material[name] == number) for name in at_nodes}
+        for name, rows in rows_of_material.items():
             xi, extrapolation = sampling(name)
-            cells = mesh.cells[name][chosen]
-            average.add(cells, extrapolation, stress.at(name, xi, cells, field.loops[name][chosen], chosen))
+            cells = mesh.cells[name][rows]
+            average.add(cells, extrapolation, stress.at(name, xi, cells, field.loops[name][rows], rows))
         nodal = average.result()
-        for name, chosen in rows.items():
-            by_kind[name][chosen] = nodal[mesh.cells[name][chosen]]
-    return by_kind
+        for name, rows in rows_of_material.items():
+            at_nodes[name][rows] = nodal[mesh.cells[name][rows]]
+    return at_nodes
 
 
 def sampling(name: str) -> tuple[Array, Array]:
-    """Return the points (n_q, dim) [-] of an element where stress is most accurate, and the extrapolation (n_nodes, n_q)."""
+    """Return the points (n_q, dim) [-] of an element where stress is most accurate, and the extrapolation (n_nodes, n_q) [-].
+
+    The matrix of the extrapolation maps values at these points to values at the nodes.
+    """
     element = elements.get(name)
     corners = element.nodes[: element.n_corners]
     centre = corners.mean(axis=0)
     if element.order == 1:
         return centre[None, :], np.ones((element.n_nodes, 1))
-    simplex = element.n_corners == element.dim + 1
-    inward = SIMPLEX_FRACTION[element.n_corners] if simplex else 1.0 / math.sqrt(3.0)
-    xi = np.asarray(centre + inward * (corners - centre))
+    is_simplex = element.n_corners == element.dim + 1
+    fraction = SIMPLEX_FRACTION[element.n_corners] if is_simplex else 1.0 / math.sqrt(3.0)
+    xi = np.asarray(centre + fraction * (corners - centre))
     return xi, np.asarray(element.corner_shape(element.nodes) @ np.linalg.inv(element.corner_shape(xi)))

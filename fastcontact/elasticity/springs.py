@@ -1,6 +1,7 @@
-"""Linear springs at nodes: ``1/2 k (r u)^2`` each, with r the row that gives its elongation from the displacements.
+"""Linear springs at nodes, which add the positive semidefinite matrix ``R.T diag(k) R`` to the stiffness.
 
-They add the positive semidefinite ``R.T diag(k) R`` to the stiffness. Springs along a line keep its reference direction.
+A spring with the stiffness k has the energy ``k (r u)^2 / 2``, where the row r of R yields its elongation from the
+displacements u. Springs along a line keep the reference direction of the line.
 """
 
 from __future__ import annotations
@@ -14,28 +15,28 @@ from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.errors import ModelError
-from fastcontact.linear.sparse_rows import nodal_rows, sum_of_blocks
+from fastcontact.linear.sparse_rows import nodal_rows, stacked_rows, sum_of_blocks
 from fastcontact.round_off import ROUND_OFF
 
 # Ratios of the stiffness of a spring between nodes to that of the bodies at its ends that cause a warning and an error.
 WARNING_RATIO, ERROR_RATIO = 1e5, 1e12
-DIGITS = 16  # decimal digits of double precision
+DIGITS = 16  # number of decimal digits in double precision
 
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """Springs defined together.
+    """Springs that are defined together, under one name.
 
     Attributes
     ----------
     name : str
         Name for messages.
     rows : csr_array (m, n_dofs)
-        Rows that yield the elongation of each spring from the displacements [-].
+        Rows R of the springs, which yield their elongations from the displacements [-].
     stiffness : ndarray (m,)
         Stiffness [force / length]; in axisymmetry over the full circle.
     grounded : bool
-        Whether the springs connect nodes to the ground, not to other nodes.
+        Whether the springs connect nodes to the ground instead of to other nodes.
     """
 
     name: str
@@ -59,10 +60,11 @@ def grounded(
 ) -> Springs:
     """Return springs from each of the `nodes` (n,) to the ground; see `joined`.
 
-    They act along every axis in `stiffness`, and along and across the unit vector `direction` (dim,) [-] with the stiffnesses
-    ``along["axial"]`` and ``along["transverse"]`` [force / length].
+    A spring with the stiffness ``stiffness[axis]`` [force / length] acts along each axis in `stiffness`. Springs with the
+    stiffnesses ``along["axial"]`` and ``along["transverse"]`` [force / length] act along and across the unit vector
+    `direction` (dim,) [-].
     """
-    directions, values = _frame(stiffness, along or {}, direction, dim)
+    directions, values = _directions(stiffness, along or {}, direction, dim)
     rows = nodal_rows(np.tile(nodes, len(values))[:, None], np.repeat(directions, len(nodes), axis=0)[:, None], n_dofs)
     return Springs(name, rows, np.repeat(values, len(nodes)), True)
 
@@ -77,10 +79,10 @@ def joined(
 ) -> Springs:
     """Return springs between pairs of the `points` (n_points, dim) [length].
 
-    `ends` (n,) of int each are the first and the second points. Springs act along every axis in `stiffness`
+    `ends` contains the first and the second points, (n,) of int each. Springs act along each axis in `stiffness`
     [force / length]; those with the stiffnesses ``along["axial"]`` and ``along["transverse"]`` [force / length] act along
-    and across the line of a pair, or the unit vector `direction` (dim,) [-]. Raises ModelError if both points of a pair are
-    the same point, or if they coincide where the line between them is needed.
+    and across the line of a pair, or the unit vector `direction` (dim,) [-]. Raises ModelError if the points of a pair are
+    the same point, or coincide where the line between them is needed.
     """
     rows, values = [], []
     for first, second in np.transpose(ends).tolist():
@@ -89,7 +91,7 @@ def joined(
                 f"{name}: both ends are point {first}; without a second node a spring is attached to the ground"
             )
         axial = _line(name, points, first, second) if along and direction is None else direction
-        directions, k = _frame(stiffness, along, axial, points.shape[1])
+        directions, k = _directions(stiffness, along, axial, points.shape[1])
         rows.append(
             nodal_rows(np.tile([first, second], (len(k), 1)), np.stack([-directions, directions], axis=1), points.size)
         )
@@ -109,28 +111,24 @@ def _line(name: str, points: Array, first: int, second: int) -> Array:
     return np.asarray(line / length)
 
 
-def _frame(
+def _directions(
     stiffness: Mapping[int, float], along: Mapping[str, float], direction: Array | None, dim: int
 ) -> tuple[Array, Array]:
     """Return the directions (m, dim) in which springs act, and their stiffness (m,) [force / length]."""
     directions = [np.eye(dim)[axis] for axis in stiffness]
     values = list(stiffness.values())
     if direction is not None:
-        frame = np.vstack([direction, np.linalg.svd(direction[None])[2][1:]])
+        basis = np.vstack(
+            [direction, np.linalg.svd(direction[None])[2][1:]]
+        )  # the unit vector and vectors normal to it
         kinds = ["axial", *["transverse"] * (dim - 1)]
-        directions += [vector for vector, kind in zip(frame, kinds, strict=True) if kind in along]
+        directions += [vector for vector, kind in zip(basis, kinds, strict=True) if kind in along]
         values += [along[kind] for kind in kinds if kind in along]
     return np.array(directions), np.array(values, float)
 
 
-def stacked(springs: Sequence[Springs], n_dofs: int) -> csr_array:
-    """Return the rows of all springs as one matrix (m, n_dofs) [-]."""
-    empty = csr_array((0, n_dofs))
-    return csr_array(vstack([empty, *(spring.rows for spring in springs)], format="csr"))
-
-
 def stiffened(K: bsr_array, springs: Sequence[Springs]) -> bsr_array:
-    """Return the stiffness matrix `K` (n, n) [force / length] with the springs added, (n, n) [force / length]."""
+    """Return the sum (n, n) of the stiffness matrix `K` (n, n) and the stiffness of springs [force / length]."""
     if not springs:
         return K
     return sum_of_blocks(K, spring_stiffness(springs, K.shape[0]))
@@ -138,7 +136,7 @@ def stiffened(K: bsr_array, springs: Sequence[Springs]) -> bsr_array:
 
 def spring_stiffness(springs: Sequence[Springs], n: int) -> csr_array:
     """Return the stiffness (n, n) of springs [force / length]."""
-    R = stacked(springs, n)
+    R = stacked_rows(springs, n)
     return csr_array(R.T @ diags_array(np.concatenate([spring.stiffness for spring in springs])) @ R)
 
 
@@ -146,15 +144,15 @@ def spring_force(springs: Sequence[Springs], u: Array) -> Array:
     """Return the nodal forces (n,) [force] of springs at the displacements `u` (n,) [length]."""
     if not springs:
         return np.zeros_like(u)
-    R = stacked(springs, len(u))
+    R = stacked_rows(springs, len(u))
     return np.asarray(R.T @ (np.concatenate([spring.stiffness for spring in springs]) * (R @ u)))
 
 
 def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
-    """Return a warning for each spring that is so much stiffer than the bodies at its ends that digits are lost.
+    """Return a warning for each spring that is so much stiffer than the bodies at its ends that results lose digits.
 
     The sum of the stiffnesses of a body and a spring has the absolute accuracy of the larger one. Springs along an axis
-    to the ground only add to the diagonal, which is harmless: they act as supports.
+    to the ground only add to the diagonal of K, like a penalty for a support, which does not impair the results.
 
     Parameters
     ----------
@@ -165,7 +163,7 @@ def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
     Raises
     ------
     ModelError
-        If fewer than about four digits would remain.
+        If a ratio of stiffnesses exceeds `ERROR_RATIO`, so that about four digits or fewer would remain.
     """
     dim, texts = K.blocksize[0], []
     for spring in springs:
@@ -174,14 +172,14 @@ def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
             continue
         text = f"{spring.name} is {ratio:.1e} times as stiff as the body at one of its ends ({body:.3g})"
         softer = 0.1 * WARNING_RATIO * body
-        instead = f"use {softer:.0e} or less, or a multi-point constraint (relate, relate_groups), which is exact"
+        remedy = f"use {softer:.0e} or less, or a multi-point constraint (relate, relate_groups), which is exact"
         lost = round(math.log10(ratio))
         if ratio > ERROR_RATIO:
             left = "no digit" if lost >= DIGITS else f"{DIGITS - lost} of {DIGITS} digits"
-            raise ModelError(f"{text}: results would keep {left}; {instead}")
+            raise ModelError(f"{text}: results would keep {left}; {remedy}")
         texts.append(
             f"{text}: results lose up to {lost} of {DIGITS} digits, and with contact its force is accurate only to this "
-            f"ratio times the convergence criteria; {instead}"
+            f"ratio times the convergence criteria; {remedy}"
         )
     return texts
 
@@ -192,16 +190,16 @@ def _stiffness_ratio(spring: Springs, diagonal: Array, dim: int) -> tuple[float,
     row, node = rows.coords[0], rows.coords[1] // dim
     ends, index = np.unique(np.stack([row, node]), axis=1, return_inverse=True)
     body = np.bincount(index.ravel(), weights=rows.data**2 * diagonal[rows.coords[1]])
-    # Springs that only add to the diagonal do not count, nor do points without a body.
-    counts = (np.diff(spring.rows.indptr)[ends[0]] > 1) & (body > 0.0)
-    if not counts.any():
+    # Springs that only add to the diagonal are left out, and so are points without a body.
+    relevant = (np.diff(spring.rows.indptr)[ends[0]] > 1) & (body > 0.0)
+    if not relevant.any():
         return 0.0, 0.0
-    ratio = spring.stiffness[ends[0][counts]] / body[counts]
-    return float(ratio.max()), float(body[counts][ratio.argmax()])
+    ratio = spring.stiffness[ends[0][relevant]] / body[relevant]
+    return float(ratio.max()), float(body[relevant][ratio.argmax()])
 
 
 def ground_force(springs: Sequence[Springs], u: Array) -> Array:
-    """Return the forces (n_dofs,) [force] of the ground on the nodes through springs, for `u` (n_dofs,) [length]."""
+    """Return the nodal forces (n_dofs,) [force] of springs to the ground at the displacements `u` (n_dofs,) [length]."""
     total = np.zeros(len(u))
     for spring in springs:
         if spring.grounded:

@@ -1,4 +1,4 @@
-"""Stiffness matrix of a mesh, whose sparsity is computed once, and rigid-body modes."""
+"""Stiffness matrix of a mesh, its sparsity, and rigid-body modes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.elasticity import (
     dilatation,
     dilatation_kernels,
-    element_kernels,
+    element_2d_kernels,
+    element_3d_kernels,
     incompatible_modes,
     incompatible_modes_kernels,
 )
@@ -26,10 +27,20 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 Indices = NDArray[np.int64]
+# Element loops `add_stiffness`, `stress` and `add_internal_force` by the number of coordinates.
+LOOPS = {2: element_2d_kernels, 3: element_3d_kernels}
 
 
 class Owners(NamedTuple):
-    """Division of the assembly among threads: part of each point, `owner` (n_points,), and range of cells of each part."""
+    """Division of the assembly into parts, one for each thread.
+
+    Attributes
+    ----------
+    owner : ndarray of uint8 (n_points,)
+        Part of each point, whose rows of the matrix it computes.
+    cells : list of (int, int)
+        First cell of each part, and the cell after its last one.
+    """
 
     owner: NDArray[np.uint8]
     cells: list[tuple[int, int]]
@@ -37,7 +48,7 @@ class Owners(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sparsity:
-    """Node pairs with a common cell.
+    """Sparsity of a stiffness matrix: the node pairs with a common cell.
 
     Attributes
     ----------
@@ -53,7 +64,7 @@ class Sparsity:
     _owners: dict[tuple[str, int], Owners] = field(default_factory=dict, init=False, repr=False)
 
     def owners(self, mesh: Mesh, name: str) -> Owners:
-        """Return the division of the assembly of an element, computed once for every number of threads."""
+        """Return the division of the assembly of an element type, which is computed once for each number of parts."""
         key = name, len(parallel.portions(*mesh.cells[name].shape))
         if key not in self._owners:
             self._owners[key] = owners(mesh.cells[name], mesh.n_points)
@@ -61,15 +72,15 @@ class Sparsity:
 
 
 def sparsity(mesh: Mesh) -> Sparsity:
-    """Return the sparsity of the stiffness matrix of `mesh`."""
+    """Return the sparsity of the stiffness matrix of `mesh`; points without cells have a diagonal block."""
     blocks = mesh.solids
     nodes = np.concatenate([np.empty(0, np.int32), *(block.ravel() for block in blocks.values())])
-    lone = np.flatnonzero(np.bincount(nodes, minlength=mesh.n_points) == 0)  # nodes without cells have a diagonal block
+    isolated = np.flatnonzero(np.bincount(nodes, minlength=mesh.n_points) == 0)
     sizes = np.concatenate(
-        [[0], *(np.full(len(block), block.shape[1]) for block in blocks.values()), np.ones_like(lone)]
+        [[0], *(np.full(len(block), block.shape[1]) for block in blocks.values()), np.ones_like(isolated)]
     )
-    # SciPy keeps the integers of the indices, so that all later matrices have those of the nodes.
-    nodes, first = np.concatenate([nodes, lone.astype(np.int32)]), np.cumsum(sizes, dtype=np.int32)
+    # SciPy preserves the type of index arrays, so that the indices of all matrices are 32-bit integers like the nodes.
+    nodes, first = np.concatenate([nodes, isolated.astype(np.int32)]), np.cumsum(sizes, dtype=np.int32)
     of_cells = csr_array((np.ones(len(nodes), bool), nodes, first), shape=(len(sizes) - 1, mesh.n_points))
     pattern = csr_array(of_cells.T @ of_cells)
     pattern.sort_indices()
@@ -78,7 +89,7 @@ def sparsity(mesh: Mesh) -> Sparsity:
 
 
 def _slots(cells: Numbers, indptr: Numbers, indices: Numbers) -> Numbers:
-    """Return the `slots` of `Sparsity` for one element."""
+    """Return the `slots` of `Sparsity` for one element type."""
     slots = np.empty((*cells.shape, cells.shape[1]), np.int32)
 
     def find(portion: tuple[int, int]) -> None:
@@ -111,9 +122,9 @@ def stiffness(
         Material number of each cell, or of each quadrature point, by solid element type.
     pattern : Sparsity, optional
         From `sparsity`, to reuse it.
-    averaged : ndarray of bool (n_materials,), optional
-        Which materials have a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); none by
-        default.
+    averaged : ndarray of bool or uint8 (n_materials,), optional
+        Whether each material has a mean dilatation, see `dilatation`; or the codes of `MaterialField.treatment`, which also
+        state whether it has incompatible modes. By default no material has either.
 
     Returns
     -------
@@ -130,7 +141,7 @@ def stiffness(
     isotropic = is_isotropic(moduli)
     for name, block in mesh.solids.items():
         split = dilatation.split(name, moduli, averaged)
-        of_element = moduli, isotropic, split, incompatible_modes.asked(name, averaged)
+        of_element = moduli, isotropic, split, incompatible_modes.with_modes(name, averaged)
         add_part = partial(
             _add_part, mesh=mesh, name=name, material=material[name], moduli=of_element,
             axisymmetric=kinematics == "axisymmetric", pattern=pattern, data=data,
@@ -147,7 +158,7 @@ def stiffness(
 
 
 def is_isotropic(moduli: Array) -> Mask:
-    """Return which moduli (n_materials,) are isotropic up to round-off, for which element loops in 3D have a shorter form.
+    """Return which moduli (n_materials,) are isotropic up to round-off; the element loops in 3D are faster for these.
 
     Parameters
     ----------
@@ -163,9 +174,10 @@ def is_isotropic(moduli: Array) -> Mask:
 
 
 def of_cells(material: Numbers) -> Numbers:
-    """Return one material number for each cell (n_cells,) of int, that of its first quadrature point.
+    """Return one material number for each cell, shape (n_cells,) of int.
 
-    The argument `material` (n_cells,) of int may also be given at quadrature points (n_cells, n_q).
+    The numbers `material` are given for cells (n_cells,) and returned unchanged, or for quadrature points (n_cells, n_q), of
+    which the first one counts.
     """
     return material if material.ndim == 1 else np.ascontiguousarray(material[:, 0])
 
@@ -173,7 +185,10 @@ def of_cells(material: Numbers) -> Numbers:
 def _passes(
     tables: tuple[Array, Array, Array], material: Numbers
 ) -> Iterator[tuple[tuple[Array, Array, Array], Numbers]]:
-    """Yield the tables of the quadrature with the material (n_cells,): once, or for each point if it varies inside cells."""
+    """Yield quadrature tables and the material (n_cells,) at their points: of each point if it varies within cells.
+
+    Otherwise there is one pass with all points.
+    """
     if material.ndim == 1:
         yield tables, material
         return
@@ -186,26 +201,26 @@ def _add_part(
     number: int, mesh: Mesh, name: str, material: Numbers, moduli: tuple[Array, Mask, dilatation.Split | None, Mask | None],
     axisymmetric: bool, pattern: Sparsity, data: Array,
 ) -> int:  # fmt: skip
-    """Add the rows of a part of the cells of one element to `data` (n_blocks, dim, dim).
+    """Add the stiffness of one element type to `data` (n_blocks, dim, dim), in the rows of part `number` of `Owners`.
 
-    `moduli` are the moduli, which of them are isotropic, their split, and which have incompatible modes. Returns the
-    number of the first cell with a Jacobian that is not positive, or -1.
+    The tuple `moduli` contains the moduli, which of them are isotropic, their split, and which have incompatible modes.
+    Returns the number of the first cell with a Jacobian that is not positive, or -1.
     """
-    (D, isotropic, split, bends), tables = moduli, elements.get(name).tables
+    (D, isotropic, split, with_modes), tables = moduli, elements.get(name).tables
     owner, row_ranges = pattern.owners(mesh, name)
     rows = slice(*row_ranges[number])
     cells, material, slots = mesh.cells[name][rows], material[rows], pattern.slots[name][rows]
     target = axisymmetric, slots, owner, number, data
     for tables_of_pass, numbers in _passes(tables, material):
-        bad = element_kernels.loops(mesh.dim).add_stiffness(
+        bad = LOOPS[mesh.dim].add_stiffness(
             mesh.points, cells, *tables_of_pass, D if split is None else split.moduli, isotropic, numbers, *target
         )
         if bad >= 0:
             return int(bad) + rows.start
-    if bends is not None:
+    if with_modes is not None:
         incompatible_modes_kernels.subtract_stiffness(
-            mesh.points, cells, *incompatible_modes.tables(name), D, bends, material.reshape(len(cells), -1), slots, owner,
-            number, data,
+            mesh.points, cells, *incompatible_modes.tables(name), D, with_modes, material.reshape(len(cells), -1), slots,
+            owner, number, data,
         )  # fmt: skip
     if split is not None:
         polynomials = dilatation.basis(name, elements.get(name).quadrature[0])
@@ -216,10 +231,11 @@ def _add_part(
 
 
 def owners(cells: Numbers, n_points: int) -> Owners:
-    """Return the part of each point, and the cells that each part computes, of `cells` (n_cells, n_nodes).
+    """Return the division of the assembly of `cells` (n_cells, n_nodes) into parts.
 
-    A point belongs to the first portion of the cells that contains it, so that a part computes its own cells and few others.
-    Portions are chosen so that all parts compute the same number of cells, including these others.
+    The cells are divided into consecutive portions, and a point belongs to the first portion that contains it. A part
+    computes the cells of its portion and the cells of later portions at its points. The portions are chosen so that all parts
+    compute about the same number of cells.
     """
     portions = parallel.portions(*cells.shape)
     if len(portions) == 1:
@@ -232,7 +248,7 @@ def owners(cells: Numbers, n_points: int) -> Owners:
 
 
 def _owners(cells: Numbers, n_points: int, ends: Indices) -> tuple[Owners, Indices]:
-    """Return the owners for portions of the cells that begin and end at `ends`, and the number of cells each computes."""
+    """Return the owners for portions of the cells that begin and end at `ends`, and the number of cells of each part."""
     owner = np.full(n_points, parallel.MOST, np.uint8)
     last, work = np.zeros((2, len(ends) - 1), np.int64)
     pattern_kernels.first_parts(cells, ends, parallel.MOST, owner, last, work)
@@ -240,10 +256,11 @@ def _owners(cells: Numbers, n_points: int, ends: Indices) -> tuple[Owners, Indic
 
 
 def rigid_modes(points: Array, kinematics: str) -> Array:
-    """Return the rigid-body modes (n_points * dim, n_modes) [-], displacements of `points` (n_points, dim) [length].
+    """Return the rigid-body modes (n_points * dim, n_modes) at `points` (n_points, dim) [length].
 
     The columns are the translation along the axis in axisymmetry, two translations and one rotation in plane models, and
-    three translations and three rotations in 3D [length]. Rotations are about the mean point.
+    three translations and three rotations in 3D. Translations are dimensionless, and rotations, about the mean of the points,
+    have the unit of length.
     """
     (n, dim), x = points.shape, points - points.mean(axis=0)
     planes = [(0, 1)] if dim == 2 else [(1, 2), (2, 0), (0, 1)]

@@ -1,4 +1,4 @@
-"""The axis of an axisymmetric model, on which the radial displacement is zero."""
+"""Nodes on the axis of symmetry, where the radial displacement of an axisymmetric model is zero."""
 
 from __future__ import annotations
 
@@ -10,12 +10,9 @@ from fastcontact.round_off import SINGLE_PRECISION
 
 
 def axis_nodes(mesh: Mesh) -> Indices:
-    """Return the nodes (n,) of solid cells on the axis x = 0, in ascending order.
-
-    By symmetry, points of a body on the axis move along the axis only.
-    """
-    near = np.abs(mesh.points[:, 0]) <= SINGLE_PRECISION * np.abs(mesh.points).max()
-    used = np.zeros(mesh.n_points, bool)
-    for block in mesh.solids.values() if near.any() else ():
-        used[block] = True
-    return np.flatnonzero(near & used)
+    """Return the nodes (n,) of solid cells on the axis x = 0, in ascending order."""
+    on_axis = np.abs(mesh.points[:, 0]) <= SINGLE_PRECISION * np.abs(mesh.points).max()
+    in_solid = np.zeros(mesh.n_points, bool)
+    for block in mesh.solids.values() if on_axis.any() else ():
+        in_solid[block] = True
+    return np.flatnonzero(on_axis & in_solid)

@@ -1,10 +1,9 @@
-"""Temperatures of the nodes of solid cells."""
+"""Prescribed temperatures at the nodes of solid cells."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,21 +25,21 @@ from fastcontact.mesh.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Temperature:
-    """A temperature of the nodes of groups of solid cells, or of all.
+    """A temperature at the nodes of groups of solid cells, or of all solid cells.
 
     Attributes
     ----------
     groups : tuple of str or None
-        Groups of solid cells; None: all.
+        Groups of solid cells; None means all solid cells.
     value : float, callable or ndarray (n_points,)
         A number, a function of the position, or a value for each point of the mesh [temperature].
     reference : float
         Temperature without thermal strain [temperature].
     ramp : tuple, optional
-        Ramp of the temperature rise over the reference.
+        Points (instant, multiplier) of the ramp of the temperature rise over the reference.
     times : tuple of float
-        Instants of the history to which the temperature belongs, if any.
-    place : int
+        Instants of the history to which the temperature belongs; empty without a history.
+    instant : int
         Index of the instant of this temperature in `times`.
     """
 
@@ -48,13 +47,12 @@ class Temperature:
     value: Value | Array
     reference: float
     ramp: Table | None = None
-    # For a history by instants, set by `histories`: the instants, and the index of this one.
-    times: tuple[float, ...] = field(default=(), init=False)
-    place: int = field(default=0, init=False)
+    times: tuple[float, ...] = ()
+    instant: int = 0
 
     @property
     def name(self) -> str:
-        """Description with the groups, for messages."""
+        """Text with the groups, for messages."""
         return f"the temperature of {listed(self.groups)}"
 
     @property
@@ -77,7 +75,7 @@ class Temperature:
             raise ModelError(f"{self.name} is not finite at point {int(np.flatnonzero(~np.isfinite(self.value))[0])}")
 
     def rise(self, mesh: Mesh) -> Array:
-        """Return the rise over the reference (n_points,) at multiplier 1, zero at points of other cells [temperature]."""
+        """Return the rise over the reference (n_points,) [temperature] at multiplier 1, zero at points of other cells."""
         points = solid_points(mesh, self.groups)
         rise = np.zeros(mesh.n_points)
         if isinstance(self.value, np.ndarray):
@@ -87,15 +85,10 @@ class Temperature:
         return rise
 
 
-def checked_value(value: Any) -> Any:
-    """Return a temperature, with lists of numbers as arrays."""
-    return np.array(value, float) if isinstance(value, (list, tuple, np.ndarray)) and np.ndim(value) else value
-
-
 def histories(
     groups: tuple[str, ...] | None, values: Array, reference: float, times: Sequence[float]
 ) -> list[Temperature]:
-    """Return a temperature for each of several instants, between which they are interpolated linearly.
+    """Return a temperature for each of several instants, with ramps that interpolate linearly between the instants.
 
     Parameters
     ----------
@@ -112,24 +105,13 @@ def histories(
     ModelError
         If there are not as many times as instants, or they do not ascend.
     """
-    instants = checked_times(times, len(values))
-    temperatures = []
-    for k, time in enumerate(instants):
-        hat = tuple((other, float(other == time)) for other in instants)
-        temperature = Temperature(groups, values[k], reference, hat)
-        object.__setattr__(temperature, "times", instants)
-        object.__setattr__(temperature, "place", k)
-        temperatures.append(temperature)
-    return temperatures
-
-
-def checked_times(times: Sequence[float], count: int) -> tuple[float, ...]:
-    """Return the load factors of the instants of a history; ModelError unless they are `count`, at least two, and ascend."""
-    checked = np.asarray(times, float)
-    if checked.shape != (count,) or count < 2:
+    factors, count = np.asarray(times, float), len(values)
+    if factors.shape != (count,) or count < 2:
         raise ModelError(
-            f"the temperature has {count} instants, but {checked.size} times: give the load factor of each, at least two"
+            f"the temperature has {count} instants, but {factors.size} times: give the load factor of each, at least two"
         )
-    if not (np.isfinite(checked).all() and (np.diff(checked) > 0.0).all()):
-        raise ModelError(f"the times of the temperature must ascend, not {checked.tolist()}")
-    return tuple(checked.tolist())
+    if not (np.isfinite(factors).all() and (np.diff(factors) > 0.0).all()):
+        raise ModelError(f"the times of the temperature must ascend, not {factors.tolist()}")
+    instants = tuple(factors.tolist())
+    ramps = [tuple(zip(instants, row, strict=True)) for row in np.eye(count).tolist()]
+    return [Temperature(groups, values[k], reference, ramps[k], instants, k) for k in range(count)]

@@ -1,4 +1,4 @@
-"""Material constants that vary with position, given as functions, or as values for cells or points."""
+"""Material constants that vary with position, given as functions or as values for cells or points."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ AXES = ("x", "y", "z", "radius")
 class Tabulated:
     """A tabulated function of one coordinate, which is piecewise linear and constant beyond both ends of the table.
 
-    It can be used for material constants, temperatures, pressures and all other values that may be functions of position.
+    It can be used for material constants, temperatures, pressures and all other quantities that may be functions of position.
 
     Parameters
     ----------
     along : {"x", "y", "z", "radius"}
-        The coordinate. ``"radius"`` is the distance from the z axis in 3D, and from the origin in 2D.
+        Name of the coordinate; ``"radius"`` is the distance from the z axis in 3D, and from the origin in 2D.
     table : sequence of (float, float)
         Coordinate [length] and value [unit of the quantity] of each point of the table.
 
@@ -56,27 +56,28 @@ class Tabulated:
         try:
             rows = tuple((_number(abscissa), _number(value)) for abscissa, value in self.table)
         except (TypeError, ValueError):
-            raise ModelError(f"the table along {self.along} must be pairs [place, value] of numbers") from None
+            raise ModelError(f"the table along {self.along} must be pairs [coordinate, value] of numbers") from None
         for number in (number for row in rows for number in row):
             check_number(f"a number of the table along {self.along}", number)
         if not rows or any(b[0] <= a[0] for a, b in itertools.pairwise(rows)):
-            raise ModelError(f"the places of the table along {self.along} must ascend, at least one of them")
+            raise ModelError(
+                f"the coordinates of the table along {self.along} must ascend, and there must be at least one"
+            )
         object.__setattr__(self, "table", rows)
 
     def __call__(self, points: Array) -> Array:
         """Return the values (n,) [unit of the quantity] at `points` (n, dim) [length]."""
         if self.along == "radius":
-            at = np.hypot(points[:, 0], points[:, 1])
+            coordinate = np.hypot(points[:, 0], points[:, 1])
         elif AXES.index(self.along) < points.shape[1]:
-            at = points[:, AXES.index(self.along)]
+            coordinate = points[:, AXES.index(self.along)]
         else:
             raise ModelError("a table is along z, but the mesh is plane: use x, y or radius")
-        places, values = np.array(self.table).T
-        return np.interp(at, places, values)
+        return np.interp(coordinate, *np.transpose(self.table))
 
 
 def _number(value: Any) -> float:
-    """Return a number unchanged; raise TypeError for other values, such as text."""
+    """Return a number as a float; raise TypeError for text, and TypeError or ValueError for other values."""
     if isinstance(value, str | bytes):
         raise TypeError(value)
     return float(value)
@@ -84,7 +85,7 @@ def _number(value: Any) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Some solid cells of a mesh; `rows` contains the rows (m,) of int of these cells, by element type."""
+    """A set of solid cells of a mesh; `rows` contains their numbers (m,) of int by element type."""
 
     mesh: Mesh
     rows: Rows
@@ -95,28 +96,30 @@ class Cells:
         return sum(map(len, self.rows.values()))
 
     def samples(self) -> Iterator[tuple[str, Indices, Array]]:
-        """Yield element type, cells and shape functions (n, n_nodes) [-] at the centres and at the quadrature points."""
+        """Yield element type, cells and shape functions (n, n_nodes) [-]: first at centres, then at quadrature points."""
         for name, rows in self.rows.items():
-            yield name, rows, middle(name)
+            yield name, rows, centre(name)
         for name, rows in self.rows.items():
             yield name, rows, elements.get(name).tables[0]
 
 
-def middle(name: str) -> Array:
+def centre(name: str) -> Array:
     """Return the shape functions (1, n_nodes) [-] of an element type at the centre of the cell."""
     n = elements.get(name).n_nodes
     return np.full((1, n), 1.0 / n)
 
 
 class Varying:
-    """A material constant that varies with position; two of them are equal if they have the same function or array.
+    """A material constant that varies with position.
+
+    Two objects are equal if they refer to the same function or array.
 
     Parameters
     ----------
     given : callable or ndarray
         A function from positions (n, dim) [length] to numbers (n,), or an array with a number for each cell or point.
     cells : Cells, optional
-        Cells of the material, when they are known.
+        Cells of the material, once it has been assigned to cells.
     name : str
         Name of the constant in messages.
     """
@@ -126,7 +129,7 @@ class Varying:
         self._nodal: Array | None = None
         self._by_cell: dict[str, Array] | None = None
         if cells is not None and not callable(given):
-            self._place(np.asarray(given), cells)
+            self._assign(np.asarray(given), cells)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Varying) and self.given is other.given
@@ -143,8 +146,8 @@ class Varying:
         low, high = self.range
         return f"{low:{spec}} to {high:{spec}}"
 
-    def _place(self, values: Array, cells: Cells) -> None:
-        """Determine from the length of an array whether its values belong to cells or to points."""
+    def _assign(self, values: Array, cells: Cells) -> None:
+        """Assign the values of an array to cells or to points, according to its length."""
         mesh = cells.mesh
         total = sum(map(len, mesh.solids.values()))
         lengths = {"cells": cells.count, "solid cells of the mesh": total, "points of the mesh": mesh.n_points}
@@ -160,8 +163,8 @@ class Varying:
             )
         if not column and len(values) == mesh.n_points and len(values) in (cells.count, total):
             raise ModelError(
-                f"{self._name} has {len(values)} numbers, and there are as many cells as points: give those of cells as a "
-                "column, shape (n, 1), those of points as a function"
+                f"{self._name} has {len(values)} numbers, but there are as many cells as points: give numbers of cells as a "
+                "column, shape (n, 1), and those of points as a function"
             )
         if not np.isfinite(values).all():
             raise ModelError(f"{self._name} is not finite at row {int(np.flatnonzero(~np.isfinite(values))[0])}")
@@ -177,16 +180,16 @@ class Varying:
 
     @cached_property
     def range(self) -> tuple[float, float]:
-        """The smallest and the largest value in the cells of the material."""
+        """The smallest and the largest value at the centres and quadrature points of the cells of the material."""
         assert self.cells is not None
         samples = [self.at(*sample) for sample in self.cells.samples()]
         return float(min(values.min() for values in samples)), float(max(values.max() for values in samples))
 
     def at(self, name: str, rows: Indices, N: Array) -> Array:
-        """Return the values (n_rows * n,) [unit of the constant] at points of cells of one element type, cell by cell.
+        """Return the values (n_rows * n,) [unit of the constant] at n points of each of some cells, cell by cell.
 
-        `name` is the element type, `rows` (n_rows,) of int contains the numbers of the cells, and `N` (n, n_nodes) [-] the
-        shape functions at the n points of a cell.
+        `name` is the element type of the cells, `rows` (n_rows,) of int contains their numbers, and `N` (n, n_nodes) [-] the
+        shape functions at the points.
         """
         assert self.cells is not None
         mesh = self.cells.mesh
@@ -199,13 +202,13 @@ class Varying:
 
 
 class CellAxes(Varying):
-    """Material axes that differ from cell to cell, given as unit vectors in rows (n_cells, 3, 3) [-].
+    """Material axes of cells, given as unit vectors in rows (n_cells, 3, 3) [-].
 
     The array contains axes for each cell of the material or for each solid cell of the mesh.
     """
 
-    def _place(self, values: Array, cells: Cells) -> None:
-        """Determine from the length of the array whether it contains axes for the cells of the material or of the mesh."""
+    def _assign(self, values: Array, cells: Cells) -> None:
+        """Assign the axes to the cells of the material or of the mesh, according to the length of the array."""
         total = sum(map(len, cells.mesh.solids.values()))
         if len(values) not in (cells.count, total):
             raise ModelError(
@@ -217,12 +220,12 @@ class CellAxes(Varying):
     def at(self, name: str, rows: Indices, N: Array) -> Array:
         """Return the axes (n_rows * n, 3, 3) [-] at points of cells; the parameters are described for `Varying.at`."""
         if self._by_cell is None:
-            raise ModelError("axes by cell are known in the material of a model only")
+            raise ModelError("axes given by cell can be evaluated only for the material of a model")
         return np.repeat(self._by_cell[name][rows], len(N), axis=0)
 
 
 def _by_cell(values: Array, cells: Cells) -> dict[str, Array]:
-    """Return values that are given for `cells` or for all solid cells, by element type, with NaN for other cells."""
+    """Return values given for `cells` or for all solid cells as arrays by element type, with NaN for other cells."""
     blocks, first = {}, 0
     for name, block in cells.mesh.solids.items():
         blocks[name] = np.full((len(block), *values.shape[1:]), np.nan)
@@ -233,17 +236,18 @@ def _by_cell(values: Array, cells: Cells) -> dict[str, Array]:
 
 
 def positions(mesh: Mesh, nodes: Numbers, N: Array) -> Array:
-    """Return the positions (n_cells * n, dim) [length] of points in cells with `nodes` (n_cells, n_nodes) of int.
+    """Return the positions (n_cells * n, dim) [length] of n points in each cell, given the shape functions there.
 
-    `N` (n, n_nodes) [-] contains the shape functions at the n points of a cell.
+    `nodes` (n_cells, n_nodes) of int are the nodes of the cells, and `N` (n, n_nodes) [-] the shape functions at the points.
     """
     return np.einsum("qa,cad->cqd", N, mesh.points[nodes]).reshape(-1, mesh.dim)
 
 
 def wrapped(value: Any, vector: bool = False) -> Any:
-    """Return a constant that is a number unchanged, and other constants as `Varying`.
+    """Return functions and arrays as `Varying`, and numbers and None unchanged.
 
-    If `vector`, a sequence of constants is converted item by item.
+    If `vector` is true, a sequence of constants is converted item by item. ModelError if an array does not contain real
+    numbers.
     """
     if vector and isinstance(value, Sequence) and not isinstance(value, str):
         return tuple(wrapped(v) for v in value)
@@ -254,20 +258,20 @@ def wrapped(value: Any, vector: bool = False) -> Any:
             value = np.asarray(value, float)
         except (TypeError, ValueError, OverflowError):
             raise ModelError(
-                f"a constant of a material is a number or one for each cell or point, not {value!r}"
+                f"a constant of a material must be a number, or numbers for all cells or points, not {value!r}"
             ) from None
     if isinstance(value, np.ndarray) and value.dtype.kind not in "fiu":
-        raise ModelError(f"a constant of a material is real numbers, not an array of {value.dtype}")
+        raise ModelError(f"a constant of a material must be real numbers, not an array of {value.dtype}")
     if isinstance(value, Varying) or not (callable(value) or (isinstance(value, np.ndarray) and value.ndim > 0)):
         return value
     return Varying(value)
 
 
-def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
-    """Return the result of `change` for a constant, or a tuple of the results for a tuple of constants."""
-    return tuple(change(v) for v in value) if isinstance(value, tuple) else change(value)
+def mapped(value: Any, function: Callable[[Any], Any]) -> Any:
+    """Return `function` of a constant, or the tuple of its results for a tuple of constants."""
+    return tuple(function(v) for v in value) if isinstance(value, tuple) else function(value)
 
 
 def varying(value: Any) -> list[Varying]:
-    """Return the list of the constants that vary, from a constant or a tuple of constants."""
+    """Return the constants that vary among one constant or a tuple of constants."""
     return [v for v in (value if isinstance(value, tuple) else (value,)) if isinstance(v, Varying)]

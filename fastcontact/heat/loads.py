@@ -88,7 +88,7 @@ class FixedTemperature(TemporaryHeat):
             return self.ramp, ()
         return ((self.begins, 0.0), *later), ((self.begins, 1.0), (later[0][0], 0.0))
 
-    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+    def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
         check_points(mesh, self.group, "no temperature can be prescribed on it")
 
 
@@ -134,7 +134,7 @@ class NodalHeat(Heating):
     value: Value
     ramp: Table | None = None
 
-    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+    def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
         check_points(mesh, self.group, "nothing can heat it")
 
     def power(self, mesh: Mesh, kinematics: str, deformed: Mesh) -> Array:

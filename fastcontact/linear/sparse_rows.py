@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, coo_array, csr_array
+from scipy.sparse import bsr_array, coo_array, csr_array, vstack
 
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
 
@@ -75,6 +78,11 @@ def nodal_rows(nodes: NDArray[np.integer], values: Array, n_dofs: int) -> csr_ar
     return rows
 
 
+def stacked_rows(items: Sequence[Any], n_dofs: int) -> csr_array:
+    """Return the attributes `rows` of multi-point constraints or springs as one matrix (m, n_dofs) [unit of the rows]."""
+    return csr_array(vstack([csr_array((0, n_dofs)), *(item.rows for item in items)], format="csr"))
+
+
 def scaled(matrix: csr_array, factor: AnyArray) -> csr_array:
     """Return the matrix (m, n) with its rows multiplied by `factor` (m,); rows with a factor of zero are empty."""
     values = matrix.data * np.repeat(factor, np.diff(matrix.indptr))
@@ -95,12 +103,6 @@ def without_remnants(matrix: csr_array, origin: csr_array, least: float) -> csr_
 
     These are rows whose entries are less than `least` times the largest entry in the same row of `origin`.
     """
-    significant = _largest_in_rows(matrix) > least * _largest_in_rows(origin)
+    largest, largest_in_origin = (np.ravel(abs(rows).max(axis=1).toarray()) for rows in (matrix, origin))
+    significant = largest > least * largest_in_origin
     return matrix if significant.all() else scaled(matrix, significant)
-
-
-def _largest_in_rows(matrix: csr_array) -> Array:
-    """Return the largest absolute value in each row of a matrix (m, n), zero for empty rows."""
-    largest = np.zeros(matrix.shape[0])
-    np.maximum.at(largest, np.repeat(np.arange(len(largest)), np.diff(matrix.indptr)), np.abs(matrix.data))
-    return largest

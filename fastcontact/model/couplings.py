@@ -140,7 +140,7 @@ class SpreadForce(Load):
     spread: Spread
     ramp: Table | None = None
 
-    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+    def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
         if kinematics == "axisymmetric":
             raise ModelError(f"{self.name}: in axisymmetry a force cannot act at a point: use a varying traction")
         check_points(mesh, self.group, f"{self.name} acts nowhere")
@@ -172,7 +172,7 @@ class Moment(Load):
     components: Mapping[int, float]
     ramp: Table | None = None
 
-    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+    def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
         if kinematics == "axisymmetric":
             raise ModelError(f"{self.name}: a moment cannot act on an axisymmetric model, since its resultant is zero")
         check_points(mesh, self.group, f"{self.name} acts nowhere")

@@ -40,7 +40,7 @@ def sentences(model: Any) -> Iterator[str]:
     for load in model.loads:
         yield f"Load: {load.name}: {_load(load)}{_history(load.ramp)}."
     for temperature in model.temperatures:
-        if temperature.place:  # another instant of the previous one
+        if temperature.instant:  # the history was described at its first instant
             continue
         value = "a number for each point" if isinstance(temperature.value, np.ndarray) else _value(temperature.value)
         groups = temperature.name.removeprefix("the temperature of ")

@@ -125,7 +125,7 @@ class PretensionForce(Load):
         """Ramp of the force."""
         return self.section.ramp
 
-    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+    def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
         pass
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:

@@ -53,7 +53,7 @@ def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
         return mesh, np.arange(mesh.n_points, dtype=np.int32), step.stress
     sides = material_sides(mesh, cells_by_element(mesh, material_stress.cells))
     stress = step.stress[sides.node]
-    stress[sides.place] = material_stress.stress
+    stress[sides.slot] = material_stress.stress
     return Mesh(mesh.points[sides.node], sides.cells), sides.node, stress
 
 

@@ -81,7 +81,7 @@ def by_largest_von_mises(
     material_stress : MaterialStress
         Stress of each material at interfaces.
     """
-    stress, values = separated[:n_points].copy(), separated[sides.place]
+    stress, values = separated[:n_points].copy(), separated[sides.slot]
     order = np.lexsort((recovery.von_mises(values), sides.points))  # the last row of each node has the largest
     stress[sides.points[order]] = values[order]
     return stress, MaterialStress(cells, sides.points, sides.material, values)

@@ -23,7 +23,7 @@ from fastcontact._tools.html_table import fields_table
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.surface import surface
-from fastcontact.elasticity.cell_stress import CellStress, beside
+from fastcontact.elasticity.cell_stress import CellStress, interpolation
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.initial_states import StressOffset
@@ -195,7 +195,7 @@ def stress_in_cells(
     stress = cell_stress.at(name, xi, cells, numbers, np.arange(len(mesh.cells[name]))[rows])
     elastic = field.compliance[numbers.reshape(len(numbers), -1)]
     if elastic.shape[1] > 1:
-        elastic = np.einsum("nq,cqij->cnij", beside(name, xi), elastic)
+        elastic = np.einsum("nq,cqij->cnij", interpolation(name, xi), elastic)
     return N, stress, cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights, elastic
 
 

@@ -292,7 +292,7 @@ def test_constants_that_vary_are_named_before_cells_are_known():
     material = fc.Orthotropic(E=(lambda x: x[:, 0], 1.0, 1.0), nu=(0.1, 0.1, 0.1), G=(1.0, 1.0, np.ones(3)))
     assert "E = (a function of the position, 1, 1)" in material.described
     assert "an array of 3 numbers" in material.described
-    with pytest.raises(fc.ModelError, match=r"a number or one for each cell or point, not \['a'\]"):
+    with pytest.raises(fc.ModelError, match=r"must be a number, or numbers for all cells or points, not \['a'\]"):
         fc.Anisotropic(np.eye(6), density=["a"])
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array, vstack
+from scipy.sparse import csr_array
 
 from fastcontact._jit import ahead
 from fastcontact._tools.argument_types import finite_vector, typed
@@ -18,15 +18,16 @@ from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load, Value, check_number, check_solids, evaluated, solid_rows
 from fastcontact.elasticity.material_field import MaterialField, material_field
 from fastcontact.elasticity.materials import KINEMATICS, Material
-from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, stacked_rows
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies, check_law, field_names, nonlinear_bodies
 from fastcontact.elasticity.nonlinear_materials import STRAINS, NonlinearElastic
-from fastcontact.elasticity.springs import Springs, stacked
+from fastcontact.elasticity.springs import Springs
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.elasticity.varying_constants import Cells
 from fastcontact.errors import ModelError, Suggesting, check_known
 from fastcontact.heat.loads import Film, FixedTemperature, Heating
+from fastcontact.linear.sparse_rows import stacked_rows
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 from fastcontact.model.contact_pair import ContactPair
@@ -209,8 +210,7 @@ class ModelBase(Suggesting):
 
         A rigid-body mode that neither constraints nor springs prevent is in the null space of these rows.
         """
-        relations = stacked_rows(self.relations, self.n_dofs)
-        return csr_array(vstack([relations, stacked(self.springs, self.n_dofs)], format="csr"))
+        return stacked_rows([*self.relations, *self.springs], self.n_dofs)
 
     def add_material(self, material: Material, groups: Sequence[str] | str | None = None) -> None:
         """Assign a material to groups of solid cells.

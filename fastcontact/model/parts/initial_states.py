@@ -19,7 +19,7 @@ from fastcontact.elasticity.material_axes import Axes
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.materials import Constant
 from fastcontact.elasticity.recovery import internal_force, stress_at_points
-from fastcontact.elasticity.temperature import Temperature, checked_value, histories
+from fastcontact.elasticity.temperature import Temperature, histories
 from fastcontact.errors import ModelError
 from fastcontact.model.parts.base import group_names
 from fastcontact.model.parts.loads import ModelLoads
@@ -73,7 +73,8 @@ class ModelInitialStates(ModelLoads):
         >>> model.add_temperature(lambda points: 10.0 * points[:, 1], "BLOCK")
         """
         names = group_names(groups)
-        checked = checked_value(value)
+        is_array = isinstance(value, (list, tuple, np.ndarray)) and np.ndim(value) > 0
+        checked = np.array(value, float) if is_array else value
         reference = self.reference_temperature if reference is None else reference
         if times is not None:
             if ramp is not None:

@@ -347,7 +347,7 @@ def test_as_many_cells_as_points_is_no_array():
     lone = fc.Mesh([*ring, [0, 0], [5.0, 0.0]], {"tri3": [*cells, [0, 9, 1], [0, 7, 9]]})
     model = fc.Model(lone, "plane_strain")
     with pytest.raises(
-        fc.ModelError, match="10 numbers, and there are as many cells as points: give those of cells as a column"
+        fc.ModelError, match="10 numbers, but there are as many cells as points: give numbers of cells as a column"
     ):
         model.add_material(fc.LinearElastic(np.ones(10), 0.3))
     model.add_material(fc.LinearElastic(np.ones((10, 1)), 0.3))
@@ -378,7 +378,7 @@ def test_a_table_is_straight_between_its_places_and_constant_beyond():
     for arguments, words in (
         (("r", [(0, 1)]), "along x, y, z or radius, not along 'r'"),
         (("x", [(0, 1), (0, 2)]), "must ascend"),
-        (("x", []), "must ascend, at least one"),
+        (("x", []), "must ascend, and there must be at least one"),
         (("x", [(0, 1, 2)]), "pairs"),
         (("x", [(0, np.inf)]), "not a finite number"),
     ):

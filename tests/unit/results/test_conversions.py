@@ -268,7 +268,7 @@ def test_three_materials_at_one_node():
     sides = material_sides(mesh, {"quad4": np.array([2, 0, 1, 2], np.int32)})
     middle = int(np.flatnonzero(np.isclose(mesh.points, 1.0).all(axis=1))[0])
     assert sides.material[sides.points == middle].tolist() == [0, 1, 2]
-    assert sides.place[sides.points == middle][0] == middle
+    assert sides.slot[sides.points == middle][0] == middle
     assert len(sides.node) == mesh.n_points + 2 + 4
 
 
