@@ -58,6 +58,8 @@ class SettledContact:
         Scatter of the last iterates, if round-off prevents convergence to `Criteria.geometry`.
     nodes : SharedNodes, optional
         Nodes of several pairs, or at both ends of a period, whose constraints are merged.
+    paired_at : ndarray (k,), optional
+        Displacements of the last pairing, in the components of `StepContext.dofs` [length].
     """
 
     constraints: StackedConstraints
@@ -66,6 +68,7 @@ class SettledContact:
     last_change: tuple[int, float] | None = None
     scatter: Scatter | None = None
     nodes: SharedNodes | None = None
+    paired_at: Array | None = None
 
     @property
     def gaps_and_forces(self) -> dict[str, tuple[Array, Array]]:
@@ -79,7 +82,7 @@ class SettledContact:
         return self.constraints.force(self.solution.multiplier, self.solution.tangential)
 
 
-def settle_geometry(step: StepContext, iterate: Iterate) -> SettledContact:
+def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact | None = None) -> SettledContact:
     """Alternate between pairing the surfaces and solving the contact problem until the displacements converge.
 
     Parameters
@@ -88,6 +91,8 @@ def settle_geometry(step: StepContext, iterate: Iterate) -> SettledContact:
     iterate : Iterate
         Iterate from which to begin, or the converged iterate of a less accurate iteration of the same step, to continue
         from. It is modified.
+    paired : SettledContact, optional
+        Contact of almost the same displacements in this step, whose last pairing serves as the first.
 
     Raises
     ------
@@ -96,7 +101,7 @@ def settle_geometry(step: StepContext, iterate: Iterate) -> SettledContact:
     """
     touching = Touching(step, _linearises(step.problem))
     try:
-        settled = _settle(step, iterate, touching)
+        settled = _settle(step, iterate, touching, paired if _linearises(step.problem) else None)
     except ConvergenceError as error:
         error.history = error.history or iterate.history
         raise
@@ -111,7 +116,9 @@ def _linearises(problem: Problem) -> bool:
     return not (fluid or problem.solver.iterative)
 
 
-def _settle(step: StepContext, iterate: Iterate, touching: Touching) -> SettledContact:
+def _settle(
+    step: StepContext, iterate: Iterate, touching: Touching, paired: SettledContact | None = None
+) -> SettledContact:
     """Return the result of `settle_geometry` before nodes in several pairs share their forces; `iterate` is modified."""
     problem, criteria = step.problem, step.problem.criteria
     limit = 0 if criteria.keep_pairing else criteria.geometry_updates
@@ -123,7 +130,10 @@ def _settle(step: StepContext, iterate: Iterate, touching: Touching) -> SettledC
     if extrapolates:
         iterate.u = step.extrapolation.displacement(iterate.u)
     for update in range(limit + 1):
-        constraints = pair_surfaces(problem, step.state, step.load, iterate)
+        if update == 0 and paired is not None and paired.paired_at is not None:
+            iterate.u, constraints = step.dofs.put(iterate.u, paired.paired_at), paired.constraints
+        else:
+            constraints = pair_surfaces(problem, step.state, step.load, iterate)
         active = initially_active(constraints, iterate, step.extrapolation if extrapolates and update == 0 else None)
         accuracy = tolerances.accuracy(largest(step.load.lift) + largest(iterate.u))
         # Constraints of several pairs, or of both ends of a period, may be at one node.
@@ -150,7 +160,7 @@ def _settle(step: StepContext, iterate: Iterate, touching: Touching) -> SettledC
             continue
         if not tolerances.inexact:
             touching.check(step, constraints, solution, moved.change - tolerances.enough(moved.size), moved.size)
-        settled = SettledContact(constraints, solution, iterate, nodes=nodes)
+        settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=moved.before)
         if not solution.settled or tolerances.inexact:
             watch.forget()
         elif moved.change <= tolerances.enough(moved.size) and not (touching.due or touching.unfinished):

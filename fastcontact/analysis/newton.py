@@ -122,6 +122,7 @@ class _Newton:
         self._iterate = Iterate.of(begin.state) if settled is None else settled.iterate
         self._settled: SettledContact | None = None
         self._kept: Problem | None = None  # the last tangent, if another iteration may use it
+        self._moved_fully = False  # whether displacements are those of the last contact solution
         self._by = Regularisation()  # of the last tangent
         self._replaces = bool(begin.problem.force_driven.pairs)  # see `Regularisation.replaces`
 
@@ -157,6 +158,7 @@ class _Newton:
             small = self._stands_still(changes) or moved <= self._start.gap_round_off
             if fraction == 1.0 and balanced.excess <= 1.0 and small:
                 return StepEquilibrium(self._settled, u, balanced, self._terms, history)
+            self._moved_fully = fraction == 1.0 and not self._by.linear
             u = self._accelerated(before, u, changes) if fraction == 1.0 else u
             if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > DECLINE * min(changes[:-PATIENCE]):
                 break
@@ -309,7 +311,8 @@ class _Newton:
             step = replace(
                 self._begin, problem=problem, load=load, loaded=reduced, dofs=dofs, extrapolation=extrapolation
             )
-            settled = settle_geometry(step, self._iterate)
+            paired = self._settled if self._moved_fully and problem.linearised_at is None else None
+            settled = settle_geometry(step, self._iterate, paired)
             self._iterate = settled.iterate
         solution = solve_displacements(problem, load, loaded, settled, u)
         self._settled = settled

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, csc_array, eye_array
+from scipy.sparse import bsr_array, coo_array, csc_array, eye_array
 from scipy.sparse.linalg import spilu
 
 from fastcontact._jit.parallel import on_one_blas_thread
@@ -28,9 +28,10 @@ def singular() -> ModelError:
     return ModelError("the stiffness matrix is singular: support the rigid-body motions of every body")
 
 
-def fill_reducing(K: bsr_array, last: Indices) -> Indices:
+def fill_reducing(K: bsr_array, last: Indices, connected: bool = False) -> Indices:
     """Return the unknowns (n,) of K in a fill-reducing elimination order, with the unknowns `last` (m,) at the end.
 
+    If `connected`, the order takes into account that these are connected with each other when all others are eliminated.
     Nodes are ordered by the minimum degree algorithm for the pattern of K (Liu, 1985). SciPy only provides this order as a
     part of the factorisations of SuperLU. An incomplete factorisation that drops all entries costs little more than the
     ordering.
@@ -38,6 +39,9 @@ def fill_reducing(K: bsr_array, last: Indices) -> Indices:
     size = K.blocksize[0]
     n = K.shape[0] // size
     pattern = csc_array((np.ones(len(K.indices)), K.indices, K.indptr), shape=(n, n))
+    if connected:
+        pairs = np.stack(np.meshgrid(nodes := np.unique(last // size), nodes)).reshape(2, -1)
+        pattern = pattern + coo_array((np.ones(pairs.shape[1]), pairs), shape=(n, n))
     # A dominant diagonal prevents pivoting. Panels of one column suffice, because almost nothing is computed.
     pattern = csc_array(pattern + 2.0 * n * eye_array(n))
     incomplete = spilu(
@@ -90,23 +94,25 @@ class SymbolicFactors:
         One of these matrices.
     last : ndarray of int (m,)
         Unknowns that are eliminated last.
+    many : bool, optional
+        Whether there are many matrices, so that the better of two orders is worth its time.
     """
 
-    def __init__(self, K: bsr_array, last: Indices) -> None:
-        n = K.shape[0]
+    def __init__(self, K: bsr_array, last: Indices, many: bool = False) -> None:
+        n, late = K.shape[0], np.zeros(K.shape[0], bool)
         self._pattern, self._last = (K.indptr, K.indices), last
-        self._order = order = fill_reducing(K, last)
-        self._reordered: csc_array | None = None
-        late = np.zeros(n, bool)
-        late[last] = True
-        self._first: csc_array | None = reordered(K, order)
-        self._tree = elimination_tree(self._first)
-        self._nodes = supernodes(self._first, self._tree, late[order[self._tree.order]])
-        self._position = np.empty(n, np.intp)
-        self._position[order[self._tree.order]] = np.arange(n)
+        self._kept = Kept(np.empty(0), np.empty(0, np.int64), NO_FACTORS)
+        self._numbers: csc_array | None = None
+        self._first: csc_array | None
+        orders = [fill_reducing(K, last, connected) for connected in (False, True)[: 1 + many]]
+        analysed = [(order, A := reordered(K, order), elimination_tree(A)) for order in orders]
+        order, self._first, self._tree = min(analysed, key=lambda one: np.square(one[2].entries, dtype=float).sum())
+        self._unknowns, self._position = order[self._tree.order], np.empty(n, np.intp)
+        self._position[self._unknowns] = np.arange(n)
+        late[self._position[last]] = True
+        self._nodes = supernodes(self._first, self._tree, late)
         above = self._tree.parent[self._nodes.first[1:] - 1].astype(np.int64)
         self._above = np.where(above < 0, -1, np.searchsorted(self._nodes.first, above, side="right") - 1)
-        self._kept = Kept(np.empty(0), np.empty(0, np.int64), NO_FACTORS)
 
     def serves(self, K: bsr_array, last: Indices) -> bool:
         """Return whether the matrix K has the pattern of this factorisation, and the same unknowns are eliminated last."""
@@ -121,45 +127,49 @@ class SymbolicFactors:
         ModelError
             If K is singular or not positive definite.
         """
-        A, tree, nodes, n = self._numbered(K), self._tree, self._nodes, K.shape[0]
+        (A, *place), nodes, n = self._numbered(K), self._nodes, K.shape[0]
         width, below = np.diff(nodes.first), np.diff(nodes.begin)
         start = np.concatenate([[0], np.cumsum(np.repeat(nodes.first[1:] + below, width) - np.arange(n))])
         values, d = np.empty(start[-1]), np.empty(n)
-        sizes = factorisation_kernels.room(tree.parent, nodes.first, nodes.begin)
-        source, target, updates = self._planned(A)
+        sizes = factorisation_kernels.room(self._tree.parent, nodes.first, nodes.begin)
+        source, target, updates = self._planned(A, place[0])
         bad = factorisation_kernels.factorise(
-            A.indptr, A.indices, A.data, tree.order, tree.place, tree.parent, *nodes, sizes, start,
+            A.indptr, A.indices, A.data, *place, self._tree.parent, *nodes, sizes, start,
             source, self._kept.factors, target, updates, values, d,
         )  # fmt: skip
         if bad >= 0:
-            if abs(d[bad]) <= LENGTH_ROUND_OFF * A.diagonal()[tree.order[bad]]:
+            if abs(d[bad]) <= LENGTH_ROUND_OFF * A.diagonal()[place[0][bad]]:
                 raise singular()
             raise ModelError("the stiffness matrix is not positive definite: check the material and the cells")
-        if self._reordered is not None:
+        if self._numbers is not None:
             self._kept = Kept(A.data, target, (values, d, updates) if (target >= 0).any() else NO_FACTORS)
         return SymmetricFactors(LowerTriangle(start, values, *nodes), d, self._position, self._last)
 
-    def _planned(self, A: csc_array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    def _planned(self, A: csc_array, order: Numbers) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """Return `source` and `target` (n_supernodes,) of `factorisation_kernels.plan`, and an array for update matrices."""
         nodes, kept, size = self._nodes, self._kept, 0
         source, target = np.full(len(self._above), factorisation_kernels.ANEW), np.full(len(self._above), -1)
         if len(kept.entries):
             size = factorisation_kernels.plan(
-                A.indptr, A.data, kept.entries, self._tree.order, self._above, nodes.first, nodes.begin, kept.offsets,
-                source, target,
+                A.indptr, A.data, kept.entries, order, self._above, nodes.first, nodes.begin, kept.offsets, source, target,
             )  # fmt: skip
         return source, target, np.empty(size)
 
-    def _numbered(self, K: bsr_array) -> csc_array:
-        """Return K in the order of elimination; the permutation of its numbers is cached from the second matrix on."""
+    def _numbered(self, K: bsr_array) -> tuple[csc_array, Numbers, Numbers]:
+        """Return K, and its columns in the order of elimination with the inverse; see `factorisation_kernels.factorise`.
+
+        From the second matrix on, K is its lower triangle in this order, taken by cached numbers of its entries.
+        """
         if self._first is not None:
             A, self._first = self._first, None
-            return A
-        if self._reordered is None:
+            return A, self._tree.order, self._tree.place
+        if self._numbers is None:
             numbers = np.arange(K.data.size, dtype=np.int64).reshape(K.data.shape)
-            self._reordered = reordered(bsr_array((numbers, K.indices, K.indptr), shape=K.shape), self._order)
-        A = self._reordered
-        return csc_array((K.data.ravel()[A.data], A.indices, A.indptr), shape=K.shape)
+            A = reordered(bsr_array((numbers, K.indices, K.indptr), shape=K.shape), self._unknowns).tocoo()
+            lower = A.row >= A.col
+            self._numbers = csc_array((A.data[lower], (A.row[lower], A.col[lower])), shape=K.shape)
+        A, same = self._numbers, np.arange(K.shape[0], dtype=np.intc)
+        return csc_array((K.data.ravel()[A.data], A.indices, A.indptr), shape=K.shape), same, same
 
 
 class Tree(NamedTuple):

@@ -12,13 +12,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
+from fastcontact._jit.decorators import innermost_kernel, interpretable_kernel, kernel
 from fastcontact.arrays import Array, Numbers
 
 Offsets = NDArray[np.int64]
 
-# Number of columns in a panel, and of rows of the update that are computed together.
-PANEL, ROWS = 48, 96
+# Number of columns that are subtracted in one pass, of columns in a panel, and of rows of the update that BLAS computes.
+TOGETHER, PANEL, ROWS = 4, 48, 96
 # Smallest number of multiplications for which a product is passed to BLAS.
 SMALL = 20_000
 # Supernodes that are factorised, and those below the root of a subtree that keeps its columns, in `plan`.
@@ -99,10 +99,10 @@ def factorise(
     Parameters
     ----------
     start, rows, values
-        The matrix by columns, both triangles, in its original numbering; everything else is numbered as in
+        The matrix by columns, at least the lower triangle in the order of elimination; everything else is numbered as in
         `elimination_tree_kernels.postordered`.
     order, position : ndarray of int (n,)
-        Elimination order and its inverse.
+        Columns of the matrix in the order of elimination, and the inverse.
     parent : ndarray of int (n,)
         Elimination tree.
     first, begin, below
@@ -225,41 +225,55 @@ def _eliminated(F: Array, width: int, one: Array, other: Array, product: Array) 
     size = len(F)
     for begin in range(0, width, PANEL):
         end = min(begin + PANEL, width)
-        for j in range(begin, end):
-            pivot = F[j, j]
-            if not pivot > 0.0:
-                return j
-            row = F[j]
-            for i in range(j + 1, end):
-                factor, target = row[i] / pivot, F[i]
-                for k in range(i, size):
-                    target[k] -= factor * row[k]
-            for k in range(j + 1, size):
-                row[k] /= pivot
+        for low in range(begin, end, TOGETHER):
+            high = min(low + TOGETHER, end)
+            for j in range(low, high):
+                if not F[j, j] > 0.0:
+                    return j
+                _subtract(F, j, j + 1, j + 1, high, False)
+            _subtract(F, low, high, high, end, False)
+            for j in range(low, high):
+                pivot = F[j, j]
+                for k in range(j + 1, size):
+                    F[j, k] /= pivot
         m = size - end
-        if m:
-            if (end - begin) * m * m < SMALL:
-                _reduced_by_rows(F, begin, end)
-            else:
-                _reduced_by_blocks(F, begin, end, one, other, product)
+        if (end - begin) * m * m >= SMALL:
+            _reduced_by_blocks(F, begin, end, one, other, product)
+        else:
+            for low in range(begin, end, TOGETHER):
+                _subtract(F, low, min(low + TOGETHER, end), end, size, True)
     return -1
 
 
-@inlined_kernel
-def _reduced_by_rows(F: Array, begin: int, end: int) -> None:
-    """Subtract the contribution of the columns `begin` to `end` of L from the rest of a front."""
+@innermost_kernel
+def _subtract(F: Array, low: int, high: int, begin: int, end: int, scaled: bool) -> None:
+    """Subtract the contribution of the columns `low` to ``high - 1`` of L from the rows `begin` to ``end - 1`` of a front.
+
+    `scaled` tells whether these columns have been divided by their pivots. `TOGETHER` columns are subtracted in one pass.
+    """
     size = len(F)
-    for j in range(begin, end):
-        row, pivot = F[j], F[j, j]
-        for i in range(end, size):
-            factor, target = row[i] * pivot, F[i]
+    for i in range(begin, end):
+        if high - low == TOGETHER:
+            a, b = _factor(F, low, i, scaled), _factor(F, low + 1, i, scaled)
+            c, d = _factor(F, low + 2, i, scaled), _factor(F, low + 3, i, scaled)
             for k in range(i, size):
-                target[k] -= factor * row[k]
+                F[i, k] = F[i, k] - a * F[low, k] - b * F[low + 1, k] - c * F[low + 2, k] - d * F[low + 3, k]
+        else:
+            for j in range(low, high):
+                factor = _factor(F, j, i, scaled)
+                for k in range(i, size):
+                    F[i, k] -= factor * F[j, k]
+
+
+@innermost_kernel
+def _factor(F: Array, j: int, i: int, scaled: bool) -> float:
+    """Return the factor of row j in the elimination of row i."""
+    return F[j, i] * F[j, j] if scaled else F[j, i] / F[j, j]
 
 
 @kernel
 def _reduced_by_blocks(F: Array, begin: int, end: int, one: Array, other: Array, product: Array) -> None:
-    """Do the same as `_reduced_by_rows` by matrix products."""
+    """Subtract the contribution of the columns `begin` to ``end - 1`` of L from the rest of a front by matrix products."""
     size, width = len(F), end - begin
     m = size - end
     plain, scaled = one[: m * width].reshape(m, width), other[: m * width].reshape(m, width)

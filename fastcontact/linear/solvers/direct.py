@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 from scipy.sparse import bsr_array
 
 from fastcontact.arrays import Indices
 from fastcontact.linear.cholesky.factorisation import SymbolicFactors
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
-from fastcontact.linear.factor_solver import FactorSolver
+from fastcontact.linear.factor_solver import ATTAINABLE, FactorSolver
 
 
 class Direct(FactorSolver):
     """Direct solver with the Cholesky factorisation of `linear.cholesky`; see `FactorSolver`."""
 
     name = "direct"
-    _symbolic: SymbolicFactors | None = None  # shared by the solvers of all tangents
+    _of_tangents = False
+
+    def __init__(self, tolerance: float = ATTAINABLE) -> None:
+        super().__init__(tolerance)
+        # Symbolic factorisations of tangents (True), which their solvers share, and of other matrices.
+        self._symbolic: dict[bool, SymbolicFactors] = {}
 
     def __repr__(self) -> str:
         if not self.n:
@@ -27,9 +34,16 @@ class Direct(FactorSolver):
         return self._factors.nbytes
 
     def _factorised(self, K: bsr_array, last: Indices) -> SymmetricFactors:
-        if self._symbolic is None or not self._symbolic.serves(K, last):
-            self._symbolic = SymbolicFactors(K, last)
-        return self._symbolic.factors(K)
+        symbolic = self._symbolic.get(self._of_tangents)
+        if symbolic is None or not symbolic.serves(K, last):
+            symbolic = self._symbolic[self._of_tangents] = SymbolicFactors(K, last, self._of_tangents)
+        return symbolic.factors(K)
+
+    def near(self) -> Self:
+        """See `LinearSolver.near`."""
+        new = super().near()
+        new._of_tangents = True
+        return new
 
 
 SOLVER = Direct
