@@ -174,11 +174,13 @@ def _settle(
         mixed = mixing.next(settled, moved, displacement, tolerances)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative, solution.residual)
-        if update == max(limit // 2, PATIENT_UPDATES) and any(pair.faceted for pair in problem.pairs.values()):
-            log.info("nodes flip between facets: from now on the edges of facets are rounded")
-            iterate.rounded = True
-            mixing.restart()
-            watch.forget()
+        if update == max(limit // 2, PATIENT_UPDATES):
+            mixing.across = True
+            if any(pair.faceted for pair in problem.pairs.values()):
+                log.info("nodes flip between facets: from now on the edges of facets are rounded")
+                iterate.rounded = True
+                mixing.restart()
+                watch.forget()
     if problem.until_settled:
         changed = step.dofs.put(np.zeros_like(iterate.u), displacement - moved.before)
         raise ConvergenceError(geometry_moves(problem, iterate.history, changed, limit), iterate.history)
@@ -254,6 +256,7 @@ class _Mixing:
     def __init__(self, step: StepContext) -> None:
         self._step, self._accelerated = step, None
         self._known: AnyArray | None = None
+        self.across = False
         self._newton, self._change, self.contraction = _linearises(step.problem), np.inf, np.inf
 
     _accelerated: Anderson | None
@@ -280,7 +283,7 @@ class _Mixing:
         state = settled.constraints.state(solution.active)
         same = self._known is not None and np.array_equal(self._known, state)
         self._known = state if solution.settled else None
-        if tolerances.inexact or not (same or settled.iterate.rounded):
+        if tolerances.inexact or not (same or self.across):
             self.restart()
         if tolerances.inexact:
             return None

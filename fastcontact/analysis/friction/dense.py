@@ -32,6 +32,7 @@ EDGES, LARGEST = (8, 32), 2500
 # REGULARISATION and, if it does not suffice, the second. If the elastic slip due to this compliance exceeds SINGLE_PRECISION,
 # relative to the gaps and slips without forces, the forces are not in equilibrium: the bodies jam.
 REGULARISATION = 10 * ROUND_OFF, LENGTH_ROUND_OFF
+SOFT, HARDER = 1e-2, 0.1
 
 
 def solve(
@@ -73,8 +74,7 @@ def solve(
     if guess is not None:
         guess = guess / (length * unit)
     for compliance in REGULARISATION if _dependent(F) else (0.0,):
-        slips = np.arange(m, len(F))
-        F[slips, slips] += compliance
+        F[np.diag_indices_from(F)] += compliance
         problem = _Problem(F, free * unit / length, law)
         for start, line_search in problem.starts(closed, guess):
             # At least one iteration: the residual of forces of an earlier geometry update may be below the round-off bound,
@@ -139,6 +139,7 @@ class _Problem:
         sticking = closed & ~equality if (closed & ~equality).any() else (self.free[0] < 0) & ~equality
         stuck = self.step(np.zeros_like(self.free), self.free, sticking | equality, sticking)[0]
         yield stuck, True
+        yield self._softened(stuck), True
         if guess is not None:
             yield guess, False
         yield stuck, False
@@ -146,6 +147,18 @@ class _Problem:
             edge_forces = _on_edges(self, edges)
             if edge_forces is not None:
                 yield edge_forces, True
+
+    def _softened(self, y: Array) -> Array:
+        """Return forces (1 + k, m) close to the solution: those with a compliance, which decreases from SOFT to ROUND_OFF.
+
+        The solution with a large compliance is unique and easily found from any forces y, and it varies continuously with it.
+        """
+        compliance = SOFT
+        while compliance > ROUND_OFF:
+            softened = _Problem(self.F + compliance * np.eye(len(self.F)), self.free, self.law)
+            y = newton(softened, y, softened.gaps(y), least=1).y
+            compliance *= HARDER
+        return y
 
 
 def _equations(law: Law, F: Array, y: Array, gaps: Array, rows: Indices, sticking: Mask) -> tuple[Array, Array]:
