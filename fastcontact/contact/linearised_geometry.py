@@ -170,7 +170,8 @@ class Variation(NamedTuple):
     xi : ndarray (n, dim - 1)
         Variation of the reference coordinates of the facing points [-].
     foot : ndarray (n, dim)
-        Variation of the positions of the facing points due to that of xi, with fixed facets [length].
+        Variation of the positions of the facing points, on the smooth surface if there is one, due to that of xi, with fixed
+        facets [length].
     normal : ndarray (n, dim)
         Variation of the normals [-].
     """
@@ -198,6 +199,8 @@ class _SurfacePoints:
     closest : bool
         Whether the points face their closest points on the primary side, instead of the points along the normals. Both
         coincide for facet normals.
+    rise : ndarray (n, dim - 1), optional
+        Derivatives along facets of the heights of a smooth primary surface above them, see `surface_smoothing` [length].
 
     Attributes
     ----------
@@ -215,7 +218,7 @@ class _SurfacePoints:
 
     def __init__(
         self, candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface, coordinates: Array,
-        normals: object, closest: bool,
+        normals: object, closest: bool, rise: Array | None,
     ) -> None:  # fmt: skip
         at, n_points, facet = pairing.places(primary, rows), len(coordinates), pairing.facet[rows]
         nodes, shape = np.hstack([candidates.nodes[rows], at.nodes]), np.hstack([candidates.shape[rows], -at.shape])
@@ -247,6 +250,7 @@ class _SurfacePoints:
         )
         inverse = np.linalg.inv(np.einsum("ntd,nid->nti", frame, self.axes + self._gap[:, :, None] * bend))
         self._inverse = inverse @ frame
+        self._foot = self.axes if rise is None else self.axes + rise[:, :, None] * self.normal[:, None]
 
     def _facet_bend(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, at: Places) -> Array:
         """Return the derivatives (n, dim - 1, dim) of facet normals along facets, and store the dual axes of the facets."""
@@ -273,7 +277,7 @@ class _SurfacePoints:
         if self.averaged is not None:
             at_fixed_xi = self.averaged.along(du)
         xi = np.einsum("nid,nd->ni", self._inverse, moved - self._gap * (of_facet if self._closest else at_fixed_xi))
-        foot = np.einsum("nid,ni->nd", self.axes, xi)
+        foot = np.einsum("nid,ni->nd", self._foot, xi)
         return Variation(xi, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._bend, xi))
 
     def spread(self, force: Array, varied: Array, xi: Array) -> Array:
@@ -508,6 +512,9 @@ class Linearised:
         Rows of the m constraints among all constraints of the pair, and the number of the latter.
     smooth : (InterpolatedNormals, ndarray (n, dim - 1, dim)), optional
         Primary normals of the slips, and their derivatives along facets, where they are not those of the points.
+    compliance : Callable, optional
+        Elastic displacements (m, dim) [length] of the constraints under forces (m, dim) [force], if the compliance couples
+        vectors: its components along normals and tangents rotate with these.
     """
 
     side: Surface
@@ -520,6 +527,7 @@ class Linearised:
     slips: Slips | None = None
     place: tuple[Indices, int] | None = None
     smooth: tuple[InterpolatedNormals, Array] | None = None
+    compliance: Callable[[Array], Array] | None = None
 
     def along(self, du: Array) -> tuple[Array, Array]:
         """Return the variation of nodal forces (n_points, dim) [force] and of gaps and slips (1 + k, m) [length] along du."""
@@ -536,6 +544,8 @@ class Linearised:
             gaps = np.vstack([gaps, self.slips.along(du, varied, self.points, self.functions, normals)])
         tangential = None if self.slips is None else self.slips.force
         force = _turned(self.multiplier, tangential, self.normal, normal)
+        if self.compliance is not None and self.slips is not None:
+            gaps += self._elastic(normal, force)
         force = force if self.functions is None else self.functions.T @ force
         if self.place is not None:
             rows, of_place = self.place[0], gaps
@@ -543,12 +553,32 @@ class Linearised:
             gaps[:, rows] = of_place
         return self.points.spread(self._force, force, varied.xi), gaps
 
+    def _elastic(self, normal: Array, force: Array) -> Array:
+        """Return the variation (1 + k, m) of elastic gaps and slips [length] due to those of normals and forces (m, dim)."""
+        assert self.compliance is not None
+        assert self.slips is not None
+        stretched, varied = self._stretched, self.compliance(force)
+        gaps = np.einsum("md,md->m", normal, stretched) + np.einsum("md,md->m", self.normal, varied)
+        slips = np.einsum("kmd,md->km", self.slips.tangents, varied)
+        slips -= np.einsum("kmd,md->km", self.slips.tangents, normal) * np.einsum("md,md->m", self.normal, stretched)
+        return np.vstack([gaps, slips])
+
+    @cached_property
+    def _stretched(self) -> Array:
+        """Elastic displacements (m, dim) of the constraints [length]."""
+        assert self.compliance is not None
+        return self.compliance(self._forces)
+
+    @property
+    def _forces(self) -> Array:
+        """Forces of the constraints (m, dim) [force]."""
+        force = self.multiplier[:, None] * self.normal
+        return force if self.slips is None else force + self.slips.force
+
     @cached_property
     def _force(self) -> Array:
         """Forces at the points (n, dim) [force]."""
-        force = self.multiplier[:, None] * self.normal
-        force = force if self.slips is None else force + self.slips.force
-        return force if self.functions is None else np.asarray(self.functions.T @ force)
+        return self._forces if self.functions is None else np.asarray(self.functions.T @ self._forces)
 
     @cached_property
     def _length(self) -> Array:
@@ -581,14 +611,14 @@ Geometry = Callable[[Array, Array, Array], Linearised]
 
 def faced(
     candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface | RigidSide, coordinates: Array,
-    normals: object, pose: Pose, closest: bool = False,
+    normals: object, pose: Pose, closest: bool = False, rise: Array | None = None,
 ) -> Points:  # fmt: skip
     """Return the points in the rows `rows` (n,) of `pairing`, which was computed at `coordinates` (n_points, dim) [length].
 
-    `pose` applies to obstacles. `normals` and `closest` apply to meshed primary sides and are described for `_SurfacePoints`.
+    `pose` applies to obstacles. `normals`, `closest` and `rise` apply to meshed primary sides, see `_SurfacePoints`.
     """
     if not isinstance(primary, RigidSide):
-        return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, closest)
+        return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, closest, rise)
     return _ObstaclePoints(
         shapes_at(candidates.shape[rows], candidates.nodes[rows], len(coordinates)), primary, coordinates, pose
     )

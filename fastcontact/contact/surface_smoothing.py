@@ -63,6 +63,15 @@ class SmoothSide:
         powers = np.vander(xi[:, 0], k, True), np.vander(xi[:, -1], m, True)
         return np.asarray(np.einsum("nij,ni,nj->n", self.heights[facet], *powers))
 
+    def slope(self, facet: Indices, xi: Array) -> Array:
+        """Return the derivatives (n, dim - 1) of the heights `at` with respect to the reference coordinates [length]."""
+        k, m = self.heights.shape[1:]
+        derived = [
+            replace(self, heights=np.arange(1.0, k)[:, None] * self.heights[:, 1:]),
+            replace(self, heights=np.arange(1.0, m) * self.heights[:, :, 1:]),
+        ]
+        return np.stack([side.at(facet, xi) for side in derived[: xi.shape[1]]], axis=1)
+
 
 @dataclass(frozen=True, eq=False)
 class Smoothing:

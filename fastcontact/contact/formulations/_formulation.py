@@ -367,7 +367,8 @@ class Formulation(ABC):
 
         def linearised(multiplier: Array, tangential: Array, displacement: Array) -> Linearised:
             rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
-            points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, at.pose)
+            rise = self.rise(candidates, pairing, rows, coordinates)
+            points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, at.pose, rise=rise)
             forces = Linearised(
                 self.secondary, points, None, points.normal, multiplier[rows], place=(rows, len(multiplier))
             )
@@ -464,6 +465,18 @@ class Formulation(ABC):
         )
         closer[rows] = self.smoothing.overlap(on_secondary, on_primary, axes)
         return closer
+
+    def rise(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
+        """Return the derivatives (n, dim - 1) of `overlap_of_smooth` along primary facets [length]; None without smoothing.
+
+        `rows` (n,) are candidates, `deformed` (n_points, dim) are current coordinates. Facets have straight extensions.
+        """
+        if self.smoothing is None or candidates.facet is None or not isinstance(self.primary, Surface):
+            return None
+        axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
+        factor = self.smoothing.shared(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
+        slope = factor * self.smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
+        return slope if pairing.beyond is None else np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
 
     def carried(self, candidates: Candidates, at: Configuration) -> Array:
         """Return the displacements (n, dim) in the step of the points of an obstacle opposite to candidates [length]."""

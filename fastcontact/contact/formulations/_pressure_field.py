@@ -25,6 +25,7 @@ as many points with an area as it has nodes. Integrals are taken over the undefo
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
@@ -35,6 +36,7 @@ from fastcontact.contact.closed_nodes import NO_AREA
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
+from fastcontact.contact.linearised_geometry import Geometry, Linearised
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.errors import ContactError
@@ -259,6 +261,8 @@ class PressureFieldFormulation(Formulation):
             axes = turning.axes(constraints.positions), turning.axes(self.points[self.secondary.points])
             field = replace(field, axes=axes)
             along = tuple(np.einsum("mde,md->me", axes[0], t) for t in along)
+        if constraints.tangents and constraints.geometry is not None:
+            constraints = replace(constraints, geometry=partial(_coupled, constraints.geometry, projection, field.axes))
         undetermined = self._undetermined(field, constraints, along, at) if self.friction else np.empty(0)
         return replace(
             constraints, low_rank_compliance=undetermined, areas=field.areas, nodal=field, coupled_directions=along
@@ -291,3 +295,24 @@ class PressureFieldFormulation(Formulation):
                 factor[0, :, pressure > PART_OF_CONE * constraints.friction.max() * shear] = 0.0
                 factors.append(factor)
         return np.concatenate(factors, axis=2) if factors else np.empty(0)
+
+
+def _coupled(
+    geometry: Geometry, projection: Projection, axes: tuple[Array, Array] | None, multiplier: Array, tangential: Array,
+    displacement: Array,
+) -> Linearised:  # fmt: skip
+    """Return the linearised geometry of constraints whose forces a multiplier field couples as vectors.
+
+    The first three arguments are the geometry at fixed compliance, the multiplier field, and its `PressureField.axes`.
+    """
+    linearised = geometry(multiplier, tangential, displacement)
+    assert linearised.place is not None
+    rows, count = linearised.place
+
+    def elastic(force: Array) -> Array:
+        forces = np.zeros((count, force.shape[1]))
+        forces[rows] = force if axes is None else np.einsum("mde,md->me", axes[0][rows], force)
+        moved = np.column_stack([projection.apply(component) for component in forces.T])[rows]
+        return moved if axes is None else np.einsum("mde,me->md", axes[0][rows], moved)
+
+    return replace(linearised, compliance=elastic)

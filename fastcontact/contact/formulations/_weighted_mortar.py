@@ -187,7 +187,7 @@ class WeightedMortar(Formulation):
         """
         at, acts, overlap = replace(at, displacement=displacement), multiplier != 0.0, coverage.overlap
         deformed = self.points + displacement
-        nodes, shapes, functions, tests, first = [], [], Entries(), Entries(), 0
+        nodes, shapes, facets, functions, tests, first, blocks_end = [], [], [], Entries(), Entries(), 0, 0
         of_blocks = zip(self.secondary.blocks, self._test, coverage.functions, strict=True)
         for number, (block, T, (psi, _)) in enumerate(of_blocks):
             inside = self._points_of(number, overlap) if overlap.points is None else overlap.points[number]
@@ -197,12 +197,14 @@ class WeightedMortar(Formulation):
             tests.add(block.local[facet], columns, (area[:, None] * (shape @ T.T))[:, :, None])
             nodes.append(block.facets[facet])
             shapes.append(shape)
-            first += len(facet)
-        candidates = Candidates(filled_up(nodes), filled_up(shapes))
+            facets.append(blocks_end + facet)
+            first, blocks_end = first + len(facet), blocks_end + len(block.facets)
+        candidates = Candidates(filled_up(nodes), filled_up(shapes), np.concatenate(facets))
         pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", at.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), first)
         along = "facet" if self.normals == "secondary" else self.normals
-        points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, closest=True)
+        rise = self.rise(candidates, pairing, rows, deformed)
+        points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, True, rise)
         weighted = scaled(csr_array(functions.matrix(size)[:, rows]), 1.0 / weight)
         mean = csr_array(tests.matrix(size)[:, rows])
         own_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
