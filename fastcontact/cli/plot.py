@@ -92,7 +92,7 @@ def _of_bodies(
 ) -> Any:
     """Draw the deformed mesh, or a section through it."""
     from fastcontact.results import plot
-    from fastcontact.results.plot.shape import scale_of
+    from fastcontact.results.plot._shape import scale_of
 
     at = f"section {options.section}, " if plane else ""
     scale = scale_of(options.scale, results.mesh, [step])

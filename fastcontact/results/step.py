@@ -6,7 +6,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, SupportsIndex, overload
+from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
 import numpy as np
 
@@ -573,7 +573,19 @@ class StepResult(Suggesting):
 SHOWN = 30
 
 
-class StepSequence(Sequence[StepResult]):
+class _Steps(Suggesting):
+    """Base class of lists of steps, whose AttributeError says that each step has an attribute."""
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> object:
+            if not name.startswith("_") and (name in StepResult.__dataclass_fields__ or hasattr(StepResult, name)):
+                text = f"'{type(self).__name__}' object has no attribute '{name}': each step has one, such as [-1].{name}"
+                raise AttributeError(text, name=name, obj=text)
+            return super().__getattr__(name)
+
+
+class StepSequence(_Steps, Sequence[StepResult]):
     """A sequence of steps, each of which is read or computed on access."""
 
     @abstractmethod
@@ -593,7 +605,7 @@ class StepSequence(Sequence[StepResult]):
         return range(len(self))[number]
 
 
-class Steps(list[StepResult]):
+class Steps(_Steps, list[StepResult]):
     """A list of `StepResult` that notebooks display as a table."""
 
     @overload
