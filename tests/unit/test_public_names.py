@@ -55,7 +55,7 @@ def test_an_unknown_name_is_no_attribute():
         (fc.obstacles, "Plane", "did you mean 'HalfSpace'?"),
         (fc.generate, "rotated", "did you mean 'transformed'?"),
         (fc.analytic, "hertz_sphere", "did you mean 'hertz_point'?"),
-        (fc.analytic, "lame", "or 'thick_cylinder' or 'thick_sphere'?"),  # names of modules are private, so that nobody calls a module
+        (fc.analytic, "lame", "or 'thick_cylinder' or 'thick_sphere'?"),  # not a module
         (fc.analytic, "persson", "did you mean 'persson_pin' or 'PerssonPin'?"),
         (fc.plot, "shape", "did you mean 'deformed_shape'?"),
         (fc.generate, "refine", "did you mean 'refined'?"),
