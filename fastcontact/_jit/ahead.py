@@ -14,7 +14,6 @@ import contextlib
 import importlib
 import itertools
 import json
-import multiprocessing
 import os
 import subprocess
 import sys
@@ -206,7 +205,7 @@ def expect(runs: Sequence[str]) -> None:
     """
     new, helpers = [run for run in runs if run not in _helped], min(decorators.threads() - 1, MOST)
     python = Path(sys.executable or "").stem.startswith("python")
-    if not new or helpers < 1 or multiprocessing.parent_process() is not None or not python or not kernel_files.files:
+    if not new or helpers < 1 or compiling.in_worker() or not python or not kernel_files.files:
         return
 
     def begin() -> None:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import importlib
+import io
 import logging
 import os
 import pickle
@@ -25,6 +27,7 @@ import numba
 import numpy as np
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
+from numba.core.environment import Environment, lookup_environment
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
@@ -37,6 +40,30 @@ OPTIONS = ("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "CPU_NAME", "CPU_FEATURES"
 # Number of characters of a digest.
 DIGEST = 64
 CONSTANTS = (bool, int, float, complex, str, tuple, np.ndarray, np.generic, type(None))
+
+
+class _Unpickler(pickle.Unpickler):
+    """Unpickler of kernels that does not import the modules of Numba whose functions a kernel contains.
+
+    Their import takes longer than loading the kernels, and compiled code does not read the globals of a module.
+    """
+
+    def find_class(self, module: str, name: str) -> Any:
+        """Return a global of a module."""
+        return _environment if name == "_rebuild_env" else super().find_class(module, name)
+
+
+def _environment(module: str, constants: list[Any], name: str) -> Any:
+    """Return the constants of a compiled function as Numba keeps them, by the name of the function."""
+    known = lookup_environment(name)
+    if known is None:
+        known = Environment(
+            {"__name__": module} if module.startswith("numba.") else vars(importlib.import_module(module))
+        )
+        known.consts[:] = constants
+        known.env_name = name
+        Environment._memo[name] = known
+    return known
 
 
 class KernelFiles(_Cache):  # type: ignore[misc]
@@ -97,7 +124,7 @@ class KernelFiles(_Cache):  # type: ignore[misc]
                     return None
                 content = file.read()
             if _digest(content[:-DIGEST]).encode() == content[-DIGEST:]:
-                return pickle.loads(content)  # the digest makes the file one of this package
+                return _Unpickler(io.BytesIO(content)).load()  # the digest makes the file one of this package
             _log_once(f"the compiled kernel '{path}' is damaged")
         except FileNotFoundError:
             pass

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import multiprocessing
 import sys
 from collections.abc import Callable
 
@@ -52,7 +51,13 @@ def tell_who_waits() -> None:
 def _somebody_waits() -> bool:
     """Return whether the error output is visible to a user, and this is not a worker process."""
     seen = sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
-    return seen and multiprocessing.parent_process() is None
+    return seen and not in_worker()
+
+
+def in_worker() -> bool:
+    """Return whether this is a worker process, in which `multiprocessing` is already imported."""
+    processes = sys.modules.get("multiprocessing")
+    return processes is not None and processes.parent_process() is not None
 
 
 # Called when a kernel is compiled or waited for, but not when it is read from the disk cache.

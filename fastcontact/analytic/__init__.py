@@ -14,9 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from fastcontact.analytic._half_space import VonMisesMaximum
-from fastcontact.analytic._inputs import Bodies
-from fastcontact.analytic.cattaneo_mindlin import (
+from fastcontact.analytic._cattaneo_mindlin import (
     BlockSliding,
     CattaneoMindlinLine,
     CattaneoMindlinSphere,
@@ -24,11 +22,10 @@ from fastcontact.analytic.cattaneo_mindlin import (
     cattaneo_mindlin_line,
     cattaneo_mindlin_sphere,
 )
-from fastcontact.analytic.finite_spheres import FiniteHalfSpheres, finite_half_spheres
-from fastcontact.analytic.hertz_elliptical import HertzElliptical, hertz_elliptical
-from fastcontact.analytic.hertz_line import HertzLine, hertz_line
-from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
-from fastcontact.analytic.lame import (
+from fastcontact.analytic._finite_spheres import FiniteHalfSpheres, finite_half_spheres
+from fastcontact.analytic._half_space import VonMisesMaximum
+from fastcontact.analytic._inputs import Bodies
+from fastcontact.analytic._lame import (
     LameShell,
     PressFit,
     press_fit_cylinders,
@@ -36,9 +33,9 @@ from fastcontact.analytic.lame import (
     thick_cylinder,
     thick_sphere,
 )
-from fastcontact.analytic.manufactured import HertzBox, hertz_box
-from fastcontact.analytic.persson import PerssonPin, persson_limit_angle, persson_pin
-from fastcontact.analytic.punches import (
+from fastcontact.analytic._manufactured import HertzBox, hertz_box
+from fastcontact.analytic._persson import PerssonPin, persson_limit_angle, persson_pin
+from fastcontact.analytic._punches import (
     FlatPunch,
     FlatPunch2D,
     PowerLawPunch,
@@ -50,7 +47,10 @@ from fastcontact.analytic.punches import (
     power_law_punch,
     spence_stick_ratio,
 )
-from fastcontact.analytic.receding import RecedingLayer, receding_layer
+from fastcontact.analytic._receding import RecedingLayer, receding_layer
+from fastcontact.analytic.hertz_elliptical import HertzElliptical, hertz_elliptical
+from fastcontact.analytic.hertz_line import HertzLine, hertz_line
+from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
 from fastcontact.errors import names_of
 
 THEORIES: dict[str, Callable[..., Any]] = {

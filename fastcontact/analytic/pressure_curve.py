@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastcontact.analytic.cattaneo_mindlin import CattaneoMindlinLine, CattaneoMindlinSphere
+from fastcontact.analytic._cattaneo_mindlin import CattaneoMindlinLine, CattaneoMindlinSphere
+from fastcontact.analytic._lame import PressFit
+from fastcontact.analytic._manufactured import HertzBox
+from fastcontact.analytic._persson import PerssonPin
+from fastcontact.analytic._punches import PowerLawPunch
 from fastcontact.analytic.hertz_line import HertzLine
 from fastcontact.analytic.hertz_point import HertzPoint
-from fastcontact.analytic.lame import PressFit
-from fastcontact.analytic.manufactured import HertzBox
-from fastcontact.analytic.persson import PerssonPin
-from fastcontact.analytic.punches import PowerLawPunch
 from fastcontact.arrays import Array
 
 # Names of the theories, after their authors.

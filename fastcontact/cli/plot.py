@@ -93,7 +93,7 @@ def _body_plot(
 ) -> Any:
     """Return a plot of the deformed mesh, or of a section through it."""
     from fastcontact.results import plot
-    from fastcontact.results.plot.shape import scale_of
+    from fastcontact.results.plot._shape import scale_of
 
     section = f"section {options.section}, " if plane else ""
     scale = scale_of(options.scale, results.mesh, [step])

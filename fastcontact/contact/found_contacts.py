@@ -72,6 +72,8 @@ class FoundContacts(Sequence[FoundContact]):
     mesh : Mesh
         The mesh with a group of facets for each side.
     pairs : tuple of FoundContact
+    units : mapping of str to str
+        Names of units of the model, as described for `Model`.
 
     Examples
     --------
@@ -82,7 +84,8 @@ class FoundContacts(Sequence[FoundContact]):
     """
 
     mesh: Mesh
-    pairs: tuple[FoundContact, ...] = field(default=())
+    pairs: tuple[FoundContact, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.pairs)

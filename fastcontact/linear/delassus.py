@@ -9,13 +9,13 @@ K.
 
 from __future__ import annotations
 
-import warnings
 import weakref
 from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq, lu_factor
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
+from scipy.linalg.lapack import dgetrf
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
@@ -159,8 +159,7 @@ def lu_factors(A: Array) -> tuple[Array, Array]:
     LinAlgError
         If A is singular up to round-off.
     """
-    with warnings.catch_warnings(action="ignore"):  # SciPy warns if a pivot is exactly zero; below this is an error
-        lu, pivots = lu_factor(A)
+    lu, pivots, _ = dgetrf(A)  # `lu_factor` warns if a pivot is exactly zero; below this is an error
     if not (np.abs(np.diag(lu)) > _round_off(A) * np.abs(A).max(axis=0)).all():
         raise LinAlgError("singular")
     return lu, pivots

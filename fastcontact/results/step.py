@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, SupportsIndex, overload
+from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
 import numpy as np
 
@@ -409,7 +409,8 @@ class StepResult(Suggesting):
         - ``temperature_factors``, ``initial_factors``, ``pressure_factors``: multipliers of the temperatures, of the
           initial stresses and strains, and of the pressures in finite strain [-].
         - ``work`` and ``pretension``: data of the properties of the same names.
-        - ``parameter``, in vibration modes: quantity that the load factor represents, ``frequency`` or ``phase``.
+        - ``parameter``, in vibration modes, whose shapes have no unit: quantity that the load factor represents,
+          ``frequency`` or ``phase``.
     warnings : tuple of str
         Warnings of the step.
     cell_fields : dict of str to ndarray (n_solids,)
@@ -474,7 +475,9 @@ class StepResult(Suggesting):
         displacement, stress = (float(np.abs(field).max(initial=0.0)) for field in (self.displacement, self.von_mises))
         shown = {
             self.iterations.get("parameter", "load factor"): f"{self.load_factor:.6g}",
-            "largest displacement": with_unit(f"{displacement:.6g}", self.units, "length"),
+            "largest displacement": with_unit(
+                f"{displacement:.6g}", {} if "parameter" in self.iterations else self.units, "length"
+            ),
             "largest von Mises stress": with_unit(f"{stress:.6g}", self.units, "pressure"),
         }
         labels = {"geometry_updates": "geometry updates", "active_set_iterations": "active-set iterations"}
@@ -573,7 +576,19 @@ class StepResult(Suggesting):
 MOST_SHOWN = 30
 
 
-class StepSequence(Sequence[StepResult]):
+class _Steps(Suggesting):
+    """Base class of lists of steps, whose AttributeError says that each step has an attribute."""
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> object:
+            if not name.startswith("_") and (name in StepResult.__dataclass_fields__ or hasattr(StepResult, name)):
+                text = f"'{type(self).__name__}' has no attribute '{name}': each step has one, such as [-1].{name}"
+                raise AttributeError(text, name=name, obj=text)
+            return super().__getattr__(name)
+
+
+class StepSequence(_Steps, Sequence[StepResult]):
     """A sequence of steps, each of which is read or computed on access."""
 
     @abstractmethod
@@ -593,7 +608,7 @@ class StepSequence(Sequence[StepResult]):
         return range(len(self))[number]
 
 
-class Steps(list[StepResult]):
+class Steps(_Steps, list[StepResult]):
     """A list of `StepResult` that notebooks display as a table."""
 
     @overload

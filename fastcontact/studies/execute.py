@@ -25,7 +25,7 @@ from fastcontact._tools.paths import replacing
 from fastcontact.analysis.progress import StatusLine
 from fastcontact.errors import CaseError, FastcontactError, FileError
 from fastcontact.results.committed_file import uninterrupted
-from fastcontact.studies.job import Run, run
+from fastcontact.studies.job import QuantityError, Run, run
 
 
 class Runs(StatusLine):
@@ -95,7 +95,8 @@ def run_all(
 ) -> list[Result]:
     """Run jobs in parallel and return their results in the order of the jobs; options as in `convergence_study`.
 
-    Raises CaseError if the number of workers is invalid, and FastcontactError if no worker process can start.
+    Raises CaseError if the number of workers is invalid or if the function of a quantity fails before any run succeeds, and
+    FastcontactError if no worker process can start.
     """
     storage = None if store is None else Store(store)
     results = {i: stored for i, job in enumerate(jobs) if storage and (stored := storage.get(job)) is not None}
@@ -113,6 +114,8 @@ def run_all(
     for index, result in _run_jobs(jobs, list(waiting), executor, workers):
         if storage is not None and "error" not in result:
             storage.put(jobs[index], result)
+        if result.get("kind") == QuantityError.__name__ and all("error" in other for other in results.values()):
+            raise CaseError(f"{jobs[index].label}: {result['error']}")  # it would fail for the other runs as well
         results[index] = result
         report(index)
     return [results[index] for index in range(len(jobs))]

@@ -171,13 +171,17 @@ class FunctionRun(Run):
             raise CaseError(f"the function {self.name} failed{where}: {type(error).__name__}: {error}") from error
 
 
+class QuantityError(CaseError):
+    """A function of a quantity has failed."""
+
+
 def _number(name: str, measure: Measure, steps: Sequence[StepResult]) -> float:
-    """Return the value of a quantity that the caller has given as a function; CaseError if the function fails."""
+    """Return the value of a quantity that a function of the caller evaluates; QuantityError if the function fails."""
     try:
         return float(measure(steps if first_parameter(measure) == STEPS else steps[-1]))
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
-        raise CaseError(
+        raise QuantityError(
             f"the quantity '{name}' is a function that failed ({reason}): it must return a number of the last StepResult, "
             f"or of the list of all if its argument is called '{STEPS}'"
         ) from error

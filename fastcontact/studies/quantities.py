@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.analytic.lame import PressFit
-from fastcontact.analytic.manufactured import HertzBox
+from fastcontact.analytic._lame import PressFit
+from fastcontact.analytic._manufactured import HertzBox
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.arrays import Array
 from fastcontact.cases.case import Case

@@ -69,7 +69,7 @@ def picture_without_matplotlib(patch):
 
 
 def view_without_pyvista(patch):
-    from fastcontact.results.plot.shape import view
+    from fastcontact.results.plot._shape import view
 
     without(patch, "pyvista")
     view(None, None)

@@ -15,7 +15,7 @@ from fastcontact.cli import _study
 from fastcontact.cli._main import parser
 from fastcontact.cli._outputs import write_text
 from fastcontact.mesh.generate import block, box, half_spheres, merge_points
-from fastcontact.mesh.generate.refine import Circle, refined
+from fastcontact.mesh.generate._refine import Circle, refined
 from fastcontact.studies import execute, fit
 from fastcontact.studies.adaptive import adaptive_study
 from fastcontact.studies.case_parameters import by_law

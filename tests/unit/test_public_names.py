@@ -10,6 +10,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.errors import Suggesting
+from fastcontact.results.step import Steps
 
 FOLDER = Path(fc.__file__).parent
 
@@ -54,6 +55,12 @@ def test_an_unknown_name_is_no_attribute():
         (fc.obstacles, "Plane", "did you mean 'HalfSpace'?"),
         (fc.generate, "rotated", "did you mean 'transformed'?"),
         (fc.analytic, "hertz_sphere", "did you mean 'hertz_point'?"),
+        (fc.analytic, "lame", "or 'thick_cylinder' or 'thick_sphere'?"),  # not a module
+        (fc.analytic, "persson", "did you mean 'persson_pin' or 'PerssonPin'?"),
+        (fc.plot, "shape", "did you mean 'deformed_shape'?"),
+        (fc.generate, "refine", "did you mean 'refined'?"),
+        (Steps(), "contact", "each step has one, such as [-1].contact"),
+        (Steps(), "indx", "did you mean 'index'?"),
         (fc, "sweep", "did you mean 'parameter_sweep'?"),
         (fc, "qqq", "no attribute 'qqq'"),
     ],

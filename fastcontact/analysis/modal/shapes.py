@@ -49,11 +49,16 @@ class Shapes(StepSequence):
         return phases(self[number], count)
 
 
-def _as_step(number: int, frequency: float, u: Array, stress: Array) -> StepResult:
+def _as_step(number: int, frequency: float, u: Array, stress: Array, model: Model) -> StepResult:
     equivalent = recovery.von_mises(stress)
     signed = recovery.von_mises_signed(stress, equivalent)
-    kind = {"parameter": "frequency"}
-    return StepResult(number + 1, float(frequency), u, stress, equivalent, signed, np.zeros_like(u), iterations=kind)
+    lengths = {
+        key: name for key, name in model.units.items() if key == "length"
+    }  # of the mesh, since shapes have no scale
+    return StepResult(
+        number + 1, float(frequency), u, stress, equivalent, signed, np.zeros_like(u),
+        iterations={"parameter": "frequency"}, units=lengths,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -116,7 +121,7 @@ class Modes(Shapes):
         stress = recovery.nodal_stress(
             model.mesh, model.kinematics, self._field.moduli, self._field.loops, u, self._field.treatment
         )
-        return _as_step(number, self.frequencies[number], u.copy(), stress)
+        return _as_step(number, self.frequencies[number], u.copy(), stress, model)
 
     def whole_ring(self) -> RingModes:
         """Return the same modes on the mesh of the whole ring; ModelError if no nodal diameters were requested."""
@@ -213,7 +218,7 @@ class RingModes(Shapes):
             real, imaginary = math.cos(angle), -sign * math.sin(angle)
             u.append((real * here.displacement + imaginary * there.displacement) @ turn.T)
             stress.append(_turned(real * here.stress + imaginary * there.stress, turn))
-        return _as_step(number, modes.frequencies[number], np.concatenate(u), np.concatenate(stress))
+        return _as_step(number, modes.frequencies[number], np.concatenate(u), np.concatenate(stress), modes._model)
 
 
 def _turned(stress: Array, turn: Array) -> Array:

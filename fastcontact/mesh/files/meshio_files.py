@@ -12,7 +12,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -172,6 +171,8 @@ def files_of(path: Path) -> list[Path]:
 
 def _references(path: Path) -> Iterator[tuple[Path, str]]:
     """Yield the files referenced by an XDMF file, and their formats."""
+    from xml.etree import ElementTree
+
     try:
         items = [item for item in ElementTree.parse(path).iter() if item.get("Format") in ("HDF", "Binary")]
     except (ElementTree.ParseError, ValueError, LookupError) as error:

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from fastcontact.errors import names_of
+from fastcontact.mesh.generate._refine import circles, linearised, refined
+from fastcontact.mesh.generate._sphere import sphere_octant, sphere_on_block
 from fastcontact.mesh.generate.blocks import block, block_on_block, cylinder_on_block
 from fastcontact.mesh.generate.box import box
 from fastcontact.mesh.generate.cut import cut
@@ -17,8 +19,6 @@ from fastcontact.mesh.generate.forest import Forest
 from fastcontact.mesh.generate.half_planes import crowned_blocks, graded_block, punched_block
 from fastcontact.mesh.generate.half_spheres import half_spheres, quarter_disc, rings
 from fastcontact.mesh.generate.quadratic import Circle, to_quadratic
-from fastcontact.mesh.generate.refine import circles, linearised, refined
-from fastcontact.mesh.generate.sphere import sphere_octant, sphere_on_block
 from fastcontact.mesh.generate.transform import (
     merge_points,
     mirrored,

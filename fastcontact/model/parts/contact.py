@@ -212,7 +212,7 @@ class ModelContact(ModelConnections):
             trial = copy.copy(self)
             trial.contact = []
             trial.add_contact("contacts", formulation=formulation, secondary=secondary, primary=primary, **options)
-        return FoundContacts(self.mesh, tuple(added))
+        return FoundContacts(self.mesh, tuple(added), self.units)
 
     def add_fluid_pressure(self, contact: str, pressure: float, *, source: str, ramp: History = None) -> None:
         """Apply a fluid pressure to both sides of a contact pair, wherever the fluid can penetrate from a source.

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from fastcontact.errors import names_of
 from fastcontact.results.plot._axes import UNITS
+from fastcontact.results.plot._shape import animate, deformed_shape, section, view
 from fastcontact.results.plot.contact_map import contact_map
 from fastcontact.results.plot.curves import axis_stress, contact_zones, history, pressure_profile
 from fastcontact.results.plot.found import contacts
-from fastcontact.results.plot.shape import animate, deformed_shape, section, view
 
 __all__ = [
     "UNITS", "animate", "axis_stress", "contact_map", "contact_zones", "contacts", "deformed_shape", "history",

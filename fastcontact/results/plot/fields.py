@@ -84,7 +84,7 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
         return Field(separate_mesh, node, values, caption, "pressure")
     caption, quantity = name, ""
     if name in DISPLACEMENTS:
-        caption, quantity = name.replace(".", " along "), "length"
+        caption, quantity = name.replace(".", " along "), "" if "parameter" in step.iterations else "length"
         axis = AXES.index(name[-1]) if "." in name else None
         values = np.linalg.norm(step.displacement, axis=1) if axis is None else step.displacement[:, axis]
     elif name in SLIPS:

@@ -117,7 +117,7 @@ def test_no_help(started, monkeypatch, spoilt):
     if spoilt == "one thread":
         monkeypatch.setattr(ahead.decorators, "threads", lambda: 1)
     elif spoilt == "works for another":
-        monkeypatch.setattr(ahead.multiprocessing, "parent_process", object)
+        monkeypatch.setattr("multiprocessing.parent_process", object)
     elif spoilt == "not kept":
         monkeypatch.setattr(ahead.kernel_files, "files", {})
     else:

@@ -52,6 +52,53 @@ def test_a_new_process_finds_kernels_and_notices_changes_in_other_files(tmp_path
         assert done.stdout == expected
 
 
+OWN = """
+import sys
+import numpy as np
+from fastcontact._jit.decorators import kernel
+
+@kernel
+def inverse(A):
+    if A.shape[0] != A.shape[1]:
+        raise ValueError("not square")
+    return np.linalg.inv(A)
+
+@kernel
+def twice(A):
+    return inverse(inverse(A))
+"""
+LOAD = """
+from own import inverse, np, sys, twice
+A = np.array([[2.0, 1.0], [1.0, 3.0]])
+print(inverse(A).tolist(), sum(inverse.stats.cache_hits.values()), "numba.np.linalg" in sys.modules)
+try:
+    inverse(A[:1])
+except ValueError as error:
+    print(error)
+print(np.allclose(twice(A), A), sum(twice.stats.cache_hits.values()))
+"""
+
+
+def test_a_kernel_is_loaded_without_the_modules_of_numba_that_it_was_compiled_with(tmp_path):
+    (tmp_path / "own.py").write_text(OWN)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
+    program = [
+        LOAD.rpartition("print(np.allclose")[0],
+        LOAD,
+        LOAD,
+    ]  # the kernel that calls it is compiled once it is loaded
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", text], capture_output=True, text=True, check=True, env=environment, cwd=tmp_path
+        ).stdout.splitlines()
+        for text in program
+    ]
+    values = said[0][0].rpartition("]]")[0]
+    assert said[0] == [f"{values}]] 0 True", "not square"]
+    assert said[1] == [f"{values}]] 1 False", "not square", "True 0"]
+    assert said[2] == [f"{values}]] 1 False", "not square", "True 1"]
+
+
 def forget():
     """Forget what a process remembers of modules and of the cache."""
     for name in ("caller", "callee", "constants"):
@@ -211,7 +258,7 @@ def test_nothing_without_error_output(told, monkeypatch):
 
 
 def test_nothing_in_a_process_that_works_for_another(told, monkeypatch):
-    monkeypatch.setattr(compiling.multiprocessing, "parent_process", object)
+    monkeypatch.setattr("multiprocessing.parent_process", object)
     assert told(Terminal()) == ""
 
 

@@ -19,9 +19,9 @@ from fastcontact.cli import main
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import block, box, union
+from fastcontact.results.plot._shape import _cut_tetrahedra
 from fastcontact.results.plot.fields import field_of, names
 from fastcontact.results.plot.patches import fill, outlines
-from fastcontact.results.plot.shape import _cut_tetrahedra
 from fastcontact.results.plot.solid import Screen
 
 pytestmark = pytest.mark.each_value
@@ -521,7 +521,7 @@ def test_an_interruption_before_the_first_frame_is_told_as_such(tmp_path, monkey
     def interrupted(*given, **named):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("fastcontact.results.plot.shape.deformed_shape", interrupted)
+    monkeypatch.setattr("fastcontact.results.plot._shape.deformed_shape", interrupted)
     mesh = block((1.0, 1.0), (2, 2), "quad4")
     with pytest.raises(KeyboardInterrupt):
         fc.plot.animate(mesh, [step_of(mesh)], tmp_path / "a.gif")

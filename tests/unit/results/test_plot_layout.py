@@ -162,3 +162,13 @@ def test_the_legend_of_contacts_is_whole():
     for drawn in (ax.get_legend(), ax.yaxis):
         assert ax.figure.bbox.fully_containsx(drawn.get_tightbbox(ax.figure.canvas.get_renderer()).x0)
         assert ax.figure.bbox.fully_containsx(drawn.get_tightbbox(ax.figure.canvas.get_renderer()).x1)
+
+
+def test_pictures_of_contacts_and_modes_show_the_units_of_the_model():
+    model = fc.Model(fc.generate.block_on_block(), kinematics="plane_strain", units="mm, N, MPa")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3, density=1e-9))
+    assert fc.plot.contacts(model.add_contacts()).get_xlabel() == "x [mm]"
+    mode = fc.modes(model, n=1)[0]
+    ax = fc.plot.deformed_shape(model.mesh, mode, field="displacement")
+    assert [ax.get_xlabel(), ax.figure.axes[1].get_ylabel()] == ["x [mm]", "displacement"]  # a mode has no scale
+    assert "mm" not in repr(mode)

@@ -145,6 +145,25 @@ def test_options_that_do_not_fit_a_function_are_told(options, message, tmp_path,
         fc.convergence_study(tube, [0.5, 0.25, 0.125], **options)
 
 
+def test_a_wrong_quantity_stops_a_sweep_at_its_first_point():
+    solved = []
+
+    def solving(size):
+        solved.append(size)
+        return tube(size)
+
+    def late(step):
+        return bore(step) if len(solved) < 2 else step.missing
+
+    with pytest.raises(fc.CaseError, match=r"size = 0\.5: the quantity 'x' is a function that failed"):
+        fc.parameter_sweep(solving, [0.5, 0.25, 0.125], quantities={"x": lambda step: step.x})
+    assert solved == [0.5]
+    solved.clear()
+    sweep = fc.parameter_sweep(solving, [0.5, 0.25], quantities={"x": late})
+    assert [point.parameters for point in sweep.points] == [{"size": 0.5}]
+    assert "'x' is a function that failed" in sweep.failed[0][1]
+
+
 def test_sizes_that_are_numbers_of_cells_are_told():
     with pytest.warns(fc.FastcontactWarning, match="sizes must decrease as meshes become finer"):
         fc.convergence_study(lambda n: tube(1 / n), [2, 4, 8], quantities={"bore": bore})

@@ -11,7 +11,7 @@ from fastcontact import topology
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import crowned_blocks, punched_block, rings, sphere_octant, sphere_on_block
-from fastcontact.mesh.generate.sphere import SOLIDS
+from fastcontact.mesh.generate._sphere import SOLIDS
 
 QUADRANGLES = ("quad4", "quad8", "quad9")
 
