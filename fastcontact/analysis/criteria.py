@@ -13,6 +13,11 @@ from fastcontact.errors import ModelError
 NOTABLE = 1e-2
 # Largest number of halvings of an iteration: of displacements that invert cells, or of positions of floating bodies.
 HALVINGS = 6
+# Steps are halved until they reduce a norm by this fraction of the expected reduction (Nocedal and Wright, 2006, equation
+# 3.4).
+DECREASE = 1e-4
+# Largest number of Newton iterations, of a load step and for a friction law.
+MAX_NEWTON_ITERATIONS = 40
 
 
 @typed(ModelError)

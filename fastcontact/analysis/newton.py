@@ -17,7 +17,7 @@ from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import DEPTH, Anderson
-from fastcontact.analysis.criteria import HALVINGS, NOTABLE
+from fastcontact.analysis.criteria import HALVINGS, MAX_NEWTON_ITERATIONS, NOTABLE
 from fastcontact.analysis.equilibrium import (
     Balance,
     FollowingForce,
@@ -35,12 +35,10 @@ from fastcontact.analysis.tolerances import DECLINE
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import WHOLE
 from fastcontact.errors import ConvergenceError, ModelError
-from fastcontact.linear.protocol import Loaded
-from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
+from fastcontact.linear.protocol import TOLERANCE, Loaded
+from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
-# Largest number of Newton iterations of a load step.
-MOST = 40
 # Trials of a line search.
 SEARCHES = 3
 # Number of iterations within which the change of the displacement must have decreased at least once by the factor DECLINE.
@@ -51,10 +49,6 @@ PATIENCE = 12
 HELD = 5e-5, 2e-4
 # The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
 FORCING = 1e-3
-# Relative error of the displacement at which iterations end. A change that is small enough to be round-off
-# (SINGLE_PRECISION, reached in slender bodies) counts as such if it exceeds the fraction DECLINE of the previous
-# one.
-UNCHANGED = 100 * ROUND_OFF
 
 
 def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = None) -> StepEquilibrium:
@@ -133,7 +127,7 @@ class _Newton:
         """Return the equilibrium by iterations from displacements `origin` (n_dofs,) [length]."""
         history: list[dict[str, Any]] = []
         u, changes = origin, [1.0]
-        for _ in range(MOST):
+        for _ in range(MAX_NEWTON_ITERATIONS):
             before = u
             try:
                 target, contact_force = self._solve(before, changes)
@@ -188,11 +182,15 @@ class _Newton:
 
     @property
     def _enough(self) -> float:
-        """Tolerance of the relative error of the displacement."""
-        return max(self._problem.criteria.geometry, UNCHANGED)
+        """Relative error of the displacement at which iterations end."""
+        return max(self._problem.criteria.geometry, TOLERANCE)
 
     def _stands_still(self, changes: list[float]) -> bool:
-        """Return whether relative `changes` leave an error below the criterion, or are round-off."""
+        """Return whether relative `changes` leave an error below the criterion, or are round-off.
+
+        A change that is small enough to be round-off (SINGLE_PRECISION, reached in slender bodies) counts as such if it
+        exceeds the fraction DECLINE of the previous one.
+        """
         before, last = changes[-2:]
         rate = min(last / before, 1.0) if before else 1.0
         if self._by.linear:

@@ -12,7 +12,7 @@ from scipy.sparse import bsr_array, csr_array
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.floating_bodies import SOFT, STIFF, FloatingBodies, RigidPosition
+from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import at_points
@@ -329,7 +329,7 @@ def prepare(
     points = np.unique(np.concatenate([of_driven, *of_sides])).astype(np.intp)
     contact_dofs = (points[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
     motions = _floating_motions(model, supported)
-    bodies = FloatingBodies(motions, system, SOFT if solver.iterative else STIFF) if len(motions) else None
+    bodies = FloatingBodies(motions, system, solver.iterative) if len(motions) else None
     dofs = _prepared_dofs(model, solver, system, bodies, contact_dofs)
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies, dofs, contact_dofs, driven,
@@ -377,7 +377,7 @@ def linearised(
             turned = _floating_motions(model, model.prescribed_by_ramp()[0], displacement)
             motions = turned if len(turned) == len(motions) else motions
         before, soft = floating.dofs if rigid is None else rigid.dofs, problem.solver.iterative and not stiff
-        floating = FloatingBodies(motions, system, SOFT if soft else STIFF, before)
+        floating = FloatingBodies(motions, system, soft, before)
     if replaces and floating is not None and contact is not None:
         modes = floating.motions.displacement
         values = np.linalg.eigvalsh(modes.T @ (contact @ modes))

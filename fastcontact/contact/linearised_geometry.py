@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -328,7 +328,7 @@ class _ObstaclePoints:
         return np.zeros((len(self.normal), 0, values.shape[1]))
 
 
-Points = _SurfacePoints | _ObstaclePoints
+Points: TypeAlias = _SurfacePoints | _ObstaclePoints
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,15 +10,11 @@ has not changed since the last factorisation keep their columns of L, and the up
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.arrays import Array, Numbers
+from fastcontact.linear.cholesky.triangular_kernels import PANEL, Offsets
 
-Offsets = NDArray[np.int64]
-
-# Number of columns in a panel, and of rows of the update that are computed together.
-PANEL, ROWS = 48, 96
 # Smallest number of multiplications for which a product is passed to BLAS.
 SMALL = 20_000
 # Supernodes that are factorised, and those below the root of a subtree that keeps its columns, in `plan`.
@@ -129,7 +125,7 @@ def factorise(
     widest = 0
     for s in range(count):
         widest = max(widest, first[s + 1] - first[s] + begin[s + 1] - begin[s])
-    one, other, product = np.empty(PANEL * widest), np.empty(PANEL * widest), np.empty(ROWS * widest)
+    one, other, product = np.empty(PANEL * widest), np.empty(PANEL * widest), np.empty(2 * PANEL * widest)
     top = used = 0
     for s in range(count):
         low, high, rest = first[s], first[s + 1], below[begin[s] : begin[s + 1]]
@@ -268,8 +264,8 @@ def _reduced_by_blocks(F: Array, begin: int, end: int, one: Array, other: Array,
         for i in range(m):
             plain[i, j] = row[end + i]
             scaled[i, j] = pivot * row[end + i]
-    for low in range(0, m, ROWS):
-        high = min(low + ROWS, m)
+    for low in range(0, m, 2 * PANEL):
+        high = min(low + 2 * PANEL, m)
         change = product[: (high - low) * (m - low)].reshape(high - low, m - low)
         np.dot(scaled[low:high], plain[low:].T, change)
         for i in range(low, high):
