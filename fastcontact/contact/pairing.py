@@ -367,7 +367,8 @@ def rows_along(
 
 Normals: TypeAlias = str | Sequence[float]
 KINDS = ("facet", "averaged", "secondary")
-# Cosine of the angle beyond which two sides do not face each other: about 85 degrees.
+# Cosine of the angle, about 85 degrees, beyond which two sides do not face each other, and mean cosine below which a surface
+# has no mean direction, since it closes on itself.
 FACING = 0.1
 
 

@@ -36,7 +36,7 @@ from fastcontact.contact.formulations._overlap import Overlap, OverlapPoints, ob
 from fastcontact.contact.integration import areas_of_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import Closing, Linearised, NodalNormals, Points, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import Candidates, Normals, filled_up, pair, tangents
+from fastcontact.contact.pairing import FACING, Candidates, Normals, filled_up, pair, tangents
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.contact.search.limits import BEYOND
 from fastcontact.errors import ContactError, unknown
@@ -45,8 +45,6 @@ from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
 MULTIPLIERS = ("standard", "dual")
-# Smallest fraction of the squared length of a tangent, not held by supports, at which slip along the tangent is computed.
-FREE = 0.1
 
 
 class Coverage(NamedTuple):
@@ -318,7 +316,8 @@ class WeightedMortar(Formulation):
                 (along, nodes, csr_array(scaled(csr_array(on_secondary - own), 1.0 / weight)[:, self.secondary.points]))
             )
             held[nodes] += np.einsum("md,me->mde", along[nodes], along[nodes])
-        free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FREE for t in directions]
+        # Slip is computed along tangents whose part that supports do not hold is longer than FACING.
+        free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FACING**2 for t in directions]
         return tuple(scaled(row, np.where(slips, 1.0, 0.0)) for row, slips in zip(rows, free, strict=True)), additional
 
     def _weighted(self, coverage: Coverage) -> tuple[csr_array, csr_array, Array]:
