@@ -195,7 +195,7 @@ def unreadable(folder, patch):
 
 
 def repeated_equations(patch):
-    patch.setattr(pivot_order, "LARGEST_BLOCK", 0)
+    patch.setattr(pivot_order, "FULL_UP_TO", 0)
     pivot_order.assigned(csr_array(np.array([[1.0, 0.0], [2.0, 0.0]])))
 
 

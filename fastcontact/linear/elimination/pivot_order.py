@@ -20,6 +20,7 @@ from scipy.sparse.csgraph import connected_components, min_weight_full_bipartite
 
 from fastcontact.arrays import Indices, Mask
 from fastcontact.linear.elimination.coupled_pivots import (
+    CoupledError,
     CoupledPivots,
     Inverse,
     RepeatedError,
@@ -29,9 +30,10 @@ from fastcontact.linear.elimination.coupled_pivots import (
 
 # Smallest ratio of a pivot to the largest entry of its equation.
 SMALLEST = 0.25
-# Largest size of a block that is inverted instead of factorised, and largest number of equations whose pivots are chosen by a
-# dense QR factorisation.
-LARGEST_BLOCK = 64
+# Largest size of a block that is inverted instead of factorised, and largest size of a block that is inverted if it cannot be
+# factorised (`test_many_coupled_equations_are_assigned_unknowns`). The latter is also the largest number of equations whose
+# pivots are chosen by a dense QR factorisation.
+LARGEST_BLOCK, FULL_UP_TO = 64, 500
 # Largest number of layers of equations: the inverse is a sum of that many products of sparse matrices.
 MOST_LAYERS = 4
 
@@ -81,21 +83,27 @@ def inverse_of(B: csr_array, pivots: Indices, size: int) -> Inverse:
         If the matrix is singular.
     """
     P = csr_array(B[:, pivots])
-    if (inverse := _triangular_inverse(P)) is not None:
+    if (inverse := _triangular_inverse(P, LARGEST_BLOCK, MOST_LAYERS)) is not None:
         return inverse
     largest = np.bincount(connected_components(P, directed=False)[1]).max(initial=0)
     if largest > LARGEST_BLOCK:
-        return CoupledPivots(P, pivots, size)
+        try:
+            return CoupledPivots(P, pivots, size)
+        except CoupledError:
+            if (inverse := _triangular_inverse(P, FULL_UP_TO, 2 * MOST_LAYERS)) is not None:
+                return inverse
+            if largest > FULL_UP_TO:
+                raise
     return SparseInverse(block_inverse(P))
 
 
-def _triangular_inverse(P: csr_array) -> SparseInverse | None:
+def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInverse | None:
     """Return the inverse of P (m, m) if P is block triangular after a permutation, None otherwise.
 
-    The diagonal blocks must have at most LARGEST_BLOCK rows, and the inverse must be a sum of at most MOST_LAYERS terms.
+    The diagonal blocks must have at most `largest` rows, and the inverse must be a sum of at most `layers` terms.
     """
     label = connected_components(P, connection="strong")[1]
-    if np.bincount(label).max(initial=0) > LARGEST_BLOCK:
+    if np.bincount(label).max(initial=0) > largest:
         return None
     inside = np.repeat(label, np.diff(P.indptr)) == label[P.indices]
     diagonal, beyond = (
@@ -106,7 +114,7 @@ def _triangular_inverse(P: csr_array) -> SparseInverse | None:
     beyond.eliminate_zeros()
     # The inverse of a block triangular matrix is a finite Neumann series.
     total = term = inner = block_inverse(diagonal)
-    for _ in range(MOST_LAYERS):
+    for _ in range(layers):
         term = csr_array(-(inner @ beyond @ term))
         if not term.nnz:
             return SparseInverse(total)
@@ -139,7 +147,7 @@ def of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
     """Return the pivots (m,), chosen as by `of_groups` as far as possible, and by `assigned` for the remaining equations.
 
     An example of the latter are slips at supported nodes that stick to a moving side, which have no exclusive unknowns.
-    None if no group has enough exclusive unknowns, or if more than LARGEST_BLOCK equations remain. Parameters as in
+    None if no group has enough exclusive unknowns, or if more than FULL_UP_TO equations remain. Parameters as in
     `of_groups`.
     """
     pivots = _in_layers(B, groups, MOST_LAYERS)
@@ -149,7 +157,7 @@ def of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
     # A single equation may have an exclusive unknown although its group has too few of them.
     pivots[left] = _in_layers(csr_array(B[left]), np.arange(len(left)), layers=1)
     left = left[pivots[left] < 0]
-    if len(left) > LARGEST_BLOCK:
+    if len(left) > FULL_UP_TO:
         return None
     if len(left):
         pivots[left] = assigned(csr_array(B[left]))
@@ -238,7 +246,7 @@ def _place_in_group(group: Indices) -> Indices:
 def assigned(B: csr_array) -> Indices:
     """Return pivots (m,) of the equations B (m, n) for which the pivot columns are well conditioned.
 
-    They are chosen by a QR factorisation with column pivoting or, for more than LARGEST_BLOCK equations, by the bipartite
+    They are chosen by a QR factorisation with column pivoting or, for more than FULL_UP_TO equations, by the bipartite
     matching with the largest product of entries.
 
     Raises
@@ -246,7 +254,7 @@ def assigned(B: csr_array) -> Indices:
     RepeatedError
         If there are no m different pivots.
     """
-    if B.shape[0] <= LARGEST_BLOCK:
+    if B.shape[0] <= FULL_UP_TO:
         columns = np.unique(B.indices)
         if len(columns) < B.shape[0]:
             raise RepeatedError()

@@ -337,6 +337,7 @@ def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_man
 ):
     monkeypatch.setattr("fastcontact.linear.multigrid.solver.MOST_COLUMNS", 20)
     monkeypatch.setattr("fastcontact.linear.elimination.pivot_order.LARGEST_BLOCK", 8)
+    monkeypatch.setattr("fastcontact.linear.elimination.pivot_order.FULL_UP_TO", 8)
     model = pressed(5, element, **options)
     solver, found = solved(model, "amg")
     assert "columns of the inverse stiffness" in solver.gave_up
