@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact._jit.norms_kernels import largest_difference
+from fastcontact.analysis.tolerances import DECLINE
 from fastcontact.arrays import Array, Mask
 
 # Gaps (m,) [length] and multipliers (m,) [force] of a pair.
@@ -17,9 +18,6 @@ GapsAndForces = tuple[Array, Array]
 FARTHEST = 2.0
 # Highest degree of the polynomial that continues steps.
 DEGREE = 4
-# A polynomial of one more degree is clearly closer if its distance is this fraction. If any closer one were chosen,
-# indentations past yield, whose steps are not smooth, would take 5 % more iterations.
-SMOOTH = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +65,8 @@ class Extrapolation:
         """
         degree, highest = 0, self._highest
         distances = [largest_difference(u, self._continued(k)) for k in range(highest + 1)] if curve else []
-        while degree < len(distances) - 1 and distances[degree + 1] < SMOOTH * distances[degree]:
-            degree += 1
+        while degree < len(distances) - 1 and distances[degree + 1] < DECLINE * distances[degree]:
+            degree += 1  # with any closer one, indentations past yield, which are not smooth, take 5 % more iterations
         degree = max(1, degree + (degree == highest))
         return replace(self, degree=degree, states=(*self.states[-DEGREE if curve else -1 :], (u.copy(), contact)))
 

@@ -27,8 +27,8 @@ from fastcontact.results.step import ContactResult, StepResult
 
 # Estimated error over the mean pressure above which a warning is given, by the order of facets. On rings the errors of nodal
 # pressures were 0.2 to 3.2 of the estimate on linear facets, except where it is so large that contact opens, and up to 3 on
-# quadratic ones; against rigid shapes 1.1 to 1.3.
-DOUBTFUL, AGAINST_RIGID = {1: 0.2, 2: 0.1}, 0.2
+# quadratic ones; against rigid shapes, where the value for linear facets applies to all, 1.1 to 1.3.
+DOUBTFUL = {1: 0.2, 2: 0.1}
 # Ratio of the estimate to E d / L if the gaps are means: the inverse of the mass matrix amplifies what alternates.
 OF_MEANS = 2.0
 
@@ -55,7 +55,7 @@ def _text(pair: Formulation, spread: float, slope: float, contact: ContactResult
     doubtful, power = DOUBTFUL[order], 2 * order - 1
     remedy = "surface_smoothing=True measures the gap between the arcs"
     if isinstance(pair.primary, RigidSide):
-        doubtful, power = AGAINST_RIGID, 2 * order
+        doubtful, power = DOUBTFUL[1], 2 * order
         remedy = "formulation 'node_to_segment' measures the gap at nodes, which lie on the arc"
     mean = float(contact.pressure[contact.pressure > 0.0].mean())
     error = pair.modulus * slope

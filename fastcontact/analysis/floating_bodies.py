@@ -28,7 +28,7 @@ from scipy.sparse import bsr_array
 
 from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.anderson import Anderson
-from fastcontact.analysis.criteria import HALVINGS
+from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS
 from fastcontact.analysis.solution import Response, Solution
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
@@ -36,21 +36,14 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
-# Stiffness of the springs relative to that of the softest body: STIFF for factors, whose accuracy soft springs reduce (with
-# 1e-6, a wedge has an error of 3e-9; with 1e-3, displacements of plates scatter by 2e-11, and with 1 by 1e-12), and SOFT
-# for multigrid, which stiff ones would cost more solutions: with 1e-3, 1e-2 and 1, a stack with friction takes 4.1, 4.2 and
-# 65 linear solutions, and a bolt 2.8, 5.3 and 27. STIFF also compensates the negative stiffness that rotated bodies may have
-# under load. The reference is the softest body, because a contact is not stiffer than the softer one
-# of its bodies (for a layer that is softer by 2e5, 100 positions did not suffice with the stiffness of the other body).
-SOFT, STIFF = 1e-3, 1.0
-# Newton steps of the positions are halved until they reduce the elongation of the springs by this fraction of the expected
-# reduction (Nocedal and Wright, 2006, equation 3.4), because the contact state changes along a step.
-DECREASE = 1e-4
-# Largest number of positions for one pairing.
-MAX_POSITIONS = 100
-# Weight of the displacements that springs held before, in the choice of new ones: with it, multigrid takes 142 iterations
-# in two steps of a rubber block that is pressed on another one, and 157 without.
-KEPT = 4.0
+# Stiffness of soft springs relative to that of the softest body. For factors they are as stiff as that body, since soft
+# springs reduce the accuracy (with 1e-6, a wedge has an error of 3e-9; with 1e-3, displacements of plates scatter by 2e-11,
+# and with 1 by 1e-12). For multigrid they are soft, since stiff ones would cost more solutions: with 1e-3, 1e-2 and 1, a
+# stack with friction takes 4.1, 4.2 and 65 linear solutions, and a bolt 2.8, 5.3 and 27. Stiff springs also compensate the
+# negative stiffness that rotated bodies may have under load. The reference is the softest body, because a contact is not
+# stiffer than the softer one of its bodies (for a layer that is softer by 2e5, 100 positions did not suffice with the
+# stiffness of the other body).
+SOFT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -69,8 +62,6 @@ class RigidPosition:
         Number of positions, each of which takes one contact solution.
     slack : bool
         Whether the springs are slack: their forces are negligible.
-    dofs : ndarray of int (k,)
-        Displacement component to which each spring is attached.
     """
 
     state: Solution
@@ -78,7 +69,6 @@ class RigidPosition:
     spring_force: Array
     positions: int
     slack: bool
-    dofs: Indices
 
 
 @dataclass(frozen=True)
@@ -133,10 +123,8 @@ class FloatingBodies:
     motions : FreeMotions
         The free rigid-body modes.
     system : System
-    relative_stiffness : float
-        Stiffness of the springs relative to that of the softest body, SOFT or STIFF [-].
-    before : ndarray of int, optional
-        Displacement components to which earlier springs were attached. They are kept unless others are much better.
+    soft : bool
+        Whether the springs are softer than the softest body by the factor SOFT; otherwise they are as stiff.
 
     Attributes
     ----------
@@ -150,9 +138,7 @@ class FloatingBodies:
         Stiffness of each spring [force / length].
     """
 
-    def __init__(
-        self, motions: FreeMotions, system: System, relative_stiffness: float, before: Indices | None = None
-    ) -> None:
+    def __init__(self, motions: FreeMotions, system: System, soft: bool) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
         # The smallest median of the diagonal over the unknowns that each mode moves, and over those that no mode moves.
         solid, moving = system.free & ~weightless, motions.displacement != 0.0
@@ -162,8 +148,6 @@ class FloatingBodies:
         self._dim = system.matrix.blocksize[0]
         self.names = motions.names()
         weights = np.sqrt(np.maximum(diagonal, 0.0))
-        if before is not None:
-            weights[before] *= KEPT
         # The unknowns with springs determine the amplitudes of the modes, are far apart and have large weights.
         modes = system.unknowns_of(motions.displacement)
         _, _, order = qr((modes * weights[:, None]).T, mode="economic", pivoting=True)
@@ -173,7 +157,7 @@ class FloatingBodies:
         ]
         self._at_springs = motions.displacement[self.dofs]
         self.motions = motions.combined(np.asarray(np.linalg.inv(self._at_springs), np.float64))
-        self.stiffness = relative_stiffness * typical
+        self.stiffness = SOFT * typical if soft else typical
 
     def with_springs(self, matrix: bsr_array) -> bsr_array:
         """Return the sum of `matrix` (n_dofs, n_dofs) and the stiffness of the springs [force / length]."""
@@ -286,7 +270,7 @@ class FloatingBodies:
         position, before, iterations, relaxed = start, np.inf, 0, 0.0
         step, length = None, 1.0
         mixing = Anderson(len(start) + 1, np.arange(len(start)))
-        for positions in range(1, MAX_POSITIONS + 1):
+        for positions in range(1, MAX_NEWTON_ITERATIONS + 1):
             state = solve_at(position)
             elongation, iterations = state.u[springs], iterations + state.iterations
             left = float(np.abs(elongation).max())
@@ -298,7 +282,7 @@ class FloatingBodies:
             # If the forces of the springs no longer decrease, a larger tolerance applies.
             if not slack and left >= 0.5 * before and positions > 3:
                 slack = left <= max(LENGTH_ROUND_OFF * force, round_off)
-            if slack or not state.settled or positions == MAX_POSITIONS:
+            if slack or not state.settled or positions == MAX_NEWTON_ITERATIONS:
                 break
             if step is not None and length > 0.5**HALVINGS and left > before - DECREASE * length * (before - step[1]):
                 length *= 0.5
@@ -312,7 +296,7 @@ class FloatingBodies:
             position = mixing.mixed(position, position + elongation) if step is None else position + step[0]
             before, relaxed = left, 0.0 if step is None else left
         state = dataclasses.replace(state, iterations=iterations)
-        return RigidPosition(state, position, self.stiffness * elongation, positions, slack, self.dofs)
+        return RigidPosition(state, position, self.stiffness * elongation, positions, slack)
 
 
 def _newton_step(

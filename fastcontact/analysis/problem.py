@@ -12,7 +12,7 @@ from scipy.sparse import bsr_array, csr_array
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.floating_bodies import SOFT, STIFF, FloatingBodies, RigidPosition
+from fastcontact.analysis.floating_bodies import FloatingBodies
 from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import at_points
@@ -328,7 +328,7 @@ def prepare(
     points = np.unique(np.concatenate([of_driven, *of_sides])).astype(np.intp)
     contact_dofs = (points[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
     motions = _floating_motions(model, supported)
-    bodies = FloatingBodies(motions, system, SOFT if solver.iterative else STIFF) if len(motions) else None
+    bodies = FloatingBodies(motions, system, solver.iterative) if len(motions) else None
     dofs = _prepared_dofs(model, solver, system, bodies, contact_dofs)
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies, dofs, contact_dofs, driven,
@@ -339,9 +339,8 @@ def prepare(
 
 
 def linearised(
-    problem: Problem, K: bsr_array, u: Array, rigid: RigidPosition | None, contact: csr_array | None, stiff: bool,
-    replaces: bool,
-) -> Problem:  # fmt: skip
+    problem: Problem, K: bsr_array, u: Array, contact: csr_array | None, stiff: bool, replaces: bool
+) -> Problem:
     """Return the problem whose system and linear solver use the tangent of the terms at displacements u.
 
     In finite strain, rigid-body modes of floating bodies are those of the deformed configuration.
@@ -353,8 +352,6 @@ def linearised(
         Tangent of the terms, see `Terms.tangent`; it is modified [force / length].
     u : ndarray (n_dofs,)
         Displacements about which the terms are linearised [length].
-    rigid : RigidPosition, optional
-        Last position of floating bodies.
     contact : csr_array (n_dofs, n_dofs), optional
         Stiffness due to contact, which is added to K [force / length].
     stiff : bool
@@ -365,18 +362,14 @@ def linearised(
     """
     K, model, floating = problem.force_driven.stiffness(K), problem.model, problem.floating_bodies
     system = problem.system.renewed(K if contact is None else sum_of_blocks(K, contact))
-    solver, displacement, finite = (
-        problem.solver.near(),
-        problem.displacement(u),
-        problem.bodies and problem.bodies.finite,
-    )
+    solver, displacement = problem.solver.near(), problem.displacement(u)
+    finite = problem.bodies and problem.bodies.finite
     if floating is not None and finite:
         motions = floating.motions
         if model.kinematics != "axisymmetric":
             turned = _floating_motions(model, model.prescribed_by_ramp()[0], displacement)
             motions = turned if len(turned) == len(motions) else motions
-        before, soft = floating.dofs if rigid is None else rigid.dofs, problem.solver.iterative and not stiff
-        floating = FloatingBodies(motions, system, SOFT if soft else STIFF, before)
+        floating = FloatingBodies(motions, system, problem.solver.iterative and not stiff)
     if replaces and floating is not None and contact is not None:
         modes = floating.motions.displacement
         values = np.linalg.eigvalsh(modes.T @ (contact @ modes))

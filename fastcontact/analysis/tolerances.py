@@ -18,23 +18,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
-from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.criteria import NOTABLE, Criteria
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.arrays import Array
 from fastcontact.linear.protocol import LinearSolver
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Relative residual of the first solution of a step by an iterative solver. The relative residual of later solutions is
-# RESIDUAL times the last relative change of the displacements or the last residual, whichever is smaller: the pairing is no
-# more accurate.
-FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
+# Relative residual of the solutions of a step by an iterative solver, over the last relative change of the displacements or
+# the last residual, whichever is smaller: the pairing is no more accurate. It is NOTABLE in the first solution.
+RESIDUAL = 0.03
 # With friction the tolerance decreases at least by this factor, because inaccurate linear solutions may prevent the
 # residual of the friction law from decreasing.
 LEAST_FALL = 0.2
-# Number of updates in the window.
+# Number of updates, or of Newton iterations, within which changes must decline.
 WINDOW = 8
-# The iteration counts as converging if the changes in the second half of the window are below this fraction of those in the
-# first.
+# Changes, or distances, below this fraction of earlier ones count as decreasing: the iteration counts as converging if those
+# in the second half of the window are below this fraction of those in the first.
 DECLINE = 0.5
 
 
@@ -57,7 +56,7 @@ class Tolerances:
         self, solver: LinearSolver, criteria: Criteria, begin_inexact: bool, round_off: float, expected: float
     ) -> None:
         self._solver, self._criteria, self._round_off, self._expected = solver, criteria, round_off, expected
-        self._residual = max(solver.tolerance, FIRST_RESIDUAL) if begin_inexact else solver.tolerance
+        self._residual = max(solver.tolerance, NOTABLE) if begin_inexact else solver.tolerance
 
     @property
     def inexact(self) -> bool:

@@ -23,7 +23,9 @@ import numpy as np
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.formulations._formulation import LEANING
 from fastcontact.contact.held_motions import TOGETHER, HeldMotions
+from fastcontact.contact.pairing import FACING
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
@@ -111,12 +113,6 @@ def _loop(surface: Surface) -> list[int] | None:
         order.append(here)
         here = following.get(here)
     return order if here == first and len(order) == len(surface.points) else None
-
-
-# A plane of symmetry cuts the surface: its normal and that of the surface are nearly perpendicular [cosine].
-ACROSS = 0.5
-# A surface whose mean of unit normals is shorter than this closes on itself: it has no mean direction.
-DIRECTED = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +208,7 @@ def _in_space(points: Array, weight: Array, planes: list[tuple[int, Indices]], m
         if len(values) == 1:
             centre[axis], mean[axis] = values[0], 0.0
     length = float(np.linalg.norm(mean))
-    return ContactMiddle(centre, direction=mean / length if length > DIRECTED else None, ignored=ignored)
+    return ContactMiddle(centre, direction=mean / length if length > FACING else None, ignored=ignored)
 
 
 def _told_apart_by_radius(surface: Surface, coordinates: Array) -> bool:
@@ -234,7 +230,7 @@ def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions |
     points = coordinates[surface.points]
     held = np.diagonal(motions.at(surface.points), axis1=1, axis2=2) >= TOGETHER**2
     tolerance, planes = SINGLE_PRECISION * float(np.ptp(points, axis=0).max()), []
-    across = np.abs(nodal_normals(surface, coordinates)) < ACROSS
+    across = np.abs(nodal_normals(surface, coordinates)) < LEANING  # otherwise the plane does not cut the surface
     for axis in range(points.shape[1]):
         x = points[:, axis]
         if np.ptp(x) <= 10 * tolerance:
@@ -266,7 +262,7 @@ def _along_line(
     """Return the middle on a surface in the plane; a surface in several pieces is projected along its mean normal."""
     points, length = coordinates[surface.points], float(np.linalg.norm(mean))
     centre, tangent = weight @ points, np.array([-mean[1], mean[0]]) / (length or 1.0)
-    line = unrolled(surface, coordinates, centre if length > DIRECTED else None)
+    line = unrolled(surface, coordinates, centre if length > FACING else None)
     if line is None:
         line = UnrolledLine.straight(centre, tangent, float(np.ptp(points, axis=0).max()))
     lengths = line.lengths(points)
@@ -277,4 +273,4 @@ def _along_line(
         other_way = start > 0.5 * (lengths.min() + lengths.max())
         return ContactMiddle(line.at(start), line, start, other_way, tangent=np.eye(2)[axis])
     start = float(weight @ lengths)
-    return ContactMiddle(line.at(start), line, start, tangent=tangent if length > DIRECTED else None)
+    return ContactMiddle(line.at(start), line, start, tangent=tangent if length > FACING else None)

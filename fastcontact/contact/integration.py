@@ -10,9 +10,7 @@ from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.linear.sparse_rows import Entries
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import area_vectors
-
-# Radius of a node, relative to that of the other end of its facet, up to which it counts as on the axis.
-AT_AXIS = 1e-3
+from fastcontact.round_off import SINGLE_PRECISION
 
 
 def facet_measure(facets: Numbers, element: str, points: Array, xi: Array, axisymmetric: bool) -> Array:
@@ -101,7 +99,7 @@ def even_at_axis(surface: Surface, points: Array) -> csr_array:
     values = eye_array(len(surface.points), format="lil")
     for block in surface.blocks:
         radii = np.abs(points[block.facets, 0])
-        on_axis = radii <= AT_AXIS * radii.max(axis=1, keepdims=True)
+        on_axis = radii <= SINGLE_PRECISION * radii.max(axis=1, keepdims=True)
         for facet, end in zip(*np.nonzero(on_axis[:, :2]), strict=True) if block.element == "line3" else ():
             nodes = block.local[facet]
             r1, r2 = radii[facet, [2, 1 - end]] ** 2

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -243,11 +243,8 @@ class _SurfacePoints:
         # relative to the facing points, ``a_i dxi_i + g dd = dv``. The component along d is eliminated.
         along, bend = (pairing.normal[rows], bend) if closest else (self.normal, self._bend)
         frame = np.stack(tangents(along), axis=1)
-        self._closest, self._bent, self._gap = (
-            closest,
-            normals == "facet",
-            np.einsum("nd,nd->n", self.apart, along)[:, None],
-        )
+        self._closest, self._bent = closest, normals == "facet"
+        self._gap = np.einsum("nd,nd->n", self.apart, along)[:, None]
         inverse = np.linalg.inv(np.einsum("ntd,nid->nti", frame, self.axes + self._gap[:, :, None] * bend))
         self._inverse = inverse @ frame
         self._foot = self.axes if rise is None else self.axes + rise[:, :, None] * self.normal[:, None]
@@ -332,7 +329,7 @@ class _ObstaclePoints:
         return np.zeros((len(self.normal), 0, values.shape[1]))
 
 
-Points = _SurfacePoints | _ObstaclePoints
+Points: TypeAlias = _SurfacePoints | _ObstaclePoints
 
 
 @dataclass(frozen=True, eq=False)

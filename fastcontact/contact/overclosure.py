@@ -11,9 +11,8 @@ import numpy as np
 from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
 
-# Exponential law: pressure at the clearance over the pressure at a gap of zero; overclosure, in units of the clearance,
-# beyond which the law is linear.
-LEFT, FARTHEST = 0.01, 3.0
+# Overclosure, in units of the clearance, beyond which the exponential law is linear.
+FARTHEST = 3.0
 
 
 class OverclosureLaw(ABC):
@@ -82,7 +81,7 @@ class ExponentialLaw(OverclosureLaw):
     """
 
     def __init__(self, clearance: float, pressure: float) -> None:
-        self._clearance, self._pressure, self._rate = clearance, pressure, -np.log(LEFT) / clearance
+        self._clearance, self._pressure, self._rate = clearance, pressure, np.log(100.0) / clearance
 
     def line(self, overclosure: Array) -> tuple[Array, Array]:
         """See `OverclosureLaw.line`."""

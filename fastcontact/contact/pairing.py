@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -365,9 +365,10 @@ def rows_along(
     return matrix
 
 
-Normals = str | Sequence[float]
+Normals: TypeAlias = str | Sequence[float]
 KINDS = ("facet", "averaged", "secondary")
-# Cosine of the angle beyond which two sides do not face each other: about 85 degrees.
+# Cosine of the angle, about 85 degrees, beyond which two sides do not face each other, and mean cosine below which a surface
+# has no mean direction, since it closes on itself.
 FACING = 0.1
 
 

@@ -28,12 +28,11 @@ from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Factor on the columns of a fit for each degree of the polynomial, and damping of its least squares relative to the
-# smallest column: where nodes leave terms undetermined, as on a strip one facet wide, those of low degree are
-# preferred.
-LOWER, DAMPING = 0.1, 1e-5
+# Factor on the columns of a fit for each degree of the polynomial, whose least squares are damped: where nodes
+# leave terms undetermined, as on a strip one facet wide, those of low degree are preferred.
+LOWER = 0.1
 # Circles, spheres and cylinders are matched to (L / R)^(2 PASSES).
 PASSES = 3
 
@@ -87,10 +86,8 @@ class Smoothing:
         smooth_secondary = None if smooth_primary is None else smooth_side(secondary, points)
         if smooth_secondary is None or smooth_primary is None:
             return None
-        made, axes = (
-            cls(smooth_secondary, smooth_primary),
-            [frames(side, points, points) for side in (secondary, primary)],
-        )
+        made = cls(smooth_secondary, smooth_primary)
+        axes = [frames(side, points, points) for side in (secondary, primary)]
         middles = [points[b.facets[:, : elements.get(b.element).n_corners]].mean(axis=1) for b in secondary.blocks]
         opposite = closest_of_kinds(np.concatenate(middles), primary.corners(points)).facet
         factor = made.shared(np.arange(len(opposite)), opposite, axes)
@@ -224,7 +221,7 @@ class _Fit:
         lower = LOWER ** (i + j) * np.sqrt(powers)  # Bombieri's norm is invariant under rotation
         columns = np.where(valid[..., None], lower * _terms(plane, i, j), 0.0)
         rest = np.where(valid, height - _conic(self.curvature, plane), 0.0)
-        size = LOWER ** (i + j).max() * np.sqrt(DAMPING * (columns**2).sum(axis=(1, 2)))
+        size = LOWER ** (i + j).max() * np.sqrt(SINGLE_PRECISION * (columns**2).sum(axis=(1, 2)))
         damping = size[:, None, None] * np.eye(len(i), len(i) + 1)
         # With normal equations instead of QR, terms determined by the damping would be accurate to only 1e-3.
         rows = np.concatenate([np.concatenate([columns, rest[..., None]], axis=2), damping], axis=1)

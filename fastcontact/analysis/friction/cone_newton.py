@@ -23,11 +23,9 @@ from typing import Protocol
 
 import numpy as np
 
+from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.round_off import ROUND_OFF, TINY
-
-# Largest number of Newton iterations, and smallest damping factor.
-PATIENCE, SHORTEST = 40, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,13 +167,13 @@ def newton(
     exact : float
         Tolerance of the residual, relative to the largest force [-].
     patience : int, optional
-        Largest number of iterations; PATIENCE by default.
+        Largest number of iterations; MAX_NEWTON_ITERATIONS by default.
     line_search : bool
         Whether a step is halved until the residual decreases. Otherwise full steps are taken.
     least : int
         Smallest number of iterations.
     """
-    patience = PATIENCE if patience is None else patience
+    patience = MAX_NEWTON_ITERATIONS if patience is None else patience
     law = problem.law
     residual = law.residual(y, gaps)
     size = float(np.linalg.norm(residual))
@@ -194,10 +192,13 @@ def newton(
         damping = 1.0
         while (
             line_search
-            and np.linalg.norm(law.residual(y + damping * step, gaps + damping * change)) > (1 - 1e-4 * damping) * size
+            and np.linalg.norm(law.residual(y + damping * step, gaps + damping * change))
+            > (1 - DECREASE * damping) * size
         ):
             damping *= 0.5
-            if damping < SHORTEST:  # at a kink there may be no step that decreases the residual: take the full step
+            if (
+                damping < 0.5**HALVINGS
+            ):  # at a kink there may be no step that decreases the residual: take the full step
                 damping = 1.0
                 break
         y, gaps = (trial, gaps_there) if damping == 1.0 else (y + damping * step, gaps + damping * change)

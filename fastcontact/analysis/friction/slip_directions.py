@@ -14,10 +14,9 @@ import numpy as np
 from scipy.sparse import block_array, csr_array, diags_array
 
 from fastcontact.arrays import Array, Mask
-from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, TINY
+from fastcontact.linear.protocol import TOLERANCE
+from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
-# A tangent is idle if its compliance relative to the compliance of the gap is less than this.
-IDLE = 100 * ROUND_OFF
 # Compliance of a prescribed slip relative to the compliance of its gap. It is negligible, but with it the equation of stick
 # has a solution. The force of this solution lies outside the friction cone, so that the constraint slides.
 GIVING = LENGTH_ROUND_OFF
@@ -72,7 +71,7 @@ def aligning(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array
     mixed = compliance[1, 2] - compliance[1, 0] * compliance[2, 0] / gap
     radius = np.hypot(0.5 * (first - second), mixed)
     largest, least = 0.5 * (first + second) + radius, 0.5 * (first + second) - radius
-    across = (least <= IDLE * np.maximum(largest, gap)) & (np.abs(mixed) > IDLE * np.maximum(largest, gap))
+    across = (least <= TOLERANCE * np.maximum(largest, gap)) & (np.abs(mixed) > TOLERANCE * np.maximum(largest, gap))
     if not across.any() and not directions:
         return None
     angle = np.where(across, 0.5 * np.arctan2(2 * mixed, first - second), _to_axes(*directions) if directions else 0.0)
@@ -94,11 +93,12 @@ def idle(directions: Array) -> Mask:
     """Return which tangents (k, m) are idle, given the compliance `directions` (1 + k, 1 + k, m) of each constraint.
 
     Along an idle tangent, supports allow no motion, or only a motion that is proportional to the change of the gap. The
-    equation of its slip would be empty or linearly dependent. This occurs on axes and in planes of symmetry.
+    equation of its slip would be empty or linearly dependent. This occurs on axes and in planes of symmetry. Compliances are
+    no more accurate than the solutions of iterative solvers.
     """
     k = len(directions) - 1
     along = directions[np.arange(1, k + 1), np.arange(1, k + 1)]
     return np.asarray(
         along * directions[0, 0] - directions[1:, 0] ** 2
-        <= IDLE * directions[0, 0] * np.maximum(along, directions[0, 0])
+        <= TOLERANCE * directions[0, 0] * np.maximum(along, directions[0, 0])
     )

@@ -13,7 +13,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations._overlap import Coupling, Overlap, OverlapPoints
-from fastcontact.contact.pairing import Candidates, pair
+from fastcontact.contact.pairing import FACING, Candidates, pair
 from fastcontact.contact.projection import CORNER, facet_normals, nodal_normals
 from fastcontact.contact.search.closest import closest
 from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
@@ -21,9 +21,6 @@ from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Lines face each other if the angle between their normals exceeds 120 degrees: beside a corner, the flank is closest but
-# does not face the point.
-OPPOSITE = -0.5
 NO_BORDERS = np.empty(0, np.intp), np.empty(0)
 
 
@@ -189,7 +186,8 @@ def line_overlap(
         points = line_points(block, primary, reference, deformed, axisymmetric, k + 2, tolerance)
         at = Candidates(block.facets[points.facet], points.shape).positions(deformed)
         facing = pair(at, primary, deformed, tolerance)
-        opposite = np.einsum("nd,nd->n", normals_at(block, deformed, points), facing.normal) < OPPOSITE
+        # Beside a corner, the flank is closest but does not face the point.
+        opposite = np.einsum("nd,nd->n", normals_at(block, deformed, points), facing.normal) < -FACING
         # A segment faces the other side with all its points or none: too few points would not determine a field.
         mostly = (facing.paired & opposite).reshape(-1, k + 2).mean(axis=1) > 0.5
         area = np.where(np.repeat(mostly, k + 2), points.area, 0.0)

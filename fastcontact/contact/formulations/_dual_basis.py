@@ -27,10 +27,6 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
-# Fraction of the function of a mid-side node that is moved to the function of each end of its edge. With 1/4 the functions
-# become Bernstein polynomials. For quadrangles without a centre node, 3/8 is the smallest fraction for which all functions
-# are positive.
-SHARE, SHARE_WITHOUT_CENTRE = 0.25, 0.375
 # Smallest covered fraction, that is the fraction of the weight of a function that faces the other side. Below it, a node
 # has no gap, because its weighted gap would be extrapolated from a small part. On facets whose dual functions are ill
 # conditioned, a function below it has no dual function.
@@ -54,7 +50,10 @@ def positive(name: str) -> Array:
         return T
     if element.n_nodes == 9:
         return _bernstein_square(element)
-    share = SHARE_WITHOUT_CENTRE if element.n_nodes == 8 else SHARE
+    # Fraction of the function of a mid-side node that is moved to the function of each end of its edge. With 1/4 the
+    # functions become Bernstein polynomials. For quadrangles without a centre node, 3/8 is the smallest fraction for which
+    # all functions are positive.
+    share = 0.375 if element.n_nodes == 8 else 0.25
     for k, ends in enumerate(_edges(element)):
         middle = element.n_corners + k
         T[list(ends), middle] = share

@@ -459,10 +459,7 @@ class Formulation(ABC):
             return closer
         deformed = self.points + at.displacement
         axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
-        on_secondary, on_primary = (
-            (candidates.facet[rows], candidates.xi[rows]),
-            (pairing.facet[rows], pairing.xi[rows]),
-        )
+        on_secondary, on_primary = ((side.facet[rows], side.xi[rows]) for side in (candidates, pairing))
         closer[rows] = self.smoothing.overlap(on_secondary, on_primary, axes)
         return closer
 

@@ -36,7 +36,7 @@ from fastcontact.contact.formulations._overlap import Overlap, OverlapPoints, ob
 from fastcontact.contact.integration import areas_of_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import Closing, Linearised, NodalNormals, Points, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import Candidates, Normals, filled_up, pair, tangents
+from fastcontact.contact.pairing import FACING, Candidates, Normals, filled_up, pair, tangents
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.contact.search.limits import BEYOND
 from fastcontact.errors import ContactError, unknown
@@ -45,8 +45,6 @@ from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
 MULTIPLIERS = ("standard", "dual")
-# Smallest fraction of the squared length of a tangent, not held by supports, at which slip along the tangent is computed.
-FREE = 0.1
 
 
 class Coverage(NamedTuple):
@@ -161,7 +159,13 @@ class WeightedMortar(Formulation):
         slips, additional = self._slips(rubbing, held, coverage, mean, rows, weight)
         length, between = self._closing(constraints, normal, at)
         closing = length[:, None] * between
-        slip0 = self._slip0(mean, closing, rubbing, at)
+        # The slip that is not due to displacements is that of a rigid obstacle, or minus that of closing.
+        if not isinstance(self.primary, RigidSide):
+            moved = -closing if self.slip == "symmetric" else np.zeros_like(closing)
+        else:
+            now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
+            moved = self.primary.carried(now, before, at.pose, at.pose_start)
+        slip0 = -np.stack([np.einsum("nd,nd->n", t, moved) for t in rubbing])
         for along, still, more in additional:
             remaining = closing - np.where(still, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
             apparent_slip = np.einsum("md,md->m", more @ remaining, along)
@@ -247,15 +251,6 @@ class WeightedMortar(Formulation):
             np.concatenate([area[facets].ravel(), np.repeat(size[cut] / count, count)]),
         )
 
-    def _slip0(self, mean: csr_array, closing: Array, directions: tuple[Array, ...], at: Configuration) -> Array:
-        """Return the slip (k, m) not due to displacements: that of a rigid obstacle, or minus that of `closing`."""
-        if not isinstance(self.primary, RigidSide):
-            moved = -closing if self.slip == "symmetric" else np.zeros_like(closing)
-        else:
-            now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-            moved = self.primary.carried(now, before, at.pose, at.pose_start)
-        return -np.stack([np.einsum("nd,nd->n", t, moved) for t in directions])
-
     def _nodal(self, weight: Array) -> WeightedPressures:
         """Return the nodal interpretation of forces; `weight` (m,) are the areas of the gaps [area]."""
         quadratic = [
@@ -320,7 +315,8 @@ class WeightedMortar(Formulation):
                 (along, nodes, csr_array(scaled(csr_array(on_secondary - own), 1.0 / weight)[:, self.secondary.points]))
             )
             held[nodes] += np.einsum("md,me->mde", along[nodes], along[nodes])
-        free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FREE for t in directions]
+        # Slip is computed along tangents whose part that supports do not hold is longer than FACING.
+        free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FACING**2 for t in directions]
         return tuple(scaled(row, np.where(slips, 1.0, 0.0)) for row, slips in zip(rows, free, strict=True)), additional
 
     def _weighted(self, coverage: Coverage) -> tuple[csr_array, csr_array, Array]:

@@ -10,19 +10,16 @@ has not changed since the last factorisation keep their columns of L, and the up
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.decorators import innermost_kernel, interpretable_kernel, kernel
 from fastcontact.arrays import Array, Numbers
+from fastcontact.linear.cholesky.triangular_kernels import PANEL, Offsets
 
-Offsets = NDArray[np.int64]
 
-# Number of columns that are subtracted in one pass, of columns in a panel, and of rows of the update that BLAS computes.
-TOGETHER, PANEL, ROWS = 4, 48, 96
+# Number of columns that are subtracted in one pass.
+TOGETHER = 4
 # Smallest number of multiplications for which a product is passed to BLAS.
 SMALL = 20_000
-# Supernodes that are factorised, and those below the root of a subtree that keeps its columns, in `plan`.
-ANEW, BELOW = -2, -1
 
 
 @interpretable_kernel
@@ -63,7 +60,8 @@ def plan(
     kept : ndarray of int (n_supernodes,)
         Offsets of the update matrices that are kept from the last factorisation, or -1.
     source : ndarray of int (n_supernodes,)
-        Filled with `ANEW`, `BELOW`, or for the root of a subtree that keeps its columns, the offset of its update matrix.
+        Filled with -1 for supernodes that are factorised, -2 for those below the root of a subtree that keeps its columns,
+        and for the root itself with the offset of its update matrix.
     target : ndarray of int (n_supernodes,)
         Filled with the offsets of the update matrices to keep, those of the largest subtrees without a change, or -1.
     """
@@ -77,11 +75,11 @@ def plan(
             changed[above[s]] = True
     for s in range(count - 1, -1, -1):
         root = above[s] < 0
-        source[s], target[s] = ANEW, -1
-        if not root and source[above[s]] != ANEW:
-            source[s] = BELOW
+        source[s], target[s] = -1, -1
+        if not root and source[above[s]] != -1:
+            source[s] = -2
         elif not changed[s]:
-            source[s] = kept[s] if kept[s] >= 0 else ANEW
+            source[s] = kept[s]
         if not changed[s] and (root or changed[above[s]]):
             target[s] = size
             size += (begin[s + 1] - begin[s]) ** 2
@@ -129,12 +127,12 @@ def factorise(
     widest = 0
     for s in range(count):
         widest = max(widest, first[s + 1] - first[s] + begin[s + 1] - begin[s])
-    one, other, product = np.empty(PANEL * widest), np.empty(PANEL * widest), np.empty(ROWS * widest)
+    one, other, product = np.empty(PANEL * widest), np.empty(PANEL * widest), np.empty(2 * PANEL * widest)
     top = used = 0
     for s in range(count):
         low, high, rest = first[s], first[s + 1], below[begin[s] : begin[s + 1]]
         m = len(rest)
-        if source[s] == ANEW:
+        if source[s] == -1:
             size = high - low + m
             F = front[: size * size].reshape(size, size)
             _gather(start, rows, values, order, position, low, high, rest, local, F)
@@ -152,7 +150,7 @@ def factorise(
         else:
             _copy(last[0], begins[low], L, begins[low], begins[high] - begins[low])
             _copy(last[1], low, d, low, high - low)
-            if source[s] == BELOW:
+            if source[s] == -2:
                 continue
             _copy(last[2], source[s], waiting, used, m * m)
         if target[s] >= 0:
@@ -282,8 +280,8 @@ def _reduced_by_blocks(F: Array, begin: int, end: int, one: Array, other: Array,
         for i in range(m):
             plain[i, j] = row[end + i]
             scaled[i, j] = pivot * row[end + i]
-    for low in range(0, m, ROWS):
-        high = min(low + ROWS, m)
+    for low in range(0, m, 2 * PANEL):
+        high = min(low + 2 * PANEL, m)
         change = product[: (high - low) * (m - low)].reshape(high - low, m - low)
         np.dot(scaled[low:high], plain[low:].T, change)
         for i in range(low, high):

@@ -16,7 +16,7 @@ from fastcontact.arrays import Array, Mask, Numbers
 
 Offsets = NDArray[np.int64]
 
-# Largest number of columns of L in one matrix product of `solve_together`.
+# Largest number of columns of L in one matrix product.
 PANEL = 48
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array
@@ -123,7 +124,7 @@ class CoupledPivots:
         return np.asarray(self._factors.solve(b, "T"))
 
 
-Inverse = SparseInverse | CoupledPivots
+Inverse: TypeAlias = SparseInverse | CoupledPivots
 
 
 def lumped(P: csr_array, pivots: Indices, size: int) -> csr_array:

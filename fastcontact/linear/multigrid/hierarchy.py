@@ -2,7 +2,7 @@
 
 Neighbouring nodes form aggregates. The tentative prolongator of an aggregate consists of the rigid-body modes, restricted
 to its nodes. One step of the block Jacobi method smooths it (Vanek, Mandel and Brezina, 1996), and the coarse matrix is the
-Galerkin product. The levels are smoothed by a Chebyshev iteration (`smoother`).
+Galerkin product. The levels are smoothed by a Chebyshev iteration (`level`).
 
 Two functions come from pyamg: `standard_aggregation` forms the aggregates, and `fit_candidates` computes an orthonormal
 basis of the rigid-body modes of each aggregate. `linear.solvers.pyamg` uses the complete multigrid method of pyamg, for
@@ -22,10 +22,8 @@ from scipy.sparse import csr_matrix
 from fastcontact._jit.parallel import spread
 from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
-from fastcontact.linear.multigrid.coarse import COARSEST, Coarse
-from fastcontact.linear.multigrid.level import Level
+from fastcontact.linear.multigrid.level import COARSEST, DEGREE, SAFETY, Coarse, Level, chebyshev, largest_eigenvalue
 from fastcontact.linear.multigrid.matrix import ALL, WORK_OF_ROW, BlockMatrix, pointers
-from fastcontact.linear.multigrid.smoother import DEGREE, SAFETY, chebyshev, largest_eigenvalue
 
 
 class Hierarchy:
@@ -111,10 +109,8 @@ class Hierarchy:
         tentative[member] = T.data.reshape(len(member), -1)
         del T
         omega = 4.0 / 3.0 / (level.bound / SAFETY)
-        cols, neighbours = (
-            (0,) * n_modes,
-            csr_matrix((np.ones(len(A.indices), bool), A.indices, A.indptr), shape=(n, n)),
-        )
+        cols = (0,) * n_modes
+        neighbours = csr_matrix((np.ones(len(A.indices), bool), A.indices, A.indptr), shape=(n, n))
         pattern = neighbours @ aggregates.astype(bool)
         pattern.sort_indices()
         # The prolongator is stored in the precision of the cycle before the coarse matrix is computed, so that the latter is

@@ -16,9 +16,6 @@ from fastcontact.linear.cholesky.factorisation import fill_reducing, singular
 from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
 from fastcontact.linear.factor_solver import FactorSolver
 
-# Number of the system of CHOLMOD's `solve` that only permutes the right-hand side to the order of elimination.
-PERMUTE = 7
-
 
 class Cholmod(FactorSolver):
     """Direct solver with the Cholesky factorisation of CHOLMOD; see `FactorSolver`."""
@@ -91,7 +88,7 @@ def _in_order(factor: Any, n: int) -> Indices:
 
     numbers = matrix(np.arange(n, dtype=float))
     try:
-        cholmod.solve(factor, numbers, sys=PERMUTE)
+        cholmod.solve(factor, numbers, sys=7)  # only permutes to the order of elimination
     except ArithmeticError as error:  # For small matrices CHOLMOD detects a zero pivot only in a solution.
         raise singular() from error
     return np.array(numbers).ravel().astype(np.intp)

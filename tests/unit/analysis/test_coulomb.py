@@ -134,9 +134,9 @@ def test_constraints_that_repeat_each_other_share_the_force():
     np.testing.assert_allclose(both.y.sum(axis=1), one.y[:, 0], rtol=1e-9)
 
 
-@pytest.mark.parametrize("patience", [cone_newton.PATIENCE, 1])
+@pytest.mark.parametrize("patience", [cone_newton.MAX_NEWTON_ITERATIONS, 1])
 def test_the_second_method_solves_where_newton_does_not(monkeypatch, patience):
-    monkeypatch.setattr(cone_newton, "PATIENCE", patience)
+    monkeypatch.setattr(cone_newton, "MAX_NEWTON_ITERATIONS", patience)
     rng = np.random.default_rng(23)
     for _ in range(100):
         m = rng.integers(1, 9)

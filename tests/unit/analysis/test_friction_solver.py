@@ -104,7 +104,7 @@ def test_frames_of_eliminated_slips_do_not_depend_on_the_choice_of_tangents():
 
 
 def test_what_does_not_settle_is_told_with_its_numbers(monkeypatch):
-    monkeypatch.setattr(cone_newton, "PATIENCE", 0)
+    monkeypatch.setattr(cone_newton, "MAX_NEWTON_ITERATIONS", 0)
     monkeypatch.setattr(dense, "LARGEST", 0)
     mesh = fc.generate.block_on_block(divisions_lower=(6, 2), divisions_upper=(3, 3))
     model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy", UPPER_TOP={"x": 1e-3, "y": -1e-4})
