@@ -15,7 +15,6 @@ from fastcontact._jit.decorators import innermost_kernel, interpretable_kernel, 
 from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.cholesky.triangular_kernels import PANEL, Offsets
 
-
 # Number of columns that are subtracted in one pass.
 TOGETHER = 4
 # Smallest number of multiplications for which a product is passed to BLAS.
