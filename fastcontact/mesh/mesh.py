@@ -189,9 +189,9 @@ class Mesh(Suggesting):
         """
         rows = {}
         for name, start in self.offsets.items():
-            inside = (numbers >= start) & (numbers < start + len(self.cells[name]))
-            if inside.any():
-                rows[name] = (numbers[inside] - start).astype(np.intp)
+            in_block = (numbers >= start) & (numbers < start + len(self.cells[name]))
+            if in_block.any():
+                rows[name] = (numbers[in_block] - start).astype(np.intp)
         return rows
 
     def cells_of(self, group: str, dim: int | None = None) -> dict[str, AnyArray]:
@@ -406,9 +406,9 @@ def _facets_with_nodes(
 
 def _added(block: AnyArray, facets: AnyArray) -> tuple[AnyArray, Indices]:
     """Return a block of facets extended by those of the `facets` that it lacks, and the row of each of the `facets`."""
-    both = np.concatenate([block, facets])
-    _, first, facet = np.unique(np.sort(both, axis=1), axis=0, return_index=True, return_inverse=True)
-    row = first[facet.ravel()]  # row of the first facet with the same nodes
-    new = (row == np.arange(len(both))) & (np.arange(len(both)) >= len(block))
-    new_row = np.where(np.arange(len(both)) < len(block), np.arange(len(both)), len(block) + np.cumsum(new) - 1)
-    return np.concatenate([block, both[new]]), new_row[row[len(block) :]].astype(np.intp)
+    candidates = np.concatenate([block, facets])
+    _, first, facet = np.unique(np.sort(candidates, axis=1), axis=0, return_index=True, return_inverse=True)
+    row, rows = first[facet.ravel()], np.arange(len(candidates))  # row of the first facet with the same nodes
+    new = (row == rows) & (rows >= len(block))
+    new_row = np.where(rows < len(block), rows, len(block) + np.cumsum(new) - 1)
+    return np.concatenate([block, candidates[new]]), new_row[row[len(block) :]].astype(np.intp)

@@ -224,8 +224,8 @@ def product_rule(cell: str, n: int, cartesian: int | None = None) -> Rule:
 def subdivided(rule: Rule, count: int) -> Rule:
     """Return the composite rule on `count` equal intervals of [-1, 1], with coincident points merged."""
     points, weights = rule
-    left = -1.0 + 2.0 * np.arange(count) / count
-    all_points = (left[:, None] + (points[:, 0] + 1.0) / count).ravel()
+    starts = -1.0 + 2.0 * np.arange(count) / count
+    all_points = (starts[:, None] + (points[:, 0] + 1.0) / count).ravel()
     return _merged(all_points[:, None], np.tile(weights / count, count))
 
 

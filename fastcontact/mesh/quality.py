@@ -91,17 +91,17 @@ def quality(mesh: Mesh) -> MeshQuality:
     length = np.concatenate([block.ravel() for block in lengths]) if lengths else np.array([np.nan])
     with np.errstate(divide="ignore", invalid="ignore"):
         aspects = [(block.max(axis=1) / block.min(axis=1)).max() for block in lengths]
-    bad = [_bad_cells(mesh, name) for name in mesh.solids]
+    invalid = [_bad_cells(mesh, name) for name in mesh.solids]
     return MeshQuality(
         smallest_angle=float(np.degrees(angle.min())),
         largest_angle=float(np.degrees(angle.max())),
         shortest_edge=float(length.min()),
         longest_edge=float(length.max()),
         worst_aspect=float(max(aspects, default=np.nan)),
-        measure=float(sum(measure.sum() for measure, _, _ in bad)),
+        measure=float(sum(measure.sum() for measure, _, _ in invalid)),
         n_points=mesh.n_points,
         n_cells={name: len(block) for name, block in mesh.cells.items()},
-        n_bad=sum(int((degenerate | inverted).sum()) for _, degenerate, inverted in bad),
+        n_bad=sum(int((degenerate | inverted).sum()) for _, degenerate, inverted in invalid),
         dim=mesh.dim,
     )
 
@@ -132,19 +132,21 @@ def poorest_cell(mesh: Mesh) -> str:
     """
     for name in mesh.solids:
         measure, low, high, longest = _extremes(mesh, name)
-        jacobian, volume = low / high, measure / longest**3
+        # Excesses over the limits, the values and the texts of all criteria.
+        ratio, volume = low / high, measure / longest**3
         text = "its smallest Jacobian is {:.2g} of its largest; move its nodes or remesh"
-        faults = [(jacobian, jacobian, LEAST_JACOBIAN_RATIO, text)]
+        criteria = [(LEAST_JACOBIAN_RATIO - ratio, ratio, text)]
         if mesh.dim == 2:
             angle = np.degrees(corner_angles(_corners(mesh, name)).max(axis=1))
-            text = "it has an angle of {:.1f} degrees; move its nodes or remesh"
-            faults.append((-angle, angle, -LARGEST_ANGLE, text))
+            criteria.append(
+                (angle - LARGEST_ANGLE, angle, "it has an angle of {:.1f} degrees; move its nodes or remesh")
+            )
         else:
             text = "its volume is only {:.1e} of its longest edge cubed; remesh there"
-            faults.append((volume, volume, LEAST_VOLUME_RATIO, text))
-        for criterion, value, limit, text in faults:
-            row = int(np.argmin(criterion))
-            if criterion[row] < limit:
+            criteria.append((LEAST_VOLUME_RATIO - volume, volume, text))
+        for excess, value, text in criteria:
+            row = int(np.argmax(excess))
+            if excess[row] > 0.0:
                 return f"{_described(mesh, name, row, measure[row])} is poor: {text.format(value[row])}"
     return ""
 
@@ -153,11 +155,11 @@ def _check_nodes(mesh: Mesh, name: str) -> None:
     """Raise MeshError if a cell contains a node twice, because its stresses are then undefined."""
     nodes = np.sort(mesh.cells[name], axis=1)
     repeated = nodes[:, 1:] == nodes[:, :-1]
-    bad = np.flatnonzero(repeated.any(axis=1))
-    if len(bad):
-        node = int(nodes[bad[0], :-1][repeated[bad[0]]][0])
+    rows = np.flatnonzero(repeated.any(axis=1))
+    if len(rows):
+        node = int(nodes[rows[0], :-1][repeated[rows[0]]][0])
         raise MeshError(
-            f"{_described(mesh, name, int(bad[0]))} has point {node} twice, one of {len(bad)} such cells: write it as the "
+            f"{_described(mesh, name, int(rows[0]))} has point {node} twice, one of {len(rows)} such cells: write it as the "
             "element that it collapses to, a triangle, wedge, pyramid or tetrahedron"
         )
 

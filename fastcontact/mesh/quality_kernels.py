@@ -56,7 +56,7 @@ def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
         for e in range(edges.shape[0]):
             length = 0.0
             for i in range(dim):
-                along = x[i, edges[e, 1]] - x[i, edges[e, 0]]
-                length += along * along
+                component = x[i, edges[e, 1]] - x[i, edges[e, 0]]
+                length += component * component
             square = max(square, length)
         longest[c] = np.sqrt(square)

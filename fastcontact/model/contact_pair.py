@@ -137,13 +137,13 @@ def check_turns(pairs: Iterable[ContactPair], ramp: Ramp) -> None:
     for pair in pairs:
         if pair.rotation is None or not pair.options.get("friction"):
             continue
-        before = 0.0
+        previous = 0.0
         for instant in ramp.instants:
             angle = angle_at(pair, ramp, instant)
-            turn = abs(angle - before)
-            if turn > LARGEST_TURN:
+            change = abs(angle - previous)
+            if change > LARGEST_TURN:
                 raise ModelError(
-                    f"obstacle '{pair.name}' turns by {turn:.3g} radian in the step to {instant:g}, more than "
-                    f"{LARGEST_TURN:g}: with friction use at least {math.ceil(turn / LARGEST_TURN)} steps instead"
+                    f"obstacle '{pair.name}' turns by {change:.3g} radian in the step to {instant:g}, more than "
+                    f"{LARGEST_TURN:g}: with friction use at least {math.ceil(change / LARGEST_TURN)} steps instead"
                 )
-            before = angle
+            previous = angle

@@ -178,7 +178,9 @@ class Model(ModelSupports):
 
     def _check_changes(self, check: Callable[[Model], None]) -> None:
         """Call `check` once for every set of temporary items that act together, with the model that contains only these."""
-        for begin in self._changes():
+        temporary = [item for item in (*self.relations, *self.heat_loads) if isinstance(item, TEMPORARY)]
+        changes = {0.0, *(t for item in temporary for t in (item.begins, item.ends) if 0.0 < t < np.inf)}
+        for begin in sorted(changes):
             try:
                 check(self._acting(begin))
             except ModelError as error:
@@ -195,11 +197,6 @@ class Model(ModelSupports):
         acting.relations = [r for r in self.relations if not isinstance(r, TemporaryConstraint) or r.acts_from(begin)]
         acting.heat_loads = [r for r in self.heat_loads if not isinstance(r, TemporaryHeat) or r.acts_from(begin)]
         return acting
-
-    def _changes(self) -> list[float]:
-        """Return 0 and the load factors at which temporary constraints and loads of heat begin or end."""
-        temporary = [item for item in (*self.relations, *self.heat_loads) if isinstance(item, TEMPORARY)]
-        return sorted({0.0, *(t for item in temporary for t in (item.begins, item.ends) if 0.0 < t < np.inf)})
 
     def _check_relations(self, fixed: Mask, prescribed: Mapping[PartHistory, Array], ramp: Ramp) -> None:
         relations = [relation for relation in self.relations if not isinstance(relation, TemporaryConstraint)]

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, kron, vstack
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact._tools.neighbours import nearest
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.contact.projection import places
 from fastcontact.contact.search.closest import closest_of_kinds
@@ -187,7 +187,7 @@ def _nearest_after(
     return *nearest(mesh.points[second], (mesh.points[first] - centre) @ turn.T + centre), turn
 
 
-def _rows(interface: PeriodicInterface, at_second: Array, at_first: Array, mesh: Mesh) -> csr_array:
+def _rows(interface: PeriodicInterface, at_second: AnyArray, at_first: AnyArray, mesh: Mesh) -> csr_array:
     """Return the rows (m, n_dofs) of ``at_second . u_second + at_first . u_first`` for all pairs of coincident nodes."""
     nodes = np.column_stack([interface.second, interface.first])
     return nodal_rows(nodes, np.tile([at_second, at_first], (len(nodes), 1, 1)), mesh.points.size)

@@ -32,19 +32,14 @@ def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
         )
     else:
         for facing, opposite in ((other.secondary, other.primary), (other.primary, other.secondary)):
-            _check_sides(mesh, pair, other, facing, opposite)
-
-
-def _check_sides(mesh: Mesh, pair: ContactPair, other: ContactPair, facing: str, opposite: str) -> None:
-    """Raise ContactError if the secondary side of `pair` shares facets with `facing`, the primary side with `opposite`."""
-    secondary = shared_facets(mesh, pair.secondary, facing)
-    if len(secondary) and len(shared_facets(mesh, pair.primary, opposite)):
-        raise ContactError(
-            f"contact '{pair.name}' pairs facets of '{pair.secondary}' and '{pair.primary}' that contact '{other.name}' "
-            f"pairs already: '{pair.secondary}' and '{facing}' share facets with {len(secondary)} nodes (first: point "
-            f"{secondary[0]}), '{pair.primary}' and '{opposite}' share facets, too. Leave out one of the two contacts, or "
-            "separate their groups"
-        )
+            nodes = shared_facets(mesh, pair.secondary, facing)
+            if len(nodes) and len(shared_facets(mesh, pair.primary, opposite)):
+                raise ContactError(
+                    f"contact '{pair.name}' pairs facets of '{pair.secondary}' and '{pair.primary}' that contact "
+                    f"'{other.name}' pairs already: '{pair.secondary}' and '{facing}' share facets with {len(nodes)} nodes "
+                    f"(first: point {nodes[0]}), '{pair.primary}' and '{opposite}' share facets, too. Leave out one of the "
+                    "two contacts, or separate their groups"
+                )
 
 
 def joined_already(mesh: Mesh, sides: tuple[str, str], other: ContactPair) -> bool:

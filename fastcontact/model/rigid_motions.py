@@ -203,8 +203,8 @@ def _body_motions(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
     coefficients = np.split(joint, np.cumsum([motion.shape[2] for _, motion in moving]))
     displacement = np.zeros((mesh.n_points, mesh.dim, joint.shape[1]))
     for number, ((members, motion), of_part) in enumerate(zip(moving, coefficients[:-1], strict=True)):
-        own = rigid.part[members] == number  # a node at a hinge belongs to several parts
-        displacement[members[own]] = motion[own] @ of_part
+        in_part = rigid.part[members] == number  # a node at a hinge belongs to several parts
+        displacement[members[in_part]] = motion[in_part] @ of_part
     return FreeMotions(
         displacement.reshape(mesh.points.size, joint.shape[1]), np.asarray(block_diag(*matrices), float) @ joint, labels,
         np.unique(rigid.hinge_node),
@@ -317,9 +317,9 @@ def unstopped(gaps: Array, works: Array) -> Array:
     driven = works[scale > 0] / scale[scale > 0, None]
     for axis in range(k):
         for sign in (1.0, -1.0):
-            away = _extreme(sign * np.eye(k)[axis], gaps, np.zeros(len(gaps)), driven, 1.0)
-            if np.abs(away).max(initial=0.0) > 1e-6:
-                return away[:, None]
+            motion = _extreme(sign * np.eye(k)[axis], gaps, np.zeros(len(gaps)), driven, 1.0)
+            if np.abs(motion).max(initial=0.0) > 1e-6:
+                return motion[:, None]
     return np.empty((k, 0))
 
 

@@ -306,17 +306,19 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
             continue
         if np.ma.isMaskedArray(field):
             raise FileError(f"step {step.index}: {name} is a masked array, which files cannot store: fill it first")
-        given = np.shape(field)
-        if given != shape:
-            raise FileError(f"step {step.index}: {name} has shape {given}, but the mesh of the file needs {shape}")
+        shape_given = np.shape(field)
+        if shape_given != shape:
+            raise FileError(
+                f"step {step.index}: {name} has shape {shape_given}, but the mesh of the file needs {shape}"
+            )
     for name, contact in step.contact.items():
         check_contact(f"step {step.index}, contact '{name}'", contact, mesh)
     count = sum(map(len, mesh.solids.values()))
     for name in cell_fields:
-        given = np.shape(step.cell_fields.get(name, ()))
-        if given != (count,):
+        shape_given = np.shape(step.cell_fields.get(name, ()))
+        if shape_given != (count,):
             raise FileError(
-                f"step {step.index}: the declared cell field '{name}' has shape {given}, but ({count},) is "
+                f"step {step.index}: the declared cell field '{name}' has shape {shape_given}, but ({count},) is "
                 "needed, a number for each solid cell"
             )
 

@@ -455,8 +455,8 @@ def _checked_names(cell_fields: Iterable[str], mesh: Mesh) -> tuple[str, ...]:
     """Return the names of cell fields, after a check that all can be written."""
     names = tuple(cell_fields)
     for name in names:
-        taken = {*layout.cell_fields(mesh), *layout.MATERIAL_FIELDS, "material"}
-        if name in taken or not name.isidentifier():
+        reserved = {*layout.cell_fields(mesh), *layout.MATERIAL_FIELDS, "material"}
+        if name in reserved or not name.isidentifier():
             raise FileError(
                 f"'{name}' cannot be the name of a cell field: it is taken or no plain word; choose another"
             )

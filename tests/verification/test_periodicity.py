@@ -349,7 +349,7 @@ def test_ends_that_do_not_match_are_refused():
     model = ring(sector(5))
     with pytest.raises(fc.ModelError, match=r"turned by 1/6 of a turn, lies 0\.\d+ from the nearest node of 'RIGHT'"):
         model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=6)
-    with pytest.raises(fc.ModelError, match=r"from the nearest node of .TOP., and the groups are not facets"):
+    with pytest.raises(fc.ModelError, match=r"from the nearest node of .TOP., and the groups do not consist of facets"):
         model.add_cyclic_symmetry("LEFT", "TOP", sectors=5)
     with pytest.raises(fc.ModelError, match="needs two sectors at least"):
         model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=1)

@@ -148,8 +148,8 @@ def quadratic(name: str, linear: Element, functions: Functions, **others: Any) -
     facets = []
     for facet in linear.facets:
         corners = nodes[list(facet)]
-        middles = (corners + np.roll(corners, -1, axis=0)) / 2
-        on_facet = [np.flatnonzero((nodes == node).all(axis=1)) for node in (*middles, corners.mean(axis=0))]
+        midpoints = (corners + np.roll(corners, -1, axis=0)) / 2
+        on_facet = [np.flatnonzero((nodes == node).all(axis=1)) for node in (*midpoints, corners.mean(axis=0))]
         facets.append(tuple(dict.fromkeys((*facet, *np.concatenate(on_facet).tolist()))))
     return Element(
         name, nodes, linear.edges, tuple(facets), shape, gradient, quadratic=name, corner_element=linear, **others

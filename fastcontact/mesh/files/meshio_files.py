@@ -227,9 +227,9 @@ def _arguments(mesh: Mesh, file_format: str) -> dict[str, Any]:
         return _with_tags(content, mesh)
     if file_format == "abaqus":
         return {**content, "point_sets": dict(mesh.point_groups)}
-    lost = len(mesh.cell_groups) + len(mesh.point_groups)
-    if lost:
-        warn(f"{file_format} files have no named groups: {lost} groups are left out; {KEEPS_ALL}")
+    n_groups = len(mesh.cell_groups) + len(mesh.point_groups)
+    if n_groups:
+        warn(f"{file_format} files have no named groups: {n_groups} groups are left out; {KEEPS_ALL}")
     return content
 
 

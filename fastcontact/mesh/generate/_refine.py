@@ -181,17 +181,9 @@ def _on_curve(mesh: Mesh, curve: Curve, keys: AnyArray) -> AnyArray:
 
 def _cell_groups(mesh: Mesh) -> dict[str, AnyArray]:
     """Return the cell groups of the refined mesh; the children of a cell have consecutive numbers."""
-    n_children = {name: len(_pattern(name).children) for name in mesh.cells}
-    starts = np.cumsum([0, *(n_children[name] * len(block) for name, block in mesh.cells.items())]).tolist()
-    first_child = dict(zip(mesh.cells, starts, strict=False))
-    groups: dict[str, AnyArray] = {}
-    for group, members in mesh.cell_groups.items():
-        cells = [np.empty(0, np.int64)]
-        for name, rows in mesh.split(members).items():
-            n = n_children[name]
-            cells.append(first_child[name] + (rows[:, None] * n + np.arange(n)).ravel())
-        groups[group] = np.concatenate(cells)
-    return groups
+    n_children = [np.full(len(block), len(_pattern(name).children)) for name, block in mesh.cells.items()]
+    parent = np.repeat(np.arange(mesh.n_cells), np.concatenate([np.empty(0, np.intp), *n_children]))
+    return {group: np.flatnonzero(np.isin(parent, members)) for group, members in mesh.cell_groups.items()}
 
 
 def _point_groups(mesh: Mesh, new: _NewPoints) -> dict[str, AnyArray]:

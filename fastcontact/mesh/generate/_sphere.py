@@ -84,11 +84,11 @@ def sphere_on_block(
         element, R=R, size=size, contact_size=contact_size, contact_radius=contact_radius, growth=growth
     )
     spacing = _spacing(R, size, contact_size, contact_radius, growth)
-    across, down = graded(width, spacing), graded(height, _shallow(spacing))
+    horizontal, vertical = graded(width, spacing), graded(height, _shallow(spacing))
     names = {"BLOCK": "BLOCK", "XMIN": "SYMMETRY_X", "YMIN": "SYMMETRY_Z", "ZMIN": "CONT_BLOCK", "ZMAX": "BLOCK_BOTTOM"}
     names |= {"XMAX": "BLOCK_SIDE", "YMAX": "BLOCK_SIDE"}
     block = _mapped(
-        element, (across, across, down), lambda x, z, depth: np.column_stack([x, -depth, z]), "BLOCK", names
+        element, (horizontal, horizontal, vertical), lambda x, z, depth: np.column_stack([x, -depth, z]), "BLOCK", names
     )
     return union(sphere, with_points_at(block, {"POLE_BLOCK": (0.0, 0.0, 0.0)}))
 

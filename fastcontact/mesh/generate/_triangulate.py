@@ -88,13 +88,13 @@ def _midpoints_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> A
     # Sides of the outline are excluded, but not chords that cut off a corner.
     side = np.isin(edges[:, 1] - edges[:, 0], (1, n_fixed - 1)) & (edges[:, 1] < n_fixed)
     edges = edges[~side]
-    middles = points[edges].mean(axis=1)
+    midpoints = points[edges].mean(axis=1)
     sides = points[edges[:, 0]] - points[edges[:, 1]]
-    ratio = np.hypot(sides[:, 0], sides[:, 1]) / spacing(middles)
+    ratio = np.hypot(sides[:, 0], sides[:, 1]) / spacing(midpoints)
     long = ratio > 1.0 + 1e-9
     worst = np.zeros(len(points))
     np.maximum.at(worst, edges[long].ravel(), np.repeat(ratio[long], 2))
-    return middles[long & (ratio >= worst[edges].max(axis=1))]
+    return midpoints[long & (ratio >= worst[edges].max(axis=1))]
 
 
 def _checked(triangles: Indices, n_points: int, n_outline: int) -> Indices:
@@ -113,11 +113,11 @@ def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
     candidates = _lattice(spacing, density, low, high) if spacing.uniform else _rings(spacing, density, low, high)
     corners = _separated(_corner_seeds(outline, spacing, density), outline, spacing, density)
     size = density * spacing(candidates)
-    inside = candidates[_depth(outline, candidates) > _CLEARANCE * size]
+    seeds = candidates[_depth(outline, candidates) > _CLEARANCE * size]
     if not len(corners):
-        return inside
-    free = nearest(corners, inside)[0] > 0.7 * density * spacing(inside)
-    return np.vstack([corners, inside[free]])
+        return seeds
+    free = nearest(corners, seeds)[0] > 0.7 * density * spacing(seeds)
+    return np.vstack([corners, seeds[free]])
 
 
 def _separated(seeds: Array, outline: Array, spacing: Spacing, density: float) -> Array:

@@ -208,9 +208,9 @@ def crowned_blocks(
     size = positive("contact_size", contact_size, fine, "contact_radius")
     right, down = _lines(size, fine, width, rate), _lines(size, size, width, rate)
     lattice = on_lines(element, [np.concatenate([-right[:0:-1], right]), -down[::-1]], "LOWER")
-    across, up = lattice.points.T
-    crown = across**2 / (2 * R) * (1 + up / width)  # the displacement of the nodes decays downward
-    lower = renamed(lattice.replace(points=np.column_stack([across, up - crown])), _NAMES_CROWNED.get)
+    x, y = lattice.points.T
+    crown = x**2 / (2 * R) * (1 + y / width)  # the displacement of the nodes decays downward
+    lower = renamed(lattice.replace(points=np.column_stack([x, y - crown])), _NAMES_CROWNED.get)
     lower = with_cells_inside(lower, "CONT_LOWER", "CONT_LOWER", lambda points: np.abs(points[:, 0]) <= 1.2 * fine)
     lower = with_points_at(lower, {"POLE_LOWER": (0.0, 0.0)})
     upper = mirrored(lower, "y", rename=lambda name: name.replace("LOWER", "UPPER"))

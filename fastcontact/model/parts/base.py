@@ -272,7 +272,7 @@ class ModelBase(Suggesting):
         return field.moduli, field.rows
 
     def material_field(self) -> MaterialField:
-        """Return the materials of all solid cells; raise ModelError if a cell has no material or two different ones."""
+        """Return the materials of all solid cells. Raises ModelError if a cell has no material or two different ones."""
         return material_field(
             self.mesh, self.kinematics, [material for material, _ in self.materials], self.material_of_cells()
         )
@@ -307,6 +307,7 @@ class ModelBase(Suggesting):
                 )
 
     def _check_all_have_material(self, numbers: dict[str, Numbers]) -> None:
+        """Raise ModelError if a solid cell has no material, that is the number -1."""
         without = {name: np.flatnonzero(values < 0) for name, values in numbers.items()}
         total = sum(map(len, without.values()))
         if not total:
@@ -314,9 +315,9 @@ class ModelBase(Suggesting):
         offsets = self.mesh.offsets
         cells = np.concatenate([rows + offsets[name] for name, rows in without.items()])
         groups = [g for g, members in self.mesh.cell_groups.items() if np.isin(members, cells).any()]
-        named = f", in {', '.join(repr(g) for g in groups)}" if groups else ""
+        of_groups = f", in {', '.join(repr(g) for g in groups)}" if groups else ""
         raise ModelError(
-            f"{total} solid cells have no material{named}: assign one to their groups by add_material or [[material]]"
+            f"{total} solid cells have no material{of_groups}: assign one to their groups by add_material or [[material]]"
         )
 
     def internal_forces(self, displacement: Array) -> Array:

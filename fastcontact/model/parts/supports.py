@@ -207,7 +207,7 @@ class ModelSupports(ModelContact):
         return fixed, by_ramp
 
     def _refuse(self, number: int, node: int) -> None:
-        """Raise a ModelError which states that support `number` contradicts an before support at `node`."""
+        """Raise a ModelError which states that support `number` contradicts an earlier support at `node`."""
         support = self.supports[number]
         for before in self.supports[:number]:
             if before.component == support.component and node in self.mesh.points_of(before.group):

@@ -505,9 +505,9 @@ def animate(
     if pictures_per_second < 1:
         raise FastcontactError(f"pictures_per_second = {pictures_per_second}: one or more a second can be shown")
     target, scale = checked_target(path), scale_of(scale, mesh, steps)
-    size, projection = (6.4, 6.0), "3d"
+    projection, size = None if mesh.dim == 2 else "3d", (6.4, 6.0)
     if mesh.dim == 2:
-        size, projection = _axes.size_around(mesh.points * [2.0 if mirrored else 1.0, 1.0], 3.8), None
+        size = _axes.size_around(mesh.points * [2.0 if mirrored else 1.0, 1.0], 3.8)
     figure = new_axes(None, size, projection).figure
     writer = writer_of(target, pictures_per_second)
     colours, box = _over_all(mesh, steps, field, scale, mirrored)

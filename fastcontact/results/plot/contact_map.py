@@ -107,7 +107,7 @@ def contact_map(
         high = _limit(ax, flat, _carrying(contact, blocks) & ~np.array(everything))
         bar = {"location": "bottom", "shrink": 0.6} if high == FLAT else {"shrink": 0.75 * high}
         ax.figure.colorbar(artist, ax=ax, label=labelled(caption, units, quantity), **bar)
-        _nodes(ax, flat, contact, two_maps)
+        _mark_nodes(ax, flat, contact, two_maps)
         ax.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"), aspect="equal")
         ax.set_title(f"{caption}\nlargest {valued(float(values.max(initial=0.0)), units, quantity)}", fontsize="medium")
     if two_maps:
@@ -164,32 +164,31 @@ def _projection(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Arr
     return seen_along(total / np.linalg.norm(total), 0.9)
 
 
-def _nodes(ax: Any, flat: Array, contact: ContactResult, both: bool) -> None:
-    """Mark the closed nodes and, if `both`, the sliding nodes."""
-    sliding = contact.active & ~contact.sticking if both else np.zeros(len(flat), bool)
-    for name, here, colour in (
-        ("sticking" if both else "closed", contact.active & ~sliding, "white"),
-        ("sliding", sliding, "tab:orange"),
-    ):
-        if here.any():
-            ax.plot(*flat[here].T, "o", ms=3, mfc=colour, mec="black", mew=0.4, label=name)
+def _mark_nodes(ax: Any, flat: Array, contact: ContactResult, friction: bool) -> None:
+    """Mark the closed nodes and, with `friction`, the sliding nodes among them."""
+    sliding = contact.active & ~contact.sticking & friction
+    closed = contact.active & ~sliding
+    states = (("sticking" if friction else "closed", closed, "white"), ("sliding", sliding, "tab:orange"))
+    for state, nodes, colour in states:
+        if nodes.any():
+            ax.plot(*flat[nodes].T, "o", ms=3, mfc=colour, mec="black", mew=0.4, label=state)
 
 
 def _carrying(contact: ContactResult, blocks: dict[str, Indices]) -> Mask:
-    """Return for each node (m,) whether it is closed or belongs to a facet with pressure."""
-    carrying = contact.active.copy()
+    """Return the mask (m,) of nodes that are closed or belong to a facet with pressure."""
+    mask = contact.active.copy()
     for facets in blocks.values():
-        carrying[facets[(contact.pressure[facets] != 0.0).any(axis=1)]] = True
-    return carrying
+        mask[facets[(contact.pressure[facets] != 0.0).any(axis=1)]] = True
+    return mask
 
 
 def _limit(ax: Any, flat: Array, closed: Mask) -> float:
     """Set the limits of the axes to the closed part with a margin, or to the entire surface if no node is closed.
 
-    Return the height of the figure relative to that of a square map, from FLAT to 1 [-].
+    Returns the height of the figure relative to that of a square map, from FLAT to 1 [-].
     """
-    kept = flat[closed] if closed.any() else flat
-    low, high = kept.min(axis=0), kept.max(axis=0)
+    points = flat[closed] if closed.any() else flat
+    low, high = points.min(axis=0), points.max(axis=0)
     margin = MARGIN * max(0.5 * float((high - low).max()), 0.02 * float(np.ptp(flat, axis=0).max()))
     low = np.maximum(low - margin, flat.min(axis=0) - 0.05 * margin)
     high = np.minimum(high + margin, flat.max(axis=0) + 0.05 * margin)

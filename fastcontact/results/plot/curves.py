@@ -195,7 +195,7 @@ def axis_stress(
     units: Units = UNKNOWN,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the stresses at the here on the axis of a contact as functions of the depth below the surface.
+    """Plot the stresses at the nodes on the axis of a contact as functions of the depth below the surface.
 
     The axis passes through the middle of the contact along the normal of the surface; in axisymmetry it is the axis of
     symmetry.
@@ -221,7 +221,7 @@ def axis_stress(
     Raises
     ------
     FastcontactError
-        If the mesh is three-dimensional or has no here on the axis, or the step has no such pair.
+        If the mesh is three-dimensional or has no nodes on the axis, or the step has no such pair.
 
     Examples
     --------
@@ -311,9 +311,9 @@ def _axis(step: StepResult, pair: str) -> tuple[Array, Array]:
 
 def _rotated(stress: Array, direction: Array) -> Array:
     """Return the stress (n, 4) in rotated axes, of which x is normal to and y along a direction (2,) [pressure]."""
-    along, across = direction, np.array([direction[1], -direction[0]])
+    x, y = np.array([direction[1], -direction[0]]), direction
     tensor = stress[:, [0, 3, 3, 1]].reshape(-1, 2, 2)
-    xx, yy, xy = (np.einsum("i,nij,j->n", a, tensor, b) for a, b in ((across, across), (along, along), (across, along)))
+    xx, yy, xy = (np.einsum("i,nij,j->n", a, tensor, b) for a, b in ((x, x), (y, y), (x, y)))
     return np.column_stack([xx, yy, stress[:, 2], xy])
 
 

@@ -54,8 +54,8 @@ def fill(
         interpolated.append((values[cells] @ shape.T).ravel())
         triangles.append((start + len(shape) * np.arange(len(cells))[:, None, None] + pieces).reshape(-1, 3))
         start += len(shape) * len(cells)
-    all_values = np.concatenate(interpolated)
-    return fill_triangles(ax, np.concatenate(positions), np.concatenate(triangles), all_values, colours, ends)
+    x, values = np.concatenate(positions), np.concatenate(interpolated)
+    return fill_triangles(ax, x, np.concatenate(triangles), values, colours, ends)
 
 
 def fill_triangles(

@@ -96,10 +96,10 @@ def seen_along(direction: Array, aligned: float) -> tuple[Array, tuple[str, str]
     If the magnitude of a component of the vector is at least `aligned`, they are the other coordinate axes and their names
     are returned; otherwise they are normal to the vector and the names are None.
     """
-    along = int(np.argmax(np.abs(direction)))
-    if abs(direction[along]) < aligned:
+    k = int(np.argmax(np.abs(direction)))
+    if abs(direction[k]) < aligned:
         return across(direction)[:2], None
-    first, second = [axis for axis in range(3) if axis != along]
+    first, second = [axis for axis in range(3) if axis != k]
     return np.eye(3)[[first, second]], ("xyz"[first], "xyz"[second])
 
 
