@@ -118,8 +118,9 @@ OTHER_WORDS = {
     "add_friction": "add_contact", "boundary": "support", "load": "pressure force traction",
     "loads": "pressure force traction", "solve": "run", "study": "converge sweep", "convert": "export",
     "show": "info plot", "view": "plot", "examples": "cases", "list": "cases", "restart": "resume", "cores": "threads",
-    "nproc": "threads", "constraint": "support", "displacement": "support", "boundary_condition": "support",
+    "nproc": "threads", "constraint": "support", "displacement": "support motion", "boundary_condition": "support",
     "interaction": "contact", "friction": "contact", "preload": "pretension", "bolt": "pretension",
+    "p_max": "pressure_max", "radius": "R", "wear_depth": "wear",
     "tangential_force": "force_parts", "add_support": "fix prescribe", "add_mpc": "relate",
 }  # fmt: skip
 

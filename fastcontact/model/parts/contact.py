@@ -405,6 +405,7 @@ class ModelContact(ModelConnections):
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
         set_here = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
         known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in set_here)]
+        known += ["motion", "rotation", "force"] * (pair.obstacle is not None)  # arguments of `add_obstacle`
         for option in pair.options:
             check_known(f"option of {pair.formulation}", option, known, ContactError)
         specific = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
