@@ -147,8 +147,10 @@ def nearest(name: str, known: Collection[str]) -> list[str]:
 def no_attribute(owner: str, name: str, known: Collection[str]) -> AttributeError:
     """Return the AttributeError for a name that an `owner`, such as "module 'x'", lacks, with the nearest known names."""
     text = f"{owner} has no attribute '{name}'"
-    if name in getattr(sys.modules["fastcontact"], "__all__", ()):
-        text += f": use fastcontact.{name}"
+    public = {"fastcontact": "fastcontact", "fastcontact.mesh.generate": "fastcontact.generate"}
+    places = [place for module, place in public.items() if name in getattr(sys.modules.get(module), "__all__", ())]
+    if places:
+        text += f": use {places[0]}.{name}"
     elif near := nearest(name, known):
         text += ": did you mean " + " or ".join(map(repr, near)) + "?"
     return AttributeError(text, name=name, obj=text)  # a string as `obj` prevents suggestions by Python
