@@ -118,8 +118,9 @@ OTHER_WORDS = {
     "add_friction": "add_contact", "boundary": "support", "load": "pressure force traction",
     "loads": "pressure force traction", "solve": "run", "study": "converge sweep", "convert": "export",
     "show": "info plot", "view": "plot", "examples": "cases", "list": "cases", "restart": "resume", "cores": "threads",
-    "nproc": "threads", "constraint": "support", "displacement": "support", "boundary_condition": "support",
+    "nproc": "threads", "constraint": "support", "displacement": "support motion", "boundary_condition": "support",
     "interaction": "contact", "friction": "contact", "preload": "pretension", "bolt": "pretension",
+    "p_max": "pressure_max", "radius": "R", "wear_depth": "wear",
     "tangential_force": "force_parts", "add_support": "fix prescribe", "add_mpc": "relate",
 }  # fmt: skip
 
@@ -146,8 +147,10 @@ def nearest(name: str, known: Collection[str]) -> list[str]:
 def no_attribute(owner: str, name: str, known: Collection[str]) -> AttributeError:
     """Return the AttributeError for a name that an `owner`, such as "module 'x'", lacks, with the nearest known names."""
     text = f"{owner} has no attribute '{name}'"
-    if name in getattr(sys.modules["fastcontact"], "__all__", ()):
-        text += f": use fastcontact.{name}"
+    public = {"fastcontact": "fastcontact", "fastcontact.mesh.generate": "fastcontact.generate"}
+    places = [place for module, place in public.items() if name in getattr(sys.modules.get(module), "__all__", ())]
+    if places:
+        text += f": use {places[0]}.{name}"
     elif near := nearest(name, known):
         text += ": did you mean " + " or ".join(map(repr, near)) + "?"
     return AttributeError(text, name=name, obj=text)  # a string as `obj` prevents suggestions by Python

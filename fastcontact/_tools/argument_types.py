@@ -92,13 +92,18 @@ def _refusal(
     by_name = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
     if len(args) > len(by_place) and by_name:
         required = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY and p.default is p.empty]
-        example = ", ".join(f"{key}=..." for key in (required or by_name)[:3])
+        axes = [*"xy"] * ("components" in signature.parameters)  # the direction of a load or a support
+        example = ", ".join(f"{key}=..." for key in (required or axes or by_name)[:3])
         places = ", ".join([p.name for p in by_place if p.name != "self"]) or "nothing"
         return TypeError(f"{called} takes {places} by position and all other arguments by keyword: write {example}")
     try:
         call(*args, **kwargs)
     except TypeError as failure:
         text = str(failure).replace(f"{call.__qualname__}()", f"{called}()", 1)
+        missing = [key for key in signature.parameters if f"'{key}'" in text]
+        others = {key: nearest(key, missing) for key in kwargs if key not in signature.parameters}
+        meant = [f"{near[0]} instead of {key}" for key, near in others.items() if near]
+        text += f": write {' and '.join(meant)}" * bool(meant)
         if wrong := text.partition("unexpected keyword argument '")[2].partition("'")[0]:
             text = text.partition(". Did you mean")[0]  # Python 3.13 suggests a name, too
             known = [key for key in signature.parameters if key != "self"]

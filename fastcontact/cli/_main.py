@@ -26,6 +26,8 @@ from fastcontact.cli._terminal import encodable, say, stderr_is_terminal, warnin
 from fastcontact.errors import ConvergenceError, FastcontactError, printable, unknown
 
 SHELLS = ("bash", "zsh", "tcsh")
+# Options that need no arguments of subcommands.
+BRIEF = ("-h", "--help", "--version")
 # Names and metavars of arguments whose values are file names.
 FILES = ("case", "file", "output", "mesh", "FILE", "PNG", "FOLDER", "DIR")
 
@@ -113,7 +115,10 @@ class PrintVersion(argparse.Action):
 
 
 def parser(command: str | None = None) -> argparse.ArgumentParser:
-    """Return the parser of the subcommand `command` only, or of all subcommands if none has this name."""
+    """Return the parser of the subcommand `command`, or of all subcommands if none has this name.
+
+    Mesh generators, whose import takes most of the time, are declared only for the subcommand that was requested.
+    """
     top = Parser(prog="fastcontact", description="Fast finite elements for elastic contact problems.")
     top.add_argument("--version", action=PrintVersion, nargs=0, help="show program's version number and exit")
     top.add_argument(
@@ -127,7 +132,7 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
         subparser = commands.add_parser(name, help=module.HELP, description=module.HELP)
         if hasattr(module, "ARGUMENTS"):
             declare(subparser, module.ARGUMENTS)
-        else:
+        elif command in (None, name):
             module.add_generators(subparser)
         subparser.set_defaults(run=module.run)
         add_loudness(subparser, default=False)
@@ -164,7 +169,8 @@ def _run_with_exit_code(words: list[str], raised: list[int]) -> int:
 
 def _run(words: list[str]) -> int:
     """Parse the arguments, set up logging, and run the subcommand; return its exit code."""
-    arguments = parser(words[0] if words else None).parse_args(words or ["--help"])
+    words = words or ["--help"]
+    arguments = parser(None if words[0] not in BRIEF and words[0].startswith("-") else words[0]).parse_args(words)
     handler = _Printable()
     log.handlers[:] = [handler]
     log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)

@@ -15,6 +15,7 @@ from fastcontact.elasticity import recovery
 from fastcontact.elasticity.material_sides import MaterialSides
 from fastcontact.errors import FastcontactError, ModelError, Suggesting, unknown
 from fastcontact.results.units import valued, with_unit
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +101,7 @@ def force_text(parts: Sequence[float], normal_force: float, units: Mapping[str, 
     total, normal, tangential, normal_sum = (valued(part, units, "force", 6) for part in (*parts, normal_force))
     if parts[0] < CANCELLED * normal_force:
         return f"{total}, sum of normal forces {normal_sum}"
-    return total + f" (normal {normal}, tangential {tangential})" * (parts[2] > 0.0)
+    return total + f" (normal {normal}, tangential {tangential})" * (parts[2] > LENGTH_ROUND_OFF * parts[0])
 
 
 def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple[float, float]:

@@ -225,6 +225,15 @@ def test_imaginary_parts_are_not_lost_without_a_word(what):
             lambda model: model.add_contact("pair", secondary="TOP"),
             "Model.add_contact() missing 1 required keyword-only argument: 'primary'",
         ),
+        (
+            lambda model: model.add_contact("pair", slave="TOP", master="BOTTOM"),
+            "Model.add_contact() missing 2 required keyword-only arguments: 'secondary' and 'primary': write secondary "
+            "instead of slave and primary instead of master",
+        ),
+        (
+            lambda model: model.add_force("TOP", -1.0),
+            "Model.add_force takes group by position and all other arguments by keyword: write x=..., y=...",
+        ),
         (lambda model: model.fix("TOP"), "Model.fix() missing 1 required positional argument: 'components'"),
     ],
 )

@@ -47,6 +47,7 @@ def test_an_unknown_name_is_no_attribute():
     ("owner", "name", "told"),
     [
         (fc.generate.block(), "nodes", "did you mean 'points'?"),
+        (fc.generate.block(), "transformed", "use fastcontact.generate.transformed"),
         (fc.generate.block(), "group_nams", "did you mean 'group_names'?"),
         (fc.Model(fc.generate.block(), "plane_strain"), "add_bolt", "did you mean 'add_pretension'?"),
         (fc.Model(fc.generate.block(), "plane_strain"), "solve", "use fastcontact.solve"),

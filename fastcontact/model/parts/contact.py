@@ -408,6 +408,7 @@ class ModelContact(ModelConnections):
             *SHARED_OPTIONS,
             *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given),
         ]
+        available += ["motion", "rotation", "force"] * (pair.obstacle is not None)  # arguments of `add_obstacle`
         for option in pair.options:
             check_known(f"option of {pair.formulation}", option, available, ContactError)
         specific = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
