@@ -12,8 +12,8 @@ from typing import Any
 
 from fastcontact._version import __version__ as __version__
 
-# By default, idle OpenBLAS threads spin for about 0.1 s before they sleep. OpenBLAS reads this variable once, when NumPy or
-# SciPy is first imported.
+# Without this setting, idle threads of OpenBLAS spin for about 0.1 s before they sleep. OpenBLAS reads the variable once,
+# when NumPy or SciPy is first imported.
 os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
 
 logging.getLogger(__name__).addHandler(logging.NullHandler())  # no output unless the user configures logging
