@@ -58,7 +58,8 @@ class Interpretable:
     def _choose(self, *arguments: Any) -> Any:
         """Compute a call in Python, or this and all later calls with the compiled kernel."""
         began = time.thread_time()
-        if self._is_compiled() or not self._is_small(arguments):
+        is_compiled = self.compiled.signatures or (self._files is not None and self._files.exist())
+        if is_compiled or not self._is_small(arguments):
             self._call = self.compiled
             return self.compiled(*arguments)
         if self._spent == 0.0:
@@ -67,10 +68,6 @@ class Interpretable:
         result = interpret(self, arguments)
         self._spent += time.thread_time() - began
         return result
-
-    def _is_compiled(self) -> bool:
-        """Return whether the kernel is compiled, in this process or on disk."""
-        return bool(self.compiled.signatures) or (self._files is not None and self._files.exist())
 
     def _is_small(self, arguments: tuple[Any, ...]) -> bool:
         """Return whether a call may run in Python: the time spent so far is less than that of a compilation."""

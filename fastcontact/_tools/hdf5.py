@@ -56,7 +56,7 @@ def check_contents(file: Any, path: PathLike) -> None:
     """Check an open HDF5 file before anything in it is read.
 
     Raises FileError if a link or the values of a data set refer to another file, if a data set needs an external filter, if
-    the data sets need more memory than is plausible for a file of this size, or if groups are nested too deeply or cyclically.
+    the data sets need more memory than plausible for a file of this size, or if groups are nested too deeply or cyclically.
     """
     from h5py import h5d, h5g, h5o
     from h5py.h5l import TYPE_HARD, TYPE_SOFT

@@ -115,6 +115,11 @@ class Material(Located):
     expansion: float | tuple[float, ...] | None = None
     conductivity: Block | None = None
 
+    @property
+    def about(self) -> str:
+        """Beginning of messages about the material."""
+        return f"material '{self.name}': "
+
 
 @dataclass
 class Interaction(Located):

@@ -239,13 +239,12 @@ class Reader:
         if keyword in OUTPUT:
             content.outputs.append(block.location)
             return
-        properties = checked(block, f"material '{self.material.name}': " if self.material else "")
+        properties = checked(block, self.material.about if self.material else "")
         context = properties.context
         if self.coupling is not None and keyword not in ("KINEMATIC", "DISTRIBUTING"):
             raise self.coupling.refuse("*KINEMATIC or *DISTRIBUTING must follow")
         if self.material is not None and keyword in COHESIVE_DAMAGE:
-            name = self.material.name
-            raise block.refuse(f"material '{name}': damage is supported for cohesive layers only, not in bodies")
+            raise block.refuse(f"{self.material.about}damage is supported for cohesive layers only, not in bodies")
         owner = {
             "part": self.part or content.root, "material": self.material, "interaction": self.interaction,
             "coupling": self.coupling, "procedure": self.step, "step": self.step,

@@ -28,21 +28,10 @@ def pretension_section(content: Content, block: Block) -> None:
     )
 
 
-def section_points(assembly: Assembly) -> dict[int, PretensionSection]:
-    """Return the sections by the point of their node; CaseError if a node belongs to a body or to two sections."""
-    sections: dict[int, PretensionSection] = {}
-    for section in assembly.content.pretension_sections:
-        point = assembly.node(section.node, section.location)
-        if point in assembly.of_solids:
-            raise section.refuse(f"node {section.node} belongs to an element: a section needs a separate node")
-        if point in sections:
-            raise section.refuse(f"node {section.node} has a section already, in line {sections[point].location.line}")
-        sections[point] = section
-    return sections
-
-
 class Locks:
     """Load factors at which pretension sections are locked.
+
+    Raises CaseError if the node of a section belongs to a body or to another section.
 
     Attributes
     ----------
@@ -55,9 +44,17 @@ class Locks:
     """
 
     def __init__(self, assembly: Assembly) -> None:
-        self.points = section_points(assembly)
+        self.points: dict[int, PretensionSection] = {}
         self.begins: dict[int, float] = {}
         self.number = 0
+        for section in assembly.content.pretension_sections:
+            point = assembly.node(section.node, section.location)
+            if point in assembly.of_solids:
+                raise section.refuse(f"node {section.node} belongs to an element: a section needs a separate node")
+            if point in self.points:
+                line = self.points[point].location.line
+                raise section.refuse(f"node {section.node} has a section already, in line {line}")
+            self.points[point] = section
 
     def begin(self, number: int, supports: list[Given], assembly: Assembly) -> None:
         """Advance to step `number`; CaseError if it releases a locked section."""
