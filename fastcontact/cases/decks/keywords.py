@@ -130,10 +130,10 @@ TRANSLATED = {
     "TIE": Keyword("model", relating.tie, "POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
     "TRANSFORM": Keyword("model", local_axes.transform, "NSET; TYPE"),
     # Supports and loads in steps.
-    "BOUNDARY": Keyword("step", stepping.given, "OP; AMPLITUDE; FIXED; TYPE"),
+    "BOUNDARY": Keyword("step", stepping.condition, "OP; AMPLITUDE; FIXED; TYPE"),
     **dict.fromkeys(
         ("CFLUX", "CLOAD", "DFLUX", "DLOAD", "DSFLUX", "DSLOAD", "FILM", "SFILM", "TEMPERATURE"),
-        Keyword("step", stepping.given, "OP; AMPLITUDE"),
+        Keyword("step", stepping.condition, "OP; AMPLITUDE"),
     ),
     # Procedures of steps.
     **dict.fromkeys(

@@ -190,7 +190,9 @@ def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
         law = replace(law, incompatible_modes=True)
     if content.heat or material.conductivity is not None:
         law = _with_constants(material, law, axes, conductivity=_conductivity(content, material))
-    heated = content.heat or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
+    heated = content.heat or any(
+        condition.block.keyword == "TEMPERATURE" for step in content.steps for condition in step.conditions
+    )
     if expansion is None:
         if heated:
             content.note(material, f"material '{material.name}' has no *EXPANSION: temperatures cause no strain")

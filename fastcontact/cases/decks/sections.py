@@ -7,7 +7,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.cases.decks.assembled import Assembly, facet_points
 from fastcontact.cases.decks.blocks import Block, folded, refusing
-from fastcontact.cases.decks.content import Content, Given, PretensionSection, SectorEnds, Sectors
+from fastcontact.cases.decks.content import Condition, Content, PretensionSection, SectorEnds, Sectors
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.mesh.generate.cut import cut
@@ -56,17 +56,20 @@ class Locks:
                 raise section.refuse(f"node {section.node} has a section already, in line {line}")
             self.points[point] = section
 
-    def begin(self, number: int, supports: list[Given], assembly: Assembly) -> None:
+    def begin(self, number: int, supports: list[Condition], assembly: Assembly) -> None:
         """Advance to step `number`; CaseError if it releases a locked section."""
         self.number = number
-        if not any(given.new for given in supports):
+        if not any(condition.new for condition in supports):
             return
         named = {
-            p for given in supports for row in given.block.each() for p in assembly.nodes(row.text(0), row.location)
+            p
+            for condition in supports
+            for row in condition.block.each()
+            for p in assembly.nodes(row.text(0), row.location)
         }
         for point in self.begins:
             if point not in named:
-                location = next(given.block.location for given in supports if given.new)
+                location = next(condition.block.location for condition in supports if condition.new)
                 raise location.refuse(
                     f"node {self.points[point].node} of a pretension section is released here: a locked section stays locked"
                 )
