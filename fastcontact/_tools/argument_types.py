@@ -102,9 +102,9 @@ def _refusal(
         text = str(failure).replace(f"{call.__qualname__}()", f"{called}()", 1)
         if wrong := text.partition("unexpected keyword argument '")[2].partition("'")[0]:
             text = text.partition(". Did you mean")[0]  # Python 3.13 suggests a name, too
-            names = [key for key in signature.parameters if key != "self"]
-            similar = " or ".join(map(repr, nearest(wrong, names)))
-            text += f": did you mean {similar}?" if similar else f": expected one of {', '.join(names)}"
+            valid = [key for key in signature.parameters if key != "self"]
+            similar = " or ".join(map(repr, nearest(wrong, valid)))
+            text += f": did you mean {similar}?" if similar else f": expected one of {', '.join(valid)}"
         return TypeError(text)
     raise AssertionError(called)
 
@@ -231,9 +231,8 @@ def kind_of(annotation: Any) -> Kind:
         return _sequence_kind(kind, members)
     if kind in (abc.Mapping, dict):
         return _mapping_kind(members)
-    name = {str: "string", os.PathLike: "path", abc.Callable: "function"}.get(kind) or getattr(
-        kind, "__name__", str(kind)
-    )
+    names = {str: "string", os.PathLike: "path", abc.Callable: "function"}
+    name = str(names.get(kind) or getattr(kind, "__name__", kind))
     return Kind(_simple_test(annotation, kind, members), f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")
 
 
