@@ -56,8 +56,8 @@ class Conditions:
         self.loads: Histories[Target] = Histories(content)
         initial = initial_temperatures(assembly, content.initial_temperatures)
         self.temperatures: Histories[int] = Histories(content, rest=initial)
-        self.periods: dict[Component, Acting] = {}  # of supports that begin after the first step, or with FIXED
-        self.ended: list[tuple[Component, Acting]] = []
+        self.periods: dict[Component, Acting] = {}  # latest periods; supports without an entry act from the start
+        self.ended: list[tuple[Component, Acting]] = []  # earlier periods
         self.fixed_now: set[Component] = set()  # supports with FIXED in the current step
         self.heat = HeatConditions(assembly, initial)
         self.locks = Locks(assembly)

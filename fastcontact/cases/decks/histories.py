@@ -237,10 +237,6 @@ class Histories(Generic[Name]):
         self.tracks.update((name, track) for name in names)
         return track
 
-    def distinct(self) -> list[Track]:
-        """Return each track once."""
-        return list({id(track): track for track in self.tracks.values()}.values())
-
     def table(self, name: Name) -> Table:
         """Return the history as pairs of load factor and value, up to the end of the last step of the deck."""
         points, end = self.tracks[name].points, float(len(self.content.steps))
