@@ -157,7 +157,7 @@ def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
 
 def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], units: Mapping[str, str]) -> Rows:
     """Return a header and a row for each combination with the limits, mesh errors and model errors of the quantities."""
-    header, cells = ["combination", "levels", "finest DOF"], []
+    header, cells = ["combination", "levels", "finest DOF"], []  # type: list[str], list[tuple[str, tuple[str, ...]]]
     for name in quantities:
         header += [column(name, name, units), "+-", "order", "mesh error", "model error"]
         cells += [(name, ("limit", "+-", "order alone", "mesh error", "model error"))]
