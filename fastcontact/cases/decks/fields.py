@@ -62,7 +62,8 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
         corners = sorted({times[0], *times[max(k - 1, 0) : k + 2], times[-1]})
         change = np.zeros(model.mesh.n_points)
         for _, points, values, table in fields:
-            factor = np.interp(time, *zip(*table, strict=True))
+            instants, factors = zip(*table, strict=True)
+            factor = np.interp(time, instants, factors)
             change[points] = factor * (values(points) if callable(values) else values)
         _add_field(model, change, tuple((corner, float(corner == time)) for corner in corners))
 
