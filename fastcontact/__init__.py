@@ -12,8 +12,8 @@ from typing import Any
 
 from fastcontact._version import __version__ as __version__
 
-# By default, idle OpenBLAS threads spin for about 0.1 s before they sleep. OpenBLAS reads this variable once, when NumPy or
-# SciPy is first imported.
+# Without this setting, idle threads of OpenBLAS spin for about 0.1 s before they sleep. OpenBLAS reads the variable once,
+# when NumPy or SciPy is first imported.
 os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
 
 logging.getLogger(__name__).addHandler(logging.NullHandler())  # no output unless the user configures logging
@@ -31,18 +31,8 @@ _NAMES = {
     "analysis.criteria": ("Criteria",),
     "analysis.modal.shapes": ("Modes", "RingModes"),
     "analysis.modes": ("modes",),
-    "analysis.resultants": (
-        "ContactAnswers",
-        "ContactResultants",
-        "contact_answers",
-        "contact_history",
-        "contact_moment",
-        "contact_resultants",
-        "pretension_history",
-        "spring_forces",
-        "support_forces",
-        "wear",
-    ),
+    "analysis.resultants": ("ContactAnswers", "ContactResultants", "contact_answers", "contact_history",
+        "contact_moment", "contact_resultants", "pretension_history", "spring_forces", "support_forces", "wear"),
     "analysis.run": ("solve", "solve_steps"),
     "analysis.sensitivities": ("Sensitivities", "sensitivities"),
     "cases.decks.deck": ("Deck", "read_deck"),
@@ -52,16 +42,8 @@ _NAMES = {
     "elasticity.materials": ("LinearElastic",),
     "elasticity.nonlinear_materials": ("ElasticPlastic", "MooneyRivlin", "NeoHookean", "Ogden", "Yeoh"),
     "elasticity.varying_constants": ("Tabulated",),
-    "errors": (
-        "CaseError",
-        "ContactError",
-        "ConvergenceError",
-        "FastcontactError",
-        "FastcontactWarning",
-        "FileError",
-        "MeshError",
-        "ModelError",
-    ),
+    "errors": ("CaseError", "ContactError", "ConvergenceError", "FastcontactError", "FastcontactWarning",
+        "FileError", "MeshError", "ModelError"),
     "mesh.files.med": ("read_med_field",),
     "mesh.files.mesh_fields": ("read_field",),
     "mesh.files.mesh_files": ("read_mesh", "write_mesh"),
@@ -80,7 +62,7 @@ _NAMES = {
     "studies.adaptive": ("adaptive_study",),
     "studies.error_norms": ("ErrorEstimate", "ErrorNorms", "error_against", "estimate_error"),
     "studies.runs": ("convergence_study", "parameter_sweep"),
-}
+}  # fmt: skip
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
 __all__ = sorted([*_HOME, *_MODULES])
 

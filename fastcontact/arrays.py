@@ -1,4 +1,4 @@
-"""Types of arrays, and a check that rejects masked arrays, whose masked entries most NumPy functions treat as valid."""
+"""Types of arrays, and a test for masked entries, which most functions of NumPy would treat as valid numbers."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 Mask: TypeAlias = NDArray[np.bool_]
-# Indices into arrays, numbers of points and cells of meshes, and arrays of any type.
+# Indices into arrays; numbers of the points and cells of meshes; arrays of any type.
 Indices: TypeAlias = NDArray[np.intp]
 Numbers: TypeAlias = NDArray[np.int32]
 AnyArray: TypeAlias = NDArray[Any]
 
+# End of the error message about an argument with masked entries.
 REFUSAL = "has entries that are masked, and masks are not kept: fill them first, or leave them out"
 
 

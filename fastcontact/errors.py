@@ -1,4 +1,4 @@
-"""Exceptions and warnings of fastcontact, and messages that suggest known names for unknown ones."""
+"""Exceptions and warnings of fastcontact, and error messages that suggest similar names for unknown ones."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def printable(text: str) -> str:
 
 
 class FastcontactError(Exception):
-    """Base class of the errors that fastcontact raises. Their messages consist of one line."""
+    """Base class of the errors that fastcontact raises, whose messages consist of one line."""
 
     def __str__(self) -> str:
         # Names and values from files may contain line ends, control characters and thousands of characters.
@@ -55,9 +55,9 @@ class ConvergenceError(FastcontactError):
     Attributes
     ----------
     history : list of dict
-        Residual, active constraints and change of the displacement in each iteration of the failed step.
+        Residual, number of active constraints and change of the displacement in each iteration of the failed step.
     smaller_steps_help : bool
-        Whether smaller load steps may converge.
+        True if smaller load steps may converge.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class ConvergenceError(FastcontactError):
 
 
 class FastcontactWarning(UserWarning):
-    """A model or a result is doubtful; the message quantifies the reason."""
+    """A model or a result is doubtful, for a reason that the message quantifies."""
 
     def __str__(self) -> str:
         return printable(super().__str__())
@@ -77,7 +77,10 @@ class FastcontactWarning(UserWarning):
 
 @contextmanager
 def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Prefix the messages of errors in the block with a file name, unless they contain it; ConvergenceError is unchanged."""
+    """Prefix the messages of errors in a ``with`` block with a file name, unless they contain the name.
+
+    A ConvergenceError is unchanged.
+    """
     try:
         yield
     except FastcontactError as error:
@@ -87,7 +90,7 @@ def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def warn(text: str) -> None:
-    """Issue a FastcontactWarning that is attributed to the line of the user's code that called the package."""
+    """Issue a FastcontactWarning, attributed to the line of the user's code that called the package."""
     package = os.path.dirname(__file__) + os.sep
     level, frame = 2, sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(package):
@@ -97,9 +100,9 @@ def warn(text: str) -> None:
 
 LONGEST_NAME = 120  # largest number of characters of an unknown name in a message
 SHOWN = 20  # largest number of known names in the message about an unknown one
-# Smallest ratio of matching characters (difflib) of a name that is suggested; "loads" for "nodes" has 0.6.
+# Smallest similarity ratio (difflib) of a name that is suggested; that of "loads" and "nodes" is 0.6.
 SIMILAR = 0.65
-# Names of fastcontact, separated by spaces, by the names that other programs or other parts of fastcontact use.
+# Names in fastcontact, separated by blanks, by the names that other programs or other parts of fastcontact use.
 OTHER_WORDS = {
     "slave": "secondary", "master": "primary", "mu": "friction", "interference": "clearance", "gap": "clearance",
     "h": "coefficient", "k": "coefficient", "plane": "half_space", "circle": "sphere", "ball": "sphere",
@@ -126,33 +129,33 @@ OTHER_WORDS = {
 
 
 def nearest(name: str, known: Collection[str]) -> list[str]:
-    """Return the known names that a name may stand for: see `OTHER_WORDS`, or up to three that resemble it.
+    """Return the known names that `name` may stand for, according to `OTHER_WORDS`, or up to three similar ones.
 
-    A table that all names have in common, such as "support[1].", does not count.
+    A prefix that all names share, such as "support[1].", is ignored.
     """
-    table = name[: name.rfind(".") + 1]
-    shared = len(table) if all(candidate.startswith(table) for candidate in known) else 0
-    exact = {candidate[shared:].lstrip("-"): candidate for candidate in reversed([*known])}
+    prefix = name[: name.rfind(".") + 1]
+    start = len(prefix) if all(candidate.startswith(prefix) for candidate in known) else 0
+    exact = {candidate[start:].lstrip("-"): candidate for candidate in reversed([*known])}
     folded = {key.casefold(): candidate for key, candidate in exact.items()}
-    name = name[shared:].lstrip("-")
-    meant = OTHER_WORDS.get(name.rpartition(".")[2].casefold(), "").casefold().replace("_", "").split()
-    plainest = {key.replace("_", ""): candidate for key, candidate in reversed(folded.items())}
-    near = [candidate for key, candidate in plainest.items() if key.rpartition(".")[2] in meant]
-    near = near or [exact[key] for key in difflib.get_close_matches(name, exact, n=3, cutoff=SIMILAR)]
+    name = name[start:].lstrip("-")
+    synonyms = OTHER_WORDS.get(name.rpartition(".")[2].casefold(), "").casefold().replace("_", "").split()
+    without_underscores = {key.replace("_", ""): candidate for key, candidate in reversed(folded.items())}
+    similar = [candidate for key, candidate in without_underscores.items() if key.rpartition(".")[2] in synonyms]
+    similar = similar or [exact[key] for key in difflib.get_close_matches(name, exact, n=3, cutoff=SIMILAR)]
     name = name.casefold()
-    near = near or [folded[key] for key in difflib.get_close_matches(name, folded, n=3, cutoff=SIMILAR)]
-    return near or [folded[key] for key in reversed(folded) if len(name) > 2 and name in key][:3]
+    similar = similar or [folded[key] for key in difflib.get_close_matches(name, folded, n=3, cutoff=SIMILAR)]
+    return similar or [folded[key] for key in reversed(folded) if len(name) > 2 and name in key][:3]
 
 
 def no_attribute(owner: str, name: str, known: Collection[str]) -> AttributeError:
-    """Return the AttributeError for a name that an `owner`, such as "module 'x'", lacks, with the nearest known names."""
+    """Return the AttributeError for a name that an `owner`, such as "module 'x'", lacks, with similar known names."""
     text = f"{owner} has no attribute '{name}'"
     public = {"fastcontact": "fastcontact", "fastcontact.mesh.generate": "fastcontact.generate"}
-    places = [place for module, place in public.items() if name in getattr(sys.modules.get(module), "__all__", ())]
-    if places:
-        text += f": use {places[0]}.{name}"
-    elif near := nearest(name, known):
-        text += ": did you mean " + " or ".join(map(repr, near)) + "?"
+    owners = [public[module] for module in public if name in getattr(sys.modules.get(module), "__all__", ())]
+    if owners:
+        text += f": use {owners[0]}.{name}"
+    elif similar := nearest(name, known):
+        text += ": did you mean " + " or ".join(map(repr, similar)) + "?"
     return AttributeError(text, name=name, obj=text)  # a string as `obj` prevents suggestions by Python
 
 
@@ -162,11 +165,11 @@ class Suggesting:
     if not TYPE_CHECKING:  # hidden from type checkers, which report unknown names themselves
 
         def __getattr__(self, name: str) -> object:
-            # Tools such as IPython look up private names; and an error inside a property is not a missing attribute.
+            # Tools such as IPython look up private names, and a name of the class is missing only if its property fails.
             if name.startswith("_") or hasattr(type(self), name):
                 return object.__getattribute__(self, name)
-            known = [each for each in dir(self) if not each.startswith("_")]
-            raise no_attribute(f"'{type(self).__name__}' object", name, known)
+            public = [attribute for attribute in dir(self) if not attribute.startswith("_")]
+            raise no_attribute(f"'{type(self).__name__}' object", name, public)
 
 
 def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
@@ -181,18 +184,18 @@ def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Ca
 def check_known(
     kind: str, name: object, known: Collection[str], error: type[FastcontactError], about: str = ""
 ) -> None:
-    """Raise `error` with the nearest known names unless `name` is in `known`; `about` precedes the message."""
+    """Raise `error`, with similar known names, unless `name` is in `known`; `about` precedes the message."""
     if not isinstance(name, str) or name not in known:
         raise error(about + unknown(kind, str(name), known))
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    """Return the message for an unknown name, with the nearest known names or, if none is near, the first known names."""
+    """Return the message about an unknown name, with similar known names or, if none is similar, the first known names."""
     names, name = sorted(known), str(name)
     name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     if not names:
         return f"unknown {kind} '{name}': there is none here"
-    if near := nearest(name, names):
-        return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in near) + "?"
-    shown = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
-    return f"unknown {kind} '{name}': expected one of {shown}"
+    if similar := nearest(name, names):
+        return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in similar) + "?"
+    listed = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
+    return f"unknown {kind} '{name}': expected one of {listed}"

@@ -1,4 +1,4 @@
-"""Relative tolerances for round-off, below which values are treated as zero."""
+"""Relative tolerances for round-off, up to which values are treated as zero, and related constants."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ LENGTH_ROUND_OFF = 1e-9
 SINGLE_PRECISION = 1e-6
 # Round-off of a sum, relative to the sum of the magnitudes of its terms.
 SUM_ROUND_OFF = 16 * float(np.finfo(float).eps)
-# Step of central differences, relative to the size of the argument, at which truncation and round-off errors are of the same
-# order.
+# Step of central differences, relative to the magnitude of the argument, for which truncation and round-off errors are of the
+# same order.
 DIFFERENCES = float(np.finfo(float).eps) ** (1.0 / 3.0)
 # Lower bound of divisors that may vanish.
 TINY = 1e-300

@@ -1,1 +1,1 @@
-"""Kernels: compilation, cache on disk, and threads."""
+"""Compilation of kernels, their cache on disk, and threads."""

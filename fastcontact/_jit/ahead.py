@@ -1,10 +1,10 @@
 """Compilation of kernels ahead of the run that needs them, in parallel helper processes.
 
-`kernels.json` lists the kernels called by the usual kinds of runs, with the types of their arguments, in the order of the
-calls; ``python bench/kernels.py`` makes it. Helpers begin with the kernels that cannot run in Python (`interpreting`), and
-report to the run which ones they are compiling. The run waits for a kernel that a helper is compiling, and meanwhile compiles
-one that no helper has begun, and reports it to the helpers. A kernel that is missing in the table, or listed with outdated
-types, is simply compiled in the run.
+`kernels.json`, which ``python bench/kernels.py`` writes, lists the kernels that the usual kinds of runs call, with the types
+of their arguments, in the order of the calls. Helpers begin with the kernels that cannot run in Python (`interpreting`), and
+report which kernel they are compiling. While a helper compiles a kernel that the run needs, the run compiles kernels that no
+helper has begun and reports them to the helpers, or waits. A kernel that is missing in the table, or listed with outdated
+types, is compiled in the run.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from fastcontact._jit import compiling, decorators
 
 TABLE = Path(__file__).with_name("kernels.json")
 ROOT = Path(__file__).resolve().parents[2]
-# Largest number of helpers of a run; each takes the memory of Python with Numba.
+# Largest number of helpers of a run, each of which takes the memory of Python with Numba.
 MOST = 3
-# Number of uncompiled kernels beyond which helpers start: fewer do not justify them.
+# Largest number of uncompiled kernels for which no helpers start, because they would take longer.
 ALONE = 2
 # Kinds of runs whose kernels helpers of this process have compiled, so that later runs need no helpers.
 _helped: set[str] = set()
@@ -46,41 +46,44 @@ def table() -> dict[str, Any]:
 
     The second list of a run contains the kernels that may run in Python instead.
     """
-    read: dict[str, Any] = json.loads(TABLE.read_text(encoding="utf-8"))
-    return read
+    content: dict[str, Any] = json.loads(TABLE.read_text(encoding="utf-8"))
+    return content
 
 
 def compiled_of(runs: Sequence[str]) -> list[int]:
     """Return the numbers of the kernels that must be compiled for some kinds of runs, by default for all kinds."""
-    known = table()["runs"]
-    return list(dict.fromkeys(number for run in runs or known for number in known.get(run, [[]])[0]))
+    by_run = table()["runs"]
+    return list(dict.fromkeys(number for run in runs or by_run for number in by_run.get(run, [[]])[0]))
 
 
 def kernels_of(runs: Sequence[str]) -> list[int]:
     """Return the numbers of `compiled_of`, followed by those of the kernels that may run in Python."""
-    known = table()["runs"]
-    others = [number for run in runs or known for number in known.get(run, [[], []])[1]]
+    by_run = table()["runs"]
+    others = [number for run in runs or by_run for number in by_run.get(run, [[], []])[1]]
     return list(dict.fromkeys([*compiled_of(runs), *others]))
 
 
 def numba_type(entry: Any) -> Any:
     """Return the Numba type of an entry of the table.
 
-    A string is a scalar in NumPy's notation of kind and bytes. A list ``[scalar, dimensions]`` is a contiguous array; it is
-    read-only with a third item "r". ``{"class": [type, ...]}`` is a named tuple, or a plain tuple if the class is empty.
+    A string is a scalar in NumPy's notation of kind and bytes. A list ``[scalar, dimensions]`` is a contiguous array, and
+    ``[scalar, dimensions, "r"]`` a read-only one. ``{"class": [type, ...]}`` is a named tuple, or a plain tuple if the name
+    of the class is empty.
     """
     if isinstance(entry, str):
         return from_dtype(dtype(entry))
     if isinstance(entry, list):
         return types.Array(numba_type(entry[0]), entry[1], "C", readonly=len(entry) > 2)
     ((name, members),) = entry.items()
-    inside = [numba_type(member) for member in members]
+    member_types = [numba_type(member) for member in members]
     if not name:
-        return types.Tuple(inside)
-    module, _, of = name.rpartition(".")
-    named = getattr(importlib.import_module(module), of)
-    same = len(set(inside)) == 1
-    return types.NamedUniTuple(inside[0], len(inside), named) if same else types.NamedTuple(inside, named)
+        return types.Tuple(member_types)
+    module, _, class_name = name.rpartition(".")
+    named = getattr(importlib.import_module(module), class_name)
+    uniform = len(set(member_types)) == 1
+    if uniform:
+        return types.NamedUniTuple(member_types[0], len(member_types), named)
+    return types.NamedTuple(member_types, named)
 
 
 def compile_kernel(number: int) -> None:
@@ -90,7 +93,7 @@ def compile_kernel(number: int) -> None:
 
 
 def _is_kept(number: int) -> bool:
-    """Return whether a compiled version of a kernel of the table is on disk, for any types."""
+    """Return whether a compiled version of a kernel of the table, for any types of arguments, is on disk."""
     module, name, _ = table()["kernels"][number]
     files = kernel_files.files.get(getattr(importlib.import_module(module), name).py_func)
     return files is not None and files.exist()
@@ -107,7 +110,7 @@ def start(
 ) -> list[subprocess.Popen[str]]:
     """Start helper processes that share the compilation of the kernels of some kinds of runs.
 
-    Each helper writes the number of the kernel that it begins to `output`, and the reason of a failure to `errors`.
+    Each helper writes the number of each kernel that it begins to `output`, and the reason of a failure to `errors`.
     """
     path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
     command = [sys.executable, "-m", __name__, str(helpers)]
@@ -123,14 +126,14 @@ def start(
 
 
 def _end(processes: list[subprocess.Popen[str]]) -> None:
-    """End helpers that are still running; the kernels they have compiled are complete."""
+    """Terminate helpers that are still running; the files of the kernels that they have compiled are complete."""
     for process in processes:
         process.terminate()
         process.wait()
 
 
 class Help:
-    """Interface of a run to its helpers.
+    """Communication of a run with its helpers.
 
     Parameters
     ----------
@@ -155,6 +158,7 @@ class Help:
         self._note(number, None)
 
     def _note(self, helper: int, kernel: int | None) -> None:
+        """Record the kernel that a helper has begun, or None for a helper that has ended."""
         with self._changed:
             self._current.pop(helper, None)
             if kernel is not None:
@@ -163,22 +167,23 @@ class Help:
             self._changed.notify_all()
 
     def wait(self, name: str) -> bool:
-        """Wait while a helper compiles a kernel of this name; return whether a helper has compiled it.
+        """Wait while helpers compile kernels of this name; return whether a helper was compiling one.
 
-        Meanwhile this process compiles kernels that no helper has begun. If none has begun this one, helpers skip it.
+        Meanwhile this process compiles kernels that no helper has begun. A kernel of this name that no helper has begun is
+        reported to the helpers, which then skip it.
         """
         with self._changed:
-            at_work = [(helper, kernel) for helper, kernel in self._current.items() if _file_name(kernel) == name]
-        for helper, kernel in at_work:
+            in_progress = [(helper, kernel) for helper, kernel in self._current.items() if _file_name(kernel) == name]
+        for helper, kernel in in_progress:
             compiling.tell()
             while self._current.get(helper) == kernel and self._compile_next():
                 pass
             with self._changed:
                 while self._current.get(helper) == kernel:
                     self._changed.wait()
-        if not at_work:
+        if not in_progress:
             self._take([number for number in self._left if _file_name(number) == name])
-        return bool(at_work)
+        return bool(in_progress)
 
     def _compile_next(self) -> bool:
         """Compile a needed kernel that no helper has begun; return whether there was one."""
@@ -198,23 +203,23 @@ class Help:
 
 
 def expect(runs: Sequence[str]) -> None:
-    """Let helpers compile the kernels of some kinds of runs as soon as this process lacks more than a few of them.
+    """Let helpers compile the kernels of some kinds of runs once this process has lacked more than `ALONE` kernels.
 
     Helpers start only if one of the missing kernels cannot run in Python. There are no helpers in worker processes, with a
     single thread, without a kernel cache, or if the interpreter is embedded in another program.
     """
     new, helpers = [run for run in runs if run not in _helped], min(decorators.threads() - 1, MOST)
-    python = Path(sys.executable or "").stem.startswith("python")
-    if not new or helpers < 1 or compiling.in_worker() or not python or not kernel_files.files:
+    is_python = Path(sys.executable or "").stem.startswith("python")
+    if not new or helpers < 1 or compiling.in_worker() or not is_python or not kernel_files.files:
         return
 
     def begin() -> None:
         if compiling.count > ALONE and begin in compiling.helpers:
             compiling.helpers.remove(begin)
             _helped.update(new)
-            if all(map(_is_kept, compiled_of(new))):  # the remaining ones may run in Python
+            if all(map(_is_kept, compiled_of(new))):  # the other kernels may run in Python
                 return
-            with contextlib.suppress(OSError):  # the run compiles without helpers
+            with contextlib.suppress(OSError):  # without helpers, the run compiles all kernels
                 compiling.waiters.append(Help(new, start(new, helpers)).wait)
 
     compiling.helpers[:] = [begin]
@@ -235,11 +240,10 @@ def main(arguments: Sequence[str]) -> int:
         if number not in compiled_elsewhere:
             try:
                 compile_kernel(number)
-            except Exception as error:  # the run reports it if it needs the kernel
+            except Exception as error:  # the run reports the failure if it needs the kernel
                 failed += 1
-                print(
-                    f"{_file_name(number)}: {type(error).__name__}: {error}".split("\n")[0], file=sys.stderr, flush=True
-                )
+                reason = f"{_file_name(number)}: {type(error).__name__}: {error}"
+                print(reason.split("\n")[0], file=sys.stderr, flush=True)
     return failed
 
 

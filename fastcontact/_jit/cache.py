@@ -1,8 +1,8 @@
-"""Cache of compiled kernels on disk: a file is used only if intact, owned by the user and built from the current sources.
+"""Cache of compiled kernels on disk, whose files are used only if they are intact, current and the user's own.
 
-Numba identifies a kernel by time and size of its source file alone, trusts any file in its cache, and fails if that is
-damaged. Here the file name contains a digest of all sources that the kernel depends on, so that kernels stay valid after a
-new installation of the same version, and a file ends with its checksum, so that damage only costs a compilation.
+Numba identifies a kernel by the time and the size of its source file alone, trusts any file in its cache, and fails if a file
+is damaged. Here the file name contains a digest of all sources on which the kernel depends, so that kernels stay valid when
+the same version is installed again. A file ends with its checksum, so that damage only costs a compilation.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ log = logging.getLogger("fastcontact")
 OPTIONS = ("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "CPU_NAME", "CPU_FEATURES", "THREADING_LAYER")
 # Number of characters of a digest.
 DIGEST = 64
+# Types of global variables that are compiled into kernels as constants.
 CONSTANTS = (bool, int, float, complex, str, tuple, np.ndarray, np.generic, type(None))
 
 
@@ -69,7 +70,7 @@ def _environment(module: str, constants: list[Any], name: str) -> Any:
 class KernelFiles(_Cache):  # type: ignore[misc]
     """Files of the compiled versions of a kernel, in place of Numba's cache, which searches a folder for each kernel.
 
-    Problems with a file are logged once, in one line; the kernel is then compiled.
+    If a file cannot be used, the reason is logged once, in one line, and the kernel is compiled.
 
     Parameters
     ----------
@@ -99,7 +100,7 @@ class KernelFiles(_Cache):  # type: ignore[misc]
 
     def load_overload(self, signature: Any, target: Any) -> Any:
         """Return the compiled kernel of a signature, or None."""
-        rtsys.initialize(target)  # without the compiler that Numba's own method imports first (58 modules)
+        rtsys.initialize(target)  # Numba's method would first import the compiler (58 modules)
         data = self.load(self._key(signature, target.codegen()))
         return None if data is None else CompileResult._rebuild(target, *data)
 
@@ -133,7 +134,7 @@ class KernelFiles(_Cache):  # type: ignore[misc]
         return None
 
     def save(self, key: Any, data: Any) -> None:
-        """Store the compiled kernel of a signature; the file is written completely or not at all."""
+        """Store the compiled kernel of a signature in a file that is written atomically."""
         path, content = self._path(key), dumps(data)
         temporary = path.with_name(f"{path.name}.{secrets.token_hex(8)}")
         try:
@@ -151,15 +152,16 @@ class KernelFiles(_Cache):  # type: ignore[misc]
     enable = disable = flush
 
     def _path(self, key: Any) -> Path:
+        """Return the path of the file of a signature."""
         return self.folder / f"{self.version}.{_digest(repr(key).encode())[:24]}.nbc"
 
     @cached_property
     def version(self) -> str:
-        """The name, and a digest of the dependencies of the machine code except signature and processor."""
+        """The name, with a digest of everything that determines the machine code except signature and processor."""
         environment = {name: getattr(numba.config, name, None) for name in OPTIONS}
         settings = [__version__, numba.__version__, llvmlite.__version__, sys.version, self._options, repr(environment)]
-        depends = "\n".join([*settings, *sorted(set(_sources(self._function, set())))])
-        return f"{self._name}.{_digest(depends.encode())[:24]}"
+        dependencies = "\n".join([*settings, *sorted(set(_sources(self._function, set())))])
+        return f"{self._name}.{_digest(dependencies.encode())[:24]}"
 
 
 # Files of all cached kernels, by their Python functions.
@@ -167,9 +169,9 @@ files: dict[Any, KernelFiles] = {}
 
 
 def keep(kernel: Any, function: Callable[..., Any], options: str) -> str:
-    """Cache a kernel, compiled from a function with `options`, in `KernelFiles`; return the reason if this is impossible."""
+    """Let a kernel, which is compiled with `options`, use `KernelFiles`; return the reason if this is impossible."""
     if not hasattr(kernel, "_cache"):
-        return ""  # kernels are not compiled
+        return ""  # compilation is disabled
     folder = folder_of()
     if folder is None:
         return "no writable folder for compiled kernels"
@@ -182,16 +184,16 @@ def keep(kernel: Any, function: Callable[..., Any], options: str) -> str:
 
 @lru_cache(maxsize=1)
 def _versions(folder: Path, changed: int) -> set[str]:
-    """Return the versions of kernels in a folder that was `changed` last at that time [ns]."""
+    """Return the versions of the kernels in a folder; the time `changed` [ns] of its last change invalidates the result."""
     return {name.rsplit(".", 2)[0] for name in os.listdir(folder)}
 
 
 @cache
 def folder_of() -> Path | None:
-    """Return the folder of compiled kernels: in NUMBA_CACHE_DIR, otherwise in the user's cache, otherwise in the package."""
-    chosen = str(getattr(numba.config, "CACHE_DIR", ""))
-    if chosen:
-        base = chosen
+    """Return the folder of compiled kernels in NUMBA_CACHE_DIR, in the user's cache or in the package; None if read-only."""
+    configured = str(getattr(numba.config, "CACHE_DIR", ""))
+    if configured:
+        base = configured
     elif sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA", "")
     elif sys.platform == "darwin":
@@ -200,7 +202,7 @@ def folder_of() -> Path | None:
         base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     for folder in (Path(base, "fastcontact"), Path(__file__).parent / "__pycache__"):
         try:
-            if folder.is_absolute() or chosen:
+            if folder.is_absolute() or configured:
                 folder.mkdir(parents=True, exist_ok=True)
                 if os.access(folder, os.W_OK):
                     return folder
@@ -211,16 +213,17 @@ def folder_of() -> Path | None:
 
 @cache
 def is_trusted(folder: Path) -> bool:
-    """Return whether only the owner of this process and root can write to a folder, since its files are executed.
+    """Return whether only the user of this process and root can write to a folder, since its files are executed.
 
-    The private group that many systems create for each user counts as its owner.
+    The group of the process, which on many systems contains its user only, may write as well.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    above = os.stat(folder.parent)  # users who may rename the folder could replace it
-    return _is_own(os.stat(folder)) and (bool(above.st_mode & stat.S_ISVTX) or _is_own(above))
+    parent = os.stat(folder.parent)  # users who may write to it could replace the folder
+    return _is_own(os.stat(folder)) and (bool(parent.st_mode & stat.S_ISVTX) or _is_own(parent))
 
 
 def _is_own(status: os.stat_result) -> bool:
+    """Return whether a file belongs to the user of this process or to root, and others cannot write to it."""
     if not hasattr(os, "getuid"):
         return True
     shared = status.st_mode & stat.S_IWOTH or (status.st_mode & stat.S_IWGRP and status.st_gid not in (0, os.getgid()))
@@ -229,7 +232,7 @@ def _is_own(status: os.stat_result) -> bool:
 
 @cache
 def _log_once(text: str) -> None:
-    """Log a line, once in a process."""
+    """Log the reason why a file is not used, once per process."""
     log.info("%s: compiling instead", text)
 
 
@@ -243,9 +246,9 @@ def _digest_of_file(path: str) -> str:
 
 
 def _sources(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
-    """Yield the sources on which a function, with the kernels and intrinsics that it may call, depends.
+    """Yield the sources on which a function depends, with the kernels and intrinsics that it calls.
 
-    These are their files, and constants from other files that are compiled into them.
+    These are the digests of their files, and the constants that are compiled into them.
     """
     code = function.__code__
     if code in seen:
@@ -254,7 +257,7 @@ def _sources(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
     yield _digest_of_file(code.co_filename)
     for name in code.co_names:
         value = function.__globals__.get(name)
-        called = getattr(value, "py_func", None) or getattr(value, "_defn", None)  # for kernels, intrinsics
+        called = getattr(value, "py_func", None) or getattr(value, "_defn", None)  # of a kernel, of an intrinsic
         if called is not None:
             yield from _sources(called, seen)
         elif isinstance(value, CONSTANTS):

@@ -20,23 +20,23 @@ from fastcontact._jit import cache, compiling, interpreting
 
 log = logging.getLogger("fastcontact")
 
-# Arithmetic is done as written, without fused multiply-add. A kernel called by others is compiled once separately and once
-# as a part of each of them, and optimised differently there. Which of the copies runs depends on what was compiled or
-# loaded before. Their results are bitwise identical only if each operation has a unique result.
+# Arithmetic is done as written, without fused multiply-add. A kernel that others call is compiled once separately and once as
+# a part of each of them, with different optimisations, and which of the copies runs depends on what was compiled or loaded
+# before. Their results are bitwise identical only if the result of each operation is unique.
 AS_WRITTEN: set[str] = set()
-# Flags that permit vectorised sums, for kernels that neither call nor are called by others: only one copy exists.
+# Flags that permit vectorised sums, for kernels that neither call others nor are called, so that only one copy exists.
 ANY_ORDER = {"contract", "reassoc"}
 
 _cache_reported = False
 
 
 class _Compilations(event.Listener):  # type: ignore[misc]
-    """Listener for compilations of kernels; Numba raises no event for kernels read from the cache.
+    """Listener for compilations of kernels; Numba raises no event for kernels that are read from the cache.
 
-    Garbage is collected once after each kernel. The 60 collections during its compilation took a tenth of the time.
+    Garbage collection is suspended during a compilation, of which its 60 collections would take a tenth of the time.
     """
 
-    depth = 0  # nesting: a kernel compiles those that it calls
+    depth = 0  # of nesting, since the compilation of a kernel includes that of the kernels it calls
     collects = True
 
     def on_start(self, raised_event: Any) -> None:
@@ -111,14 +111,12 @@ def _compile(function: Callable[..., Any], fastmath: set[str] = AS_WRITTEN, **in
     return dispatcher
 
 
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(
-        after_in_child=compiling.waiters.clear
-    )  # a child does not receive reports of its parent's helpers
+if hasattr(os, "register_at_fork"):  # the helpers of the parent do not report to a child
+    os.register_at_fork(after_in_child=compiling.waiters.clear)
 
 
 def compiled() -> bool:
-    """Return whether kernels are compiled in this process, i.e. NUMBA_DISABLE_JIT is not set."""
+    """Return whether kernels are compiled in this process, which NUMBA_DISABLE_JIT prevents."""
     return not getattr(numba.config, "DISABLE_JIT", False)
 
 

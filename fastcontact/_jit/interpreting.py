@@ -1,9 +1,9 @@
 """Kernels that run in Python while they are not compiled, if that takes less time than their compilation.
 
-A kernel that loops once or twice over a small mesh takes Python some hundredths of a second, and its compilation one or two
-seconds. Python runs it until it has spent about the time of a compilation on it, in this run and earlier ones. Whatever
-runs follow, this takes at most twice the time of the better choice. Results are bitwise identical: the arithmetic consists
-of sums, products, quotients and square roots of doubles, in the order written.
+Python takes some hundredths of a second for a kernel that loops once or twice over a small mesh, and its compilation takes
+one or two seconds. The kernel runs in Python until the time spent on it, in this run and earlier ones, is about that of a
+compilation. Whatever runs follow, this takes at most about twice the time of the better choice. Results are bitwise
+identical, because the arithmetic consists of sums, products, quotients and square roots of doubles in the order written.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ import numpy as np
 from fastcontact._jit import compiling
 from fastcontact._jit.cache import KernelFiles
 
-# Limits for Python: entries of all arguments of a call, seconds in all calls of a kernel in one run, and seconds in all
-# runs, which suffice to compile most kernels. Python takes 1 to 8 microseconds per entry, and Numba 0.2 to 3 seconds per
-# kernel.
+# Limits for Python: number of entries of all arguments of a call, time [s] of all calls of a kernel in one run, and time [s]
+# in all runs. Python takes 1 to 8 microseconds per entry. The compilation of a kernel takes 0.2 to 3 seconds, for most
+# kernels less than the last limit.
 ENTRIES, SECONDS, SECONDS_OF_RUNS = 200_000, 0.5, 1.0
 # File beside the compiled kernels: seconds that Python has spent on uncompiled ones, by version.
 SPENT = "interpreted.json"
-# NumPy and Numba promote smaller types differently; types of one byte are only compared.
+# Types for which NumPy and Numba agree. They promote smaller types differently; those of one byte are only compared.
 EXACT = ("float64", "int64", "int32", "uint8", "bool")
 
 
 class Interpretable:
-    """A kernel that runs in Python while calls are small and no compiled version is stored.
+    """A kernel that runs in Python while calls are small and no compiled version exists.
 
     Parameters
     ----------
@@ -58,7 +58,8 @@ class Interpretable:
     def _choose(self, *arguments: Any) -> Any:
         """Compute a call in Python, or this and all later calls with the compiled kernel."""
         began = time.thread_time()
-        if self._is_compiled() or not self._is_small(arguments):
+        is_compiled = self.compiled.signatures or (self._files is not None and self._files.exist())
+        if is_compiled or not self._is_small(arguments):
             self._call = self.compiled
             return self.compiled(*arguments)
         if self._spent == 0.0:
@@ -68,18 +69,14 @@ class Interpretable:
         self._spent += time.thread_time() - began
         return result
 
-    def _is_compiled(self) -> bool:
-        """Return whether the kernel is compiled, in this process or on disk."""
-        return bool(self.compiled.signatures) or (self._files is not None and self._files.exist())
-
     def _is_small(self, arguments: tuple[Any, ...]) -> bool:
         """Return whether a call may run in Python: the time spent so far is less than that of a compilation."""
         if self._spent > SECONDS or entries(arguments) > ENTRIES:
             return False
         if _due or self._files is None:
             return True
-        before = _spent_before(self._files.folder).get(self._files.version, 0.0)
-        _due.extend([self] if before + self._spent > SECONDS_OF_RUNS else [])
+        earlier = _spent_before(self._files.folder).get(self._files.version, 0.0)
+        _due.extend([self] if earlier + self._spent > SECONDS_OF_RUNS else [])
         return not _due
 
     @property
@@ -88,8 +85,8 @@ class Interpretable:
         return None if self._files is None else (self._files.folder, self._files.version, self._spent)
 
 
-# Kernels run in Python in this process, and the one compiled because of the time in earlier runs: only one per run, so that
-# no run has to compile all at once.
+# Kernels that this process has run in Python, and the kernel that it compiles because of the time in earlier runs. Only one
+# kernel per run is compiled for this reason, so that no run has to compile all of them.
 _interpreted: list[Interpretable] = []
 _due: list[Interpretable] = []
 
@@ -98,13 +95,13 @@ _due: list[Interpretable] = []
 def _spent_before(folder: Path) -> dict[str, float]:
     """Return the seconds spent in Python on kernels in earlier runs, by version."""
     with contextlib.suppress(OSError, ValueError):
-        read = json.loads((folder / SPENT).read_text(encoding="utf-8"))
-        return {str(version): float(seconds) for version, seconds in read.items()}
+        content = json.loads((folder / SPENT).read_text(encoding="utf-8"))
+        return {str(version): float(seconds) for version, seconds in content.items()}
     return {}
 
 
 def note_spent() -> None:
-    """Add the seconds of this process to those of earlier runs; if several runs end simultaneously, only one is counted."""
+    """Add the seconds of this process to those of earlier runs; of runs that end simultaneously only one is counted."""
     spent = [kernel.spent for kernel in _interpreted if kernel.spent is not None]
     for folder in {folder for folder, _, _ in spent}:
         _spent_before.cache_clear()
@@ -123,7 +120,7 @@ atexit.register(note_spent)
 
 def interpret(kernel: Any, arguments: tuple[Any, ...]) -> Any:
     """Return the result of a kernel, computed in Python."""
-    with np.errstate(all="ignore"):  # compiled kernels do not warn either
+    with np.errstate(all="ignore"):  # as in compiled kernels
         return _plain(as_python(kernel)(*map(_number, arguments)))
 
 
@@ -137,11 +134,11 @@ def entries(argument: Any) -> float:
 
 @functools.cache
 def as_python(kernel: Any) -> Callable[..., Any]:
-    """Return the Python function of a kernel; the kernels that it calls are Python functions, too."""
+    """Return the Python function of a kernel, in which the kernels that it calls are replaced by Python functions as well."""
     function = getattr(kernel, "py_func", kernel)
-    known, code = function.__globals__, function.__code__
-    called = {name: as_python(known[name]) for name in code.co_names if hasattr(known.get(name), "py_func")}
-    return FunctionType(code, {**known, **called}, function.__name__, function.__defaults__, function.__closure__)
+    names, code = function.__globals__, function.__code__
+    called = {name: as_python(names[name]) for name in code.co_names if hasattr(names.get(name), "py_func")}
+    return FunctionType(code, {**names, **called}, function.__name__, function.__defaults__, function.__closure__)
 
 
 def _number(argument: Any) -> Any:
@@ -150,7 +147,7 @@ def _number(argument: Any) -> Any:
 
 
 def _plain(result: Any) -> Any:
-    """Return the numbers of a result in the types of Numba."""
+    """Return a result with NumPy scalars converted to Python numbers, which compiled kernels return."""
     if type(result) is tuple:
         return tuple(map(_plain, result))
     return result.item() if isinstance(result, np.generic) else result

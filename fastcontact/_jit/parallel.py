@@ -1,7 +1,7 @@
-"""Deterministic multithreading: results do not depend on the number of threads.
+"""Deterministic multithreading, whose results do not depend on the number of threads.
 
-Compiled loops release the interpreter lock, so that plain threads run them in parallel. Each thread has its own rows of a
-matrix, or its own cells; there are no sums across threads.
+Compiled loops release the global interpreter lock, so that Python threads run them in parallel. Each thread computes separate
+rows of a matrix or separate cells, and nothing is summed across threads.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import itertools
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
-from functools import cache, lru_cache, wraps
+from functools import cache, wraps
 from typing import Any, ParamSpec, TypeVar
 
 from fastcontact._jit import decorators
@@ -19,14 +19,15 @@ from fastcontact.arrays import AnyArray
 Result = TypeVar("Result")
 Part = TypeVar("Part")
 Given = ParamSpec("Given")
-# Work up to which waking other threads (0.03 ms) costs more than they save, and the default number of nodes of a cell.
+# Work, counted in nodes, up to which waking other threads (0.03 ms) costs more than they save; default number of nodes of a
+# cell; and largest number of threads.
 WORTHWHILE, NODES = 80_000, 4
 MOST = 255
 
 
 @cache
 def _pool() -> ThreadPoolExecutor:
-    """Return the threads of this process, which are created as they are needed and then kept."""
+    """Return the thread pool of this process, whose threads are created on demand and then kept."""
     return ThreadPoolExecutor(MOST, "fastcontact")
 
 
@@ -35,14 +36,14 @@ if hasattr(os, "register_at_fork"):
 
 
 def shared(work: Callable[[Part], Result], parts: Sequence[Part]) -> list[Result]:
-    """Return the results of `work` on every part: the first runs in this thread, the others in one more thread each."""
+    """Return the results of `work` on all parts, of which the first runs in this thread and each other in another thread."""
     if len(parts) == 1:
         return [work(parts[0])]
     others = [_pool().submit(work, part) for part in parts[1:]]
     try:
         first = work(parts[0])
     finally:
-        wait(others)  # they use the arguments of this call
+        wait(others)  # they use the arguments of this call, also if the first part fails
     return [first, *(other.result() for other in others)]
 
 
@@ -57,8 +58,9 @@ def spread(kernel: Any, count: int, work: float, *arguments: Any) -> None:
         shared(lambda portion: kernel(*portion, *arguments), portions(count, work))
 
 
-@lru_cache(maxsize=1)
+@cache
 def _libraries() -> Any:
+    """Return the controller of the threads of numerical libraries."""
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
@@ -67,8 +69,8 @@ def _libraries() -> Any:
 def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Result]:
     """Limit BLAS to one thread while a function runs.
 
-    Further threads spin between the small calls of a contact iteration. The number of threads also determines the order of
-    summation, and thus the last bits of a result.
+    Further threads would spin between the small calls of a contact iteration. Besides, the number of threads determines the
+    order of summation and thus the round-off of results.
     """
 
     @wraps(function)
@@ -80,7 +82,7 @@ def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Res
 
 
 def read_only(numbers: AnyArray) -> AnyArray:
-    """Return a view that cannot be written, as the arrays of a mesh are: kernels are compiled for either kind."""
+    """Return a read-only view, such as the arrays of a mesh, since kernels are compiled separately for writable arrays."""
     view = numbers.view()
     view.flags.writeable = False
     return view
@@ -89,7 +91,7 @@ def read_only(numbers: AnyArray) -> AnyArray:
 def portions(count: int, work: float = NODES) -> list[tuple[int, int]]:
     """Return ranges of nearly equal size that cover 0 to `count`: one per thread, or a single one for little work.
 
-    `work` is the work per cell, counted in nodes; a node takes some ten nanoseconds.
+    `work` is the work per cell, counted in nodes, each of which takes some ten nanoseconds.
     """
     if count * work <= WORTHWHILE:
         return [(0, count)]

@@ -1,8 +1,8 @@
-"""Type checks of the arguments of public calls.
+"""Type checks of the arguments of public functions and methods.
 
 The annotation of an argument determines its allowed types. Numbers are real numbers, including those of NumPy but not
-booleans. Sequences include arrays and iterators but not strings. Arrays are all values that NumPy converts to an array. The
-function that is called checks the values.
+Booleans. Sequences include arrays and iterators but not strings. Arrays are all values that NumPy converts to an array of
+numbers. The values themselves are checked by the functions.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ _REAL = {bool: "True or False", int: "a whole number", float: "a number"}
 
 
 def typed(error: type[FastcontactError]) -> Callable[[F], F]:
-    """Return a decorator that raises `error` for arguments that do not match their annotation.
+    """Return a decorator of functions and classes that raises `error` for arguments that do not match their annotation.
 
-    The decorated object is a function or a class. The constructor and the public methods of a class are checked.
+    The constructor and the public methods of a class are checked.
     """
 
     def decorate(call: F) -> F:
@@ -51,6 +51,7 @@ def typed(error: type[FastcontactError]) -> Callable[[F], F]:
 
 
 def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError]) -> Callable[..., Any]:
+    """Return a function that calls `call` after a check of the arguments; errors call it `name`."""
     signature = inspect.signature(call)
 
     @functools.wraps(call)
@@ -63,15 +64,15 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
             parameter = signature.parameters[key]
             annotation = annotations.get(key, Any)
             if parameter.kind is parameter.VAR_KEYWORD:
-                each = {**value}
+                members = {**value}
                 annotation = Any if typing.get_origin(annotation) is typing.Unpack else annotation
             elif parameter.kind is parameter.VAR_POSITIONAL:
-                each = {f"{key}[{i}]": member for i, member in enumerate(value)}
+                members = {f"{key}[{i}]": member for i, member in enumerate(value)}
             elif value is parameter.default:
                 continue
             else:
-                each = {key: value}
-            for argument, member in each.items():
+                members = {key: value}
+            for argument, member in members.items():
                 if is_masked(member) or not fits(member, annotation):
                     check_type(f"the argument {argument} of {_called(call, name, args)}", member, annotation, error)
         return call(*args, **kwargs)
@@ -83,19 +84,19 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
 def _refusal(
     call: Callable[..., Any], signature: inspect.Signature, called: str, args: tuple[Any, ...], kwargs: dict[str, Any]
 ) -> TypeError:
-    """Return Python's error for missing, unknown and misplaced arguments, with the public name of the call.
+    """Return Python's error for missing, unknown and misplaced arguments, with the public name `called` of the function.
 
-    For an unknown argument it suggests the nearest ones.
+    For an unknown argument, the message suggests similar ones.
     """
     parameters = signature.parameters.values()
-    by_place = [p for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
-    by_name = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
-    if len(args) > len(by_place) and by_name:
+    positional = [p for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
+    keywords = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
+    if len(args) > len(positional) and keywords:
         required = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY and p.default is p.empty]
         axes = [*"xy"] * ("components" in signature.parameters)  # the direction of a load or a support
-        example = ", ".join(f"{key}=..." for key in (required or axes or by_name)[:3])
-        places = ", ".join([p.name for p in by_place if p.name != "self"]) or "nothing"
-        return TypeError(f"{called} takes {places} by position and all other arguments by keyword: write {example}")
+        example = ", ".join(f"{key}=..." for key in (required or axes or keywords)[:3])
+        names = ", ".join([p.name for p in positional if p.name != "self"]) or "nothing"
+        return TypeError(f"{called} takes {names} by position and all other arguments by keyword: write {example}")
     try:
         call(*args, **kwargs)
     except TypeError as failure:
@@ -106,17 +107,15 @@ def _refusal(
         text += f": write {' and '.join(meant)}" * bool(meant)
         if wrong := text.partition("unexpected keyword argument '")[2].partition("'")[0]:
             text = text.partition(". Did you mean")[0]  # Python 3.13 suggests a name, too
-            known = [key for key in signature.parameters if key != "self"]
-            near = nearest(wrong, known)
-            text += (
-                f": did you mean {' or '.join(map(repr, near))}?" if near else f": expected one of {', '.join(known)}"
-            )
+            valid = [key for key in signature.parameters if key != "self"]
+            similar = " or ".join(map(repr, nearest(wrong, valid)))
+            text += f": did you mean {similar}?" if similar else f": expected one of {', '.join(valid)}"
         return TypeError(text)
     raise AssertionError(called)
 
 
 def _named(signature: inspect.Signature, call: Callable[..., Any]) -> inspect.Signature:
-    """Return the signature for `help`, with the keys of an unpacked `TypedDict` as keyword arguments with default None."""
+    """Return the signature for `help`, in which the keys of an unpacked `TypedDict` are keyword arguments."""
     parameters = list(signature.parameters.values())
     if not parameters or not str(parameters[-1].annotation).startswith("Unpack["):
         return signature
@@ -130,7 +129,7 @@ def _named(signature: inspect.Signature, call: Callable[..., Any]) -> inspect.Si
 
 
 def _called(call: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:
-    """Return the name of a function, of the class of a constructor, or of a method with its class."""
+    """Return the name of a function, of the class of a constructor, or of a method with that of its class."""
     owner, _, method = name.rpartition(".")
     if call.__name__ == "__init__" and args:
         return type(args[0]).__name__
@@ -138,21 +137,20 @@ def _called(call: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:
 
 
 def check_fields(owner: str, values: abc.Mapping[str, Any], kind: type, error: type[FastcontactError]) -> None:
-    """Raise `error` if a value does not have the type of the dataclass field with its name; messages name the `owner`."""
-    known = {name: text for base in reversed(kind.__mro__) for name, text in types_of(base).items()}
+    """Raise `error` if a value does not have the type of the field of its name in the class `kind`; messages name `owner`."""
+    annotations = {name: annotation for base in reversed(kind.__mro__) for name, annotation in types_of(base).items()}
     for name, value in values.items():
-        check_type(f"{name} of {owner}", value, known.get(name, Any), error)
+        check_type(f"{name} of {owner}", value, annotations.get(name, Any), error)
 
 
 @functools.cache
 def types_of(call: Callable[..., Any]) -> dict[str, Any]:
     """Return the types of the arguments of a function, or of the fields of a class, by name."""
     annotations: dict[str, Any] = {}
-    given = inspect.get_annotations(call)
-    space = vars(sys.modules[call.__module__])
-    for name, text in given.items():
+    namespace = vars(sys.modules[call.__module__])
+    for name, text in inspect.get_annotations(call).items():
         try:
-            annotations |= typing.get_type_hints(types.SimpleNamespace(__annotations__={name: text}), space)
+            annotations |= typing.get_type_hints(types.SimpleNamespace(__annotations__={name: text}), namespace)
         except (NameError, TypeError):  # a name that only type checkers import, or not the annotation of an argument
             continue
     return annotations
@@ -164,22 +162,25 @@ def check_type(name_shown: str, value: Any, annotation: Any, error: type[Fastcon
         raise error(f"{name_shown} {REFUSAL}")
     if fits(value, annotation):
         return
-    shown = f"an object of the class {type(value).__name__}"
-    if isinstance(value, str | bytes):
-        shown = f"the string {_SHORT.repr(value)}"
-    elif value is None or isinstance(value, bool | Real | complex | list | tuple | dict | set):
-        shown = f"the {type(value).__name__} {_SHORT.repr(value)}" if value is not None else "None"
+    description = f"an object of the class {type(value).__name__}"
+    if value is None:
+        description = "None"
+    elif isinstance(value, str | bytes):
+        description = f"the string {_SHORT.repr(value)}"
+    elif isinstance(value, bool | Real | complex | list | tuple | dict | set):
+        description = f"the {type(value).__name__} {_SHORT.repr(value)}"
     elif isinstance(value, type):
-        shown = f"the class {value.__name__}"
+        description = f"the class {value.__name__}"
     elif isinstance(value, np.ndarray):
-        shown = f"an array of shape {value.shape}"
+        description = f"an array of shape {value.shape}"
     remedy = ""
     if isinstance(value, str) and _is_number(value) and fits(1, annotation):
         remedy = f": write {value.strip()} without quotation marks"
-    raise error(f"{name_shown} must be {words(annotation)}, not {shown}{remedy}")
+    raise error(f"{name_shown} must be {words(annotation)}, not {description}{remedy}")
 
 
 def _is_number(text: str) -> bool:
+    """Return whether a text represents a number."""
     try:
         float(text)
     except ValueError:
@@ -190,20 +191,20 @@ def _is_number(text: str) -> bool:
 def values_at(function: Callable[..., Any], points: Any, name: str, error: type[FastcontactError]) -> Any:
     """Return the values of a user's function at `points`; if it fails, raise `error` with `name` in the message."""
     try:
-        returned = function(points)
+        result = function(points)
     except Exception as failure:
         reason = f"{type(failure).__name__}: {failure}"
         raise error(
             f"{name} is a function that failed for {len(points)} points of shape {np.shape(points)} ({reason}): call it with "
             "such an array to see where"
         ) from failure
-    if is_masked(returned):
+    if is_masked(result):
         raise error(f"{name} is a function whose result {REFUSAL}")
-    return returned
+    return result
 
 
 class Kind(NamedTuple):
-    """Test of the values of an annotated type, which does not consume iterators, and the name of the type in messages."""
+    """Test of values for an annotated type, which does not consume iterators, and the name of the type in messages."""
 
     fits: Callable[[Any], bool]
     words: str
@@ -224,40 +225,41 @@ def kind_of(annotation: Any) -> Kind:
     """Return the test and the name of an annotated type."""
     kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
     if annotation == np.typing.ArrayLike or kind is np.ndarray:
-        return Kind(_makes_an_array, "an array of numbers")
+        return Kind(_is_array_like, "an array of numbers")
     if kind in (Union, types.UnionType):
-        return _union(members)
+        return _union_kind(members)
     if annotation in (None, type(None)):
         return Kind(lambda value: value is None, "None")
     if annotation in _REAL:
         return Kind(lambda value: _is_real(value, annotation), _REAL[annotation])
     if kind in (tuple, list, abc.Sequence, abc.Iterable, abc.Collection):
-        return _series(kind, members)
+        return _sequence_kind(kind, members)
     if kind in (abc.Mapping, dict):
-        return _mapping(members)
-    known = {str: "string", os.PathLike: "path", abc.Callable: "function"}
-    name = str(known.get(kind) or getattr(kind, "__name__", kind))
-    return Kind(_test(annotation, kind, members), f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")
+        return _mapping_kind(members)
+    names = {str: "string", os.PathLike: "path", abc.Callable: "function"}
+    name = str(names.get(kind) or getattr(kind, "__name__", kind))
+    return Kind(_simple_test(annotation, kind, members), f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")
 
 
-def _test(annotation: Any, kind: Any, members: tuple[Any, ...]) -> Callable[[Any], bool]:
+def _simple_test(annotation: Any, kind: Any, members: tuple[Any, ...]) -> Callable[[Any], bool]:
     """Return the test of a type without member types."""
     if kind is typing.Literal:
-        texts = all(isinstance(member, str) for member in members)
-        return lambda value: isinstance(value, str) if texts else value in members
+        are_strings = all(isinstance(member, str) for member in members)  # whose values the functions check
+        return lambda value: isinstance(value, str) if are_strings else value in members
     if kind is os.PathLike:
         return lambda value: isinstance(value, os.PathLike) and isinstance(os.fspath(value), str)
     if kind is abc.Callable:
         return callable
     if getattr(kind, "_is_protocol", False):
-        members_needed = [name for name in (*vars(kind), *inspect.get_annotations(kind)) if not name.startswith("_")]
-        return lambda value: all(hasattr(value, name) for name in members_needed) and not isinstance(value, type)
+        names = [name for name in (*vars(kind), *inspect.get_annotations(kind)) if not name.startswith("_")]
+        return lambda value: all(hasattr(value, name) for name in names) and not isinstance(value, type)
     if annotation in (Any, inspect.Parameter.empty) or not isinstance(kind, type):
         return lambda value: True
     return lambda value: isinstance(value, kind)
 
 
-def _union(members: tuple[Any, ...]) -> Kind:
+def _union_kind(members: tuple[Any, ...]) -> Kind:
+    """Return the test and the name of a union, in which None comes last."""
     if {*members} >= _ARRAY_LIKE:  # ArrayLike is itself a union
         members = (np.typing.ArrayLike, *(member for member in members if member not in _ARRAY_LIKE))
     kinds = [kind_of(member) for member in members]
@@ -265,24 +267,25 @@ def _union(members: tuple[Any, ...]) -> Kind:
     return Kind(lambda value: any(kind.fits(value) for kind in kinds), " or ".join(phrases))
 
 
-def _series(kind: Any, members: tuple[Any, ...]) -> Kind:
-    """Return the test of a sequence. It tests all members, but none of an iterator and only the first of an array."""
+def _sequence_kind(kind: Any, members: tuple[Any, ...]) -> Kind:
+    """Return the test and the name of a sequence; of an array the first member is tested, and of an iterator none."""
     kinds = [kind_of(member) for member in members if member is not ...]
     if kind is tuple and members and members[-1] is not ...:
         count = {2: "two", 3: "three"}.get(len(members), str(len(members)))
         phrase = f"{count} numbers" if {*members} <= {int, float} else f"a sequence of {count}"
-        return Kind(lambda value: _is_series(value) and hasattr(value, "__len__") and len(value) == len(kinds)
+        return Kind(lambda value: _is_sequence(value) and hasattr(value, "__len__") and len(value) == len(kinds)
                     and all(member_kind.fits(member) for member_kind, member in zip(kinds, value)), phrase)  # fmt: skip
 
     def fits(value: Any) -> bool:
         if not kinds or not isinstance(value, list | tuple | set | frozenset | np.ndarray):
-            return _is_series(value)
-        return _is_series(value) and all(map(kinds[0].fits, value[:1] if isinstance(value, np.ndarray) else value))
+            return _is_sequence(value)
+        return _is_sequence(value) and all(map(kinds[0].fits, value[:1] if isinstance(value, np.ndarray) else value))
 
     return Kind(fits, "a sequence" + (f" of {_plural(kinds[0].words)}" if kinds else ""))
 
 
-def _mapping(members: tuple[Any, ...]) -> Kind:
+def _mapping_kind(members: tuple[Any, ...]) -> Kind:
+    """Return the test and the name of a mapping."""
     if not members:
         return Kind(lambda value: isinstance(value, abc.Mapping), "a dictionary")
     keys, values = map(kind_of, members)
@@ -292,20 +295,22 @@ def _mapping(members: tuple[Any, ...]) -> Kind:
 
 
 def _is_real(value: Any, kind: type) -> bool:
+    """Return whether a value is acceptable as a Boolean, an integer or a number, according to `kind`."""
     if isinstance(value, np.ndarray) and value.shape == () and value.dtype.kind in "iuf":
         return True
-    truth = isinstance(value, bool | np.bool_)
+    is_boolean = isinstance(value, bool | np.bool_)
     if kind is bool:
-        return truth or (isinstance(value, Real) and value in (0, 1))
+        return is_boolean or (isinstance(value, Real) and value in (0, 1))
     try:
-        return isinstance(value, Real) and not truth and (math.isfinite(value) or kind is float)
+        return isinstance(value, Real) and not is_boolean and (math.isfinite(value) or kind is float)
     except OverflowError:  # an integer with hundreds of digits
         return False
 
 
-def _makes_an_array(value: Any) -> bool:
+def _is_array_like(value: Any) -> bool:
+    """Return whether NumPy converts a value to an array of numbers."""
     if isinstance(value, np.ndarray):
-        return value.dtype.kind in "biufV"  # V: a table
+        return value.dtype.kind in "biufV"  # V: a structured array
     if value is None or isinstance(value, str | bytes | abc.Mapping):
         return False
     try:
@@ -314,20 +319,22 @@ def _makes_an_array(value: Any) -> bool:
         return False
 
 
-def _is_series(value: Any) -> bool:
+def _is_sequence(value: Any) -> bool:
+    """Return whether a value is an array or another iterable, but not a string or a mapping."""
     if isinstance(value, np.ndarray):
         return value.ndim > 0
     return isinstance(value, abc.Iterable) and not isinstance(value, str | bytes | abc.Mapping)
 
 
 def _plural(phrase: str) -> str:
+    """Return the plural of the name of a type, such as "numbers or functions" for "a number or a function"."""
     if phrase.endswith(" numbers") and not phrase.startswith("a "):
         return f"groups of {phrase}"
     if phrase.startswith("a sequence of"):
         return phrase.removeprefix("a ").replace("sequence", "sequences", 1)
     return " or ".join(
-        words_of_one.removeprefix("a ").removeprefix("an ") + "s" * words_of_one.startswith(("a ", "an "))
-        for words_of_one in phrase.split(" or ")
+        name.removeprefix("a ").removeprefix("an ") + "s" * name.startswith(("a ", "an "))
+        for name in phrase.split(" or ")
     )
 
 

@@ -1,8 +1,8 @@
-"""Safe reading of HDF5 files from any source, and writing of HDF5 files whose errors are Python errors.
+"""Safe reading of HDF5 files from untrusted sources, and writing of HDF5 files in which write errors are Python errors.
 
-Nothing outside a file is read, and damage is reported. The whole tree is checked before anything is read. Only numbers and
-strings of fixed length are read: strings of variable length are stored in a heap of the file, and on some damaged heaps HDF5
-never returns.
+Nothing outside a file is read, and damage is reported. All groups and data sets are checked before anything is read. Only
+numbers and strings of fixed length are read, because strings of variable length are stored in a heap of the file, and on some
+damaged heaps HDF5 never returns.
 """
 
 from __future__ import annotations
@@ -19,23 +19,24 @@ from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.arrays import AnyArray
 from fastcontact.errors import FastcontactError, FileError
 
-# Memory limit of a data set: this size [bytes], or this multiple of the file size if that is more. Zeros compress a
-# thousandfold, but no complete file with a mesh or results does.
+# Memory limit of a data set: this size [byte], or this multiple of the size of the file if that is more. Zeros compress by a
+# factor of a thousand, but meshes and results do not.
 PLAUSIBLE_BYTES = 1 << 28
 PLAUSIBLE_EXPANSION = 20
-# Limit of all data sets together, each counted once per link to it.
+# Limit of all data sets together, in which a data set counts once per link to it.
 PLAUSIBLE_IN_ALL = 1 << 30
 PLAUSIBLE_EXPANSION_IN_ALL = 100
+# Number of strings or references that a data set may have in a file of any size.
 FEW_OBJECTS = 1000
-# Largest depth of nested groups; HDF5 follows them by recursion, and deep nesting overflows its stack.
+# Largest depth of nested groups, which HDF5 visits by recursion, so that deep nesting overflows its stack.
 DEEPEST = 64
-# Allowed kinds: numbers and strings of fixed length, but no references, variable lengths or records.
+# Allowed kinds of data: numbers and strings of fixed length.
 PLAIN_KINDS = "iufS"
 
 
 @contextmanager
 def opened(path: PathLike) -> Iterator[Any]:
-    """Open an HDF5 file for reading in a block; damage detected inside the block raises FileError."""
+    """Open an HDF5 file for reading in a ``with`` block; any error in the block due to damage becomes a FileError."""
     import h5py
 
     existing = existing_file(path)
@@ -47,15 +48,15 @@ def opened(path: PathLike) -> Iterator[Any]:
             yield file
     except (FastcontactError, Warning):
         raise
-    except Exception as error:  # HDF5 and meaningless numbers can raise any exception
+    except Exception as error:  # damage can cause any exception
         raise FileError(f"cannot read '{path}', it is damaged or incomplete: write it anew") from error
 
 
 def check_contents(file: Any, path: PathLike) -> None:
     """Check an open HDF5 file before anything in it is read.
 
-    Raises FileError if a link or the values of a data set refer to another file, a data set needs an external filter, the
-    data sets need more memory than plausible for a file of this size, or groups are nested too deeply or in a cycle.
+    Raises FileError if a link or the values of a data set refer to another file, if a data set needs an external filter, if
+    the data sets need more memory than plausible for a file of this size, or if groups are nested too deeply or cyclically.
     """
     from h5py import h5d, h5g, h5o
     from h5py.h5l import TYPE_HARD, TYPE_SOFT
@@ -69,13 +70,13 @@ def check_contents(file: Any, path: PathLike) -> None:
         group, where, depth = waiting.pop()
         links: list[tuple[bytes, int]] = []
         group.links.iterate(lambda name, info, links=links: links.append((name, info.type)), info=True)
-        for raw, kind in links:
-            name = f"{where}/{raw.decode('utf-8', 'replace')}"
+        for link_name, kind in links:
+            name = f"{where}/{link_name.decode('utf-8', 'replace')}"
             if kind == TYPE_SOFT:
                 continue  # a soft link refers to an object of the same file
             if kind != TYPE_HARD:
                 raise FileError(f"'{path}' refers to another file at '{name}': copy the data into one file")
-            item = h5o.open(group, raw)
+            item = h5o.open(group, link_name)
             if isinstance(item, h5d.DatasetID):
                 total += _check_dataset(item, f"'{name}' of '{path}'", limit, file_size)
                 if total > limit_in_all:
@@ -92,7 +93,7 @@ def check_contents(file: Any, path: PathLike) -> None:
 
 
 def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
-    """Return the size of a data set [bytes]; raises FileError if it is stored elsewhere or too large for its file."""
+    """Return the size of a data set [byte]; FileError if it is stored elsewhere or too large for its file."""
     from h5py import h5d, h5z
 
     settings = dataset.get_create_plist()
@@ -101,7 +102,7 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
         raise FileError(f"{where} stores its values in another file: copy the data into one file")
     item, count = dataset.get_type().get_size(), dataset.get_space().get_simple_extent_npoints()
     size = count * item
-    # Each string or reference becomes one Python object, and takes space in the file.
+    # Each string or reference becomes a Python object, and takes space in the file.
     if count > max(FEW_OBJECTS, file_size // 8) and dataset.dtype.hasobject:
         raise FileError(f"{where} declares {count} texts or references, which its file cannot hold: write it anew")
     if layout == h5d.CHUNKED:
@@ -128,7 +129,7 @@ def check_size(where: str, shape: tuple[int, ...], file: Any) -> None:
 
 
 def values(group: Any, name: str) -> AnyArray:
-    """Return a data set of `group` as an array of numbers or of strings of fixed length, or raise FileError."""
+    """Return a data set of a group as an array of numbers or of strings of fixed length, or raise FileError."""
     import h5py
 
     where = f"'{group.name}/{name}' of '{group.file.filename}'"
@@ -141,7 +142,10 @@ def values(group: Any, name: str) -> AnyArray:
 
 
 def attribute(item: Any, name: str, default: Any = None) -> Any:
-    """Return an attribute of a group or data set, a number or a string of fixed length; FileError for other kinds."""
+    """Return an attribute of a group or a data set, or `default` if it is missing.
+
+    Raises FileError unless the attribute is a number, a string of fixed length or an array of these.
+    """
     if name not in item.attrs and default is not None:
         return default
     if item.attrs.get_id(name).dtype.base.kind not in PLAIN_KINDS:
@@ -152,14 +156,14 @@ def attribute(item: Any, name: str, default: Any = None) -> Any:
 class DriverFile:
     """An existing file, with the methods that `h5py.File` calls.
 
-    HDF5's own driver maps and caches its output and can crash the process on a full disk. Here each write is an ordinary
-    one. HDF5 cannot be interrupted by an exception: the first error is stored, nothing is written after it, and it is raised
-    once HDF5 has returned.
+    The driver of HDF5 caches its output and can crash the process on a full disk, while here each write is a call of the
+    operating system. Since an exception cannot interrupt HDF5, the first error is stored, nothing is written after it, and
+    `check` raises it once HDF5 has returned.
 
     Attributes
     ----------
     failure : BaseException or None
-        The first error while HDF5 read or wrote.
+        The first error while HDF5 was reading or writing.
     """
 
     def __init__(self, path: Path) -> None:
@@ -173,8 +177,8 @@ class DriverFile:
             raise self.failure
 
     def _fail(self, error: BaseException) -> None:
-        """Store the first error, without its frames, which would keep HDF5 objects open."""
-        error = error.with_traceback(None)  # also for later errors, which may be the same object
+        """Store the first error, without its traceback, whose frames would keep HDF5 objects open."""
+        error = error.with_traceback(None)  # also of later errors, which may be the same object
         self.failure = self.failure or error
 
     def fileno(self) -> int:
@@ -182,11 +186,11 @@ class DriverFile:
         return self._file.fileno()
 
     def tell(self) -> int:
-        """Return the position."""
+        """Return the current position in the file [byte]."""
         return self._position
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Set the position from the start, from itself or from the end."""
+        """Set the position relative to the start, the current position or the end, and return it."""
         base = self._size() if whence == os.SEEK_END else {os.SEEK_SET: 0, os.SEEK_CUR: self._position}[whence]
         self._position = base + offset
         return self._position
@@ -195,7 +199,7 @@ class DriverFile:
         return os.fstat(self.fileno()).st_size
 
     def read(self, size: int) -> bytes:
-        """Return `size` bytes from the position on, zeros beyond the end of the file."""
+        """Return `size` bytes from the current position on, with zeros beyond the end of the file."""
         data = bytearray(size)
         try:
             self._get(self._position, data)
@@ -211,7 +215,7 @@ class DriverFile:
             view = view[count:]
 
     def write(self, data: bytes) -> int:
-        """Write at the position, unless something has failed."""
+        """Write at the current position, unless an earlier operation has failed."""
         try:
             if self.failure is None:
                 self._put(self._position, data)
@@ -227,7 +231,7 @@ class DriverFile:
             view = view[self._file.write(view) :]
 
     def truncate(self, size: int) -> int:
-        """Set the size of the file, unless something has failed."""
+        """Set the size of the file, unless an earlier operation has failed."""
         try:
             if self.failure is None:
                 self._file.truncate(size)
@@ -245,16 +249,16 @@ class DriverFile:
 
 @contextmanager
 def new_hdf5(path: Path) -> Iterator[Any]:
-    """Write an HDF5 file over the existing file at `path`; OSError if the operating system reports an error."""
+    """Open a new HDF5 file for writing in place of the existing file at `path`; OSError if writing fails."""
     import h5py
 
     driver = DriverFile(path)
-    driver.truncate(0)  # HDF5 would parse the old content
+    driver.truncate(0)  # HDF5 would interpret the old content
     try:
         with h5py.File(driver, "w") as file:
             yield file
     except Exception:
-        driver.check()  # the error of the system is more informative than that of HDF5
+        driver.check()  # the error of the operating system explains that of HDF5
         raise
     finally:
         driver.close()

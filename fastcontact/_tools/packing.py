@@ -1,6 +1,7 @@
-"""Serialisation of plain data with arrays: nothing in the bytes is executed, and damage is detected.
+"""Serialisation of plain data with arrays, which executes nothing on reading and detects damage.
 
-The format is a line of ASCII JSON with sizes and checksum, the data as JSON with offsets in place of arrays, then the arrays.
+The format is a line of ASCII JSON with sizes and a checksum, followed by the data as JSON with offsets in place of arrays,
+and then by the arrays.
 """
 
 from __future__ import annotations
@@ -13,15 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.arrays import AnyArray
-
+# Key of the offset, the type and the shape of an array.
 _ARRAY = "__array__"
-# Allowed kinds of arrays: bool, signed and unsigned integers, floats.
+# Allowed kinds of arrays: Boolean, signed and unsigned integers, floating-point numbers.
 _KINDS = "biuf"
 
 
 def packed(data: Any) -> NDArray[np.uint8]:
-    """Return `data` as bytes (n,): dictionaries with string keys, lists, strings, numbers, None and arrays of numbers."""
+    """Return data as bytes (n,).
+
+    The data consist of dictionaries with string keys, lists, strings, numbers, None and arrays of numbers.
+    """
     arrays = io.BytesIO()
     text = json.dumps(_without_arrays(data, arrays)).encode("ascii")
     body = text + arrays.getbuffer()
@@ -30,16 +33,16 @@ def packed(data: Any) -> NDArray[np.uint8]:
 
 
 def unpacked(values: NDArray[np.uint8]) -> Any:
-    """Return the data from the bytes (n,) of `packed`; bytes beyond its end are ignored.
+    """Return the data from the bytes (n,) that `packed` has returned; further bytes are ignored.
 
     Raises ValueError if the bytes are incomplete, or not from `packed`.
     """
-    raw = np.ascontiguousarray(values, np.uint8).data
-    line, separator, _ = bytes(raw[:200]).partition(b"\n")
+    buffer = np.ascontiguousarray(values, np.uint8).data
+    line, separator, _ = bytes(buffer[:200]).partition(b"\n")
     if not separator:
         raise ValueError("no packed data")
     head = json.loads(line)
-    body = raw[len(line) + 1 : len(line) + 1 + int(head["size"])]
+    body = buffer[len(line) + 1 : len(line) + 1 + int(head["size"])]
     if len(body) != head["size"] or zlib.crc32(body) != head["checksum"]:
         raise ValueError("packed data are cut off or changed")
     text = int(head["text"])
@@ -47,6 +50,7 @@ def unpacked(values: NDArray[np.uint8]) -> Any:
 
 
 def _without_arrays(data: Any, arrays: io.BytesIO) -> Any:
+    """Return data with offsets in place of arrays, which are appended to `arrays`."""
     if isinstance(data, np.ndarray):
         offset = arrays.tell()
         arrays.write(np.ascontiguousarray(data).data)
@@ -60,19 +64,17 @@ def _without_arrays(data: Any, arrays: io.BytesIO) -> Any:
     return data
 
 
-def _with_arrays(data: Any, raw: memoryview) -> Any:
+def _with_arrays(data: Any, arrays: memoryview) -> Any:
+    """Return data with arrays in place of their offsets in `arrays`."""
     if isinstance(data, dict):
-        if _ARRAY in data:
-            return _array(raw, *data[_ARRAY])
-        return {key: _with_arrays(value, raw) for key, value in data.items()}
+        if _ARRAY not in data:
+            return {key: _with_arrays(value, arrays) for key, value in data.items()}
+        offset, kind, shape = data[_ARRAY]
+        dtype = np.dtype(kind)
+        if dtype.kind not in _KINDS:
+            raise ValueError(f"an array of {kind} is not a packed array")
+        count = int(np.prod(shape, dtype=np.int64))
+        return np.frombuffer(arrays, dtype, count, offset).reshape(shape).copy()
     if isinstance(data, list):
-        return [_with_arrays(value, raw) for value in data]
+        return [_with_arrays(value, arrays) for value in data]
     return data
-
-
-def _array(raw: memoryview, offset: int, kind: str, shape: list[int]) -> AnyArray:
-    dtype = np.dtype(kind)
-    if dtype.kind not in _KINDS:
-        raise ValueError(f"an array of {kind} is not a packed array")
-    count = int(np.prod(shape, dtype=np.int64))
-    return np.frombuffer(raw, dtype, count, offset).reshape(shape).copy()

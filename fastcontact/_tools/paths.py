@@ -21,13 +21,13 @@ _DESCRIPTOR = re.compile(r"/(?:dev|proc/(?:self|thread-self|\d+))/fd/(\d+)")
 
 
 def existing_file(path: PathLike) -> Path:
-    """Return `path` as a Path, or raise FileError if there is no such regular file."""
+    """Return `path` as a Path, or raise FileError if it is not the path of a regular file."""
     file = Path(path)
     try:
         file.stat()
     except FileNotFoundError:
         pass
-    except (OSError, ValueError) as error:  # a name too long, a file used as a folder, a null byte
+    except (OSError, ValueError) as error:  # too long a name, a file as a folder, a null byte
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(f"'{str(path)[:200]}' cannot be accessed ({reason}): check its name and the folder") from error
     if file.is_dir():
@@ -40,7 +40,7 @@ def existing_file(path: PathLike) -> Path:
 
 
 def checked_target(path: PathLike) -> Path:
-    """Return the path to write to, with links resolved, or raise FileError if it cannot be written."""
+    """Return a path with links resolved, or raise FileError if no regular file can be written there."""
     try:
         target = Path(os.path.realpath(os.fspath(path)))
     except ValueError as error:  # a null byte
@@ -64,12 +64,12 @@ def checked_target(path: PathLike) -> Path:
 
 
 def descriptor(path: PathLike) -> int | None:
-    """Return the descriptor of this process that a path such as ``/dev/stdout`` names, None for other paths.
+    """Return the descriptor of this process that a path such as ``/dev/stdout`` names, or None for other paths.
 
-    The path of the underlying file is not sufficient: a shell may have opened that file in append mode.
+    The path of the file behind it does not suffice, since a shell may have opened this file in append mode.
     """
     name = os.path.abspath(os.fspath(path))
-    for _ in range(40):  # as many links as the system follows
+    for _ in range(40):  # limit of the operating system
         match = _DESCRIPTOR.fullmatch(name)
         if match:
             return int(match[1])
@@ -85,16 +85,17 @@ def is_stream(path: PathLike) -> bool:
 
 
 def _may_write(path: Path) -> bool:
+    """Return whether the effective user of this process may write to a file or a folder."""
     return os.access(path, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
 
 
 @contextlib.contextmanager
 def replacing(path: PathLike) -> Iterator[Path]:
-    """Yield an empty temporary file beside `path`, which replaces it on success and is removed after a failure.
+    """Yield the path of an empty temporary file beside `path`, which replaces it on success and is removed after a failure.
 
-    Its name is unpredictable and the file is new, so that no link placed there beforehand is followed. It is synchronised to
-    disk before it replaces `path`. If `path` is a stream such as ``/dev/stdout``, a new file in a temporary folder is yielded
-    instead, and then copied to the stream. Errors of the operating system, except a broken pipe, are raised as FileError.
+    The file is new and its name unpredictable, so that no existing link is followed. It is synchronised to disk before it
+    replaces `path`. If `path` is a stream such as ``/dev/stdout``, the file is in a temporary folder instead, and is copied
+    to the stream. Errors of the operating system, except a broken pipe, are raised as FileError.
     """
     if is_stream(path):
         with tempfile.TemporaryDirectory() as folder:
@@ -103,7 +104,7 @@ def replacing(path: PathLike) -> Iterator[Path]:
             _send(temporary, path)
         return
     target = checked_target(path)
-    # The suffix stays last, because writers derive the format from it.
+    # The suffix is kept, because writers derive the format from it.
     temporary = target.with_name(f".{target.stem[:100]}.{secrets.token_hex(12)}{target.suffix}")
     try:
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
@@ -121,7 +122,7 @@ def replacing(path: PathLike) -> Iterator[Path]:
 
 
 def _send(file: Path, stream: PathLike) -> None:
-    """Write a file to a stream, through the descriptor that it names, if any, which keeps the write position."""
+    """Write a file to a stream; if the stream is a descriptor of this process, its write position is kept."""
     number = descriptor(stream)
     try:
         if number in (1, 2):
@@ -135,7 +136,7 @@ def _send(file: Path, stream: PathLike) -> None:
 
 
 def _synchronise(path: Path) -> None:
-    """Synchronise a file, or the entries of a folder, to disk; do nothing if folders cannot be opened."""
+    """Synchronise a file, or the entries of a folder, to disk; folders are ignored where they cannot be opened."""
     if path.is_dir() and os.name == "nt":
         return
     descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)

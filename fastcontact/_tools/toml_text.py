@@ -1,4 +1,7 @@
-"""TOML from any source, parsed in bounded time although the parser takes quadratic time in the number of parts of a key."""
+"""Reading of TOML from untrusted sources in bounded time, and writing of TOML.
+
+The time of `tomllib` is quadratic in the number of parts of a dotted key, which is therefore limited.
+"""
 
 from __future__ import annotations
 
@@ -7,20 +10,19 @@ import re
 import tomllib
 from typing import Any
 
-LARGEST = 1 << 23  # largest size of a text [bytes]
+LARGEST = 1 << 23  # largest number of characters of a text
 PARTS = 50  # largest number of parts of a dotted key
 # Possessive quantifiers and the lookbehind avoid backtracking, so that the search is linear in the text.
 LONG_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{PARTS},}}""")
 
 
 def parsed(text: str) -> dict[str, Any]:
-    """Return the tables of a string in TOML format.
+    """Return the data of a text in TOML format.
 
     Raises
     ------
     ValueError
-        If the text is not TOML, tables are nested too deeply, it is larger than `LARGEST`, or a key has more than `PARTS`
-        parts.
+        If the text is not TOML or longer than `LARGEST`, tables are nested too deeply, or a key has more than `PARTS` parts.
     """
     if len(text) > LARGEST:
         raise ValueError(f"it is larger than {LARGEST >> 20} MB")
@@ -34,18 +36,20 @@ def parsed(text: str) -> dict[str, Any]:
 
 
 def written(data: Any) -> str:
-    """Return data as a string from which `parsed` recovers the data; ValueError for data that TOML cannot express."""
+    """Return data as a text from which `parsed` recovers them; ValueError for data that TOML cannot represent."""
     return "".join(f"{_key(name)} = {_value(value)}\n" for name, value in data.items())
 
 
 def _key(name: Any) -> str:
+    """Return a key, in quotation marks if necessary."""
     if not isinstance(name, str):
         raise ValueError(f"the key {name!r} is not a string")
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _value(name)
 
 
 def _value(value: Any) -> str:
-    if hasattr(value, "tolist"):  # a NumPy value
+    """Return a value in TOML format."""
+    if hasattr(value, "tolist"):  # an array or a scalar of NumPy
         value = value.tolist()
     if isinstance(value, bool):
         return str(value).lower()
@@ -56,5 +60,5 @@ def _value(value: Any) -> str:
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_value, value))}]"
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_key(name)} = {_value(inner)}" for name, inner in value.items()) + "}"
+        return "{" + ", ".join(f"{_key(name)} = {_value(entry)}" for name, entry in value.items()) + "}"
     raise ValueError(f"{type(value).__name__} is not a TOML type")

@@ -1,4 +1,4 @@
-"""Parse the names of the units of a model, and check whether the units are consistent."""
+"""Names of the units of a model, and a check of their consistency."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from fastcontact.errors import ModelError, check_known
 
-# Size of the known units in SI units, by quantity and name.
+# Sizes of units in SI units, by quantity and name.
 KNOWN: dict[str, dict[str, float]] = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254},
     "force": {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "lbf": 4.448222},
@@ -21,7 +21,7 @@ EXAMPLE = "units of length, force and pressure in this order, such as 'mm, N, MP
 def named_units(units: str | Mapping[str, str]) -> dict[str, str]:
     """Return the names of units by quantity, from a string in the order of `KNOWN` or from a mapping.
 
-    Raise ModelError for other arguments, and for a name that is known as the unit of another quantity.
+    Raises ModelError for other arguments, and for a name that is known as the unit of another quantity.
 
     Examples
     --------

@@ -14,9 +14,9 @@ LIBRARIES = ("numpy", "scipy", "numba", "pyamg", "meshio", "h5py")
 
 @cache
 def versions() -> dict[str, str]:
-    """Return the versions by name; libraries that are not installed as packages are omitted."""
-    known = {"fastcontact": __version__, "python": platform.python_version()}
+    """Return the versions by name; libraries whose version is unknown are omitted."""
+    by_name = {"fastcontact": __version__, "python": platform.python_version()}
     for name in LIBRARIES:
         with contextlib.suppress(metadata.PackageNotFoundError):
-            known[name] = metadata.version(name)
-    return known
+            by_name[name] = metadata.version(name)
+    return by_name

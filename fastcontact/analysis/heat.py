@@ -12,9 +12,8 @@ from scipy.sparse import bsr_array, coo_array, csr_array
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.errors import ConvergenceError
-from fastcontact.heat.conduction import Conduction
+from fastcontact.heat.conduction import Conduction, not_reached
 from fastcontact.heat.loads import Film, Heating
-from fastcontact.heat.reached import not_reached
 from fastcontact.linear import choice
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.model import Model

@@ -88,12 +88,12 @@ def _interpolated(table: Array, x: float) -> tuple[float, float, float]:
     force_excess = (table[:, 1] / [h.force for h in hertz] - 1.0) / s
     pressure_excess = (table[:, 2] / [h.pressure_max for h in hertz] - 1.0) / s
     radius_excess = table[:, 3] / [h.at_force(F).radius for h, F in zip(hertz, table[:, 1])] - 1.0
-    known = np.isfinite(radius_excess)
+    valid = np.isfinite(radius_excess)
 
     at_approach, root = _hertz(1.0, 1.0, x), np.sqrt(x)
     force = at_approach.force * (1.0 + root * CubicSpline(np.log(s), force_excess)(np.log(root)))
     pressure = at_approach.pressure_max * (1.0 + root * CubicSpline(np.log(s), pressure_excess)(np.log(root)))
-    excess = CubicSpline(np.append(0.0, s[known]), np.append(0.0, radius_excess[known]))(root)
+    excess = CubicSpline(np.append(0.0, s[valid]), np.append(0.0, radius_excess[valid]))(root)
     return float(force), float(pressure), float(at_approach.at_force(float(force)).radius * (1.0 + excess))
 
 

@@ -131,10 +131,6 @@ def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) 
     check_keys(where, arguments, dict.fromkeys(parameters))
     if missing := [key for key, p in parameters.items() if p.default is p.empty and key not in arguments]:
         raise CaseError(f"'{where}' needs {' and '.join(repr(key) for key in missing)}")
-    for key, value in arguments.items():
-        annotation = str(parameters[key].annotation)
-        if "float" in annotation and isinstance(value, str) and "str" not in annotation:
-            raise CaseError(f"the value of '{where}.{key}' must be a number, not {repr(value)}")
     try:
         return function(**arguments)
     except (TypeError, ValueError) as error:

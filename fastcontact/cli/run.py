@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     check_outputs(files_of_case(options.case), [output, options.json, options.modes], [options.plot])
     with warnings_shown() as setup_warnings:
         case = read_case(options.case)
-    read = time.perf_counter()
+    read_end = time.perf_counter()
     with in_file(case_path(options.case)):
         case.model.check(case.ramp)  # an invalid model must not replace existing results
         setup_warnings += _checked_study(case)
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
         n_done, stored_warnings, last, steps = _solved(options, case, output)
     texts = list(dict.fromkeys([*stored_warnings, *caught]))
     computed = _modes(options, case, last)
-    timings = {"read": read - started, "solve": time.perf_counter() - read, "cpu": time.process_time()}
+    timings = {"read": read_end - started, "solve": time.perf_counter() - read_end, "cpu": time.process_time()}
     numbers = summary.summarise(case, last, steps, timings, texts, computed)
     if options.json:
         write_json(options.json, numbers)

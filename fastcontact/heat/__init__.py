@@ -1,1 +1,1 @@
-"""Heat conduction in the solid cells: matrix, loads, and conductance of contacts."""
+"""Heat conduction in the solid cells: conduction matrix, heat flux and heat loads."""

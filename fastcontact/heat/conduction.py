@@ -1,4 +1,4 @@
-"""Steady heat conduction in the solid cells: the conduction matrix of Fourier's law, and the heat flux."""
+"""Steady heat conduction in the solid cells: conduction matrix, heat flux, and bodies of undetermined temperature."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components
 
-from fastcontact.arrays import Array, Indices, Numbers
+from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.elasticity.energy import cell_volumes, gradients_at, integration_rule
 from fastcontact.elasticity.mass import assembled, portions
 from fastcontact.elasticity.materials import Material
@@ -20,7 +21,7 @@ from fastcontact.mesh.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Conduction:
-    """Solid cells that conduct heat, in the reference configuration or a deformed configuration.
+    """Solid cells that conduct heat by Fourier's law, in the reference configuration or in a deformed configuration.
 
     Attributes
     ----------
@@ -33,7 +34,7 @@ class Conduction:
     number : mapping of str to ndarray of int (n_cells,)
         Material number of each cell, by solid element type.
     displacement : ndarray (n_points, dim), optional
-        Displacement of the deformed configuration [length]. Conductivities are evaluated at reference positions.
+        Displacement [length] of the deformed configuration. Conductivities are evaluated at reference positions.
     """
 
     mesh: Mesh
@@ -44,16 +45,16 @@ class Conduction:
 
     def check(self) -> None:
         """Raise ModelError if the material of a cell has no conductivity."""
-        lacks_conductivity = [material.conductivity is None for material in self.materials]
-        missing = sum(int(np.array(lacks_conductivity)[numbers].sum()) for numbers in self.number.values())
-        if missing:
+        lacking = np.array([material.conductivity is None for material in self.materials])
+        n_lacking = sum(int(lacking[numbers].sum()) for numbers in self.number.values())
+        if n_lacking:
             raise ModelError(
-                f"heat conduction is solved, but {missing} solid cells have a material without conductivity: define it "
+                f"heat conduction is solved, but {n_lacking} solid cells have a material without conductivity: define it "
                 "with conductivity=..."
             )
 
     def matrix(self) -> csr_array:
-        """Return the conduction matrix (n_points, n_points): integrals of ``grad N_a . k . grad N_b`` [power / temperature].
+        """Return the conduction matrix (n_points, n_points) [power / temperature]: integrals of ``grad N_a . k . grad N_b``.
 
         Quadrature is exact for constant conductivities on cells that are affine images of the reference cell.
         """
@@ -66,7 +67,7 @@ class Conduction:
         return csr_array((values[:, 0], pattern.indices, pattern.indptr), shape=(self.mesh.n_points,) * 2)
 
     def flux(self, temperature: Array) -> Array:
-        """Return the mean heat flux (n_solids, dim) [power / area] of cells at a `temperature` (n_points,) [temperature]."""
+        """Return the mean heat flux (n_solids, dim) [power / area] of cells for a `temperature` (n_points,) [temperature]."""
         flux = []
         for name, rows in portions(self.mesh):
             gradient, k, volume = self._at(name, rows)
@@ -95,3 +96,24 @@ class Conduction:
             )
             k[cells] = k_cells.reshape(len(cells), *k.shape[1:])
         return gradient, k, volume
+
+
+def not_reached(body: AnyArray, held: Mask, joined: AnyArray) -> Indices:
+    """Return the numbers (n,) of the bodies whose steady temperature is undetermined, in ascending order.
+
+    Such bodies have no thermal connection to a prescribed temperature or a film.
+
+    Parameters
+    ----------
+    body : ndarray of int (n_points,)
+        Body of each point, -1 for points without a body.
+    held : ndarray of bool (n_points,)
+        True for points with a prescribed temperature or a film.
+    joined : ndarray of int (m, 2)
+        Pairs of points between which heat flows.
+    """
+    pairs = body[joined]
+    pairs, count = pairs[(pairs >= 0).all(axis=1)], int(body.max()) + 1
+    graph = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(count, count))
+    component = connected_components(graph, directed=False)[1]
+    return np.flatnonzero(~np.isin(component, component[np.unique(body[held & (body >= 0)])]))

@@ -1,4 +1,4 @@
-"""Heat loads of solid cells: prescribed temperatures, fluxes, films, sources, nodal heat.
+"""Heat loads of solid cells: prescribed temperatures, fluxes, films, sources and nodal heat.
 
 Nodal powers are integrals with the shape functions, in axisymmetry over the full circle, in the plane per unit thickness.
 They use areas and volumes of the `deformed` mesh, and values at positions in the reference mesh.
@@ -30,14 +30,14 @@ from fastcontact.mesh.mesh import Mesh
 
 
 class TemporaryHeat(Load):
-    """A prescribed temperature or a film that acts in the load steps between two instants."""
+    """Base class of prescribed temperatures and films, which act in the load steps between two instants."""
 
     begins: float
     ends: float
 
     @property
     def label(self) -> str:
-        """Label that distinguishes the load from others of the same kind and group."""
+        """Label by which messages distinguish the load from others of the same kind and group."""
         return self.name if self.begins == -np.inf else f"{self.name} from {self.begins:g}"
 
     @property
@@ -58,10 +58,10 @@ class TemporaryHeat(Load):
 
 @dataclass(frozen=True)
 class FixedTemperature(TemporaryHeat):
-    """A prescribed temperature of the nodes of a group [temperature]; histories multiply its rise above the reference.
+    """A prescribed temperature [temperature] of the nodes of a group; ramps multiply its rise above the reference.
 
-    A temperature that begins later starts from the current rise, `reached` (n_points,), and proceeds to the next point of
-    its ramp.
+    A temperature that begins later starts from the current rise, which is `reached` (n_points,), and proceeds to the next
+    point of its ramp.
     """
 
     KIND = "the temperature"
@@ -82,7 +82,7 @@ class FixedTemperature(TemporaryHeat):
             )
 
     def history(self) -> tuple[Table | None, Table]:
-        """Return the ramps of the value and of the initial rise, which decreases to zero while the value sets in."""
+        """Return the ramp of the value, and that of the initial rise, which falls to zero at the next point of the ramp."""
         later = [point for point in self.ramp or () if point[0] > self.begins]
         if self.reached is None or not later:
             return self.ramp, ()
@@ -96,7 +96,7 @@ class Heating(Load):
     """A heat load that is independent of the temperature."""
 
     def power(self, mesh: Mesh, kinematics: str, deformed: Mesh) -> Array:
-        """Return the powers (n_points,) of the nodes of the `deformed` mesh at multiplier 1, into the body [power]."""
+        """Return the powers (n_points,) [power] into the nodes of the `deformed` mesh at multiplier 1."""
         total = np.zeros((mesh.n_points, 1))
         for element, cells in self.cells(mesh).items():
             x, N, _ = measured_points(mesh, element, cells, kinematics)
@@ -117,7 +117,7 @@ class HeatFlux(Heating):
 
 @dataclass(frozen=True)
 class HeatSource(VolumeLoad, Heating):
-    """Heat per volume [power / length^3] in groups of solid cells, or in all."""
+    """Heat per volume [power / length^3] in groups of solid cells, or in all solid cells."""
 
     KIND = "the heat source"
     groups: tuple[str, ...] | None
@@ -127,7 +127,7 @@ class HeatSource(VolumeLoad, Heating):
 
 @dataclass(frozen=True)
 class NodalHeat(Heating):
-    """Nodal heat [power] at every node of a group."""
+    """A heat flow [power] into each node of a group."""
 
     KIND = "the heat at nodes"
     group: str
@@ -151,10 +151,15 @@ class Film(TemporaryHeat):
     Attributes
     ----------
     group : str
+        Group of the facets.
     coefficient : float or callable
         Film coefficient [power / (area temperature)].
     ambient : float or callable
-        Temperature of the surroundings [temperature]; histories multiply its rise above the reference.
+        Temperature of the surroundings [temperature]; the ramp multiplies its rise above the reference.
+    ramp : sequence of (float, float), optional
+        Ramp of the ambient rise.
+    begins, ends : float
+        Instants between which the film acts.
     """
 
     KIND: ClassVar[str] = "the film"
@@ -171,9 +176,9 @@ class Film(TemporaryHeat):
         return [self.coefficient, self.ambient]
 
     def exchange(self, mesh: Mesh, kinematics: str, deformed: Mesh, reference: float) -> tuple[csr_array, Array]:
-        """Return the matrix (n_points, n_points) [power / temperature] and the powers (n_points,) of the ambient rise.
+        """Return the matrix (n_points, n_points) [power / temperature] of the film and the powers (n_points,) [power].
 
-        The powers are those at multiplier 1 [power]; rises are relative to `reference` [temperature]. Raises ModelError if a
+        The powers are those of the ambient rise above `reference` [temperature] at multiplier 1. Raises ModelError if a
         coefficient is negative.
         """
         entries, powers = Entries(), np.zeros((mesh.n_points, 1))

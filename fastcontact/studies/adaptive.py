@@ -317,17 +317,17 @@ def adaptive_study(
         raise CaseError(f"the relative tolerance {tolerance:g} must lie between 0 and 1")
     if case.mesh.dim != 2:
         raise CaseError("adaptive refinement is for triangles and quadrangles in two dimensions; this case is in 3D")
-    chosen = settings(case)
-    quantities.check_names(case, [quantity, *chosen.quantities])
-    combination = one_combination(chosen, element, formulation)
-    forest, curves = _first_mesh(case, chosen, combination)
+    setup = settings(case)
+    quantities.check_names(case, [quantity, *setup.quantities])
+    combination = one_combination(setup, element, formulation)
+    forest, curves = _first_mesh(case, setup, combination)
     rounds: list[Round] = []
     with StatusLine(80, progress) as line:
         while True:
             started = time.perf_counter()
             linear, leaf = forest.mesh()
-            solved = _case_on(linear, curves, case, chosen, combination)
-            last, error, round_ = _solved(solved, quantity, chosen.pair, rounds, started)
+            solved = _case_on(linear, curves, case, setup, combination)
+            last, error, round_ = _solved(solved, quantity, setup.pair, rounds, started)
             rounds.append(round_)
             if on_round is not None:
                 on_round(round_)
@@ -335,27 +335,27 @@ def adaptive_study(
             reached = round_.estimate <= tolerance
             if reached or len(rounds) == max_rounds or round_.n_dofs > 0.6 * max_dofs:
                 break
-            forest.refine(_marked(_indicator(solved, last, error, quantity, chosen.pair), leaf, forest.n_leaves))
+            forest.refine(_marked(_indicator(solved, last, error, quantity, setup.pair), leaf, forest.n_leaves))
     return AdaptiveStudy(
         **of_case(case), combination=str(combination), quantity=quantity, tolerance=tolerance, reached=reached, rounds=rounds,
         case=solved, last=last, error=error)  # fmt: skip
 
 
-def _first_mesh(case: Case, chosen: Settings, combination: Combination) -> tuple[Forest, list[Any]]:
+def _first_mesh(case: Case, setup: Settings, combination: Combination) -> tuple[Forest, list[Any]]:
     """Return the first mesh as a forest of linear cells, which can be refined, and the curves of its boundary."""
     mesh = case.mesh
-    if chosen.by_shape and combination.element is not None:
-        mesh = make_mesh(recipe(chosen, combination.element, 0), None)
-    curves = list(chosen.curves) if chosen.curves is not None else circles(mesh)
+    if setup.by_shape and combination.element is not None:
+        mesh = make_mesh(recipe(setup, combination.element, 0), None)
+    curves = list(setup.curves) if setup.curves is not None else circles(mesh)
     return Forest(linearised(mesh), curves), curves
 
 
-def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, chosen: Settings, combination: Combination) -> Case:
+def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, setup: Settings, combination: Combination) -> Case:
     """Return the case on another mesh, given by linear cells, which are converted if the element type is quadratic."""
     element = combination.element
     quadratic = element is not None and elements.get(element).order == 2
     mesh = to_quadratic(linear, curves, centre_nodes=element == "quad9") if quadratic else linear
-    return build_case(case_data(chosen, combination), name=case.name, folder=case.folder, text=case.text, mesh=mesh)
+    return build_case(case_data(setup, combination), name=case.name, folder=case.folder, text=case.text, mesh=mesh)
 
 
 def _solved(

@@ -30,11 +30,11 @@ def check_runs(count: int) -> None:
     log.info("%d runs", count)
 
 
-def check_levels(case: Case, chosen: Settings, members: Sequence[Combination], levels: int) -> None:
+def check_levels(case: Case, setup: Settings, members: Sequence[Combination], levels: int) -> None:
     """Raise CaseError if the analysis of the finest mesh of a study cannot fit into the memory of this machine."""
     memory = _memory()
     for member in members:
-        coarsest = make_mesh(recipe(chosen, member.element, 0), case.mesh if chosen.generator is None else None)
+        coarsest = make_mesh(recipe(setup, member.element, 0), case.mesh if setup.generator is None else None)
         unknowns = [coarsest.n_points * coarsest.dim * 2 ** (coarsest.dim * level) for level in range(levels)]
         n_fitting = sum(BYTES_PER_UNKNOWN * count <= memory for count in unknowns)
         if n_fitting < levels:
@@ -60,20 +60,20 @@ def check_study(case: Case) -> None:
     Quadrangle meshes are generated for this check if ``[study]`` gives their arguments on level 0. Free triangle meshes are
     not, since their generation takes as long as a short run.
     """
-    chosen = settings(case)
-    study = chosen.data.get("study", {})
+    setup = settings(case)
+    study = setup.data.get("study", {})
     _check_finite("study", study)
-    check_names(case, chosen.quantities)
+    check_names(case, setup.quantities)
     linked = study.get("parameters", {})
     with in_file("[study.parameters]"):
         for name in linked:
-            substituted(chosen.data, name, 1.0, linked)
-    for member in chosen.combinations if study else ():
+            substituted(setup.data, name, 1.0, linked)
+    for member in setup.combinations if study else ():
         with in_file(f"[study], {member}"):
-            job = job_of(case, chosen, member, 0, label="", marks={}, size=0.0)
-            if chosen.by_shape and shape_of(member.element or "") == "quadrangles":
+            job = job_of(case, setup, member, 0, label="", marks={}, size=0.0)
+            if setup.by_shape and shape_of(member.element or "") == "quadrangles":
                 make_mesh(job.recipe, None)
-            if member.formulation in chosen.options or chosen.load_steps is not None:
+            if member.formulation in setup.options or setup.load_steps is not None:
                 build_case(job.data, name=case.name, folder=case.folder, mesh=case.mesh)
 
 

@@ -157,7 +157,7 @@ def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
 
 def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], units: Mapping[str, str]) -> Rows:
     """Return a header and a row for each combination with the limits, mesh errors and model errors of the quantities."""
-    header, cells = ["combination", "levels", "finest DOF"], []
+    header, cells = ["combination", "levels", "finest DOF"], []  # type: list[str], list[tuple[str, tuple[str, ...]]]
     for name in quantities:
         header += [column(name, name, units), "+-", "order", "mesh error", "model error"]
         cells += [(name, ("limit", "+-", "order alone", "mesh error", "model error"))]
@@ -274,15 +274,15 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
         limit, h = series.limits[quantity], np.array(series.h)
         error = np.abs(np.array(series.values(quantity)) - limit.value) / abs(limit.value)
         bar = limit.uncertainty / abs(limit.value)
-        color, shown = f"C{position}", error > 0
+        color, positive = f"C{position}", error > 0
         label = f"{series.combination}: order {limit.order:.1f} $\\pm$ {limit.order_uncertainty:.1f}"
-        ax.plot(h[shown], error[shown], f"{marker(k)}-", ms=5, lw=1.0, label=label, color=color)
+        ax.plot(h[positive], error[positive], f"{marker(k)}-", ms=5, lw=1.0, label=label, color=color)
         if with_bars:
             low, high = np.maximum(error - bar, 0.3 * error), error + bar
-            ax.vlines(h[shown], low[shown], high[shown], colors=color, lw=0.7)
-        if math.isfinite(limit.order) and shown.sum() >= 2:
+            ax.vlines(h[positive], low[positive], high[positive], colors=color, lw=0.7)
+        if math.isfinite(limit.order) and positive.sum() >= 2:
             # The power law of the fitted order through the geometric mean of the errors.
-            factor = np.exp(np.mean(np.log(error[shown] / h[shown] ** limit.order)))
+            factor = np.exp(np.mean(np.log(error[positive] / h[positive] ** limit.order)))
             ax.plot(h, factor * h**limit.order, ":", lw=1.0, color=color)
     entries = {":": "fit $C\\,h^{order}$"} | ({"|": f"error bar of the limit, {CONFIDENCE:.0%}"} if with_bars else {})
     for style, text in entries.items():
@@ -327,10 +327,10 @@ def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]
     low = max(-reach, min(float(r.min(initial=0.0)) for r, _ in profiles))
     colors = colormaps["viridis_r"](np.linspace(0.1, 1.0, len(series.levels)))
     for color, level, (r, pressure) in zip(colors, series.levels, profiles, strict=True):
-        shown = np.abs(r) <= reach
-        style = "o-" if shown.sum() <= 60 else "-"
+        visible = np.abs(r) <= reach
+        style = "o-" if visible.sum() <= 60 else "-"
         label = f"level {level.number}, {level.n_dofs} DOF"
-        ax.plot(r[shown], pressure[shown], style, ms=3, lw=1.0, label=label, color=color)
+        ax.plot(r[visible], pressure[visible], style, ms=3, lw=1.0, label=label, color=color)
     _draw_theory(ax, theory, series, np.linspace(low, reach, 600))
     labels = (
         labelled("distance from the middle of the contact", units, "length"),

@@ -206,14 +206,14 @@ def recorded() -> Iterator[list[str]]:
 
 
 def job_of(
-    case: Case, chosen: Settings, member: Combination, level: int, *, label: str, marks: dict[str, Any], size: float
+    case: Case, setup: Settings, member: Combination, level: int, *, label: str, marks: dict[str, Any], size: float
 ) -> Job:
     """Return the job of a case with the element and the formulation of `member` on the mesh of a level."""
-    data, mesh = case_data(chosen, member), recipe(chosen, member.element, level)
-    base = case.mesh if chosen.generator is None else None
+    data, mesh = case_data(setup, member), recipe(setup, member.element, level)
+    base = case.mesh if setup.generator is None else None
     return Job(
         label=label, name=case.name, marks=marks, size=size,
-        data=data, pair=chosen.pair, recipe=mesh, base=base, folder=case.folder,
+        data=data, pair=setup.pair, recipe=mesh, base=base, folder=case.folder,
     )  # fmt: skip
 
 

@@ -160,7 +160,7 @@ def page(heading: str, blocks: Sequence[str], case_text: str) -> str:
     """Return an HTML page with a heading, blocks of HTML, the text of the case, and the versions of the software."""
     blocks = list(blocks)
     if case_text:
-        blocks += [section("The case"), f"<pre>{html.escape(case_text)}</pre>"]
+        blocks += ["<h2>The case</h2>", f"<pre>{html.escape(case_text)}</pre>"]
     software = ", ".join(f"{name} {version}" for name, version in versions().items())
     blocks.append(f"<footer>Made with {html.escape(software)}.</footer>")
     return (
@@ -172,19 +172,9 @@ def page(heading: str, blocks: Sequence[str], case_text: str) -> str:
     )
 
 
-def section(heading: str) -> str:
-    """Return the heading of a section as HTML."""
-    return f"<h2>{html.escape(heading)}</h2>"
-
-
 def paragraph(text: str) -> str:
     """Return a string as an HTML paragraph."""
     return f"<p class='say'>{_plus_minus_signs(html.escape(text))}</p>"
-
-
-def failure(text: str) -> str:
-    """Return the reason of a failure as an HTML paragraph."""
-    return f"<p class='failed'>{html.escape(text)}</p>"
 
 
 def table(rows: Sequence[Sequence[str]], caption: str = "") -> str:
@@ -273,9 +263,9 @@ class Report:
         """Return the report as a self-contained HTML page."""
         blocks = [*map(paragraph, self.sentences()), image(self.figure(), self.picture)]
         blocks += [table(rows, caption) for caption, rows in self.tables()]
-        blocks += map(failure, self.remarks())
+        blocks += [f"<p class='failed'>{html.escape(text)}</p>" for text in self.remarks()]
         if self.explanations:
-            blocks += [section("How to read this"), *map(paragraph, self.explanations)]
+            blocks += ["<h2>How to read this</h2>", *map(paragraph, self.explanations)]
         return page(f"{self.kind}: {self.title}", blocks, self.text)
 
     def table(self) -> AnyArray:

@@ -138,14 +138,14 @@ def convergence_study(
     case = case if isinstance(case, Case) else read_case(case)
     if levels < 1:
         raise CaseError(f"levels = {levels} must be at least 1; an extrapolated limit needs 3")
-    chosen = settings(case)
-    check_names(case, [*chosen.quantities, *quantities])
-    members = combinations(chosen, elements, formulations)
+    setup = settings(case)
+    check_names(case, [*setup.quantities, *quantities])
+    members = combinations(setup, elements, formulations)
     check_runs(levels * len(members))
-    check_levels(case, chosen, members, levels)
-    jobs = [level_job(case, chosen, member, level) for level in range(levels) for member in members]
+    check_levels(case, setup, members, levels)
+    jobs = [level_job(case, setup, member, level) for level in range(levels) for member in members]
     results = run_study(jobs, "no level could be solved", **options)
-    return study_of_runs(case, jobs, results, [*chosen.quantities, *quantities])
+    return study_of_runs(case, jobs, results, [*setup.quantities, *quantities])
 
 
 def _of_function(
@@ -186,10 +186,10 @@ def _of_function(
     return Study(**of_function(function, results), series=[series], failed={}, theory=None)
 
 
-def level_job(case: Case, chosen: Settings, member: Combination, level: int) -> Job:
+def level_job(case: Case, setup: Settings, member: Combination, level: int) -> Job:
     """Return the job that solves a case with one element type and formulation on the mesh of one level."""
     marks = {"level": level, "element": member.element, "formulation": member.formulation}
-    return job_of(case, chosen, member, level, label=f"{member} level {level}", marks=marks, size=level)
+    return job_of(case, setup, member, level, label=f"{member} level {level}", marks=marks, size=level)
 
 
 def study_of_runs(case: Case, jobs: Sequence[Job], results: Sequence[Result], further: Sequence[str]) -> Study:
@@ -439,13 +439,13 @@ def _job(case: Case, choice: dict[str, Value], element: str | None, formulation:
     linked = data.get("study", {}).get("parameters", {})
     for parameter, value in choice.items():
         data = substituted(data, parameter, value, linked)
-    chosen = settings(case, data)
-    member = one_combination(chosen, element, formulation)
-    level = (LEVEL if chosen.by_shape else 0) if level is None else level
+    setup = settings(case, data)
+    member = one_combination(setup, element, formulation)
+    level = (LEVEL if setup.by_shape else 0) if level is None else level
     # Runs with the largest meshes start first, which the number of points on level 0 determines.
-    size = make_mesh(recipe(chosen, member.element, 0), None).n_points if chosen.generator is not None else 0
+    size = make_mesh(recipe(setup, member.element, 0), None).n_points if setup.generator is not None else 0
     marks = {**choice, "combination": f"{member}, level {level}"}
-    return job_of(case, chosen, member, level, label=label_of(choice), marks=marks, size=size)
+    return job_of(case, setup, member, level, label=label_of(choice), marks=marks, size=size)
 
 
 def function_name(function: Function) -> str:

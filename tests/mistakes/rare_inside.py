@@ -142,7 +142,7 @@ def no_finer_meshes(patch):
 
 def not_makeable():
     chosen = settings(read_case("forma04a"))
-    recipe(replace(chosen, generator=None, arguments={}, own=Combination("quad4", None)), "tri3", 1)
+    recipe(replace(chosen, generator=None, arguments={}, case_combination=Combination("quad4", None)), "tri3", 1)
 
 
 def failing(jobs, **_):

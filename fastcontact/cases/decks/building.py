@@ -413,7 +413,7 @@ class Building:
                 instants.update(number + k / count for k in range(1, count))  # ends of equal increments
         mechanical: tuple[Histories[Any], ...] = (conditions.supports, conditions.forces, conditions.loads)
         for histories in (*mechanical, conditions.temperatures, *conditions.heat.histories):
-            for track in histories.distinct():
+            for track in {id(track): track for track in histories.tracks.values()}.values():
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
             raise steps[0].refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")

@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact.cases.decks.assembled import Target, targets
 from fastcontact.cases.decks.blocks import Block, Location, Row
-from fastcontact.cases.decks.content import Given
+from fastcontact.cases.decks.content import Condition
 from fastcontact.cases.decks.fields import OF_HEAT, HeatConditions, initial_temperatures, temperatures_of_block
 from fastcontact.cases.decks.histories import Histories
 from fastcontact.cases.decks.local_axes import local_directions
@@ -56,8 +56,8 @@ class Conditions:
         self.loads: Histories[Target] = Histories(content)
         initial = initial_temperatures(assembly, content.initial_temperatures)
         self.temperatures: Histories[int] = Histories(content, rest=initial)
-        self.periods: dict[Component, Acting] = {}  # of supports that begin after the first step, or with FIXED
-        self.ended: list[tuple[Component, Acting]] = []
+        self.periods: dict[Component, Acting] = {}  # latest periods; supports without an entry act from the start
+        self.ended: list[tuple[Component, Acting]] = []  # earlier periods
         self.fixed_now: set[Component] = set()  # supports with FIXED in the current step
         self.heat = HeatConditions(assembly, initial)
         self.locks = Locks(assembly)
@@ -66,33 +66,33 @@ class Conditions:
     def run(self) -> None:
         """Record the supports and loads of all steps."""
         content = self.assembly.content
-        for given in content.supports:
-            self._supports(given, before=True)
+        for condition in content.supports:
+            self._supports(condition, before=True)
         self.supports.begin()
         self.heat.temperatures.begin()
         self.periods.update((name, replace(ALWAYS, keeps=True)) for name in self.fixed_now)
         for number, step in enumerate(content.steps, start=1):
-            self.locks.begin(number, [g for g in step.given if g.block.keyword == "BOUNDARY"], self.assembly)
-            for given in step.given:
-                self._take(given)
+            self.locks.begin(number, [g for g in step.conditions if g.block.keyword == "BOUNDARY"], self.assembly)
+            for condition in step.conditions:
+                self._take(condition)
             self._change(number)
             for advancing in (self.supports, self.forces, self.loads, self.temperatures, self.heat):
                 advancing.advance(number, step)  # type: ignore[attr-defined]
 
-    def _take(self, given: Given) -> None:
+    def _take(self, condition: Condition) -> None:
         """Record a block of supports or loads of the current step."""
-        keyword, block = given.block.keyword, given.block
+        keyword, block = condition.block.keyword, condition.block
         if keyword == "TEMPERATURE":
-            self.temperatures.take(given, temperatures_of_block(self.assembly, given.block))
+            self.temperatures.take(condition, temperatures_of_block(self.assembly, condition.block))
         elif keyword in OF_HEAT:
-            self.heat.take(given)
+            self.heat.take(condition)
         elif keyword == "BOUNDARY":
-            self._supports(given)
+            self._supports(condition)
         elif keyword == "CLOAD":
-            self.forces.take(given, self._forces(block))
+            self.forces.take(condition, self._forces(block))
         else:
             entries = ((t, row.number(2), row.location) for row in block.each() for t in targets(self.assembly, row))
-            self.loads.take(given, entries, lambda name: name.keyword == keyword)
+            self.loads.take(condition, entries, lambda name: name.keyword == keyword)
 
     def _change(self, number: int) -> None:
         """Record the supports that begin or end at the start of step `number`."""
@@ -125,19 +125,19 @@ class Conditions:
             return f"rotation {axis + 1} of a reference node"
         return f"component {axis + 1} of node {self.assembly.number_of(point)}"
 
-    def _supports(self, given: Given, before: bool = False) -> None:
+    def _supports(self, condition: Condition, before: bool = False) -> None:
         """Record a block *BOUNDARY, which stands in the current step or, if `before` is true, before all steps."""
-        block = given.block
+        block = condition.block
         kind = block.get("TYPE", "DISPLACEMENT").upper()
         if kind != "DISPLACEMENT":
             raise block.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
-        if given.new:
+        if condition.new:
             self.supports.forget()
             self.heat.temperatures.forget()
         driven = False
         for row in block.each():
             if row.text(1) == "11":
-                self.heat.prescribe(given, row)
+                self.heat.prescribe(condition, row)
                 continue
             points = self.assembly.nodes(row.text(0), row.location)
             components, value = NAMED.get(row.text(1).upper()), 0.0
@@ -152,28 +152,28 @@ class Conditions:
             driven = driven or bool(before and value)
             for point in points:
                 for component in components:
-                    self._support(given, row, point, component, value)
+                    self._support(condition, row, point, component, value)
         if driven:
             self.assembly.content.note(block, "a displacement before the first step is reached in that step")
 
-    def _support(self, given: Given, row: Row, point: int, component: int, value: float) -> None:
+    def _support(self, condition: Condition, row: Row, point: int, component: int, value: float) -> None:
         """Record a support of a point; CaseError if the component does not exist and the value is not zero."""
         name = self._component(point, component)
         if name is None:
             if value:
                 raise row.refuse(f"component {component} does not exist at nodes of this model")
             return
-        if self.locks.take(point, component, "FIXED" in given.block.parameters):
+        if self.locks.take(point, component, "FIXED" in condition.block.parameters):
             return
         sign = 1.0
         if point in self.directions and component <= 3:
             name, sign = self._local(point, component)
-        if "FIXED" in given.block.parameters:
+        if "FIXED" in condition.block.parameters:
             self.fixed_now.add(name)
             if self._acts(name):
                 self.supports.hold(name, row.location)
                 return
-        self.supports.give(name, sign * value, given.amplitude, row.location)
+        self.supports.give(name, sign * value, condition.amplitude, row.location)
 
     def _component(self, point: int, component: int) -> Component | None:
         """Return a component of a point or, for rotations, of the point that represents them; None if it does not exist."""

@@ -115,6 +115,11 @@ class Material(Located):
     expansion: float | tuple[float, ...] | None = None
     conductivity: Block | None = None
 
+    @property
+    def about(self) -> str:
+        """Beginning of messages about the material."""
+        return f"material '{self.name}': "
+
 
 @dataclass
 class Interaction(Located):
@@ -231,7 +236,7 @@ class Amplitude:
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class Condition:
     """A block of supports, loads or temperatures; `new` is true for OP=NEW, which removes earlier ones."""
 
     block: Block
@@ -251,7 +256,7 @@ class Step(Located):
     perturbation: bool = False
     heat: str = ""  # "alone"; "coupled" with displacements; empty if temperatures are not computed
     modes: int = 0
-    given: list[Given] = field(default_factory=list)
+    conditions: list[Condition] = field(default_factory=list)
 
 
 @dataclass
@@ -277,7 +282,7 @@ class Content:
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
     gaps: dict[str, tuple[Location, float, tuple[float, ...]]] = field(default_factory=dict)
     springs: dict[str, tuple[Location, float]] = field(default_factory=dict)
-    supports: list[Given] = field(default_factory=list)
+    supports: list[Condition] = field(default_factory=list)
     initial_temperatures: list[Block] = field(default_factory=list)
     initial_stresses: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)

@@ -124,7 +124,7 @@ class Deck:
         MeshError
             If the set does not exist.
         """
-        names = {group.upper(): group for group in reversed(self.model.mesh.point_groups)}
+        names = {group.upper(): group for group in reversed([*self.model.mesh.point_groups])}
         return self.model.mesh.points_of(names.get(folded(name), name))
 
     def point(self, number: int | str) -> int:

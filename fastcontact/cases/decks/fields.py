@@ -11,7 +11,7 @@ import numpy as np
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembly, Face, Target, targets
 from fastcontact.cases.decks.blocks import Block, Location, Row
-from fastcontact.cases.decks.content import Content, Given, Step
+from fastcontact.cases.decks.content import Condition, Content, Step
 from fastcontact.cases.decks.histories import ByShape, Histories, Name
 from fastcontact.cases.decks.meshing import DeckMesh, rows_by_type
 from fastcontact.mesh.mesh import starts_of
@@ -62,7 +62,8 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
         corners = sorted({times[0], *times[max(k - 1, 0) : k + 2], times[-1]})
         change = np.zeros(model.mesh.n_points)
         for _, points, values, table in fields:
-            factor = np.interp(time, *zip(*table, strict=True))
+            instants, factors = zip(*table, strict=True)
+            factor = np.interp(time, instants, factors)
             change[points] = factor * (values(points) if callable(values) else values)
         _add_field(model, change, tuple((corner, float(corner == time)) for corner in corners))
 
@@ -127,7 +128,7 @@ def check_steps(content: Content) -> None:
                 "heat transfer steps, coupled temperature-displacement steps, and static steps after them cannot be in one "
                 "deck: use *HEAT TRANSFER for all steps, or *COUPLED TEMPERATURE-DISPLACEMENT for all"
             )
-        for block in (given.block for given in step.given):
+        for block in (condition.block for condition in step.conditions):
             if block.keyword in OF_HEAT and not step.heat:
                 raise block.refuse("needs a step with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT")
             if block.keyword == "TEMPERATURE" and first:
@@ -186,16 +187,16 @@ class HeatConditions:
         """The histories of all heat loads."""
         return self.temperatures, self.powers, self.fluxes, self.films
 
-    def prescribe(self, given: Given, row: Row) -> None:
+    def prescribe(self, condition: Condition, row: Row) -> None:
         """Record the prescribed temperature of nodes in a line of *BOUNDARY."""
         if not self.assembly.content.heat:
             raise row.refuse(
                 "degree of freedom 11 (temperature) is not within 1 to 6: in static steps use *TEMPERATURE"
             )
-        if "FIXED" in given.block.parameters:
+        if "FIXED" in condition.block.parameters:
             raise row.refuse("FIXED is not supported for temperatures: give their values")
         for point in self._points_of_solids(row):
-            self.temperatures.give(point, row.number(3, 0.0), given.amplitude, row.location)
+            self.temperatures.give(point, row.number(3, 0.0), condition.amplitude, row.location)
 
     def _points_of_solids(self, row: Row) -> list[int]:
         """Return the points of the node set in a line; CaseError if a point belongs to no solid."""
@@ -205,19 +206,19 @@ class HeatConditions:
                 raise row.refuse(f"node {self.assembly.number_of(point)} belongs to no solid, so it has no temperature")
         return points
 
-    def take(self, given: Given) -> None:
+    def take(self, condition: Condition) -> None:
         """Record a block of heat loads of the current step."""
-        keyword = given.block.keyword
+        keyword = condition.block.keyword
         histories: dict[str, Histories[Any]] = {"CFLUX": self.powers, "FILM": self.films, "SFILM": self.films}
         history = histories.get(keyword, self.fluxes)
-        if given.new:
+        if condition.new:
             history.forget(lambda name: getattr(name, "keyword", keyword) == keyword)
-        for row in given.block.each():
+        for row in condition.block.each():
             if keyword == "CFLUX":
                 if row.whole(1, TEMPERATURE) not in (0, TEMPERATURE):
                     raise row.refuse(f"degree of freedom {row.text(1)} is not 11, the temperature")
                 for point in self._points_of_solids(row):
-                    self.powers.give(point, row.number(2), given.amplitude, row.location)
+                    self.powers.give(point, row.number(2), condition.amplitude, row.location)
                 continue
             film = history is self.films
             if film and row.number(3) < 0.0:
@@ -225,7 +226,7 @@ class HeatConditions:
             for target in targets(self.assembly, row, (row.number(3),) if film else ()):
                 if film:
                     self._replace_film(target, row)
-                history.give(target, row.number(2), given.amplitude, row.location)
+                history.give(target, row.number(2), condition.amplitude, row.location)
 
     def _replace_film(self, film: Target, row: Row) -> None:
         """Remove an earlier film with another coefficient from the face of a film; CaseError if both are in this step."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.cases.decks.blocks import Location, folded
-from fastcontact.cases.decks.content import Amplitude, Content, Given, Step
+from fastcontact.cases.decks.content import Amplitude, Condition, Content, Step
 from fastcontact.model.ramp import Table
 
 Name = TypeVar("Name", bound=Hashable)
@@ -158,15 +158,15 @@ class Histories(Generic[Name]):
 
     def take(
         self,
-        given: Given,
+        condition: Condition,
         entries: Iterable[tuple[Name, float, Location]],
         removed: Callable[[Name], bool] | None = None,
     ) -> None:
         """Set the values of the lines of a block; OP=NEW first removes earlier values as `forget` does."""
-        if given.new:
+        if condition.new:
             self.forget(removed)
         for name, value, location in entries:
-            self.give(name, value, given.amplitude, location)
+            self.give(name, value, condition.amplitude, location)
 
     def hold(self, name: Name, location: Location) -> None:
         """Hold the value at the end of the last step."""
@@ -236,10 +236,6 @@ class Histories(Generic[Name]):
             track = replace(track, numbers=track.numbers[:], size=len(names))
         self.tracks.update((name, track) for name in names)
         return track
-
-    def distinct(self) -> list[Track]:
-        """Return each track once."""
-        return list({id(track): track for track in self.tracks.values()}.values())
 
     def table(self, name: Name) -> Table:
         """Return the history as pairs of load factor and value, up to the end of the last step of the deck."""

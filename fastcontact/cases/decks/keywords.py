@@ -130,10 +130,10 @@ TRANSLATED = {
     "TIE": Keyword("model", relating.tie, "POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
     "TRANSFORM": Keyword("model", local_axes.transform, "NSET; TYPE"),
     # Supports and loads in steps.
-    "BOUNDARY": Keyword("step", stepping.given, "OP; AMPLITUDE; FIXED; TYPE"),
+    "BOUNDARY": Keyword("step", stepping.condition, "OP; AMPLITUDE; FIXED; TYPE"),
     **dict.fromkeys(
         ("CFLUX", "CLOAD", "DFLUX", "DLOAD", "DSFLUX", "DSLOAD", "FILM", "SFILM", "TEMPERATURE"),
-        Keyword("step", stepping.given, "OP; AMPLITUDE"),
+        Keyword("step", stepping.condition, "OP; AMPLITUDE"),
     ),
     # Procedures of steps.
     **dict.fromkeys(
@@ -239,13 +239,12 @@ class Reader:
         if keyword in OUTPUT:
             content.outputs.append(block.location)
             return
-        properties = checked(block, f"material '{self.material.name}': " if self.material else "")
+        properties = checked(block, self.material.about if self.material else "")
         context = properties.context
         if self.coupling is not None and keyword not in ("KINEMATIC", "DISTRIBUTING"):
             raise self.coupling.refuse("*KINEMATIC or *DISTRIBUTING must follow")
         if self.material is not None and keyword in COHESIVE_DAMAGE:
-            name = self.material.name
-            raise block.refuse(f"material '{name}': damage is supported for cohesive layers only, not in bodies")
+            raise block.refuse(f"{self.material.about}damage is supported for cohesive layers only, not in bodies")
         owner = {
             "part": self.part or content.root, "material": self.material, "interaction": self.interaction,
             "coupling": self.coupling, "procedure": self.step, "step": self.step,

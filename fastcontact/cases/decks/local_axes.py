@@ -98,10 +98,10 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
     starts = starts_of(assembly.solids_by_type)
     frames = np.tile(np.eye(3), (len(assembly.solids), 1, 1))
     for element in members:
-        frame = frame_of.get(id(element), default)
-        if frame is None:
+        axes_of_element = frame_of.get(id(element), default)
+        if axes_of_element is None:
             raise block.refuse(f"element {element.number} has no axes, and there is no default line without an element")
-        frames[starts[element.solid.element] + element.row] = frame
+        frames[starts[element.solid.element] + element.row] = axes_of_element
     return frames
 
 

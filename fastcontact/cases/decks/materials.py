@@ -46,7 +46,7 @@ def elastic(content: Content, current: Material, block: Block) -> None:
     kinds = [name for name in CONSTANTS if len(kind) >= 3 and name.startswith(kind)]
     if not kinds:
         names = ", ".join(CONSTANTS)
-        raise block.refuse(f"material '{current.name}': TYPE={kind[:40]} is not supported; expected one of {names}")
+        raise block.refuse(f"{current.about}TYPE={kind[:40]} is not supported; expected one of {names}")
     if kinds[0] != "ISOTROPIC":
         _anisotropic(current, block, kinds[0])
         return
@@ -54,7 +54,7 @@ def elastic(content: Content, current: Material, block: Block) -> None:
     E, nu = row.number(0), row.number(1, 0.0)
     if row.text(2):
         content.note(row, "the temperature of the constants has no effect: there is one set of them")
-    with refusing(row, f"material '{current.name}': "):
+    with refusing(row, current.about):
         law = LinearElastic(E=E, nu=nu)
     current.law = lambda axes: law
 
@@ -63,9 +63,7 @@ def _anisotropic(current: Material, block: Block, kind: str) -> None:
     """Read the constants of an anisotropic material, which may fill several lines and be followed by a temperature."""
     numbers, count = block.numbers(), CONSTANTS[kind]
     if not count <= len(numbers) <= count + 1:
-        raise block.refuse(
-            f"material '{current.name}': {len(numbers)} constants where {kind} has {count}, at one temperature"
-        )
+        raise block.refuse(f"{current.about}{len(numbers)} constants where {kind} has {count}, at one temperature")
     values = numbers[:count]
 
     def law(axes: Any) -> Orthotropic | Anisotropic:
@@ -73,7 +71,7 @@ def _anisotropic(current: Material, block: Block, kind: str) -> None:
             return Orthotropic(E=values[:3], nu=values[3:6], G=values[6:], axes=axes)
         return Anisotropic(_moduli(values), axes=axes)
 
-    with refusing(block, f"material '{current.name}': "):
+    with refusing(block, current.about):
         law(None)
     current.law = law
 
@@ -98,7 +96,7 @@ def density(content: Content, current: Material, block: Block) -> None:
     """Read *DENSITY: the mass per volume."""
     current.density = block.only().number(0)
     if not current.density > 0:
-        raise block.refuse(f"material '{current.name}': the density {current.density:g} must be positive")
+        raise block.refuse(f"{current.about}the density {current.density:g} must be positive")
 
 
 def plastic(content: Content, current: Material, block: Block) -> None:
@@ -106,23 +104,21 @@ def plastic(content: Content, current: Material, block: Block) -> None:
     hardening = block.choice("HARDENING", ("ISOTROPIC", "KINEMATIC"))
     elastic = None if current.law is None else current.law(None)
     if type(elastic) is not LinearElastic:
-        raise block.refuse(f"material '{current.name}': isotropic *ELASTIC constants must precede it")
+        raise block.refuse(f"{current.about}isotropic *ELASTIC constants must precede it")
     table = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
     if not table:
         raise block.refuse("a data line with a yield stress is needed")
     if table[0][0] != 0.0:
-        raise block.rows[0].refuse(f"material '{current.name}': the first plastic strain {table[0][0]:g} must be zero")
+        raise block.rows[0].refuse(f"{current.about}the first plastic strain {table[0][0]:g} must be zero")
     if len({row.text(2) for row in block.rows}) > 1:
-        raise block.refuse(f"material '{current.name}': one temperature is supported")
+        raise block.refuse(f"{current.about}one temperature is supported")
     modulus = 0.0  # of kinematic hardening
     if hardening == "KINEMATIC":
         if len(table) > 2:
-            raise block.refuse(
-                f"material '{current.name}': kinematic hardening is linear: two points, not {len(table)}"
-            )
+            raise block.refuse(f"{current.about}kinematic hardening is linear: two points, not {len(table)}")
         modulus = (table[1][1] - table[0][1]) / table[1][0] if len(table) == 2 else 0.0
         table = table[:1]
-    with refusing(block, f"material '{current.name}': "):
+    with refusing(block, current.about):
         law = ElasticPlastic(E=elastic.E, nu=elastic.nu, yield_stress=table[0][1], hardening=table, kinematic=modulus)
     current.law = lambda axes: law
 
@@ -131,20 +127,20 @@ def hyperelastic(content: Content, current: Material, block: Block) -> None:
     """Read *HYPERELASTIC: the deviatoric constants, then the compressibility constants."""
     kinds = [kind for kind in HYPERELASTIC if kind in block.parameters]
     if len(kinds) != 1:
-        raise block.refuse(f"material '{current.name}': one of {', '.join(HYPERELASTIC)} is supported")
+        raise block.refuse(f"{current.about}one of {', '.join(HYPERELASTIC)} is supported")
     kind, terms = kinds[0], int(block.get("N", "1")) if kinds[0] == "OGDEN" else 1
     numbers, (n_deviatoric, n_volumetric) = block.numbers(), (count * terms for count in HYPERELASTIC[kind])
     if len(numbers) < n_deviatoric:
-        raise block.refuse(f"material '{current.name}': {kind} has {n_deviatoric} constants, {len(numbers)} are given")
+        raise block.refuse(f"{current.about}{kind} has {n_deviatoric} constants, {len(numbers)} are given")
     constants, (D1, *others) = numbers[:n_deviatoric], [*numbers[n_deviatoric:], 0.0][:n_volumetric]
     if any(others):
-        raise block.refuse(f"material '{current.name}': only the compressibility constant D1 is supported")
+        raise block.refuse(f"{current.about}only the compressibility constant D1 is supported")
     mu = sum(constants[::2]) if kind == "OGDEN" else 2.0 * sum(constants[: 2 if kind == "MOONEY-RIVLIN" else 1])
     nu = DEFAULT_POISSON_RATIO
     bulk = 2.0 / D1 if D1 else 2.0 * mu * (1.0 + nu) / (3.0 * (1.0 - 2.0 * nu))
     if not D1:
         content.note(block, f"D1 = 0: the bulk modulus is that of nu = {nu}")
-    with refusing(block, f"material '{current.name}': "):
+    with refusing(block, current.about):
         law = _hyperelastic(kind, constants, mu, bulk)
     current.law = lambda axes: law
 
@@ -177,7 +173,7 @@ def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
     row, count = block.only("temperatures"), COEFFICIENTS[kind]
     values = tuple(row.number(index) for index in range(count))
     if any(row.entries[count + 1 :]):
-        raise row.refuse(f"material '{current.name}': TYPE={kind} has {count} coefficients, at one temperature")
+        raise row.refuse(f"{current.about}TYPE={kind} has {count} coefficients, at one temperature")
     return values[0] if kind == "ISO" else values
 
 
@@ -189,18 +185,20 @@ def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     law, expansion = material.law(axes), material.expansion
     law = replace(law, density=material.density)
     if isinstance(law, NonlinearElastic) and modes:
-        content.note(material, f"material '{material.name}': incompatible modes are left out, since it is nonlinear")
+        content.note(material, f"{material.about}incompatible modes are left out, since it is nonlinear")
     elif modes:
         law = replace(law, incompatible_modes=True)
     if content.heat or material.conductivity is not None:
         law = _with_constants(material, law, axes, conductivity=_conductivity(content, material))
-    heated = content.heat or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
+    heated = content.heat or any(
+        condition.block.keyword == "TEMPERATURE" for step in content.steps for condition in step.conditions
+    )
     if expansion is None:
         if heated:
             content.note(material, f"material '{material.name}' has no *EXPANSION: temperatures cause no strain")
         return replace(law, expansion=0.0) if heated else law
     if not heated:
-        content.note(material, f"material '{material.name}': without temperatures the expansion has no effect")
+        content.note(material, f"{material.about}without temperatures the expansion has no effect")
     return _with_constants(material, law, axes, expansion=expansion)
 
 
@@ -212,11 +210,11 @@ def _conductivity(content: Content, material: Material) -> float | tuple[float, 
             raise material.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
         return None
     if not content.heat:
-        content.note(block, f"material '{material.name}': no effect, temperatures are given, not computed")
+        content.note(block, f"{material.about}no effect, temperatures are given, not computed")
         return None
     values = along_axes(material, block)
     if not np.min(values) > 0.0:
-        raise block.refuse(f"material '{material.name}': the conductivity {np.min(values):g} must be positive")
+        raise block.refuse(f"{material.about}the conductivity {np.min(values):g} must be positive")
     return values
 
 
@@ -225,7 +223,7 @@ def _with_constants(material: Material, law: Any, axes: Any, **constants: Any) -
     if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
         if isinstance(law, NonlinearElastic):
             raise material.refuse(
-                f"material '{material.name}': expansion and conductivity along axes are supported in elastic materials only"
+                f"{material.about}expansion and conductivity along axes are supported in elastic materials only"
             )
         G = law.E / (2.0 * (1.0 + law.nu))
         others = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}

@@ -293,8 +293,8 @@ def multi_point(content: Content, block: Block) -> None:
         elif kind in LEAST:
             continuing.append((row, kind, nodes))
         elif kind not in ("PIN", "TIE", "BEAM"):
-            known = ", ".join(("PIN", "TIE", "BEAM", *LEAST))
-            raise row.refuse(f"an MPC of type {kind[:40]} is not supported, only {known}")
+            kinds = ", ".join(("PIN", "TIE", "BEAM", *LEAST))
+            raise row.refuse(f"an MPC of type {kind[:40]} is not supported, only {kinds}")
         elif len(nodes) != 2:
             raise row.refuse(f"{kind} needs two nodes, the dependent and the independent one")
         elif kind == "BEAM":

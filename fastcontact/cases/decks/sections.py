@@ -7,7 +7,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.cases.decks.assembled import Assembly, facet_points
 from fastcontact.cases.decks.blocks import Block, folded, refusing
-from fastcontact.cases.decks.content import Content, Given, PretensionSection, SectorEnds, Sectors
+from fastcontact.cases.decks.content import Condition, Content, PretensionSection, SectorEnds, Sectors
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.mesh.generate.cut import cut
@@ -28,21 +28,10 @@ def pretension_section(content: Content, block: Block) -> None:
     )
 
 
-def section_points(assembly: Assembly) -> dict[int, PretensionSection]:
-    """Return the sections by the point of their node; CaseError if a node belongs to a body or to two sections."""
-    sections: dict[int, PretensionSection] = {}
-    for section in assembly.content.pretension_sections:
-        point = assembly.node(section.node, section.location)
-        if point in assembly.of_solids:
-            raise section.refuse(f"node {section.node} belongs to an element: a section needs a separate node")
-        if point in sections:
-            raise section.refuse(f"node {section.node} has a section already, in line {sections[point].location.line}")
-        sections[point] = section
-    return sections
-
-
 class Locks:
     """Load factors at which pretension sections are locked.
+
+    Raises CaseError if the node of a section belongs to a body or to another section.
 
     Attributes
     ----------
@@ -55,21 +44,32 @@ class Locks:
     """
 
     def __init__(self, assembly: Assembly) -> None:
-        self.points = section_points(assembly)
+        self.points: dict[int, PretensionSection] = {}
         self.begins: dict[int, float] = {}
         self.number = 0
+        for section in assembly.content.pretension_sections:
+            point = assembly.node(section.node, section.location)
+            if point in assembly.of_solids:
+                raise section.refuse(f"node {section.node} belongs to an element: a section needs a separate node")
+            if point in self.points:
+                line = self.points[point].location.line
+                raise section.refuse(f"node {section.node} has a section already, in line {line}")
+            self.points[point] = section
 
-    def begin(self, number: int, supports: list[Given], assembly: Assembly) -> None:
+    def begin(self, number: int, supports: list[Condition], assembly: Assembly) -> None:
         """Advance to step `number`; CaseError if it releases a locked section."""
         self.number = number
-        if not any(given.new for given in supports):
+        if not any(condition.new for condition in supports):
             return
         named = {
-            p for given in supports for row in given.block.each() for p in assembly.nodes(row.text(0), row.location)
+            p
+            for condition in supports
+            for row in condition.block.each()
+            for p in assembly.nodes(row.text(0), row.location)
         }
         for point in self.begins:
             if point not in named:
-                location = next(given.block.location for given in supports if given.new)
+                location = next(condition.block.location for condition in supports if condition.new)
                 raise location.refuse(
                     f"node {self.points[point].node} of a pretension section is released here: a locked section stays locked"
                 )

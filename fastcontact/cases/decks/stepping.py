@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from fastcontact.cases.decks.blocks import Block, defined, folded
-from fastcontact.cases.decks.content import Amplitude, Content, Given, Step
+from fastcontact.cases.decks.content import Amplitude, Condition, Content, Step
 
 # Largest number of increments into which a step of a path-dependent model is divided.
 MOST_INCREMENTS = 20
@@ -71,8 +71,8 @@ def end_step(content: Content, step: Step | None, block: Block) -> None:
         if not step.static:
             raise step.refuse("the step has no *STATIC or other procedure")
         return
-    if step.given:
-        raise step.given[0].block.refuse("cannot be in a step with *FREQUENCY: modes have the earlier supports")
+    if step.conditions:
+        raise step.conditions[0].block.refuse("cannot be in a step with *FREQUENCY: modes have the earlier supports")
     content.steps.pop()
     if not content.steps:
         raise step.refuse("*FREQUENCY needs a step with *STATIC before it: modes are vibrations about its last state")
@@ -87,15 +87,15 @@ def end_step(content: Content, step: Step | None, block: Block) -> None:
     )
 
 
-def given(content: Content, step: Step | None, block: Block) -> None:
+def condition(content: Content, step: Step | None, block: Block) -> None:
     """Store a block of supports or loads of a step, or a *BOUNDARY that precedes all steps."""
     if name := block.get("AMPLITUDE"):
         defined("amplitude", name, content.amplitudes, block)
-    conditions = Given(block, block.choice("OP", ("MOD", "NEW")) == "NEW", name)
+    new = Condition(block, block.choice("OP", ("MOD", "NEW")) == "NEW", name)
     if step is not None:
-        step.given.append(conditions)
+        step.conditions.append(new)
     elif block.keyword == "BOUNDARY":
-        content.supports.append(conditions)
+        content.supports.append(new)
     else:
         raise block.refuse("loads belong in a step")
 

@@ -14,9 +14,8 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.conductance import Conductance
 from fastcontact.elasticity.loads import Value, evaluated
 from fastcontact.errors import ModelError
-from fastcontact.heat.conduction import Conduction
+from fastcontact.heat.conduction import Conduction, not_reached
 from fastcontact.heat.loads import Film, FixedTemperature, HeatFlux, Heating, HeatSource, NodalHeat
-from fastcontact.heat.reached import not_reached
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.parts.base import ModelBase, group_names
 from fastcontact.model.periodicity import same_place
