@@ -58,10 +58,6 @@ class Elimination:
         """Whether pivots are coupled: equations of many nodes involve each other's pivots."""
         return isinstance(self.own, CoupledPivots)
 
-    def shifted(self, c: Array) -> Array:
-        """Return the change (m,) of the pivots [length] due to a change c (m,) of the right-hand sides [length]."""
-        return self.own.solve(c)
-
     def multiplier(self, forces: Array) -> Array:
         """Return the multipliers (m,) [force], given their `forces` (m,) at the pivots, ``(K u - f)[pivots]`` [force]."""
         return self.inverse.solve_transposed(forces)

@@ -144,7 +144,7 @@ class _Excess:
 
     def displacement(self, x: Array, offset: Array | None) -> Array:
         """Return the displacements (n,) of x (n,) [length]; the `offset` (m,) of the pivots is added if it is given."""
-        shift = self._elimination.shifted(x[self._pivots])
+        shift = self._elimination.own.solve(x[self._pivots])
         u = self._u
         u[:] = x
         self._elimination.complete(u, shift if offset is None else shift + offset)
