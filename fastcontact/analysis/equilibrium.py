@@ -26,7 +26,7 @@ from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array
 from fastcontact.elasticity.constrained_system import Stiffness
-from fastcontact.elasticity.nonlinear_bodies import COMPLETE, DeformedBodies
+from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies
 from fastcontact.elasticity.springs import Springs, ground_force, spring_force, spring_stiffness
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
@@ -47,7 +47,7 @@ class Term(Protocol):
         """Return the nodal forces (n_dofs,) of the term at u [force], and its energies."""
         ...
 
-    def tangent(self, u: Array, geometric: int = COMPLETE) -> bsr_array | csr_array | None:
+    def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array | csr_array | None:
         """Return the derivative (n, n) of the nodal forces with respect to the n displacements of points [force / length].
 
         The caller may modify the matrix. None means that the derivative is constant, and part of the matrix that `prepare`
@@ -75,7 +75,7 @@ class LinearBodies(Term):
         force = self._K @ u
         return force, (0.5 * float(u @ force), 0.0)
 
-    def tangent(self, u: Array, geometric: int = COMPLETE) -> None:
+    def tangent(self, u: Array, geometric: int = WHOLE) -> None:
         """See `Term`."""
 
 
@@ -113,9 +113,9 @@ class Bodies(Term):
         force[: bodies.force.size] = bodies.force.ravel()
         return force, (bodies.energy, bodies.plastic_work)
 
-    def tangent(self, u: Array, geometric: int = COMPLETE) -> bsr_array:
+    def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
         """See `Term`."""
-        if geometric < COMPLETE or u is self._taken:
+        if geometric < WHOLE or u is self._taken:
             return self._problem.deformed(u, self._start, self._rise, geometric=geometric).K
         self._taken = u
         return self.at(u).K
@@ -138,7 +138,7 @@ class SpringForces(Term):
         force[: self._n] = spring_force(self._springs, of_points)
         return force, (0.5 * float(force[: self._n] @ of_points), 0.0)
 
-    def tangent(self, u: Array, geometric: int = COMPLETE) -> csr_array:
+    def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
         """See `Term`."""
         return self._K
 
@@ -175,7 +175,7 @@ class FollowingForce(Term):
         force[: here.size] = -self._factor * (here - self._before).ravel()
         return force, (0.0, 0.0)
 
-    def tangent(self, u: Array, geometric: int = COMPLETE) -> csr_array:
+    def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
         """See `Term`."""
         return self._factor * self._stiffness(self._displacement(u))
 
@@ -214,7 +214,7 @@ class Terms:
             force, energy = force + added, (energy[0] + stored[0], energy[1] + stored[1])
         return force, energy
 
-    def tangent(self, u: Array, geometric: int = COMPLETE) -> bsr_array:
+    def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
         """Return the sum of the tangents; see `Term`. It may only be called if the bodies are nonlinear."""
         assert self.bodies is not None
         K = self.bodies.tangent(u, geometric)

@@ -33,7 +33,7 @@ from fastcontact.analysis.inequalities import Iterate, StepContext
 from fastcontact.analysis.problem import Problem, StepLoad, linearised
 from fastcontact.analysis.tolerances import DECLINE
 from fastcontact.arrays import Array
-from fastcontact.elasticity.nonlinear_bodies import COMPLETE
+from fastcontact.elasticity.nonlinear_bodies import WHOLE
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.protocol import Loaded
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
@@ -101,7 +101,7 @@ class Regularisation:
         Whether the springs along closed gaps replace those of floating bodies, if they resist all motions of these bodies.
     """
 
-    geometric: int = COMPLETE
+    geometric: int = WHOLE
     held: float = 0.0
     stiff: bool = False
     replaces: bool = False
@@ -109,7 +109,7 @@ class Regularisation:
     @property
     def linear(self) -> bool:
         """Whether iterations with this tangent converge linearly only."""
-        return self.geometric < COMPLETE or self.held > 0.0
+        return self.geometric < WHOLE or self.held > 0.0
 
 
 class _Newton:
@@ -269,9 +269,9 @@ class _Newton:
         if self._by in held:
             held.remove(self._by)
             whole, held = [], [self._by, *held]  # the whole tangent failed in an earlier iteration
-        if self._by.geometric < COMPLETE:  # so did springs
+        if self._by.geometric < WHOLE:  # so did springs
             return [*whole, *(Regularisation(less, stiff=floats) for less in range(self._by.geometric + 1)[::-1])]
-        return whole + held + [Regularisation(less, stiff=floats) for less in range(COMPLETE)[::-1]]
+        return whole + held + [Regularisation(less, stiff=floats) for less in range(WHOLE)[::-1]]
 
     def _linearised_contact(self, u: Array, changes: list[float], by: Regularisation) -> tuple[Array, Array]:
         """Return the result of `_solve` for a tangent."""
@@ -281,9 +281,9 @@ class _Newton:
             problem = replace(problem, linearised_at=None if problem.linearised_at is None else u)
         else:
             K = terms.tangent(u, by.geometric)
-            contact = self._stiffness_of_contact(K, u, by) if by.geometric == COMPLETE else None
+            contact = self._stiffness_of_contact(K, u, by) if by.geometric == WHOLE else None
             problem = linearised(self._problem, K, u, iterate.rigid, contact, by.stiff, by.replaces)
-            if by.geometric == COMPLETE:
+            if by.geometric == WHOLE:
                 self._kept = problem
         force, floating = self._load.force - terms.residual(u)[0] + problem.system.K @ u, problem.floating_bodies
         if floating is not None and iterate.rigid is not None:

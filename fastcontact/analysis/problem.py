@@ -28,7 +28,7 @@ from fastcontact.elasticity.following_pressure import FollowingPressure
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
-from fastcontact.elasticity.nonlinear_bodies import COMPLETE, DeformedBodies, NonlinearBodies
+from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies, NonlinearBodies
 from fastcontact.elasticity.springs import stiffened, too_stiff
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.elasticity.temperature import Temperature
@@ -257,7 +257,7 @@ class Problem:
         )
 
     def deformed(
-        self, u: Array, start: State, rise: Array | None, *, geometric: int = COMPLETE, tangent: bool = True
+        self, u: Array, start: State, rise: Array | None, *, geometric: int = WHOLE, tangent: bool = True
     ) -> DeformedBodies:
         """Return the nonlinear bodies at displacements u (n_dofs,) [length], see `NonlinearBodies.at`.
 

@@ -29,7 +29,7 @@ History = dict[str, Array]
 # F_zz - 1 in plane stress; see `constitutive_kernels`.
 HISTORY, PLASTIC_STRAIN, ACROSS = 9, 6, 8
 # Value of the argument `geometric` for the complete tangent, see `NonlinearBodies.at`.
-COMPLETE = 2
+WHOLE = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +135,7 @@ class NonlinearBodies:
         return moduli, bulk
 
     def at(
-        self, displacement: Array, before: Mapping[str, Array], *, rise: Array | None = None, geometric: int = COMPLETE,
+        self, displacement: Array, before: Mapping[str, Array], *, rise: Array | None = None, geometric: int = WHOLE,
         tangent: bool = True,
     ) -> DeformedBodies:  # fmt: skip
         """Return the response to a displacement, with internal forces, stresses, history and tangent.
@@ -170,7 +170,7 @@ class NonlinearBodies:
     def _elastic(self) -> Array:
         """Blocks (n_blocks, dim, dim) of the tangent without plastic flow at small strains [force / length]."""
         data = np.zeros(self._blocks)
-        self._assembled(np.zeros_like(self.mesh.points), self.beginning, None, COMPLETE, data, False)
+        self._assembled(np.zeros_like(self.mesh.points), self.beginning, None, WHOLE, data, False)
         return data
 
     def _assembled(

@@ -358,13 +358,13 @@ class Multigrid:
         """
         enough = tolerance * scale
         made, target = 0, max(min(enough, WARM * iteration.norm, aim), WARM_LEAST * enough)
-        initial_norm = iteration.norm
-        if initial_norm > STOOD * self._cut_short and self._constrained.stiffening > MILD:
+        begun = iteration.norm
+        if begun > STOOD * self._cut_short and self._constrained.stiffening > MILD:
             self._most_warm = min(2 * self._most_warm, LONGEST_WARM)
         self._cut_short = np.inf
         while not (done := self._done(iteration, tolerance, scale)) or iteration.norm > target:
             if done and made >= self._most_warm:
-                self._cut_short = initial_norm
+                self._cut_short = begun
                 return
             if made >= MAX_ITERATIONS or not iteration.step(multiply, precondition):
                 if iteration.norm <= enough:
