@@ -1,10 +1,10 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Element loop of bodies with nonlinear laws: tangent stiffness, internal forces, stress, energy and history.
 
-In the reference configuration (total Lagrangian), nodal forces are integrals of P : dN/dX, and the tangent consists of
-integrals of dN/dX : A : dN/dX (Bonet and Wood, 2008, chapter 9). At small strains, P is the Cauchy stress and J is one plus
-the trace of the strain. With thermal expansion, F is the elastic part of the deformation gradient, relative to the
-stress-free intermediate configuration (Lu and Pister, 1975).
+The formulation is total Lagrangian: nodal forces are integrals of P . dN/dX over the reference configuration, and the tangent
+consists of integrals of dN/dX . A . dN/dX (Bonet and Wood, 2008, chapter 9). At small strains, P is the Cauchy stress and J
+is one plus the trace of the strain. With thermal expansion, F is the elastic part of the deformation gradient, relative to
+the stress-free intermediate configuration (Lu and Pister, 1975).
 """
 
 import numpy as np
@@ -25,16 +25,17 @@ from fastcontact.elasticity.dilatation_kernels import back_substitute, reduce
 from fastcontact.elasticity.element_2d_kernels import TWO_PI, owned
 from fastcontact.elasticity.element_3d_kernels import add_block
 from fastcontact.elasticity.tile_product import tile
+from fastcontact.mesh.jacobian_kernels import cofactors
 
-# Largest number of Newton iterations for the out-of-plane strain in plane stress, and tolerance relative to the modulus.
-THROUGH, ENOUGH = 50, 1e-13
-# Status codes of `linearise`, in addition to the number of a cell.
+# Largest number of Newton iterations for F_zz in plane stress, and tolerance of P_zz relative to its derivative.
+MOST_ITERATIONS, TOLERANCE = 50, 1e-13
+# Status codes of `linearise`, which returns them with the number of a cell; zero means success.
 INVERTED, NO_PLANE_STRESS = 1, 2
 
 
 @kernel
 def _tables(dN, columns, rows):
-    """Fill derivatives dN (n_q, n_nodes, dim) into `columns` and `rows`: those of point q are three from 3 q on."""
+    """Store dN (n_q, n_nodes, dim) in the columns of `columns` and in the rows of `rows`, those of point q from 3 q on."""
     n_q, n_nodes, dim = dN.shape
     columns[:], rows[:] = 0.0, 0.0
     for q in range(n_q):
@@ -45,7 +46,7 @@ def _tables(dN, columns, rows):
 
 @kernel
 def _map(points, displacement, cells, c, columns, x, maps):
-    """Fill `maps`: three rows for each point, the derivatives of positions (columns 0 to 2) and displacements (4 to 6).
+    """Fill three rows of `maps` for each point: derivatives of positions (columns 0 to 2) and displacements (4 to 6).
 
     `columns` (n_nodes, n_rows) are the derivatives of the shape functions, see `_tables`. Positions and displacements of the
     nodes of cell `c` are filled into `x` (n_nodes, 8).
@@ -62,16 +63,14 @@ def _map(points, displacement, cells, c, columns, x, maps):
 
 @kernel
 def _at_point(maps, q, dim, rows, inverse, gradient, F):
-    """Fill the rows from 3 q on of `gradient` (n_q * 3 + 1, width) and F (3, 3); return det J.
+    """Fill F (3, 3) and the three rows of point q in `gradient` (n_q * 3 + 1, width); return det J.
 
     `maps` are from `_map`, and `rows` from `_tables`. `inverse` (3, 4) is overwritten.
     """
     k = 3 * q
     j00, j01, j02, j10, j11, j12 = maps[k, 0], maps[k, 1], maps[k, 2], maps[k + 1, 0], maps[k + 1, 1], maps[k + 1, 2]
     j20, j21, j22 = maps[k + 2, 0], maps[k + 2, 1], 1.0 if dim == 2 else maps[k + 2, 2]
-    c00, c01, c02 = j11 * j22 - j12 * j21, j12 * j20 - j10 * j22, j10 * j21 - j11 * j20
-    c10, c11, c12 = j02 * j21 - j01 * j22, j00 * j22 - j02 * j20, j01 * j20 - j00 * j21
-    c20, c21, c22 = j01 * j12 - j02 * j11, j02 * j10 - j00 * j12, j00 * j11 - j01 * j10
+    c00, c01, c02, c10, c11, c12, c20, c21, c22 = cofactors(j00, j01, j02, j10, j11, j12, j20, j21, j22)
     det = j00 * c00 + j01 * c01 + j02 * c02
     factor = 1.0 / det
     i00, i01, i02, i10, i11, i12 = factor * c00, factor * c01, factor * c02, factor * c10, factor * c11, factor * c12
@@ -107,18 +106,18 @@ def _about_axis(x, N, q, gradient, F):
 
 @kernel
 def _expanded(strain, N, cell, rise, finite, F, gradient):
-    """Remove the expansion by a `rise` (n_points,) from F and shape derivatives (3, width), in place.
+    """Remove thermal expansion from F and from the shape derivatives `gradient` (3, width), in place.
 
-    `rise` (n_points,) is the temperature rise, and `strain` (6,) the thermal strain per degree, with engineering shears.
+    `rise` (n_points,) is the temperature rise, and `strain` (6,) the thermal strain per unit rise, with engineering shears.
     Returns the thermal volume ratio and the thermal stretch along z.
     """
-    degrees = 0.0
+    rise_at_point = 0.0
     for a in range(len(cell)):
-        degrees += N[a] * rise[cell[a]]
+        rise_at_point += N[a] * rise[cell[a]]
     U, inverse = np.empty((3, 3)), np.empty((3, 3))
     for i in range(3):
         for j in range(3):
-            U[i, j] = 1.0 + degrees * strain[i] if i == j else 0.5 * degrees * strain[voigt(i, j)]
+            U[i, j] = 1.0 + rise_at_point * strain[i] if i == j else 0.5 * rise_at_point * strain[voigt(i, j)]
     if not finite:
         F -= U
         for i in range(3):
@@ -144,40 +143,40 @@ def _dilatation(F, finite, G):
 
 
 @kernel
-def _leave_out_initial_stress(omitted, G, J, P, pressure, turning, A):
-    """If `omitted`, subtract the initial-stress term delta_ik S_JL from A.
+def _subtract_initial_stress(omitted, G, J, P, pressure, d2J_factor, A):
+    """Subtract the initial-stress term delta_ik S_JL from A if `omitted` is true.
 
-    S is the second Piola-Kirchhoff stress of P plus G = dJ/dF times `turning` minus `pressure`. In compression, where
-    `turning` is negative, the effect of the variation of the dilatation within a cell is subtracted as well.
+    S is the second Piola-Kirchhoff stress that belongs to ``P + (d2J_factor - pressure) G``. In compression, where
+    `d2J_factor` is negative, the contribution of the variation of the dilatation within a cell is subtracted as well.
     """
     for row in range(9 if omitted else 0):
         for column in range(9):
-            A[row, column] -= turning / J * G[row // 3, row % 3] * G[column // 3, column % 3]
+            A[row, column] -= d2J_factor / J * G[row // 3, row % 3] * G[column // 3, column % 3]
     for j in range(3 if omitted else 0):
         for m in range(3):
             S = 0.0
             for k in range(3):
-                S += G[k, j] * (P[k, m] + (turning - pressure) * G[k, m])
+                S += G[k, j] * (P[k, m] + (d2J_factor - pressure) * G[k, m])
             for i in range(3):
                 A[3 * i + j, 3 * i + m] -= S / J
 
 
 @kernel
-def _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G):
+def _respond_in_plane_stress(constants, D, bulk, finite, stretch_z, F, old, new, P, A, G):
     """Solve for the F_zz at which P_zz vanishes, and eliminate F_zz from A.
 
-    `thicker` is the stress-free out-of-plane stretch. Returns the energy density, and whether the iteration converged.
+    `stretch_z` is the thermal out-of-plane stretch. Returns the energy density, and whether the iteration converged.
     """
-    F[2, 2] = (1.0 + old[8]) / thicker if finite else 2.0 + old[8] - thicker
-    for _ in range(THROUGH):
+    F[2, 2] = (1.0 + old[8]) / stretch_z if finite else 2.0 + old[8] - stretch_z
+    for _ in range(MOST_ITERATIONS):
         J = _dilatation(F, finite, G)
         pressure = bulk * (J - 1.0)
         volumetric = (pressure, bulk, pressure if finite else 0.0)
         energy = respond(constants, D, F, J, G, volumetric, True, old, new, P, A)
         if not A[8, 8] > 0.0:
             return energy, False
-        if abs(P[2, 2]) <= ENOUGH * A[8, 8]:
-            new[8] = F[2, 2] * thicker - 1.0 if finite else F[2, 2] + thicker - 2.0
+        if abs(P[2, 2]) <= TOLERANCE * A[8, 8]:
+            new[8] = F[2, 2] * stretch_z - 1.0 if finite else F[2, 2] + stretch_z - 2.0
             for row in range(8):
                 for column in range(8):
                     A[row, column] -= A[row, 8] * A[8, column] / A[8, 8]
@@ -188,40 +187,41 @@ def _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G):
 
 @kernel
 def _respond(
-    constants, D, bulk, pressure, thicker, plane_stress, finite, geometric, everywhere, F, J, G, old, new, P, A
+    constants, D, bulk, pressure, stretch_z, plane_stress, finite, geometric, everywhere, F, J, G, old, new, P, A
 ):
     """Fill the history `new` (9,), P and A of a point; return its energy density, and whether plane stress converged.
 
-    `pressure` is that of the projected dilatation, `bulk` the modulus of the remainder, J and G (3, 3) are the dilatation
-    and its derivative; see `linearise`, `_through` and, for `everywhere`, `respond`.
+    `pressure` is that of the projected dilatation, `bulk` the bulk modulus of the remainder, and G (3, 3) the derivative of
+    J. Other arguments are described for `linearise`, `_respond_in_plane_stress` and `respond`.
     """
     omitted = finite and geometric == 0 and everywhere
     if plane_stress:
-        energy, settled = _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G)
-        _leave_out_initial_stress(omitted, G, determinant(F), P, 0.0, 0.0, A)
-        return energy, settled
+        energy, converged = _respond_in_plane_stress(constants, D, bulk, finite, stretch_z, F, old, new, P, A, G)
+        _subtract_initial_stress(omitted, G, determinant(F), P, 0.0, 0.0, A)
+        return energy, converged
     pressure += bulk * (J - 1.0)
-    turning = pressure if finite and geometric == 2 and everywhere else min(pressure, 0.0) if omitted else 0.0
-    energy = respond(constants, D, F, J, G, (pressure, bulk, turning), everywhere, old, new, P, A)
-    _leave_out_initial_stress(omitted, G, J, P, pressure, turning, A)
+    d2J_factor = pressure if finite and geometric == 2 and everywhere else min(pressure, 0.0) if omitted else 0.0
+    energy = respond(constants, D, F, J, G, (pressure, bulk, d2J_factor), everywhere, old, new, P, A)
+    _subtract_initial_stress(omitted, G, J, P, pressure, d2J_factor, A)
     return energy + 0.5 * bulk * (J - 1.0) ** 2, True
 
 
 @kernel
 def _subtract_elastic(constants, D, bulk, plane_stress, A):
-    """Subtract the elastic tangent at small strains from A (18, 12), without the part of the projected dilatation."""
-    none, new, P, G, of_elasticity = np.zeros(9), np.empty(9), np.empty((3, 3)), np.empty((3, 3)), np.zeros((18, 12))
+    """Subtract the elastic tangent at small strains from A (18, 12), without the contribution of the projected dilatation."""
+    no_history, new, P, G, elastic = np.zeros(9), np.empty(9), np.empty((3, 3)), np.empty((3, 3)), np.zeros((18, 12))
     F = np.eye(3)
     J = _dilatation(F, False, G)
-    _respond(constants, D, bulk, 0.0, 1.0, plane_stress, False, 2, True, F, J, G, none, new, P, of_elasticity)
-    A -= of_elasticity
+    _respond(constants, D, bulk, 0.0, 1.0, plane_stress, False, 2, True, F, J, G, no_history, new, P, elastic)
+    A -= elastic
 
 
 @kernel
 def _weigh(P, first, weight, dim, out, row):
-    """Fill the rows from `row` on of `out` (n_rows, 4) with `weight` times the transpose of P, which begins at row `first`.
+    """Fill three rows of `out` (n_rows, 4), from `row` on, with `weight` times P.T; P begins at row `first` of its array.
 
-    The third row of shape derivatives is that along z or, about an axis, N / r, which belongs to the radial displacement.
+    The third of them belongs to the shape derivatives along z or, in axisymmetry, to N / r, which multiplies the radial
+    displacement.
     """
     for i in range(3):
         for j in range(3):
@@ -238,7 +238,7 @@ def _integrate(factors, gradient, out, row):
 
 @kernel
 def _copy(source, first, out, row):
-    """Copy the matrix (3, 3) that begins at row `first` of `source` to that at `row` of `out`."""
+    """Copy a matrix (3, 3) that begins at row `first` of `source` to `out`, where it begins at `row`."""
     for i in range(3):
         for j in range(3):
             out[row + i, j] = source[first + i, j]
@@ -246,20 +246,22 @@ def _copy(source, first, out, row):
 
 @kernel
 def _project(polynomials, volume, gradient, dim, J, G, factors, mass, projected, slopes):
-    """Project the dilatation of a cell on polynomials.
+    """Project the dilatation of a cell onto polynomials.
 
-    J (n_q,) are one plus the dilatation, and G (3 n_q, 3) its derivatives. `projected` (m, 1) is the dilatation, `slopes`
-    (4 m, width) are its derivatives by displacements, four rows for each polynomial, computed if `slopes` is not empty.
+    J (n_q,) is one plus the dilatation, and G (3 n_q, 3) its derivatives with respect to F. The results are the coefficients
+    `projected` (m, 1) of the orthonormal polynomials, the Cholesky factor `mass` (m, m) of the mass matrix and, if the array
+    is not empty, the derivatives `slopes` (4 m, width) of the coefficients with respect to the displacements, four rows for
+    each polynomial.
     """
     m = len(mass)
     mass[:], projected[:] = 0.0, 0.0
     for k in range(m):
         for q in range(len(volume)):
-            share = volume[q] * polynomials[q, k]
+            weight = volume[q] * polynomials[q, k]
             for n in range(k + 1):
-                mass[k, n] += share * polynomials[q, n]
-            projected[k, 0] += share * (J[q] - 1.0)
-            _weigh(G, 3 * q, share, dim, factors, 3 * q)
+                mass[k, n] += weight * polynomials[q, n]
+            projected[k, 0] += weight * (J[q] - 1.0)
+            _weigh(G, 3 * q, weight, dim, factors, 3 * q)
         if len(slopes):
             _integrate(factors, gradient, slopes, 4 * k)
     reduce(mass, projected)
@@ -275,7 +277,7 @@ def _project(polynomials, volume, gradient, dim, J, G, factors, mass, projected,
 
 @kernel
 def _pressures(bulk, polynomials, mass, projected, pressure):
-    """Fill the `pressure` (n_q,) of the projected dilatation and return the energy of the projected dilatation."""
+    """Fill the `pressure` (n_q,) due to the projected dilatation, and return its energy."""
     m = len(projected)
     coefficients, energy = np.empty(m), 0.0
     for k in range(m):
@@ -290,13 +292,12 @@ def _pressures(bulk, polynomials, mass, projected, pressure):
 
 
 @kernel
-def _keep_tangent(gradient, q, weight, A, dim, n, left, right):
-    """Fill the rows from n on of the factors of the stiffness, for `_stiffness`, with those of point q.
+def _store_tangent(gradient, q, weight, A, dim, n, left, right):
+    """Store the factors of the stiffness at point q, three rows from n on, for `_stiffness`.
 
-    `left` (3 n_q, width) are weighted shape derivatives. The stress change due to component k of a node is a column of A
-    times its shape derivatives; its product with component i of the others is in `right` (n_pairs * (3 n_q + 1), width), for
-    the pairs i <= k. If dim is 2, rows and columns of A change places, since the third shape derivative belongs to the radial
-    displacement.
+    `left` (3 n_q, width) receives the weighted shape derivatives, and `right` (n_pairs * (3 n_q + 1), width) the products of
+    the blocks (i, k) of A and the shape derivatives, for the pairs i <= k of displacement components. If dim is 2, rows and
+    columns of A are moved first, because the third shape derivative multiplies the radial displacement.
     """
     step, pair = len(left) + 1, 0
     for e in range(9 if dim == 2 else 0):
@@ -317,8 +318,8 @@ def _keep_tangent(gradient, q, weight, A, dim, n, left, right):
 def _stiffness(left, right, n, dim, bulk, slopes, local):
     """Fill the stiffness `local` (n_pairs * width, width) from n rows of factors and the projected dilatation.
 
-    A pair i <= k has the rows of nodes b, component k, and the columns of nodes a, component i; if i = k only tiles up to
-    the diagonal are filled.
+    The block of a pair i <= k has rows for component k of the nodes b, and columns for component i of the nodes a. If i = k,
+    only tiles up to the diagonal are filled.
     """
     step, width, pair = len(left) + 1, left.shape[1], 0
     weighted = bulk * slopes
@@ -372,17 +373,17 @@ def linearise(
     constants, moduli, bulk, expansion, rise,
     material, old, slots, owner, part, elastic, data, force, new, stress, energy,
 ):  # fmt: skip
-    """Add the tangent to `data` (n_blocks, dim, dim) and forces to `force` (n_points, dim), in rows of nodes of a `part`.
+    """Add the tangent to `data` (n_blocks, dim, dim) and forces to `force` (n_points, dim), in the rows of nodes of `part`.
 
-    For the cells of the part, whose first node it owns, this fills the history `new` (n_cells, n_q, 9), the Cauchy `stress`
+    For cells whose first node belongs to the part, this fills the history `new` (n_cells, n_q, 9), the Cauchy `stress`
     (n_cells, n_q, n_components) and `energy` (n_cells, 2), the elastic energy and the plastic work. `bulk` (n_materials, 2)
-    contains the bulk moduli of the dilatation projected on `polynomials` (n_q, m) and of its remainder. A temperature `rise`
-    (n_points,), which may be empty, causes strains of `expansion` (n_materials, 6) per degree.
+    contains the bulk moduli of the dilatation projected onto `polynomials` (n_q, m) and of its remainder. A temperature
+    `rise` (n_points,), which may be empty, causes the strains `expansion` (n_materials, 6) per unit rise.
 
-    With `geometric` 2, the tangent is complete; with 1, the second derivative of J is omitted; with 0, the initial-stress
+    With ``geometric = 2``, the tangent is complete. With 1, the second derivative of J is omitted. With 0, the initial-stress
     stiffness and, in tension, the second derivative of J are omitted, so that the tangent is positive semidefinite. If `data`
     is empty, no tangent is computed. If `elastic` is true, `data` contains the elastic tangent of small strains, and the
-    difference is added at points with plastic flow. Returns a status and the number of a cell, zero and -1 on success.
+    difference is added at points with plastic flow. Returns a status code and the number of a cell; 0 and -1 on success.
     """
     n_cells, n_nodes = cells.shape
     n_q, dim, m, tangent = N.shape[0], points.shape[1], polynomials.shape[1], len(data) > 0
@@ -392,14 +393,14 @@ def linearise(
     x, maps, inverse = np.zeros((n_nodes, 8)), np.empty((columns.shape[1], 8)), np.zeros((3, 4))
     gradient, volume, forces = np.empty((3 * n_q + 1, width)), np.empty(n_q), np.empty((4, width))
     F, G, Fs, Gs = np.empty((3, 3)), np.empty((3, 3)), np.empty((3 * n_q, 3)), np.empty((3 * n_q, 3))
-    ratio, thicker, pressure = np.empty(n_q), np.ones(n_q), np.empty(n_q)
+    ratio, stretch_z, pressure = np.empty(n_q), np.ones(n_q), np.empty(n_q)
     P, A, inside = np.empty((3, 3)), np.zeros((18, 12)), np.empty(n_nodes, np.bool_)
     before, after, factors = np.zeros(9), np.empty(9), np.zeros((3 * n_q, 4))
     left, right = np.empty((3 * n_q, width)), np.empty((n_pairs * (3 * n_q + 1), width))
     local = np.empty((n_pairs * width, width))
     mass, projected, slopes = np.empty((m, m)), np.empty((m, 1)), np.empty((4 * m if stiff else 0, width))
-    # Arrays are counted (by atomic operations) where a view is made, and in functions with branches that call others. This
-    # would take as long as the law of the first invariant, which is therefore called here, without such functions.
+    # Numba counts references to arrays by atomic operations where a view is made, and in functions that call others in
+    # branches. This would take as long as the law of the first invariant itself, which is therefore called directly here.
     row, law, D, direct = -1, constants[0], moduli[0], False
     for c in range(n_cells):
         if not owned(cells, c, owner, part, inside):
@@ -410,8 +411,8 @@ def linearise(
             if axisymmetric:
                 volume[q] *= _about_axis(x, N, q, gradient, F)
             if len(rise):
-                strain, three = expansion[material[c, q]], slice(3 * q, 3 * q + 3)
-                expansion_ratio, thicker[q] = _expanded(strain, N[q], cells[c], rise, finite, F, gradient[three])
+                strain, rows_of_q = expansion[material[c, q]], slice(3 * q, 3 * q + 3)
+                expansion_ratio, stretch_z[q] = _expanded(strain, N[q], cells[c], rise, finite, F, gradient[rows_of_q])
                 volume[q] *= expansion_ratio
             ratio[q] = _dilatation(F, finite, G)
             if finite and not ratio[q] > 0.0:
@@ -419,10 +420,10 @@ def linearise(
             _copy(F, 0, Fs, 3 * q)
             _copy(G, 0, Gs, 3 * q)
         pressure[:] = 0.0
-        stored, dissipated, mean, n_factors = 0.0, 0.0, bulk[material[c, 0], 0], 0
-        if mean > 0.0:
+        stored, dissipated, bulk_mean, n_factors = 0.0, 0.0, bulk[material[c, 0], 0], 0
+        if bulk_mean > 0.0:
             _project(polynomials, volume, gradient, dim, ratio, Gs, factors, mass, projected, slopes)
-            stored += _pressures(mean, polynomials, mass, projected, pressure)
+            stored += _pressures(bulk_mean, polynomials, mass, projected, pressure)
         for q in range(n_q):
             if material[c, q] != row:
                 row = material[c, q]
@@ -434,17 +435,17 @@ def linearise(
             _copy(Gs, 3 * q, G, 0)
             if direct:
                 total = pressure[q] + bulk[row, 1] * (ratio[q] - 1.0)
-                density, factor, turning, _, _ = first_invariant(
+                density, factor, d2J_factor, _, _ = first_invariant(
                     law, F, ratio[q], G, (total, bulk[row, 1], total), stiff, P, A
                 )
-                sum_products(2, factor, turning, stiff, F, A)
+                sum_products(2, factor, d2J_factor, stiff, F, A)
                 density += 0.5 * bulk[row, 1] * (ratio[q] - 1.0) ** 2
             else:
-                density, settled = _respond(
-                    law, D, bulk[row, 1], pressure[q], thicker[q], plane_stress, finite, geometric, stiff, F, ratio[q], G,
+                density, converged = _respond(
+                    law, D, bulk[row, 1], pressure[q], stretch_z[q], plane_stress, finite, geometric, stiff, F, ratio[q], G,
                     before, after, P, A,
                 )  # fmt: skip
-                if not settled:
+                if not converged:
                     return NO_PLANE_STRESS, c
                 dissipated += volume[q] * after[7]
             stored += volume[q] * density
@@ -453,7 +454,7 @@ def linearise(
             if tangent and elastic and flows:
                 _subtract_elastic(law, D, bulk[row, 1], plane_stress, A)
             if tangent and (flows or not elastic):
-                _keep_tangent(gradient, q, volume[q], A, dim, n_factors, left, right)
+                _store_tangent(gradient, q, volume[q], A, dim, n_factors, left, right)
                 n_factors += 3
             if inside[0]:
                 for e in range(9 if len(new) else 0):
@@ -467,17 +468,17 @@ def linearise(
                 for i in range(dim):
                     force[cells[c, b], i] += forces[i, b]
         if n_factors:
-            _stiffness(left, right, n_factors, dim, mean, slopes if mean > 0.0 else slopes[:0], local)
+            _stiffness(left, right, n_factors, dim, bulk_mean, slopes if bulk_mean > 0.0 else slopes[:0], local)
             _assemble(local, slots[c], inside, data)
     return 0, -1
 
 
 @kernel
 def strains(points, cells, N, dN, weights, axisymmetric, across, displacement, J, ratio, logarithm):
-    """Fill J (n_cells, n_q), the volume `ratio` (n_cells,), and the principal logarithmic strain of largest magnitude.
+    """Fill J (n_cells, n_q), the volume `ratio` (n_cells,), and the `logarithm` (n_cells,) of the extreme principal stretch.
 
-    `across` (n_cells, n_q) are the strains of F along z in plane stress, zero otherwise; `logarithm` (n_cells,) are
-    extremes over the points of a cell.
+    `across` (n_cells, n_q) is F_zz - 1 in plane stress, zero otherwise. `logarithm` is the principal logarithmic strain of
+    largest magnitude at the points of a cell.
     """
     n_nodes, dim, n_q, F = cells.shape[1], points.shape[1], len(N), np.empty((3, 3))
     columns, rows = np.empty((n_nodes, -(-3 * n_q // 4) * 4)), np.empty((3 * n_q, -(-n_nodes // 4) * 4))

@@ -8,7 +8,7 @@ part of F - I; their P is the Cauchy stress. `constants` (n_constants,) begin wi
 plastic strain (xx, yy, zz, xy, yz, xz, tensor components), the equivalent plastic strain, the plastic work [energy / volume],
 and in plane stress F_zz - 1. At finite strains, L - I takes the place of the plastic strain, where L is the lower triangular
 factor of the inverse plastic metric, C_p^-1 = L L^T. The element loop adds the volumetric part, U(J) = K (J - 1)^2 / 2, of
-laws with a bulk modulus.
+laws that have a bulk modulus.
 """
 
 import numpy as np
@@ -17,17 +17,17 @@ from fastcontact._jit.decorators import innermost_kernel, kernel
 from fastcontact.elasticity.tile_product import tile
 
 LINEAR, PLASTIC, SAINT_VENANT, INVARIANTS, OGDEN, LOGARITHMIC = range(6)
-# First rows of A that are work space of `first_invariant`.
+# First rows of the two groups of rows of A that are work space of `first_invariant`.
 LEFT, RIGHT = 12, 15
 # Relative excess of the trial stress over the yield stress that counts as round-off.
 YIELDING = 1e-12
 # Relative difference of squared stretches below which the tangent treats them as equal.
 EQUAL = 1e-7
-# The same for second divided differences, for which a series is used below it.
+# Relative difference of squared stretches below which second divided differences are computed by a series.
 CLOSE = 1e-3
-# Sweeps of Jacobi's method, and squared off-diagonal entries over those of the diagonal below which it ends.
+# Largest number of sweeps of Jacobi's method, and ratio of squared off-diagonal to diagonal entries at which it ends.
 SWEEPS, NEGLIGIBLE = 20, 1e-34
-# Cosine up to which eigenvalues are distinct: its arc then loses at most one digit.
+# Largest cosine for the trigonometric formula for eigenvalues: its arc cosine then loses at most one digit.
 DISTINCT = 0.99
 
 
@@ -67,8 +67,8 @@ def _add_second_derivative(F, factor, A):
 
 @kernel
 def _add_volumetric(F, G, volumetric, tangent, P, A):
-    """Add the `volumetric` part to P and, if `tangent`, to A; see `respond`."""
-    pressure, bulk, turning = volumetric
+    """Add the `volumetric` terms to P and, if `tangent` is true, to A; see `respond`."""
+    pressure, bulk, d2J_factor = volumetric
     for i in range(3):
         for j in range(3):
             P[i, j] += pressure * G[i, j]
@@ -76,7 +76,7 @@ def _add_volumetric(F, G, volumetric, tangent, P, A):
         factor = bulk * G[row // 3, row % 3]
         for column in range(9):
             A[row, column] += factor * G[column // 3, column % 3]
-    _add_second_derivative(F, turning, A)
+    _add_second_derivative(F, d2J_factor, A)
 
 
 @kernel
@@ -91,8 +91,8 @@ def right_cauchy_green(F, C):
 def extreme_eigenvalues(C):
     """Return the smallest and largest eigenvalue of a symmetric C (3, 3), which is overwritten.
 
-    By a cosine (Smith, 1961) or, where two eigenvalues are so close that its angle has few digits, by Jacobi's method (Golub
-    and Van Loan, 2013, section 8.5), which takes three or four sweeps.
+    They are computed by the trigonometric formula (Smith, 1961) or, if two eigenvalues are so close that this is inaccurate,
+    by Jacobi's method (Golub and Van Loan, 2013, section 8.5), which takes three or four sweeps.
     """
     mean = (C[0, 0] + C[1, 1] + C[2, 2]) / 3.0
     x, y, z, a, b, c = C[0, 0] - mean, C[1, 1] - mean, C[2, 2] - mean, C[0, 1], C[1, 2], C[0, 2]
@@ -102,8 +102,8 @@ def extreme_eigenvalues(C):
         angle = np.arccos(cubed / size**3) / 3.0
         return mean + 2.0 * size * np.cos(angle + 2.0 * np.pi / 3.0), mean + 2.0 * size * np.cos(angle)
     for _ in range(SWEEPS):
-        off = C[0, 1] * C[0, 1] + C[0, 2] * C[0, 2] + C[1, 2] * C[1, 2]
-        if off <= NEGLIGIBLE * (C[0, 0] * C[0, 0] + C[1, 1] * C[1, 1] + C[2, 2] * C[2, 2]):
+        off_diagonal = C[0, 1] * C[0, 1] + C[0, 2] * C[0, 2] + C[1, 2] * C[1, 2]
+        if off_diagonal <= NEGLIGIBLE * (C[0, 0] * C[0, 0] + C[1, 1] * C[1, 1] + C[2, 2] * C[2, 2]):
             break
         for k in range(3):
             i, j = (k + 1) % 3, (k + 2) % 3
@@ -117,15 +117,15 @@ def extreme_eigenvalues(C):
             C[i, i] -= t * C[i, j]
             C[j, j] += t * C[i, j]
             C[i, j] = 0.0
-            one, two = (min(i, k), max(i, k)), (min(j, k), max(j, k))
-            first, second = C[one], C[two]
-            C[one], C[two] = cosine * first - sine * second, sine * first + cosine * second
+            ik, jk = (min(i, k), max(i, k)), (min(j, k), max(j, k))
+            C_ik, C_jk = C[ik], C[jk]
+            C[ik], C[jk] = cosine * C_ik - sine * C_jk, sine * C_ik + cosine * C_jk
     return min(C[0, 0], C[1, 1], C[2, 2]), max(C[0, 0], C[1, 1], C[2, 2])
 
 
 @kernel
 def voigt(i, j):
-    """Return the number of a component in the order xx, yy, zz, xy, yz, xz."""
+    """Return the number of component (i, j) in the order xx, yy, zz, xy, yz, xz."""
     if i == j:
         return i
     if i + j == 1:
@@ -162,7 +162,7 @@ def _linear(D, F, everywhere, P, A):
 
 @kernel
 def _yield_stress(constants, p):
-    """Return the yield stress and its slope at the equivalent plastic strain p, and the end of this segment."""
+    """Return the yield stress and its slope at the equivalent plastic strain p, and the end of this segment of the table."""
     n = int(constants[4])
     for k in range(n - 1):
         p0, s0, p1, s1 = constants[5 + 2 * k], constants[6 + 2 * k], constants[7 + 2 * k], constants[8 + 2 * k]
@@ -176,7 +176,7 @@ def _yield_stress(constants, p):
 def _plastic(constants, F, everywhere, old, new, P, A):
     """Apply von Mises plasticity by radial return (Simo and Hughes, 1998, boxes 3.1, 3.2); return the elastic energy.
 
-    This is the deviatoric part, with tabulated isotropic hardening and linear kinematic hardening (Prager).
+    P, A and the energy are the deviatoric parts. Isotropic hardening is tabulated, and kinematic hardening linear (Prager).
     """
     mu, kinematic, xi = constants[1], constants[3], np.empty(9)
     third, square = (F[0, 0] + F[1, 1] + F[2, 2]) / 3.0, 0.0
@@ -227,16 +227,16 @@ def _plastic(constants, F, everywhere, old, new, P, A):
 
 
 @kernel
-def _rotate(F, S, P):
-    """Fill P with F times the second Piola-Kirchhoff stress S (3, 3)."""
+def _first_piola_kirchhoff(F, S, P):
+    """Fill P with ``F S``, where S (3, 3) is the second Piola-Kirchhoff stress."""
     for i in range(3):
         for j in range(3):
             P[i, j] = F[i, 0] * S[0, j] + F[i, 1] * S[1, j] + F[i, 2] * S[2, j]
 
 
 @kernel
-def _pushed(F, S, C, A):
-    """Fill A from the second Piola-Kirchhoff stress S (3, 3) and its moduli C (9, 9) w.r.t. Green-Lagrange strains."""
+def _push_forward(F, S, C, A):
+    """Fill A, given the second Piola-Kirchhoff stress S (3, 3) and its moduli C (9, 9) for Green-Lagrange strains."""
     half = np.empty((9, 9))
     for i in range(3):
         for j in range(3):
@@ -275,20 +275,21 @@ def _bend(x, y, z):
 def _logarithmic(constants, F, everywhere, old, new, P, A):
     """Apply plasticity with logarithmic elastic strains (Eterovic and Bathe, 1990; Simo, 1992); return the elastic energy.
 
-    With the plastic deformation before the load step fixed, `_plastic` relates the strain ln(C) / 2 of the elastic part of F
-    and its conjugate stress T. The flow is integrated exponentially, with the principal axes of C. Derivatives of the strain
-    in principal axes are divided differences of the logarithm (Daleckii and Krein).
+    For the plastic deformation at the beginning of the load step, with the factor L, the trial elastic strain is ln(C) / 2
+    with C = (F L)^T F L. `_plastic` relates it to its conjugate stress T. The plastic flow is integrated by the exponential
+    map, in the principal axes of C. Derivatives of the strain in principal axes are divided differences of the logarithm
+    (Daleckii and Krein).
     """
-    C, T, D, turn, before = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9)), np.empty((9, 9)), np.eye(3)
+    C, T, D, turn, L = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9)), np.empty((9, 9)), np.eye(3)
     for i in range(3):
         for j in range(i + 1):
-            before[i, j] += old[voigt(i, j)]
-    right_cauchy_green(F @ before, C)
+            L[i, j] += old[voigt(i, j)]
+    right_cauchy_green(F @ L, C)
     squared, axes = np.linalg.eigh(C)
-    unstrained = old.copy()
-    unstrained[:6] = 0.0
-    energy = _plastic(constants, (axes * (0.5 * np.log(squared))) @ axes.T, True, unstrained, new, T, D)
-    slope, carried = np.empty((3, 3)), before @ axes
+    without_strain = old.copy()
+    without_strain[:6] = 0.0
+    energy = _plastic(constants, (axes * (0.5 * np.log(squared))) @ axes.T, True, without_strain, new, T, D)
+    slope, carried = np.empty((3, 3)), L @ axes
     _flow(carried, axes, old, new)
     for a in range(3):
         for b in range(3):
@@ -296,7 +297,7 @@ def _logarithmic(constants, F, everywhere, old, new, P, A):
     _fill_turn(axes, turn)
     T, factor = axes.T @ T @ axes, slope.reshape(9)
     S = carried @ (slope * T) @ carried.T
-    _rotate(F, S, P)
+    _first_piola_kirchhoff(F, S, P)
     if not everywhere:
         return energy
     moduli = turn.T @ D @ turn * factor
@@ -311,7 +312,7 @@ def _logarithmic(constants, F, everywhere, old, new, P, A):
                         moduli[row, column] += value
                         moduli[column, row] += value
     _fill_turn(carried, turn)
-    _pushed(F, S, turn @ moduli @ turn.T, A)
+    _push_forward(F, S, turn @ moduli @ turn.T, A)
     return energy
 
 
@@ -329,7 +330,8 @@ def _fill_turn(axes, turn):
 def _flow(carried, axes, old, new):
     """Replace the increment of plastic strain in `new` by the factor of the inverse plastic metric after the load step.
 
-    The increment has the principal axes `axes` (3, 3); `carried` (3, 3) are the factor before the load step times `axes`.
+    The columns of `axes` (3, 3) are the principal axes of the increment, and `carried` (3, 3) is the factor before the load
+    step times `axes`.
     """
     if new[6] > old[6]:
         increment = np.empty((3, 3))
@@ -355,19 +357,19 @@ def _saint_venant(D, F, everywhere, P, A):
     for i in range(3):
         strain[i, i] -= 0.5
     energy = _hooke(D, strain, S)
-    _rotate(F, S, P)
+    _first_piola_kirchhoff(F, S, P)
     if not everywhere:
         return energy
     for row in range(9):
         for column in range(9):
             C[row, column] = D[voigt(row // 3, row % 3), voigt(column // 3, column % 3)]
-    _pushed(F, S, C, A)
+    _push_forward(F, S, C, A)
     return energy
 
 
 @innermost_kernel
 def _add_isochoric(value, first, number, power, scale, J, G, slope, bend, everywhere, P, A):
-    """Add to P and A the terms of an energy of the invariant `scale` times `value`, except for second derivatives.
+    """Add to P and A the terms of an energy of the isochoric invariant ``scale * value``, except for second derivatives.
 
     `scale` is ``J**-power``, and `first` (3, 3) the derivative of the value; `slope` and `bend` are derivatives of the energy
     with respect to the invariant. The terms of A are stored as factors, see `first_invariant`. Returns the factors of the
@@ -398,7 +400,7 @@ def first_invariant(constants, F, J, G, volumetric, everywhere, P, A):
     J, I1 and ``J**(-2/3)``.
     """
     C10, C20, C30 = constants[3], constants[5], constants[6]
-    pressure, bulk, turning = volumetric
+    pressure, bulk, d2J_factor = volumetric
     I1 = 0.0
     for i in range(3):
         for j in range(3):
@@ -410,12 +412,12 @@ def first_invariant(constants, F, J, G, volumetric, everywhere, P, A):
     scale = 1.0 / (root * root)
     x = scale * I1 - 3.0
     slope, bend = C10 + 2.0 * C20 * x + 3.0 * C30 * x * x, 2.0 * C20 + 6.0 * C30 * x
-    factor, turns = _add_isochoric(0.5 * I1, F, 1, 2.0 / 3.0, scale, J, G, 2.0 * slope, 4.0 * bend, everywhere, P, A)
-    return C10 * x + C20 * x**2 + C30 * x**3, factor, turning + turns, I1, scale
+    factor, of_J = _add_isochoric(0.5 * I1, F, 1, 2.0 / 3.0, scale, J, G, 2.0 * slope, 4.0 * bend, everywhere, P, A)
+    return C10 * x + C20 * x**2 + C30 * x**3, factor, d2J_factor + of_J, I1, scale
 
 
 @innermost_kernel
-def sum_products(n, factor, turning, everywhere, F, A):
+def sum_products(n, factor, d2J_factor, everywhere, F, A):
     """If `everywhere`, fill A with the products of n rows from LEFT and RIGHT on and the terms of second derivatives.
 
     See `first_invariant` for their factors.
@@ -425,25 +427,25 @@ def sum_products(n, factor, turning, everywhere, F, A):
             tile(A, LEFT, row, A, RIGHT, column, n, A, row, True)
     for row in range(9 if everywhere else 0):
         A[row, row] += factor
-    _add_second_derivative(F, turning if everywhere else 0.0, A)
+    _add_second_derivative(F, d2J_factor if everywhere else 0.0, A)
 
 
 @kernel
 def _invariants(constants, F, J, G, volumetric, everywhere, P, A):
     """Apply a polynomial law of the isochoric invariants (Rivlin and Saunders, 1951); see `first_invariant`, `respond`."""
     C01 = constants[4]
-    energy, factor, turning, I1, scale = first_invariant(constants, F, J, G, volumetric, everywhere, P, A)
+    energy, factor, d2J_factor, I1, scale = first_invariant(constants, F, J, G, volumetric, everywhere, P, A)
     if C01 != 0.0:
-        return energy + _second_invariant(C01, I1, scale * scale, F, J, G, factor, turning, everywhere, P, A)
-    sum_products(2, factor, turning, everywhere, F, A)
+        return energy + _second_invariant(C01, I1, scale * scale, F, J, G, factor, d2J_factor, everywhere, P, A)
+    sum_products(2, factor, d2J_factor, everywhere, F, A)
     return energy
 
 
 @kernel
-def _second_invariant(C01, I1, scale, F, J, G, factor, turning, everywhere, P, A):
-    """Add C01 (I2 - 3) to P, and fill A with all terms; return its energy density.
+def _second_invariant(C01, I1, scale, F, J, G, factor, d2J_factor, everywhere, P, A):
+    """Add the term C01 (I2 - 3) of the energy to P, and fill A with all terms; return this term.
 
-    `factor` and `turning` are those of `first_invariant`.
+    `factor` and `d2J_factor` are results of `first_invariant`.
     """
     C, first, square = np.empty((3, 3)), np.empty((3, 3)), 0.0
     right_cauchy_green(F, C)
@@ -452,15 +454,15 @@ def _second_invariant(C01, I1, scale, F, J, G, factor, turning, everywhere, P, A
             first[i, j] = I1 * F[i, j] - F[i, 0] * C[0, j] - F[i, 1] * C[1, j] - F[i, 2] * C[2, j]
             square += C[i, j] ** 2
     I2 = 0.5 * (I1 * I1 - square)
-    own, turns = _add_isochoric(0.5 * I2, first, 2, 4.0 / 3.0, scale, J, G, 2.0 * C01, 0.0, everywhere, P, A)
-    sum_products(3, factor + own * I1, turning + turns, everywhere, F, A)
+    of_I2, of_J = _add_isochoric(0.5 * I2, first, 2, 4.0 / 3.0, scale, J, G, 2.0 * C01, 0.0, everywhere, P, A)
+    sum_products(3, factor + of_I2 * I1, d2J_factor + of_J, everywhere, F, A)
     for i in range(3 if everywhere else 0):
         for j in range(3):
             for k in range(3):
-                A[3 * i + j, 3 * i + k] -= own * C[k, j]
-                A[3 * i + j, 3 * k + j] -= own * (F[i, 0] * F[k, 0] + F[i, 1] * F[k, 1] + F[i, 2] * F[k, 2])
+                A[3 * i + j, 3 * i + k] -= of_I2 * C[k, j]
+                A[3 * i + j, 3 * k + j] -= of_I2 * (F[i, 0] * F[k, 0] + F[i, 1] * F[k, 1] + F[i, 2] * F[k, 2])
                 for m in range(3):
-                    A[3 * i + j, 3 * k + m] += own * (2.0 * F[i, j] * F[k, m] - F[i, m] * F[k, j])
+                    A[3 * i + j, 3 * k + m] += of_I2 * (2.0 * F[i, j] * F[k, m] - F[i, m] * F[k, j])
     return C01 * (scale * I2 - 3.0)
 
 
@@ -494,7 +496,7 @@ def _ogden(constants, F, everywhere, P, A):
         for i in range(3):
             for j in range(3):
                 S[i, j] += beta[a] / squared[a] * axes[i, a] * axes[j, a]
-    _rotate(F, S, P)
+    _first_piola_kirchhoff(F, S, P)
     if not everywhere:
         return energy
     for a in range(3):
@@ -515,13 +517,13 @@ def _ogden(constants, F, everywhere, P, A):
                     moduli[row, column] += normal * left * axes[k, b] * axes[m, b]
                     if a != b:
                         moduli[row, column] += shear * mixed * (axes[k, a] * axes[m, b] + axes[k, b] * axes[m, a])
-    _pushed(F, S, moduli, A)
+    _push_forward(F, S, moduli, A)
     return energy
 
 
 @kernel
 def _other(constants, D, F, everywhere, old, new, P, A):
-    """Apply any law but `_invariants`; return the elastic energy density without the volumetric part."""
+    """Apply a law other than `_invariants`; return the elastic energy density without the volumetric part."""
     law = int(constants[0])
     if law == LINEAR:
         return _linear(D, F, everywhere, P, A)
@@ -538,10 +540,10 @@ def _other(constants, D, F, everywhere, old, new, P, A):
 def respond(constants, D, F, J, G, volumetric, everywhere, old, new, P, A):
     """Fill `new`, P and A by the law of `constants` and return the elastic energy [energy / volume].
 
-    The energy does not include the volumetric part of the law. `volumetric` are the pressure, the bulk modulus and the factor
-    of d2J/dF2: P contains pressure dJ/dF, and A contains bulk dJ/dF dJ/dF and the last term. D (6, 6) are the moduli of
-    Hooke's laws, J and G (3, 3) the determinant of F and its derivative. Unless `everywhere`, A is filled only where plastic
-    flow occurs at small strains.
+    The energy does not include the volumetric part of the law. `volumetric` contains a pressure, a bulk modulus and a factor:
+    P includes ``pressure dJ/dF``, and A includes ``bulk dJ/dF dJ/dF + factor d2J/dF2``. D (6, 6) are the moduli of Hooke's
+    law, and J and G (3, 3) the determinant of F and its derivative. If `everywhere` is false, the caller needs A only where
+    plastic flow occurs at small strains.
     """
     for e in range(9):
         new[e] = old[e]

@@ -3,13 +3,13 @@
 
 Shared arguments: ``points`` (n_points, dim) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
 n_nodes, dim), ``weights`` (n_q,) of the reference element; ``basis`` (n_q, m), the polynomials at the same points, the
-constant first; ``bulk`` (n_materials, 2) [pressure], the moduli of the mean dilatation and of the other polynomials, zero
-for materials without projection; ``material`` (n_cells,). dim is 2 or 3.
+constant first; ``bulk`` (n_materials, 2) [pressure], the bulk moduli of the mean dilatation and of the other polynomials,
+zero for materials without projection; ``material`` (n_cells,). dim is 2 or 3.
 
-Let t = d.u be the dilatation of the nodal displacements u, w the quadrature weights, and p the polynomials. Their mass
-matrix is M = sum w p p^T = L L^T, and g = sum w p d^T. The projected dilatation is p^T M^-1 g u. The polynomials L^-1 p are
-orthonormal, and the first of them is constant, so that the stiffness is (L^-1 g)^T B (L^-1 g) with the diagonal matrix B
-of the moduli (Hughes, Int. J. Numer. Meth. Engng 15, 1980).
+Let d.u be the dilatation due to the nodal displacements u, w the quadrature weights times det J, and p the polynomials. Their
+mass matrix is M = sum w p p^T = L L^T, and g = sum w p d^T. The projected dilatation is p^T M^-1 g u. The polynomials
+L^-1 p are orthonormal, and the first of them is constant, so that the stiffness is (L^-1 g)^T B (L^-1 g) with the diagonal
+matrix B of the bulk moduli (Hughes, Int. J. Numer. Meth. Engng 15, 1980).
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacob
 
 @kernel
 def _measure(x, N, dN, q, axisymmetric, J, inverse, gradient):
-    """Fill `gradient` (n_nodes, dim) with the dilatation of unit displacements of the nodes `x` (n_nodes, dim).
+    """Fill `gradient` (n_nodes, dim) with the dilatation due to unit displacements of the nodes `x` (n_nodes, dim).
 
     Returns det J, in axisymmetry times the circumference 2 pi r; `J` and `inverse` (dim, dim) are overwritten.
     """
@@ -83,8 +83,8 @@ def back_substitute(L, y):
 def add_products(factors, g, slots, c, inside, row, data):
     """Add ``g^T diag(factors) g`` of cell `c`, with `g` (m, n_nodes * dim), to `data` (n_blocks, dim, dim).
 
-    Only rows of nodes with `inside` (n_nodes,) are added to. `slots` (n_cells, n_nodes, n_nodes) are the numbers of the
-    blocks of `data`, and `row` (n_nodes * dim,) is overwritten.
+    Only the rows of nodes that are `inside` (n_nodes,) are changed. `slots` (n_cells, n_nodes, n_nodes) are the indices of
+    the blocks in `data`, and `row` (n_nodes * dim,) is overwritten.
     """
     n_nodes, dim = len(inside), data.shape[1]
     for a in range(n_nodes):
@@ -124,11 +124,11 @@ def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymme
 
 
 @kernel
-def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmetric, displacement, at, out):
+def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmetric, displacement, basis_out, out):
     """Add the moduli times the projected dilatation to the normal stresses in `out` (n_cells, n_out, n_components).
 
-    `displacement` (n_points, dim) [length] are the displacements, `at` (n_out, m) [-] the polynomials at the points of
-    `out`, whose unit is [pressure].
+    `displacement` (n_points, dim) [length] contains the displacements, and `basis_out` (n_out, m) [-] the polynomials at the
+    points of `out` [pressure].
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], basis.shape[1]
@@ -158,9 +158,9 @@ def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmet
         for m in range(size):
             coefficient[m] = g[m, 0] * (bulk_mean if m == 0 else bulk_rest)
         back_substitute(mass, coefficient)
-        for k in range(at.shape[0]):
+        for k in range(basis_out.shape[0]):
             mean_stress = 0.0
             for m in range(size):
-                mean_stress += at[k, m] * coefficient[m]
+                mean_stress += basis_out[k, m] * coefficient[m]
             for i in range(3):
                 out[c, k, i] += mean_stress

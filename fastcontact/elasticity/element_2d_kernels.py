@@ -1,9 +1,10 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loops of plane and axisymmetric solids: stiffness, stresses, rotations, nodal sums.
+"""Element loops of plane and axisymmetric solids: stiffness, stresses, internal forces; and nodal sums.
 
-Shared arguments: ``points`` (n_points, 2); ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes),
+Shared arguments: ``points`` (n_points, 2) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes),
 ``dN`` (n_q, n_nodes, 2), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 4, 4) [pressure] for
-strains (xx, yy, zz, 2xy); ``material`` (n_cells,). Axisymmetric integrals run over the full circle: weight 2 pi r det J w.
+strains (xx, yy, zz, 2xy); ``material`` (n_cells,). Axisymmetric integrals are over the full circle, with the weights
+2 pi r det J w.
 """
 
 import numpy as np
@@ -16,7 +17,7 @@ TWO_PI = 2.0 * np.pi
 
 @kernel
 def _map(points, cell, N, dN, q, gradient):
-    """Fill `gradient` (n_nodes, 2) with shape derivatives in x, y; return det J and the radius."""
+    """Fill `gradient` (n_nodes, 2) with shape derivatives in x, y at point q; return det J and the radius."""
     n_nodes = cell.shape[0]
     j00 = j01 = j10 = j11 = radius = 0.0
     for a in range(n_nodes):
@@ -35,16 +36,16 @@ def _map(points, cell, N, dN, q, gradient):
 
 @kernel
 def owned(cells, c, owner, part, inside):
-    """Fill `inside` (n_nodes,) with whether the nodes of a cell have the owner `part`; return whether any has."""
-    is_owned = False
+    """Fill `inside` (n_nodes,) with whether each node of cell `c` belongs to `part`; return whether any of them does."""
+    any_inside = False
     for a in range(cells.shape[1]):
         inside[a] = owner[cells[c, a]] == part
-        is_owned = is_owned or inside[a]
-    return is_owned
+        any_inside = any_inside or inside[a]
+    return any_inside
 
 
 @kernel
-def _cell(points, cell, N, dN, weights, D, axisymmetric, gradient, local):
+def _integrate(points, cell, N, dN, weights, D, axisymmetric, gradient, local):
     """Add the stiffness for moduli D (4, 4) to `local` (n_nodes, n_nodes, 2, 2); return whether the Jacobian is positive."""
     n_nodes = cell.shape[0]
     for q in range(weights.shape[0]):
@@ -75,9 +76,9 @@ def _cell(points, cell, N, dN, weights, D, axisymmetric, gradient, local):
 def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, axisymmetric, slots, owner, part, data):
     """Add element stiffness blocks to `data` (n_blocks, 2, 2), in the rows of nodes with ``owner[node] == part``.
 
-    `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
-    Returns the number of the first cell with a Jacobian that is not positive, or -1. `isotropic` is an argument only because
-    the loops of both dimensions have the same arguments.
+    The block of each node pair of a cell has the index `slots` (n_cells, n_nodes, n_nodes). Each thread adds to the rows of
+    its own nodes, in the order of the cells. Returns the number of the first cell with a Jacobian that is not positive, or
+    -1. `isotropic` has no effect: the loops of both dimensions are called in the same way.
     """
     n_cells, n_nodes = cells.shape
     gradient = np.empty((n_nodes, 2))
@@ -87,7 +88,7 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
         if not owned(cells, c, owner, part, inside):
             continue
         local[:] = 0.0
-        if not _cell(points, cells[c], N, dN, weights, moduli[material[c]], axisymmetric, gradient, local):
+        if not _integrate(points, cells[c], N, dN, weights, moduli[material[c]], axisymmetric, gradient, local):
             return c
         for b in range(n_nodes):
             local[b, b, 1, 0] = local[b, b, 0, 1]  # equal up to round-off; keeps K bitwise symmetric
@@ -139,10 +140,11 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
 
 @interpretable_kernel
 def add_nodal(cells, extrapolation, at_points, low, high, total, count):
-    """Extrapolate quadrature values to the nodes `low` to ``high - 1`` of each cell and sum them per node, in place.
+    """Extrapolate values from quadrature points to the nodes of each cell, and add them up at the points of the mesh.
 
-    `extrapolation` is (n_nodes, n_q) and `at_points` (n_cells, n_q, n_components). The sums are added to `total`
-    (n_points, n_components), the numbers of cells to `count` (n_points,).
+    Only nodes with numbers from `low` to ``high - 1`` are processed. `extrapolation` is (n_nodes, n_q) and `at_points`
+    (n_cells, n_q, n_components). The values are added to `total` (n_points, n_components), and the number of cells of each
+    point to `count` (n_points,).
     """
     n_cells, n_nodes = cells.shape
     for c in range(n_cells):

@@ -1,10 +1,10 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loops of three-dimensional solids: stiffness, stresses, rotations.
+"""Element loops of three-dimensional solids: stiffness, stresses, and internal forces.
 
 Shared arguments: ``points`` (n_points, 3) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
 n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6) [pressure], symmetric, for strains
-(xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` have no effect; the loops of both dimensions have
-the same arguments.
+(xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` have no effect: they are arguments because the
+loops of both dimensions are called in the same way.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.elasticity.constitutive_kernels import voigt
 from fastcontact.elasticity.element_2d_kernels import owned
-from fastcontact.mesh.jacobian_kernels import jacobian_3d, transposed
+from fastcontact.mesh.jacobian_kernels import cofactors, jacobian_3d, transposed
 
 
 @kernel
@@ -28,9 +28,7 @@ def _gather(values, cells, c, x):
 def map_3d(x, slopes, q, gradient):
     """Fill `gradient` (3, n_nodes) with shape derivatives in x, y, z; return det J."""
     j00, j01, j02, j10, j11, j12, j20, j21, j22 = jacobian_3d(x, slopes, q)
-    c00, c01, c02 = j11 * j22 - j12 * j21, j12 * j20 - j10 * j22, j10 * j21 - j11 * j20
-    c10, c11, c12 = j02 * j21 - j01 * j22, j00 * j22 - j02 * j20, j01 * j20 - j00 * j21
-    c20, c21, c22 = j01 * j12 - j02 * j11, j02 * j10 - j00 * j12, j00 * j11 - j01 * j10
+    c00, c01, c02, c10, c11, c12, c20, c21, c22 = cofactors(j00, j01, j02, j10, j11, j12, j20, j21, j22)
     det = j00 * c00 + j01 * c01 + j02 * c02
     inverse = 1.0 / det
     for a in range(x.shape[1]):
@@ -43,7 +41,7 @@ def map_3d(x, slopes, q, gradient):
 
 @kernel
 def _tensor(D, tensor):
-    """Fill `tensor` (9, 9) with moduli (6, 6): row 3 i + j, column 3 k + l holds D_ikjl, for K_ij = D_ikjl g_kl."""
+    """Fill `tensor` (9, 9) with moduli (6, 6): D_ikjl in row 3 i + j and column 3 k + l, for K_ij = D_ikjl g_kl."""
     for row in range(9):
         for column in range(9):
             i, j, k, n = row // 3, row % 3, column // 3, column % 3
@@ -54,7 +52,8 @@ def _tensor(D, tensor):
 def _integrate_products(x, slopes, weights, gradient, g):
     """Fill `g` (6, n_nodes, n_nodes) with the integrals of dN_a/dx_i dN_b/dx_j for ij = 00, 01, 02, 11, 12, 22.
 
-    Returns whether the Jacobian is positive everywhere. There is one short loop for each ij, which the compiler vectorises.
+    Returns whether the Jacobian is positive at all points. The compiler vectorises the innermost loop, which is short and has
+    one sum.
     """
     n_nodes = x.shape[1]
     g[:] = 0.0
@@ -76,7 +75,10 @@ def _integrate_products(x, slopes, weights, gradient, g):
 
 @kernel
 def add_block(flat, at_upper, at_lower, upper, lower, block):
-    """Add the `block` (9,) of a node pair if `at_upper`, and its transpose beyond the diagonal if `at_lower`."""
+    """Add the `block` (9,) of a node pair at slot `upper` if `at_upper`, and its transpose at slot `lower` if `at_lower`.
+
+    The transpose of a diagonal block is not added.
+    """
     u, v = 9 * upper, 9 * lower
     if at_upper:
         for k in range(9):
@@ -87,16 +89,16 @@ def add_block(flat, at_upper, at_lower, upper, lower, block):
 
 
 @inlined_kernel
-def _add_isotropic_block(flat, pair, at_upper, at_lower, upper, lower, coupling, shear, g):
+def _add_isotropic_block(flat, differ, at_upper, at_lower, upper, lower, coupling, shear, g):
     """Add the block of two nodes for Lamé's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij.
 
-    `pair` is whether the nodes differ; the order of g is xx, yy, zz, xy, xz, yz, yx, zx, zy.
+    `differ` is whether the nodes differ; the order of g is xx, yy, zz, xy, xz, yz, yx, zx, zy.
     """
     xx, yy, zz, xy, xz, yz, yx, zx, zy = g
     trace, both = shear * (xx + yy + zz), coupling + shear
     k01, k02, k12 = coupling * xy + shear * yx, coupling * xz + shear * zx, coupling * yz + shear * zy
     k10, k20, k21 = coupling * yx + shear * xy, coupling * zx + shear * xz, coupling * zy + shear * yz
-    if not pair:  # equal up to round-off; keeps K bitwise symmetric
+    if not differ:  # equal up to round-off; keeps K bitwise symmetric
         k10, k20, k21 = k01, k02, k12
     block = both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace
     add_block(flat, at_upper, at_lower, upper, lower, block)
@@ -137,8 +139,8 @@ def _add_general(g, tensor, products, block, slots, c, inside, flat):
 def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, inside, gradient, flat):
     """Add the blocks of a linear tetrahedron, whose gradients (4, 3) are constant, for Lamé's constants.
 
-    `volume` is that of the reference cell. Returns whether the Jacobian is positive. Loops over exactly four nodes
-    take half the time of `_integrate_products` and `_add_isotropic`.
+    `volume` is that of the reference cell. Returns whether the Jacobian is positive. With a fixed number of nodes this takes
+    half the time of `_integrate_products` and `_add_isotropic`.
     """
     first = cells[c, 0]
     x0, y0, z0 = points[first, 0], points[first, 1], points[first, 2]
@@ -154,7 +156,7 @@ def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, inside, g
         return False
     for i in range(3):
         gradient[0, i] = -(gradient[1, i] + gradient[2, i] + gradient[3, i])
-    weight = volume / det  # gradients are cofactors over det, the volume is that of the reference cell times det
+    weight = volume / det  # the volume of the cell is `volume` times det, and gradients are cofactors over det
     for b in range(4):
         gx, gy, gz = weight * gradient[b, 0], weight * gradient[b, 1], weight * gradient[b, 2]
         for a in range(b + 1):
@@ -170,10 +172,10 @@ def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, inside, g
 def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, axisymmetric, slots, owner, part, data):
     """Add element stiffness blocks to `data` (n_blocks, 3, 3), in the rows of nodes with ``owner[node] == part``.
 
-    `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
-    Returns the number of the first cell with a Jacobian that is not positive, or -1. The products of gradients are
-    integrated first, and multiplied with the moduli of the cell at the end. Where ``isotropic`` (n_materials,) holds, these
-    are Lamé's constants, ``D[0, 1]`` and ``D[3, 3]``.
+    The block of each node pair of a cell has the index `slots` (n_cells, n_nodes, n_nodes). Each thread adds to the rows of
+    its own nodes, in the order of the cells. Returns the number of the first cell with a Jacobian that is not positive, or
+    -1. The products of gradients are integrated first, and then multiplied with the moduli of the cell. For the materials
+    that are `isotropic` (n_materials,), these are Lamé's constants ``D[0, 1]`` and ``D[3, 3]``.
     """
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
@@ -218,9 +220,7 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
         for q in range(dN.shape[0]):
             xr, yr, zr, xs, ys, zs, xt, yt, zt = jacobian_3d(x, slopes, q)
             ur, vr, wr, us, vs, ws, ut, vt, wt = jacobian_3d(u, slopes, q)
-            rx, ry, rz = ys * zt - zs * yt, zs * xt - xs * zt, xs * yt - ys * xt
-            sx, sy, sz = zr * yt - yr * zt, xr * zt - zr * xt, yr * xt - xr * yt
-            tx, ty, tz = yr * zs - zr * ys, zr * xs - xr * zs, xr * ys - yr * xs
+            rx, ry, rz, sx, sy, sz, tx, ty, tz = cofactors(xr, yr, zr, xs, ys, zs, xt, yt, zt)
             inverse = 1.0 / (xr * rx + yr * ry + zr * rz)
             exx = (rx * ur + sx * us + tx * ut) * inverse
             eyy = (ry * vr + sy * vs + ty * vt) * inverse

@@ -2,14 +2,14 @@
 """Element loops of incompatible modes: condensed stiffness and additional stresses.
 
 Shared arguments: ``points`` (n_points, dim) [length]; ``cells`` (n_cells, n_nodes); ``dN`` (n_q, n_nodes, dim), ``xi`` (n_q,
-dim) and ``weights`` (n_q,) of the quadrature; ``middle`` (1, n_nodes, dim), shape derivatives in the middle of the reference
-cell; ``pairs`` (dim, dim), the component of stress of two directions; ``moduli`` (n_moduli, n_components, n_components)
-[pressure]; ``bends`` (n_moduli,) of bool, which of them have modes; ``material`` (n_cells, 1 or n_q), numbers of the cells,
-or of their quadrature points. dim is 2 or 3, with 4 or 13 modes.
+dim) and ``weights`` (n_q,) of the quadrature; ``middle`` (1, n_nodes, dim), shape derivatives at the centre of the reference
+cell; ``pairs`` (dim, dim), the number of the stress component (i, j); ``moduli`` (n_moduli, n_components, n_components)
+[pressure]; ``with_modes`` (n_moduli,) of bool, which of them have modes; ``material`` (n_cells, 1 or n_q), numbers of the
+moduli of cells, or of their quadrature points. dim is 2 or 3, with 4 or 13 modes.
 
-With the strains M of unit modes and B of unit nodal displacements, let modal = sum w M^T D M = L L^T and mixed = sum w M^T D
-B. Static condensation eliminates the modes by a = -modal^-1 mixed u, and subtracts (L^-1 mixed)^T (L^-1 mixed) from the
-stiffness.
+With the strains M due to unit modes and B due to unit nodal displacements, let modal = sum w M^T D M = L L^T and mixed =
+sum w M^T D B. Static condensation eliminates the amplitudes of the modes, a = -modal^-1 mixed u, and subtracts
+(L^-1 mixed)^T (L^-1 mixed) from the stiffness.
 """
 
 import numpy as np
@@ -22,7 +22,10 @@ from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacob
 
 @kernel
 def _modes(xi, q, inverse, ratio, pairs, M):
-    """Fill `M` (n_components, n_modes) with the strains of modes; `inverse` is that of the middle, `ratio` of Jacobians."""
+    """Fill `M` (n_components, n_modes) with the strains due to unit modes at point q.
+
+    `inverse` (dim, dim) is the inverse Jacobian at the centre, and `ratio` its determinant divided by that at the point.
+    """
     dim = xi.shape[1]
     M[:] = 0.0
     for k in range(dim):
@@ -75,11 +78,11 @@ def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, modal, mixed)
 
 @kernel
 def subtract_stiffness(
-    points, cells, dN, xi, weights, middle, pairs, moduli, bends, material, slots, owner, part, data
+    points, cells, dN, xi, weights, middle, pairs, moduli, with_modes, material, slots, owner, part, data
 ):
-    """Subtract the condensed modes from `data` (n_blocks, dim, dim), in the rows of a part's nodes.
+    """Subtract the stiffness of condensed modes from `data` (n_blocks, dim, dim), in the rows of nodes that `part` owns.
 
-    `slots`, `owner` and `part` are as for the element loops of the stiffness; Jacobians are known to be positive.
+    `slots`, `owner` and `part` are as for the element loops of the stiffness, which have checked the Jacobians.
     """
     n_cells, n_nodes = cells.shape
     dim = points.shape[1]
@@ -87,7 +90,7 @@ def subtract_stiffness(
     x, row, inside = np.empty((n_nodes, dim)), np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
     modal, mixed, factors = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim)), np.full(n_modes, -1.0)
     for c in range(n_cells):
-        if not bends[material[c, 0]] or not owned(cells, c, owner, part, inside):
+        if not with_modes[material[c, 0]] or not owned(cells, c, owner, part, inside):
             continue
         at_nodes(points, cells, c, x)
         _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], modal, mixed)
@@ -97,13 +100,15 @@ def subtract_stiffness(
 
 @kernel
 def add_stress(
-    points, cells, dN, xi, weights, middle, pairs, moduli, bends, material, displacement, lost, at, slopes, beside, out
-):
+    points, cells, dN, xi, weights, middle, pairs, moduli, with_modes, material, displacement, subtracted, xi_out, dN_out,
+    interpolation, out,
+):  # fmt: skip
     """Add the stresses of modes to `out` (n_cells, n_out, n_components), in place.
 
-    `displacement` (n_points, dim) are the displacements, `lost` (n_cells or 0, n_q, n_components) the stresses subtracted for
-    temperature and initial states, `at` (n_out, dim) the points of `out`, `slopes` (n_out, n_nodes, dim) shape derivatives
-    there, and `beside` (n_out, n_q) the interpolation weights from the quadrature points to the points of `out`.
+    `displacement` (n_points, dim) contains the displacements, and `subtracted` (n_cells or 0, n_q, n_components) the stresses
+    that were subtracted for temperature and initial states. The points of `out` are `xi_out` (n_out, dim). The shape
+    derivatives there are `dN_out` (n_out, n_nodes, dim), and the weights of the quadrature points for the interpolation to
+    these points are `interpolation` (n_out, n_q).
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], moduli.shape[1]
@@ -113,7 +118,7 @@ def add_stress(
     J, inverse, at_middle = np.empty((dim, dim)), np.empty((dim, dim)), np.empty((dim, dim))
     M, strain = np.empty((size, n_modes)), np.empty(size)
     for c in range(n_cells):
-        if not bends[material[c, 0]]:
+        if not with_modes[material[c, 0]]:
             continue
         at_nodes(points, cells, c, x)
         at_nodes(displacement, cells, c, u)
@@ -123,24 +128,24 @@ def add_stress(
             force[m, 0] = 0.0
             for k in range(n_nodes * dim):
                 force[m, 0] -= mixed[m, k] * u[k // dim, k % dim]
-        if lost.shape[0]:
+        if subtracted.shape[0]:
             for q in range(weights.shape[0]):
                 det = inverse_jacobian(x, dN, q, J, inverse)
                 _modes(xi, q, at_middle, middle_det / det, pairs, M)
                 for e in range(size):
                     for m in range(n_modes):
-                        force[m, 0] += det * weights[q] * M[e, m] * lost[c, q, e]
+                        force[m, 0] += det * weights[q] * M[e, m] * subtracted[c, q, e]
         reduce(modal, force)
         back_substitute(modal, force[:, 0])
-        for k in range(at.shape[0]):
-            det = inverse_jacobian(x, slopes, k, J, inverse)
-            _modes(at, k, at_middle, middle_det / det, pairs, M)
+        for k in range(xi_out.shape[0]):
+            det = inverse_jacobian(x, dN_out, k, J, inverse)
+            _modes(xi_out, k, at_middle, middle_det / det, pairs, M)
             for e in range(size):
                 strain[e] = 0.0
                 for m in range(n_modes):
                     strain[e] += M[e, m] * force[m, 0]
             for q in range(material.shape[1]):
-                weight = 1.0 if material.shape[1] == 1 else beside[k, q]
+                weight = 1.0 if material.shape[1] == 1 else interpolation[k, q]
                 for e in range(size):
                     for f in range(size):
                         out[c, k, e] += weight * moduli[material[c, q], e, f] * strain[f]

@@ -1,4 +1,4 @@
-"""Linear elastic materials: the base class of all linear materials, and isotropic elasticity."""
+"""Linear elastic materials: the base class of all materials, and isotropic elasticity."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from fastcontact.round_off import ROUND_OFF
 AnyMaterial = TypeVar("AnyMaterial", bound="Material")
 
 KINEMATICS = ("axisymmetric", "plane_strain", "plane_stress", "3d")
-# Names of the treatments of the dilatation.
+# Treatments of the dilatation.
 VOLUMETRIC = ("auto", "plain", "mean_dilatation")
 # Poisson's ratio above which a material has a mean dilatation by default.
 NEARLY_INCOMPRESSIBLE = 0.49
-# Constants that determine the moduli and may vary with position.
+# Names of the constants that determine the moduli, and of all constants that may vary with position.
 MODULI = ("E", "nu", "G")
 CONSTANTS = (*MODULI, "density", "expansion", "conductivity")
 
 
 @typed(ModelError)
 class Material:
-    """Base class of linear elastic materials, with moduli in material axes, density and thermal properties.
+    """Base class of materials, with linear elastic moduli in material axes, density and thermal properties.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Material:
         Material axes: unit vectors in rows (3, 3) [-], or a function of position, see `Orthotropic`; None means the
         axes of the mesh.
     averaged : bool
-        Whether elements that support a mean dilatation use it, except in plane stress.
+        Whether elements that support a mean dilatation have it, except in plane stress.
     incompatible_modes : bool
         Whether linear quadrangles and hexahedra have incompatible modes instead of a mean dilatation, except in axisymmetry.
     """
@@ -69,7 +69,7 @@ class Material:
 
     @property
     def contact_modulus(self) -> float:
-        """Smallest plane-strain modulus E / (1 - nu^2) along the axes, a measure of the contact stiffness [pressure]."""
+        """Smallest plane-strain modulus along the axes, a measure of the contact stiffness [pressure]."""
         D = np.moveaxis(np.linalg.inv(self._all_compliances()), 0, -1)
         plane_strain = [
             D[i, i] - D[i, j] * D[j, i] / D[j, j] for i, j in ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))
@@ -77,7 +77,7 @@ class Material:
         return float(np.min(plane_strain))
 
     def _all_compliances(self) -> Array:
-        """Return the compliances (n, 6, 6) [1 / pressure] in material axes, at all sampling points if constants vary."""
+        """Return the compliances (n, 6, 6) [1 / pressure] in material axes, at all points of `Cells.samples` if they vary."""
         if not self.graded:
             return self.local_compliance[None]
         return np.concatenate([self.compliances(self.constants_at(*sample)) for sample in self._cells().samples()])
@@ -107,10 +107,9 @@ class Material:
 
     @property
     def varies_inside(self) -> bool:
-        """Whether material axes, moduli or thermal expansion vary within cells.
+        """Whether material axes, moduli or thermal expansion vary within cells, as functions and nodal values do.
 
-        They do if they are functions of position or nodal values. Cells with a mean dilatation use the constants at their
-        centres.
+        Cells with a mean dilatation use the constants at their centres instead.
         """
         varying_constants = [v for name in (*MODULI, "expansion") for v in varying(getattr(self, name, None))]
         return (callable(self.axes) or any(v.inside for v in varying_constants)) and not self.averaged
@@ -118,8 +117,7 @@ class Material:
     def check_thermal_and_density(self, most: int) -> None:
         """Raise ModelError if the density is negative, or a thermal constant is neither a number nor `most` numbers.
 
-        `most` is 3 for materials with axes, otherwise 1. Constants that vary are checked when the cells of the material are
-        known.
+        `most` is 3 for materials with axes, otherwise 1. Constants that vary are checked by `bound`.
         """
         density = self.density
         if not isinstance(density, Varying) and density is not None and not 0.0 <= _real(density) < math.inf:
@@ -128,7 +126,7 @@ class Material:
         check_conductivity(self.conductivity, most)
 
     def bound(self: AnyMaterial, cells: Cells) -> AnyMaterial:
-        """Return a copy of the material with its cells, in which varying constants can be evaluated.
+        """Return a copy of the material whose varying constants are assigned to `cells`, so that they can be evaluated.
 
         ModelError if a varying constant is not admissible somewhere in these cells.
         """
@@ -150,11 +148,10 @@ class Material:
         return bound_material
 
     def constants_at(self, name: str, rows: Indices, N: Array) -> SimpleNamespace:
-        """Return the constants at points of some cells of an element type.
+        """Return the constants at n points of each of some cells of an element type, as attributes.
 
-        Varying constants are arrays (n_rows * n,) [unit of the constant], the others numbers. `name` is the element type,
-        `rows` (n_rows,) of int contains the numbers of the cells, and `N` (n, n_nodes) [-] the shape functions at n points
-        of a cell.
+        Varying constants are arrays (n_rows * n,) [unit of the constant], and the others numbers. `name` is the element type,
+        `rows` (n_rows,) of int contains the numbers of the cells, and `N` (n, n_nodes) [-] the shape functions at the points.
         """
 
         def at(value: Any) -> Any:
@@ -167,7 +164,7 @@ class Material:
         raise NotImplementedError
 
     def admissible(self, constants: Any) -> Any:
-        """Return for each set of constants (n,) whether it is admissible, that is whether the elastic energy is positive."""
+        """Return for each set of constants (n,) whether it is admissible: whether the elastic energy is positive definite."""
         raise NotImplementedError
 
     def _cells(self) -> Cells:
@@ -178,7 +175,7 @@ class Material:
         return varying_constants[0].cells
 
     def _check_at(self, names: Sequence[str], element: str, rows: Indices, N: Array) -> None:
-        """Raise ModelError with the position if the constants called `names` are not admissible somewhere."""
+        """Raise ModelError with the position if constants are not admissible somewhere; `names` are those that vary."""
         constants, count = self.constants_at(element, rows, N), len(rows) * len(N)
         wrong = np.array(np.broadcast_to(~np.asarray(self.admissible(constants), bool), count))
         if constants.density is not None:
@@ -187,15 +184,15 @@ class Material:
             wrong |= k is not None and ~(np.asarray(k, float) > 0.0)
         if not wrong.any():
             return
-        row = int(wrong.argmax())
+        point = int(wrong.argmax())
         values = {
-            name: mapped(getattr(constants, name), lambda v: float(np.broadcast_to(np.asarray(v), count)[row]))
+            name: mapped(getattr(constants, name), lambda v: float(np.broadcast_to(np.asarray(v), count)[point]))
             for name in names
         }
-        mesh, cell = self._cells().mesh, int(rows[row // len(N)])
+        mesh, cell = self._cells().mesh, int(rows[point // len(N)])
         where = f"in cell {cell} of {element} near {mesh.points[mesh.cells[element][cell]].mean(axis=0)}"
         try:
-            dataclasses.replace(self, **values)  # type: ignore[type-var]
+            dataclasses.replace(self, **values)  # type: ignore[type-var] # raises the error for these values
         except ModelError as error:
             raise ModelError(f"{where}: {error}") from None
 
@@ -214,32 +211,32 @@ class Material:
     def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `moduli`.
 
-        If constants vary, `constants` contains the result of `constants_at` at these points.
+        If constants vary, `constants` must be the result of `constants_at` for these points.
         """
         compliance = self._compliance6(points, kinematics, constants)
         if kinematics == "3d":
             return np.asarray(np.linalg.inv(compliance))
         if kinematics != "plane_stress":
             return np.asarray(np.linalg.inv(compliance)[:, :4, :4])
-        inner = np.ix_(range(len(compliance)), (0, 1, 3), (0, 1, 3))
+        in_plane = np.ix_(range(len(compliance)), (0, 1, 3), (0, 1, 3))
         D = np.zeros((len(compliance), 4, 4))
-        D[inner] = np.linalg.inv(compliance[inner])
+        D[in_plane] = np.linalg.inv(compliance[in_plane])
         return D
 
     def compliance_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the compliance (n, 4, 4), in 3D (n, 6, 6) [1 / pressure] at `points` (n, dim) [length].
 
-        In 2D it includes the component zz, so that stress : compliance : stress is twice the complete energy density; the
-        stresses yz and xz are zero.
+        In 2D it includes the component zz, so that stress : compliance : stress is twice the elastic energy density, since
+        the stresses yz and xz are zero.
         """
         size = 6 if kinematics == "3d" else 4
         return np.asarray(self._compliance6(points, kinematics, constants)[:, :size, :size])
 
     def expansion_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
-        """Return the thermal strain (n, 4), in 3D (n, 6) [1 / temperature] per unit temperature rise.
+        """Return the thermal strain (n, 4), in 3D (n, 6) [1 / temperature] per unit rise at `points` (n, dim) [length].
 
-        It is evaluated at `points` (n, dim) [length], and NaN without a coefficient of thermal expansion. ModelError if it
-        has an out-of-plane shear component, which plane kinematics exclude.
+        It is NaN without a coefficient of thermal expansion. ModelError if it has an out-of-plane shear component, which
+        plane kinematics exclude.
         """
         size = 6 if kinematics == "3d" else 4
         if self.expansion is None:
@@ -257,8 +254,8 @@ class Material:
     def conductivity_at(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the conductivity (n, dim, dim) [power / (length temperature)] at `points` (n, dim) [length].
 
-        `constants` contains the result of `constants_at` at these points. ModelError if inclined material axes conduct heat
-        out of the plane of the model.
+        `constants` is the result of `constants_at` for these points. ModelError if inclined material axes conduct heat out of
+        the plane of the model.
         """
         conductivity, dim = constants.conductivity, points.shape[1]
         if not isinstance(conductivity, tuple):
@@ -272,9 +269,9 @@ class Material:
         return np.asarray(tensor[:, :dim, :dim])
 
     def _along_axes(self, values: Any, points: Array, kinematics: str, constants: Any) -> tuple[Array, Array]:
-        """Return one or three constants as an array (n, 3) along the material axes, and as tensors (n, 3, 3).
+        """Return one or three constants `values` as components (n, 3) along the material axes, and as tensors (n, 3, 3).
 
-        Both are in the unit of `values`; the tensors refer to the axes of the mesh.
+        Both have the unit of `values`; the tensors refer to the axes of the mesh.
         """
         along, axes = np.empty((len(points), 3)), self._frames(points, kinematics, constants)
         for axis in range(3):
@@ -282,7 +279,7 @@ class Material:
         return along, np.einsum("nai,na,naj->nij", axes, along, axes)
 
     def _frames(self, points: Array, kinematics: str, constants: Any) -> Array:
-        """Return the material axes (n, 3, 3) [-] at `points` (n, dim) [length]; axes given by cell are in `constants`."""
+        """Return the material axes (n, 3, 3) [-] at `points` (n, dim) [length]; `constants` contains axes given by cell."""
         axes = constants.axes if constants and varying(self.axes) else self.axes
         if varying(axes):
             raise ModelError(
@@ -291,7 +288,7 @@ class Material:
         return frames(axes, points, kinematics)
 
     def _compliance6(self, points: Array, kinematics: str, constants: Any) -> Array:
-        """Return the compliance (n, 6, 6) [1 / pressure] in the axes of the mesh.
+        """Return the compliance (n, 6, 6) [1 / pressure] at `points` (n, dim) [length] in the axes of the mesh.
 
         ModelError if the material couples in-plane stresses with out-of-plane shear, which plane kinematics exclude.
         """
@@ -313,7 +310,7 @@ class Material:
 
 
 def _real(value: Any) -> float:
-    """Return `value` as a float: infinity if it is too large for a float, NaN if it is not a real number."""
+    """Return `value` as a float, infinity if it is too large for a float, and NaN if it is not a real number."""
     try:
         return float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     except OverflowError:
@@ -334,8 +331,8 @@ def check_expansion(value: Any, most: int) -> None:
     numbers = [value] if not isinstance(value, (Sequence, np.ndarray)) else list(value)
     valid = all(isinstance(v, Varying) or math.isfinite(_real(v)) for v in numbers)
     if value is not None and not (valid and len(numbers) in (1, most)):
-        wanted = "a number" if most == 1 else "a number, or three along the material's axes"
-        raise ModelError(f"the coefficient of thermal expansion = {value} must be {wanted}")
+        required = "a number" if most == 1 else "a number, or three along the material's axes"
+        raise ModelError(f"the coefficient of thermal expansion = {value} must be {required}")
 
 
 def check_conductivity(value: Any, most: int) -> None:
@@ -348,7 +345,8 @@ def check_conductivity(value: Any, most: int) -> None:
             check_positive("the conductivity", number)
 
 
-# A number, a function of position, or numbers for each cell or point. Type checkers see Any, since users read numbers.
+# A number, a function of position, or numbers for all cells or points. It is Any for type checkers, because a constant that
+# was given as a number is read as a number.
 if TYPE_CHECKING:
     Constant = Any
 else:
@@ -370,7 +368,7 @@ class LinearElastic(Material):
     nu : float, callable or ndarray (n,)
         Poisson's ratio, -1 < nu < 0.5 [-], in one of the forms of E.
     volumetric : {"auto", "plain", "mean_dilatation"}
-        Treatment of the dilatation. ``"plain"`` uses the dilatation of the displacements. ``"mean_dilatation"`` projects it
+        Treatment of the dilatation. ``"plain"`` does not modify it. ``"mean_dilatation"`` projects it
         onto constants in linear cells and onto linear functions in quadratic cells, so that nearly incompressible materials
         do not lock. In quadratic triangles, tetrahedra, wedges and pyramids only the mean has the full bulk modulus, and the
         remainder has at most that of nu = 0.3. ``"auto"`` selects the mean dilatation for nu >= 0.49. The treatment has no
@@ -430,12 +428,12 @@ class LinearElastic(Material):
 
     @property
     def young(self) -> tuple[float, float]:
-        """Smallest and largest Young's modulus, which differ only if the modulus varies [pressure]."""
+        """Smallest and largest Young's modulus [pressure], which are equal unless E varies."""
         return self.E.range if isinstance(self.E, Varying) else (self.E, self.E)
 
     @property
     def contact_modulus(self) -> float:
-        """Plane-strain modulus E / (1 - nu^2) [pressure]; its smallest value if E or nu varies."""
+        """Plane-strain modulus E / (1 - nu^2) [pressure], or its smallest value if E or nu varies."""
         if not self.graded:
             return self.E / (1 - self.nu**2)
         samples = [self.constants_at(*sample) for sample in self._cells().samples()]
@@ -443,7 +441,7 @@ class LinearElastic(Material):
 
     @property
     def largest_nu(self) -> float:
-        """Poisson's ratio [-]. If it varies, its largest value, and zero before the material is assigned to cells."""
+        """Largest Poisson's ratio [-]; zero if it varies and the material has not been assigned to cells."""
         if not isinstance(self.nu, Varying):
             return self.nu
         return 0.0 if self.nu.cells is None else self.nu.range[1]
@@ -464,9 +462,9 @@ class LinearElastic(Material):
 
     @property
     def averaged(self) -> bool:  # type: ignore[override]
-        """Whether elements that support a mean dilatation use it, except in plane stress."""
-        nearly = self.largest_nu >= NEARLY_INCOMPRESSIBLE
-        return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly)
+        """Whether elements that support a mean dilatation have it, except in plane stress."""
+        nearly_incompressible = self.largest_nu >= NEARLY_INCOMPRESSIBLE
+        return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly_incompressible)
 
     @property
     def shear_modulus(self) -> float:

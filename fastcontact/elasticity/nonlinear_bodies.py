@@ -25,28 +25,29 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 History = dict[str, Array]
-# Size of the history of a quadrature point, see `constitutive_kernels`.
+# Number of history variables of a quadrature point, and the indices of two of them: the equivalent plastic strain, and
+# F_zz - 1 in plane stress; see `constitutive_kernels`.
 HISTORY, PLASTIC_STRAIN, ACROSS = 9, 6, 8
-# Parts of the geometric stiffness in a tangent, see `NonlinearBodies.at`.
+# Value of the argument `geometric` for the complete tangent, see `NonlinearBodies.at`.
 WHOLE = 2
 
 
 @dataclass(frozen=True, eq=False)
 class DeformedBodies:
-    """The bodies at a displacement.
+    """Response of the bodies to a displacement.
 
     Attributes
     ----------
     tangent : callable
-        Function that returns K.
+        Function without arguments that returns K.
     force : ndarray (n_points, dim)
         Internal forces [force].
     history : dict of str to ndarray (n_cells, n_q, 9)
-        History by solid element type, if the load step ended here.
+        History by solid element type, at the end of a load step with this displacement.
     stress : dict of str to ndarray (n_cells, n_q, n_components)
-        Cauchy stress [pressure].
+        Cauchy stress by solid element type [pressure].
     energy, plastic_work : float
-        Elastic energy, and the plastic work since the beginning [energy].
+        Elastic energy, and plastic work since the beginning of the analysis [energy].
     """
 
     tangent: Callable[[], bsr_array]
@@ -76,24 +77,24 @@ class NonlinearBodies:
 
     def __init__(self, mesh: Mesh, kinematics: str, strain: str, field: MaterialField) -> None:
         self.mesh, self.kinematics, self.finite = mesh, kinematics, strain == "finite"
-        if kinematics == "plane_stress":  # the out-of-plane strain follows from the full law
+        if kinematics == "plane_stress":  # the kernels compute the out-of-plane strain from the law
             field = material_field(mesh, "plane_strain", field.materials, field.number)
         self._materials, self._owner = field.materials, field.owner
-        self._moduli = _six_by_six(field.moduli)
-        self._expansion = np.zeros((len(self._moduli), 6))
-        self._expansion[:, : field.moduli.shape[1]] = np.nan_to_num(field.expansion)
+        size = field.moduli.shape[1]
+        self._moduli, self._expansion = np.zeros((len(field.moduli), 6, 6)), np.zeros((len(field.moduli), 6))
+        self._moduli[:, :size, :size], self._expansion[:, :size] = field.moduli, np.nan_to_num(field.expansion)
         self._cells = {name: _at_points(field.loops[name], name) for name in mesh.solids}
         self._averaged = field.averaged & (kinematics != "plane_stress")
-        self._constants = self._rows()
+        self._constants = self._constants_of_laws()
         self._pattern: Sparsity = sparsity(mesh)
         self._blocks = len(self._pattern.indices), mesh.dim, mesh.dim
 
-    def _rows(self) -> Array:
-        """Return the constants (n_moduli, n_constants) of all laws."""
+    def _constants_of_laws(self) -> Array:
+        """Return the constants (n_moduli, n_constants) of the laws for `constitutive_kernels`."""
         hooke = SAINT_VENANT if self.finite else LINEAR
-        constants_of_laws = [law.constants if isinstance(law, NonlinearElastic) else [hooke] for law in self._materials]
-        rows = np.zeros((len(constants_of_laws), max(4, *map(len, constants_of_laws))))
-        for row, constants in zip(rows, constants_of_laws, strict=True):
+        by_law = [law.constants if isinstance(law, NonlinearElastic) else [hooke] for law in self._materials]
+        rows = np.zeros((len(by_law), max(4, *map(len, by_law))))
+        for row, constants in zip(rows, by_law, strict=True):
             row[: len(constants)] = constants
             if self.finite and constants[0] == PLASTIC:
                 row[0] = LOGARITHMIC
@@ -101,11 +102,11 @@ class NonlinearBodies:
 
     @property
     def yields(self) -> bool:
-        """Whether there is an elastic-plastic law."""
+        """Whether one of the materials is elastic-plastic."""
         return any(isinstance(law, ElasticPlastic) for law in self._materials)
 
     @property
-    def _remembers(self) -> bool:
+    def _has_history(self) -> bool:
         """Whether the history may change."""
         return self.yields or self.kinematics == "plane_stress"
 
@@ -115,7 +116,10 @@ class NonlinearBodies:
         return {name: np.zeros((*numbers.shape, HISTORY)) for name, numbers in self._cells.items()}
 
     def _split(self, name: str) -> tuple[Array, Array]:
-        """Return moduli without dilatation, and bulk moduli (n_moduli, 2) of the projected dilatation and the remainder."""
+        """Return the moduli without the bulk modulus where the dilatation is projected, and bulk moduli (n_moduli, 2).
+
+        The latter are those of the projected dilatation and of the remainder, as in `dilatation.Split`.
+        """
         moduli, element = self._moduli.copy(), elements.get(name)
         bulk = np.zeros((len(moduli), 2))
         bulk[:, 1] = self._constants[:, 2]
@@ -134,13 +138,23 @@ class NonlinearBodies:
         self, displacement: Array, before: Mapping[str, Array], *, rise: Array | None = None, geometric: int = WHOLE,
         tangent: bool = True,
     ) -> DeformedBodies:  # fmt: skip
-        """Return the bodies at `displacement` (n_points, dim) [length], with the history `before` the load step.
+        """Return the response to a displacement, with internal forces, stresses, history and tangent.
 
-        They expand by a temperature `rise` (n_points,) over the reference [temperature].
-        `geometric` selects the full tangent (2), the tangent without the rotation of the mean pressure (1), or also without
-        initial-stress stiffness (0). The last one is positive definite farther from the solution, and where only contact
-        prevents the rotation of a body under load. Without `tangent`, K is computed only at its first use, which takes half
-        the time if K is never used, and one and a half times the time if it is.
+        Parameters
+        ----------
+        displacement : ndarray (n_points, dim)
+            Displacements [length].
+        before : mapping of str to ndarray (n_cells, n_q, 9)
+            History at the beginning of the load step, by solid element type.
+        rise : ndarray (n_points,), optional
+            Temperature rise over the reference temperature; zero by default [temperature].
+        geometric : int
+            2 for the complete tangent, 1 without the second derivative of J, 0 also without initial-stress stiffness; see
+            `body_kernels.linearise`. With 0, the tangent is positive definite farther from the solution, and if only contact
+            prevents the rotation of a body under load.
+        tangent : bool
+            Whether K is computed at once. If not, it is computed at its first use. This halves the time if K is not used,
+            and increases it by a half if K is used.
 
         Raises
         ------
@@ -163,13 +177,13 @@ class NonlinearBodies:
         self, displacement: Array, before: Mapping[str, Array], rise: Array | None, geometric: int, data: Array,
         elastic: bool,
     ) -> DeformedBodies:  # fmt: skip
-        """Return the result of `at`; `data` (n_blocks, dim, dim) receive the tangent, see `body_kernels.linearise`."""
+        """Return the result of `at`; the tangent is added to `data` (n_blocks, dim, dim), see `body_kernels.linearise`."""
         from fastcontact.elasticity import body_kernels  # most models are linear
 
         mesh, dim, pattern = self.mesh, self.mesh.dim, self._pattern
         history, stress, force, energy = {}, {}, np.zeros((mesh.n_points, dim)), np.zeros(2)
-        finite, degrees = (self.finite, geometric), np.zeros(0) if rise is None else rise
-        flags = self.kinematics == "axisymmetric", self.kinematics == "plane_stress", *finite
+        rise_or_none = np.zeros(0) if rise is None else rise
+        flags = self.kinematics == "axisymmetric", self.kinematics == "plane_stress", self.finite, geometric
         for name, cells in mesh.solids.items():
             N, dN, weights = elements.get(name).tables
             moduli, bulk = self._split(name)
@@ -178,45 +192,45 @@ class NonlinearBodies:
                 polynomials = polynomials[:, :1].copy() if elements.get(name).dilatation == 0 else polynomials
             owner, row_ranges = pattern.owners(mesh, name)
             cauchy = np.empty((*before[name].shape[:2], 6 if dim == 3 else 4))
-            new = np.empty_like(before[name]) if self._remembers else before[name][:0]
+            new = np.empty_like(before[name]) if self._has_history else before[name][:0]
             energies, numbers = np.zeros((len(cells), 2)), self._cells[name]
             slots, old = pattern.slots[name], before[name]
 
-            def part(number: int) -> tuple[int, int]:
+            def linearise_part(number: int) -> tuple[int, int]:
                 rows = slice(*row_ranges[number])  # noqa: B023
                 status, cell = body_kernels.linearise(
                     mesh.points, cells[rows], N, dN, weights, polynomials, *flags, displacement, self._constants, moduli,  # noqa: B023
-                    bulk, self._expansion, degrees, numbers[rows], old[rows], slots[rows], owner, number, elastic, data,  # noqa: B023
+                    bulk, self._expansion, rise_or_none, numbers[rows], old[rows], slots[rows], owner, number, elastic, data,  # noqa: B023
                     force, new[rows], cauchy[rows], energies[rows],  # noqa: B023
                 )  # fmt: skip
                 return status, int(cell) + rows.start
 
-            for status, cell in parallel.shared(part, range(len(row_ranges))):
+            for status, cell in parallel.shared(linearise_part, range(len(row_ranges))):
                 if status:
                     raise ConvergenceError(self._failure(status, name, cell, displacement))
-            history[name], stress[name] = new if self._remembers else before[name], cauchy
+            history[name], stress[name] = new if self._has_history else before[name], cauchy
             energy += energies.sum(axis=0)
         size = mesh.n_points * dim
 
-        def whole() -> bsr_array:
+        def assembled_tangent() -> bsr_array:
             if not len(data):
                 return self.at(displacement, before, rise=rise, geometric=geometric).K
             return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
 
-        return DeformedBodies(whole, force, history, stress, float(energy[0]), float(energy[1]))
+        return DeformedBodies(assembled_tangent, force, history, stress, float(energy[0]), float(energy[1]))
 
     def _failure(self, status: int, name: str, cell: int, displacement: Array) -> str:
+        """Return the message for a status other than zero of `body_kernels.linearise`."""
         from fastcontact.elasticity import body_kernels
 
         where = self.mesh.points[self.mesh.cells[name][cell]].mean(axis=0)
-        measure = self._measures(name, cell, displacement).min()
-        failure = f"is inverted (J = {measure:.3g})"
+        failure = f"is inverted (J = {self._volume_ratios(name, cell, displacement).min():.3g})"
         if status != body_kernels.INVERTED:
             failure = "has no out-of-plane strain of zero stress"
         return f"cell {cell} of {name} near {where} {failure}: smaller load steps, or a mesh that is coarser there, may help"
 
-    def _measures(self, name: str, cell: int, displacement: Array) -> Array:
-        """Return J (n_q,) of a cell."""
+    def _volume_ratios(self, name: str, cell: int, displacement: Array) -> Array:
+        """Return J (n_q,) at the quadrature points of a cell."""
         N, dN, _ = elements.get(name).tables
         nodes, dim, F = self.mesh.cells[name][cell], self.mesh.dim, np.tile(np.eye(3), (len(N), 1, 1))
         points, u = self.mesh.points[nodes], displacement[nodes]
@@ -226,7 +240,7 @@ class NonlinearBodies:
         return np.linalg.det(F)
 
     def cell_fields(self, bodies: DeformedBodies, displacement: Array) -> dict[str, Array]:
-        """Return the fields of `field_names` (n_solids,): extremes over the points of each cell, except for the volume."""
+        """Return the fields of `field_names` (n_solids,): extremes over the points of each cell, and its volume ratio."""
         fields = {name: self._fields(name, bodies, displacement) for name in self._cells}
         names = field_names(self._materials, "finite" if self.finite else "small")
         return {name: np.concatenate([field[i] for field in fields.values()]) for i, name in enumerate(names)}
@@ -252,18 +266,18 @@ class NonlinearBodies:
         J, ratio, logarithm = np.empty_like(across), np.empty(len(cells)), np.empty(len(cells))
         axisymmetric = self.kinematics == "axisymmetric"
 
-        def part(cut: tuple[int, int]) -> None:
-            rows = slice(*cut)
+        def fill_rows(portion: tuple[int, int]) -> None:
+            rows = slice(*portion)
             body_kernels.strains(
                 self.mesh.points, cells[rows], N, dN, weights, axisymmetric, across[rows], displacement, J[rows], ratio[rows],
                 logarithm[rows],
             )  # fmt: skip
 
-        parallel.shared(part, parallel.portions(len(cells), len(N)))
+        parallel.shared(fill_rows, parallel.portions(len(cells), len(N)))
         return J, ratio, logarithm
 
     def _yielding(self, name: str, bodies: DeformedBodies, J: Array) -> list[Array]:
-        """Return the largest equivalent plastic strain and yield ratio (n_cells,) of cells.
+        """Return the largest equivalent plastic strain and the largest ratio of stress to yield stress (n_cells,) in cells.
 
         The yield condition applies to the Kirchhoff stress, J (n_cells, n_q) times the Cauchy stress.
         """
@@ -272,15 +286,15 @@ class NonlinearBodies:
         ratio = np.zeros(strain.shape)
         for index, law in enumerate(self._materials):
             if isinstance(law, ElasticPlastic):
-                at = owner == index
-                stress = J[at][:, None] * bodies.stress[name][at]
-                relative = stress - 2.0 / 3.0 * law.kinematic * history[at][:, : stress.shape[1]]
-                ratio[at] = von_mises(relative) / law.yield_at(strain[at])
+                of_law = owner == index
+                stress = J[of_law][:, None] * bodies.stress[name][of_law]
+                relative = stress - 2.0 / 3.0 * law.kinematic * history[of_law][:, : stress.shape[1]]
+                ratio[of_law] = von_mises(relative) / law.yield_at(strain[of_law])
         return [strain.max(axis=1), ratio.max(axis=1)]
 
 
 def field_names(materials: Sequence[Material], strain: str) -> tuple[str, ...]:
-    """Return the names of the cell fields in steps with these materials; none for linear bodies."""
+    """Return the names of the cell fields of steps with these materials and strains; none for linear bodies."""
     plastic = ("plastic_strain", "yield_ratio") if any(isinstance(law, ElasticPlastic) for law in materials) else ()
     return (*(("J", "logarithmic_strain") if strain == "finite" else ()), *plastic)
 
@@ -307,17 +321,8 @@ def check_law(law: Material, strain: str) -> None:
         )
 
 
-def _six_by_six(moduli: Array) -> Array:
-    """Return moduli (n, 6, 6), extended from plane-strain moduli (n, 4, 4) if necessary."""
-    if moduli.shape[1] == 6:
-        return np.ascontiguousarray(moduli)
-    full = np.zeros((len(moduli), 6, 6))
-    full[:, :4, :4] = moduli
-    return full
-
-
 def _at_points(numbers: Numbers, name: str) -> Numbers:
-    """Return the moduli numbers of every quadrature point (n_cells, n_q) from those of cells or points."""
+    """Return the number of the moduli of each quadrature point (n_cells, n_q), given the numbers of cells or points."""
     n_q = len(elements.get(name).quadrature[1])
     columns = numbers[:, None] if numbers.ndim == 1 else numbers
     return np.ascontiguousarray(np.broadcast_to(columns, (len(columns), n_q)))

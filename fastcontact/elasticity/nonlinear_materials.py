@@ -1,8 +1,8 @@
-"""Nonlinear material laws: von Mises plasticity (small strain) and hyperelasticity (finite strain).
+"""Nonlinear material laws: von Mises plasticity, and hyperelasticity at finite strains.
 
-A law is a row of constants for `constitutive_kernels`: its number, the shear modulus, the bulk modulus of the volumetric
-part ``U(J) = K (J - 1)^2 / 2``, then the constants of the law. Loads, contact and checks use its initial isotropic
-elasticity.
+For `constitutive_kernels`, a law is a row of constants: its number, the shear modulus, the bulk modulus of the volumetric
+part ``U(J) = K (J - 1)^2 / 2``, and further constants of the law. Loads, contact and checks use its isotropic elasticity at
+small strains.
 """
 
 from __future__ import annotations
@@ -20,15 +20,16 @@ from fastcontact.elasticity.materials import NEARLY_INCOMPRESSIBLE, Constant, Li
 from fastcontact.errors import ModelError
 
 STRAINS = ("small", "finite")
-# Plastic strain, which concentrates in a few cells, beyond which linear kinematics are worth a warning: under a ball without
-# hardening the mean contact pressure falls from 2.6 times the yield stress, where it reaches 0.1, to 2.3 at 0.5, 2.1 at 1.1.
+# Largest plastic strain in a cell for which linear kinematics cause no warning. Under a ball of a material without hardening,
+# the mean contact pressure is 2.6 times the yield stress if the largest plastic strain is 0.1, 2.3 if it is 0.5, and 2.1 if
+# it is 1.1.
 LARGEST_PLASTIC_STRAIN = 0.5
 
 
 class NonlinearElastic(LinearElastic):
-    """Base of nonlinear laws; as a `LinearElastic` it represents their initial elasticity."""
+    """Base class of nonlinear laws; as `LinearElastic` they represent their elasticity at small strains."""
 
-    strains: tuple[str, ...] = STRAINS  # kinematics of the law
+    strains: tuple[str, ...] = STRAINS  # that the law supports
 
     def _check_numbers(self) -> None:
         """Raise ModelError if E or nu is not a number: constants of these laws do not vary."""
@@ -43,9 +44,9 @@ class NonlinearElastic(LinearElastic):
 
     @property
     def averaged(self) -> bool:  # type: ignore[override]
-        """Whether elements that support it project the dilatation, except in plane stress."""
-        nearly = "small" in self.strains or self.nu >= NEARLY_INCOMPRESSIBLE
-        return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly)
+        """Whether elements that support a mean dilatation have it, except in plane stress."""
+        nearly_incompressible = "small" in self.strains or self.nu >= NEARLY_INCOMPRESSIBLE
+        return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly_incompressible)
 
     @property
     def constants(self) -> list[float]:
@@ -58,10 +59,11 @@ class NonlinearElastic(LinearElastic):
 class ElasticPlastic(NonlinearElastic):
     """Von Mises plasticity with associated flow (Simo and Hughes, 1998, chapter 3).
 
-    With ``strain="finite"`` the same law relates the logarithmic elastic strain, of a multiplicative split of the deformation
-    gradient, and the Kirchhoff stress (Simo, Comput. Methods Appl. Mech. Engrg. 99, 1992): uniaxial stresses and strains are
-    true ones, up to the elastic change of volume. Load steps must be small where the principal axes of strain rotate: in
-    simple shear, steps of 0.1 cause a normal stress of 5 % of the shear stress.
+    With ``strain="finite"`` the deformation gradient is split multiplicatively, and the same law relates the logarithmic
+    elastic strain to the Kirchhoff stress (Simo, Comput. Methods Appl. Mech. Engrg. 99, 1992). Stresses and strains in
+    uniaxial tension are then true stresses and logarithmic strains, apart from the elastic change of volume. Load steps must
+    be small where the principal axes of strain rotate: in simple shear, steps of 0.1 cause a normal stress of 5 % of the
+    shear stress.
 
     Parameters
     ----------
@@ -70,17 +72,16 @@ class ElasticPlastic(NonlinearElastic):
     yield_stress : float
         Initial yield stress in uniaxial tension [pressure].
     hardening : sequence of (float, float)
-        Isotropic hardening: pairs of equivalent plastic strain [-], ascending from zero, and yield stress [pressure],
-        interpolated linearly and constant beyond the last; by default perfect plasticity. The first pair, (0,
-        `yield_stress`), may be omitted.
+        Isotropic hardening: pairs of equivalent plastic strain [-], ascending from zero, and yield stress [pressure]. The
+        yield stress is interpolated linearly, and constant beyond the last pair; by default plasticity is perfect. The first
+        pair, (0, `yield_stress`), may be omitted.
     kinematic : float
-        Modulus of linear kinematic hardening: slope of the stress over the plastic strain in uniaxial tension (Prager,
-        1956) [pressure]; small strains only.
+        Modulus of linear kinematic hardening (Prager, 1956), the slope of the stress over the plastic strain in uniaxial
+        tension [pressure]; only for small strains.
     volumetric : str
-        As of `LinearElastic`; ``"auto"`` always projects the dilatation, if the element allows it, since plastic flow
-        preserves the volume.
+        As for `LinearElastic`, but ``"auto"`` always selects the mean dilatation, because plastic flow preserves the volume.
     density, expansion, conductivity : float, optional
-        As of `LinearElastic`.
+        As for `LinearElastic`.
 
     Raises
     ------
@@ -108,9 +109,9 @@ class ElasticPlastic(NonlinearElastic):
         object.__setattr__(self, "hardening", self._table())
 
     def _table(self) -> tuple[tuple[float, float], ...]:
-        """Return the hardening table, starting at zero plastic strain; ModelError if it is not one."""
+        """Return the hardening table, beginning at zero plastic strain; ModelError if it is not valid."""
         try:
-            rows = np.array([[float(value) for value in row] for row in self.hardening]).reshape(-1, 2)
+            rows = np.array([[float(value) for value in pair] for pair in self.hardening]).reshape(-1, 2)
         except (TypeError, ValueError, OverflowError):
             raise ModelError(
                 "hardening must be pairs (equivalent plastic strain, yield stress), such as [(0.0, 250.0), (0.1, 400.0)]"
@@ -133,7 +134,7 @@ class ElasticPlastic(NonlinearElastic):
 
     @property
     def described(self) -> str:
-        """E, nu and the yield stress, for messages."""
+        """Text with E, nu and the yield stress, for messages."""
         return f"{super().described}, yield stress {self.yield_stress:g}"
 
     @property
@@ -148,7 +149,7 @@ class ElasticPlastic(NonlinearElastic):
 
 
 class Hyperelastic(NonlinearElastic):
-    """Hyperelasticity of finite strains: an isochoric part and ``U(J) = K (J - 1)^2 / 2``."""
+    """Base class of hyperelastic laws, whose energy is an isochoric part plus ``U(J) = K (J - 1)^2 / 2``."""
 
     strains = ("finite",)
 
@@ -164,7 +165,7 @@ class NeoHookean(Hyperelastic):
         Young's modulus [pressure] and Poisson's ratio [-] at small strains: mu = E / (2 (1 + nu)), K = E / (3 (1 - 2
         nu)).
     volumetric, density, expansion, conductivity
-        As of `LinearElastic`: from nu = 0.49 on the dilatation is projected, so that elements do not lock.
+        As for `LinearElastic`.
 
     Raises
     ------
@@ -190,12 +191,12 @@ class NeoHookean(Hyperelastic):
 
 @dataclass(frozen=True)
 class OwnConstants(Hyperelastic):
-    """A law with its own constants and a `bulk` modulus, from which E and nu follow.
+    """Base class of laws with constants from which E and nu follow.
 
     Parameters
     ----------
     volumetric, density, expansion, conductivity
-        Further properties, as for `LinearElastic`.
+        As for `LinearElastic`.
     """
 
     E: Constant = field(init=False, default=0.0)
@@ -206,13 +207,13 @@ class OwnConstants(Hyperelastic):
     incompatible_modes: bool = field(init=False, default=False)
     conductivity: Constant | None = field(default=None, kw_only=True)
 
-    def _begins_with(self, mu: float, how: str, bulk: float) -> None:
-        """Set E and nu by the shear modulus `mu` of small strains, found as `how` says, and the bulk modulus [pressure].
+    def _set_initial_moduli(self, mu: float, formula: str, bulk: float) -> None:
+        """Set E and nu, given the shear modulus `mu` at small strains and the bulk modulus [pressure].
 
-        ModelError if one is not positive.
+        ModelError if one of them is not positive; the message contains the `formula` of mu.
         """
         if not (0.0 < mu < math.inf):
-            raise ModelError(f"the shear modulus {how} = {mu:g} of {type(self).__name__} must be positive")
+            raise ModelError(f"the shear modulus {formula} = {mu:g} of {type(self).__name__} must be positive")
         check_positive("the bulk modulus", bulk)
         object.__setattr__(self, "E", 9.0 * bulk * mu / (3.0 * bulk + mu))
         object.__setattr__(self, "nu", (3.0 * bulk - 2.0 * mu) / (2.0 * (3.0 * bulk + mu)))
@@ -220,7 +221,7 @@ class OwnConstants(Hyperelastic):
 
 
 class Polynomial(OwnConstants):
-    """A polynomial of isochoric invariants of C: C10 (I1 - 3) + C01 (I2 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3."""
+    """Base class of laws ``C10 (I1 - 3) + C01 (I2 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3`` of the isochoric invariants."""
 
     bulk: float
 
@@ -228,7 +229,7 @@ class Polynomial(OwnConstants):
         if not all(map(math.isfinite, self._coefficients)):
             raise ModelError(f"the constants of {type(self).__name__} must be finite numbers")
         C10, C01, _, _ = self._coefficients
-        self._begins_with(2.0 * (C10 + C01), "2 (C10 + C01)" if C01 else "2 C10", self.bulk)
+        self._set_initial_moduli(2.0 * (C10 + C01), "2 (C10 + C01)" if C01 else "2 C10", self.bulk)
 
     @property
     def _coefficients(self) -> list[float]:
@@ -254,7 +255,7 @@ class MooneyRivlin(Polynomial):
     bulk : float
         Bulk modulus K [pressure].
     volumetric, density, expansion, conductivity
-        As of `NeoHookean`.
+        As for `NeoHookean`.
 
     Raises
     ------
@@ -286,7 +287,7 @@ class Yeoh(Polynomial):
     bulk : float
         Bulk modulus K [pressure].
     volumetric, density, expansion, conductivity
-        As of `NeoHookean`.
+        As for `NeoHookean`.
 
     Raises
     ------
@@ -321,7 +322,7 @@ class Ogden(OwnConstants):
     bulk : float
         Bulk modulus K of ``K (J - 1)^2 / 2`` [pressure].
     volumetric, density, expansion, conductivity
-        As of `NeoHookean`.
+        As for `NeoHookean`.
 
     Raises
     ------
@@ -346,12 +347,12 @@ class Ogden(OwnConstants):
         except (TypeError, ValueError, OverflowError):
             raise ModelError("mu and alpha of Ogden must be numbers, or lists with a number for each term") from None
         if len(terms[0]) != len(terms[1]) or not terms[0]:
-            raise ModelError(f"Ogden has {len(terms[0])} mu and {len(terms[1])} alpha: give as many of both")
+            raise ModelError(f"Ogden has {len(terms[0])} mu and {len(terms[1])} alpha: give the same number of both")
         if not all(map(math.isfinite, terms[0] + terms[1])) or 0.0 in terms[1]:
             raise ModelError("mu and alpha of Ogden must be finite, and no alpha zero")
         object.__setattr__(self, "mu", terms[0])
         object.__setattr__(self, "alpha", terms[1])
-        self._begins_with(sum(terms[0]), "(the sum of mu)", self.bulk)
+        self._set_initial_moduli(sum(terms[0]), "(the sum of mu)", self.bulk)
 
     @property
     def constants(self) -> list[float]:

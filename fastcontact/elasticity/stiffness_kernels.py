@@ -1,12 +1,12 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Block index of each node pair of each cell in the stiffness matrix, and division of the cells among threads."""
+"""Block index of each node pair of each cell in the stiffness matrix, and division of the assembly among threads."""
 
 from fastcontact._jit.decorators import interpretable_kernel, kernel
 
 
 @interpretable_kernel
 def find_slots(cells, indptr, indices, slots):
-    """Fill `slots` (n_cells, n_nodes, n_nodes) with the position in `indices` of each node pair of each cell."""
+    """Fill `slots` (n_cells, n_nodes, n_nodes) with the positions in `indices` of the node pairs of cells, by bisection."""
     n_cells, n_nodes = cells.shape
     for c in range(n_cells):
         for a in range(n_nodes):

@@ -1,6 +1,6 @@
-"""Linear solvers by name, and the choice of one by the size of a problem.
+"""Linear solvers by name, and the automatic choice of a solver by the size of the problem.
 
-Each module of the package `solvers` implements one solver under the name of the module. To add a solver, add a module.
+Each module of the package `solvers` defines a solver class as ``SOLVER``; the name of the solver is that of the module.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ def make(
     name : str
         - ``"direct"``: Cholesky factorisation;
         - ``"cholmod"``: Cholesky factorisation by CHOLMOD, which needs an optional package;
-        - ``"amg"``: multigrid, which needs more iterations if parts are thin or materials nearly incompressible;
-        - ``"pyamg"``: multigrid of pyamg, which is slower, for comparison;
+        - ``"amg"``: multigrid, which needs more iterations for thin parts and nearly incompressible materials;
+        - ``"pyamg"``: the slower multigrid method of pyamg, for comparison;
         - ``"auto"``: ``"direct"`` for 2D problems and small 3D problems, otherwise ``"amg"``.
     dim, n_dofs : int
         Dimension and number of unknowns, for the choice by ``"auto"``.
@@ -48,8 +48,8 @@ def make(
     precision : {"single", "double"}, optional
         Precision of the multigrid cycle, single by default. Direct solvers always use double precision.
     columns : bool
-        Whether constraints cannot be eliminated and need columns of ``K^-1``, such as those with a full compliance matrix;
-        for the choice by ``"auto"``.
+        Whether there are constraints that cannot be eliminated and need columns of ``K^-1``, such as those with a full
+        compliance matrix; for the choice by ``"auto"``.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def tight_enough(tolerance: float, relative: float) -> float:
     """Return the smaller of a checked `tolerance` and the criterion `relative` on the residual force."""
     check_tolerance(tolerance)
     if tolerance > relative:
-        log.info("linear solver: the tolerance %.1e falls to %.1e, the criterion on balance", tolerance, relative)
+        log.info("linear solver: the tolerance %.1e is reduced to the residual criterion %.1e", tolerance, relative)
         return relative
     return tolerance
 
@@ -92,4 +92,4 @@ def chosen(dim: int, n_dofs: int, columns: bool = False) -> tuple[str, str]:
     limit = (AFFORDABLE if columns else DIRECT_UP_TO)[dim]
     if n_dofs <= limit:
         return "direct", f"for {n_dofs} unknowns in {dim}D a factorisation is cheapest (up to {limit})"
-    return "amg", f"for {n_dofs} unknowns in {dim}D a factorisation is dearer than multigrid (beyond {limit})"
+    return "amg", f"for {n_dofs} unknowns in {dim}D a factorisation costs more than multigrid (above {limit})"

@@ -1,10 +1,10 @@
 """Schur complement of linear constraints, the Delassus operator.
 
 A system ``K u = f + B.T multiplier`` with the constraints ``B u + C multiplier = c`` is reduced to
-``(B K^-1 B.T + C) multiplier = c - B K^-1 f``. For symbols see `linear.protocol`. The matrix ``B K^-1 B.T`` only depends on
-the rows and columns of ``K^-1`` that belong to degrees of freedom in B. They are computed when they are first needed, and
-stored. A new active set or pairing with the same degrees of freedom then costs a small dense solution and one solution with
-K.
+``(B K^-1 B.T + C) multiplier = c - B K^-1 f``. The symbols are those of `linear.protocol`. The matrix ``B K^-1 B.T`` only
+depends on the rows and columns of ``K^-1`` that belong to degrees of freedom in B. They are computed when they are first
+needed, and stored. A new active set or pairing with the same degrees of freedom then takes a small dense solution and one
+solution with K.
 """
 
 from __future__ import annotations
@@ -31,12 +31,13 @@ CHEAP = 'formulation="mortar" with multipliers="dual"'
 
 
 class TooManyColumnsError(ConvergenceError):
-    """Raised if an iterative solver would need so many columns of the inverse that a factorisation costs less."""
+    """Raised if an iterative solver would need more columns of the inverse than it may compute."""
 
     def __init__(self, count: int) -> None:
         super().__init__(
-            f"the contact needs {count} columns of the inverse stiffness, a solution each, since its constraints cannot be "
-            f"eliminated or its friction does not settle then: use the direct solver, or {CHEAP} and pairs that share no node"
+            f"the contact needs {count} columns of the inverse stiffness, each of which takes a solution, since its "
+            "constraints cannot be eliminated, or its friction does not converge with eliminated constraints: use the direct "
+            f"solver, or {CHEAP} and pairs that share no node"
         )
 
 
@@ -65,8 +66,8 @@ class InverseColumns:
     n : int
         Size of K.
     entries : method
-        Method of the solver or factors to which this object belongs. It maps rows (m,) and columns (k,) to the entries of
-        ``K^-1`` in them, shape (m, k) [length / force].
+        Method of the solver or factors to which this object belongs, which returns the entries (m, k) of ``K^-1`` in given
+        rows (m,) and columns (k,) [length / force].
     most : int, optional
         Largest number of columns; unlimited by default.
 
@@ -81,68 +82,69 @@ class InverseColumns:
         self._most = n if most is None else most
         # The reference is weak, because a reference cycle would keep the factors of the solver, which are large, in memory.
         self._entries = weakref.WeakMethod(entries)
-        self._place = np.full(n, -1, np.intp)
+        self._position = np.full(n, -1, np.intp)  # of each degree of freedom in `_dofs`
         self._dofs = np.empty(0, np.intp)
         self._values = np.empty((0, 0))
         self.asked: list[Indices] = []
 
     def give(self, dofs: Indices, values: Array) -> None:
-        """Store the submatrix `values` (k, k) of ``K^-1`` for `dofs` (k,) [length / force], which was computed elsewhere.
+        """Store the submatrix `values` (k, k) of ``K^-1`` for `dofs` (k,) [length / force], computed by the caller.
 
-        It must be called before any request.
+        This method must be called before any request.
         """
         self._dofs, self._values = dofs, values
-        self._place[dofs] = np.arange(len(dofs))
+        self._position[dofs] = np.arange(len(dofs))
 
     def of_rows(self, R: csr_array) -> Array:
         """Return ``R K^-1 R.T`` (m, m) [length / force] for a sparse matrix R (m, n)."""
         check_rows(R.shape[0])
-        used = R.data != 0.0
-        column = self._places(R.indices[used])
-        starts = np.concatenate([[0], np.cumsum(used)])[R.indptr]
-        rows = csr_array((R.data[used], column, starts), shape=(R.shape[0], len(self._dofs)))
+        nonzero = R.data != 0.0
+        column = self._positions(R.indices[nonzero])
+        starts = np.concatenate([[0], np.cumsum(nonzero)])[R.indptr]
+        rows = csr_array((R.data[nonzero], column, starts), shape=(R.shape[0], len(self._dofs)))
         return symmetric(np.asarray(rows @ (rows @ self._values).T))
 
     def put_back(self, requests: Sequence[Indices]) -> None:
         """Restore the state after the given `requests`, in their order; solve only for columns that are not stored."""
         pairs = zip(self.asked, requests, strict=False)
-        same = next((i for i, (old, new) in enumerate(pairs) if not np.array_equal(old, new)), len(requests))
-        if later := sum(len(dofs) for dofs in self.asked[same:]):
-            self._place[self._dofs[-later:]] = -1
-            self._dofs, self._values = self._dofs[:-later], self._values[:-later, :-later].copy()
-        del self.asked[same:]
+        n_equal = next((i for i, (old, new) in enumerate(pairs) if not np.array_equal(old, new)), len(requests))
+        if n_discarded := sum(len(dofs) for dofs in self.asked[n_equal:]):
+            self._position[self._dofs[-n_discarded:]] = -1
+            self._dofs = self._dofs[:-n_discarded]
+            self._values = self._values[:-n_discarded, :-n_discarded].copy()
+        del self.asked[n_equal:]
         for dofs in requests[len(self.asked) :]:
-            self._places(dofs)
+            self._positions(dofs)
 
-    def _places(self, dofs: NDArray[np.integer]) -> Indices:
-        """Return the positions (k,) of `dofs` (k,) among the stored columns, after solving for new ones.
+    def _positions(self, dofs: NDArray[np.integer]) -> Indices:
+        """Return the positions (k,) of `dofs` (k,) among the stored columns, after computing columns that are missing.
 
         A degree of freedom may occur several times in `dofs`.
         """
-        new = np.unique(dofs[self._place[dofs] < 0]).astype(np.intp)
+        new = np.unique(dofs[self._position[dofs] < 0]).astype(np.intp)
         if len(new):
             self._extend(new)
-        return self._place[dofs]
+        return self._position[dofs]
 
     def _extend(self, new: Indices) -> None:
-        """Solve for the columns of the degrees of freedom `new` (k,), and store them."""
+        """Compute the columns of the degrees of freedom `new` (k,), and store them."""
         old = len(self._dofs)
         if old + len(new) > self._most:
             raise TooManyColumnsError(old + len(new))
         self.asked.append(new)
         self._dofs = np.concatenate([self._dofs, new])
-        self._place[new] = np.arange(old, len(self._dofs))
+        self._position[new] = np.arange(old, len(self._dofs))
         entries = self._entries()
-        assert entries is not None, "the columns outlived their solver"
-        grown = np.empty((len(self._dofs), len(self._dofs)))
-        grown[:old, :old] = self._values
-        grown[:, old:] = entries(self._dofs, new)
-        grown[old:, :old] = grown[:old, old:].T
-        self._values = grown
+        assert entries is not None, "the solver of these columns no longer exists"
+        extended = np.empty((len(self._dofs), len(self._dofs)))
+        extended[:old, :old] = self._values
+        extended[:, old:] = entries(self._dofs, new)
+        extended[old:, :old] = extended[:old, old:].T
+        self._values = extended
 
 
 def inverse_entries(n: int, solve: Callable[[Array], Array], rows: Indices, columns: Indices) -> Array:
-    """Return the entries of ``K^-1`` (n, n) in some `rows` (m,) and `columns` (k,), by a solution for each column."""
+    """Return the entries (m, k) of ``K^-1`` in `rows` (m,) and `columns` (k,); `solve` is called for each column."""
     entries = np.empty((len(rows), len(columns)))
     for k, column in enumerate(columns):
         unit = np.zeros(n)
@@ -159,7 +161,7 @@ def lu_factors(A: Array) -> tuple[Array, Array]:
     LinAlgError
         If A is singular up to round-off.
     """
-    lu, pivots, _ = dgetrf(A)  # `lu_factor` warns if a pivot is exactly zero; below this is an error
+    lu, pivots, _ = dgetrf(A)  # `lu_factor` warns if a pivot is exactly zero, which is an error below
     if not (np.abs(np.diag(lu)) > _round_off(A) * np.abs(A).max(axis=0)).all():
         raise LinAlgError("singular")
     return lu, pivots
@@ -170,16 +172,16 @@ def symmetric(delassus: Array) -> Array:
     return 0.5 * (delassus + delassus.T)
 
 
-def solve_multipliers(delassus: Array, wanted: Array, C: Array | FieldCompliance | None) -> Array:
-    """Return the multipliers with ``(delassus + C) multiplier = wanted``.
+def solve_multipliers(delassus: Array, right: Array, C: Array | FieldCompliance | None) -> Array:
+    """Return the multipliers with ``(delassus + C) multiplier = right``.
 
-    If the matrix is singular up to round-off, the solution of minimum norm is returned.
+    If the matrix is singular up to round-off, the least-squares solution of minimum norm is returned.
 
     Parameters
     ----------
     delassus : ndarray (m, m)
         Delassus operator; it is overwritten [length / force].
-    wanted : ndarray (m,)
+    right : ndarray (m,)
         Right-hand side [length].
     C : ndarray (m, m) or (m,) or FieldCompliance, optional
         Compliance of the constraints, or the diagonal of a diagonal one [length / force].
@@ -197,16 +199,13 @@ def solve_multipliers(delassus: Array, wanted: Array, C: Array | FieldCompliance
     try:
         factor = cho_factor(delassus)
     except LinAlgError:
-        return _smallest(delassus, wanted)
-    repeated = factor[0].diagonal() ** 2 <= _round_off(delassus) * delassus.diagonal()
-    return _smallest(delassus, wanted) if repeated.any() else cho_solve(factor, wanted)
-
-
-def _smallest(delassus: Array, wanted: Array) -> Array:
-    """Return the multipliers (m,) of minimum norm [force] for linearly dependent constraints."""
-    return np.asarray(lstsq(delassus, wanted, cond=_round_off(delassus))[0])
+        pass
+    else:
+        if not (factor[0].diagonal() ** 2 <= _round_off(delassus) * delassus.diagonal()).any():
+            return cho_solve(factor, right)
+    return np.asarray(lstsq(delassus, right, cond=_round_off(delassus))[0])
 
 
 def _round_off(delassus: Array) -> float:
-    """Return a bound of the round-off of the pivots of a matrix (m, m), relative to its diagonal [-]."""
+    """Return a bound of the round-off in the pivots of a matrix (m, m), relative to its diagonal [-]."""
     return 10.0 * len(delassus) * float(np.finfo(float).eps)

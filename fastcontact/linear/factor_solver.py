@@ -1,6 +1,7 @@
-"""Common part of direct solvers: solution with the factors of K, and constraints by the Schur complement.
+"""Common part of direct solvers: solutions with the factors of K, and constraints by the Schur complement.
 
-If a right-hand side is a linear combination of earlier ones, so is its solution, which is not computed again (`KnownLoads`).
+If a right-hand side is a linear combination of earlier ones, its solution is the same combination of the earlier solutions
+(`KnownLoads`).
 """
 
 from __future__ import annotations
@@ -42,53 +43,52 @@ class KnownLoads:
 
         If f is not a linear combination of the stored right-hand sides up to round-off, the function `solve` is called.
         """
-        size = float(np.linalg.norm(f))
-        if size == 0.0:
+        norm = float(np.linalg.norm(f))
+        if norm == 0.0:
             return np.zeros_like(f)
-        weights, left = self._projected(f)
-        if len(weights) and np.linalg.norm(left) <= SUM_ROUND_OFF * size:
+        weights, error = self._projected(f)
+        if len(weights) and np.linalg.norm(error) <= SUM_ROUND_OFF * norm:
             return sum((w * u for w, u in zip(weights, self._solutions, strict=True)), np.zeros_like(f))
-        f = f / size
+        f = f / norm
         u = solve(f)
         self._keep(f, u)
-        return size * u
+        return norm * u
 
     def _projected(self, f: Array) -> tuple[Array, Array]:
         """Return the weights of the stored right-hand sides in the least-squares approximation of f, and its error (n,)."""
-        weights, left = np.zeros(len(self._loads)), f
+        weights, error = np.zeros(len(self._loads)), f
         if self._loads:
-            gram = np.array([[one @ other for other in self._loads] for one in self._loads])
+            gram = np.array([[row @ column for column in self._loads] for row in self._loads])
             for _ in range(2):  # The second pass removes the error of the normal equations.
-                weights = weights + np.linalg.lstsq(gram, [load @ left for load in self._loads], rcond=None)[0]
-                left = f - sum((w * load for w, load in zip(weights, self._loads, strict=True)), np.zeros_like(f))
-        return weights, left
+                weights = weights + np.linalg.lstsq(gram, [load @ error for load in self._loads], rcond=None)[0]
+                error = f - sum((w * load for w, load in zip(weights, self._loads, strict=True)), np.zeros_like(f))
+        return weights, error
 
     def _keep(self, f: Array, u: Array) -> None:
-        """Store the right-hand side f (n,) and its solution u (n,); discard the oldest ones."""
+        """Store the right-hand side f (n,) and its solution u (n,); discard the oldest ones beyond KEPT."""
         self._loads, self._solutions = [*self._loads[1 - KEPT :], f], [*self._solutions[1 - KEPT :], u]
 
     def snapshot(self) -> list[dict[str, Any]]:
-        """Return the stored right-hand sides: ``places`` and ``values`` of their nonzero entries."""
-        places = [np.flatnonzero(f) for f in self._loads]
-        return [{"places": at, "values": f[at]} for at, f in zip(places, self._loads, strict=True)]
+        """Return the stored right-hand sides: the indices ``places`` and the ``values`` of their nonzero entries."""
+        return [{"places": np.flatnonzero(f), "values": f[f != 0.0]} for f in self._loads]
 
     def put_back(self, snapshot: Sequence[Mapping[str, Any]], n: int, solve: Callable[[Array], Array]) -> None:
         """Restore the right-hand sides of a `snapshot` for the same matrix (n, n); `solve` computes missing solutions."""
-        now = list(zip(self._loads, self._solutions, strict=True))
+        stored = list(zip(self._loads, self._solutions, strict=True))
         self._loads, self._solutions = [], []
         for entry in snapshot:
             f = np.zeros(n)
             f[entry["places"]] = entry["values"]
-            known = [u for load, u in now if np.array_equal(load, f)]
-            self._keep(f, known[0] if known else solve(f))
+            solutions = [u for load, u in stored if np.array_equal(load, f)]
+            self._keep(f, solutions[0] if solutions else solve(f))
 
 
 class FactorSolver(LinearSolver):
     """Base class of direct solvers; subclasses implement the factorisation.
 
-    Unknowns that equations may involve, with the index c below, are eliminated last. With the factors ``K = L D L.T``,
-    their block of the inverse is ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, which takes no solution with K. The displacements of
-    the other unknowns under contact forces follow from those of the unknowns c by back substitution alone.
+    Unknowns that equations may involve, denoted by c, are eliminated last. With the factors ``K = L D L.T``, their block of
+    the inverse is ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, which takes no solution with K. Under contact forces, the
+    displacements of the other unknowns follow from those of the unknowns c by back substitution alone.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class FactorSolver(LinearSolver):
     iterative = False
 
     def __init__(self, tolerance: float = ATTAINABLE) -> None:
-        self.tolerance = ATTAINABLE  # regardless of the argument
+        self.tolerance = ATTAINABLE
         self.counters = Counters()
         self.n = 0
         self._factors: SymmetricFactors
@@ -180,7 +180,7 @@ class FactorSolver(LinearSolver):
         return self._factors.solve(f)
 
     def extend(self, u: Array) -> Array:
-        """Return the displacements (n,) [length] under forces on the unknowns `last` alone, which move by u (m,)."""
+        """Return the displacements (n,) under forces on the unknowns `last` alone, given those of `last`, u (m,) [length]."""
         self.counters.iterations += 1
         return self._factors.extended(u)
 
@@ -210,11 +210,11 @@ class LoadedFactor:
 
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """See `Loaded`."""
-        moved = self._moved(force) if elsewhere is not None else None
-        if elsewhere is None or moved is None:
+        change = self._change_of_last(force) if elsewhere is not None else None
+        if elsewhere is None or change is None:
             return self.full_solution(force)
         u, last = elsewhere.copy(), self._solver.last
-        u[last] = self._free[last] + moved
+        u[last] = self._free[last] + change
         return u
 
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
@@ -223,18 +223,18 @@ class LoadedFactor:
             return self._solver.refined(self._f + force)
         if not force.any():
             return self._free.copy()
-        moved = self._moved(force)
-        return (
-            self._solver.back_substitute(self._f + force) if moved is None else self._free + self._solver.extend(moved)
-        )
+        change = self._change_of_last(force)
+        if change is None:
+            return self._solver.back_substitute(self._f + force)
+        return self._free + self._solver.extend(change)
 
     def condensed(self) -> CondensedProblem | None:
         """See `Loaded`."""
         last = self._solver.last
         return None if last is None else CondensedProblem(self._solver.inverse, self._free[last])
 
-    def _moved(self, force: Array) -> Array | None:
-        """Return the displacements (m,) of the unknowns `last` under forces (n,); None if forces act on other unknowns."""
+    def _change_of_last(self, force: Array) -> Array | None:
+        """Return the displacements (m,) of the unknowns `last` due to forces (n,); None if they act on other unknowns."""
         last = self._solver.last
         if last is None or np.count_nonzero(force) != np.count_nonzero(force[last]):
             return None
@@ -265,9 +265,9 @@ class CondensedProblem:
         if B.shape[0] == 0:
             return self._free, np.empty(0)
         check_rows(B.shape[0])
-        moved = B @ self._inverse
-        multiplier = solve_multipliers(symmetric(B @ moved.T), c - B @ self._free, C)
-        return self._free + multiplier @ moved, multiplier
+        B_inverse = B @ self._inverse
+        multiplier = solve_multipliers(symmetric(B @ B_inverse.T), c - B @ self._free, C)
+        return self._free + multiplier @ B_inverse, multiplier
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""

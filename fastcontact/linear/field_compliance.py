@@ -1,4 +1,4 @@
-r"""Compliance of point forces of a multiplier field, and equivalent equations for the values of the field.
+r"""Compliance of the point forces of a multiplier field, and equivalent equations for the values of the field.
 
 A multiplier field with the values p has the pressures ``P p`` at its integration points, whose areas are the diagonal
 matrix W. Let M be the mass matrix of the field, integrated with all points, and :math:`\rho` the constant of the augmented
@@ -10,8 +10,8 @@ field, and to springs of the stiffness :math:`\rho W` along the rows of B. E is 
 divided by :math:`\rho`. It vanishes except at the edge of the contact.
 
 If points have an additional compliance S, such as that of a penalty, their compliance is :math:`C + S`. In the equations of
-the field and in the springs, W is then replaced by :math:`W' = W / (1 + \rho W S)`, and E by :math:`E + P^T W W' S P`, so
-that all values of the field are compliant.
+the field and in the springs, W is then replaced by :math:`W' = W / (1 + \rho W S)`, and E by :math:`E + P^T W W' S P`. All
+values of the field then have a compliance.
 """
 
 from __future__ import annotations
@@ -79,50 +79,51 @@ class FieldCompliance:
 
         `dense` is the function that returns the sum as a matrix.
         """
-        share = 1.0 / (1.0 + self.stiffness * softness)
-        weights = self.weights * share
-        added = self.P.T @ diags_array(self.weights * weights * softness) @ self.P
-        others = csr_array(self.others + added)
+        reduction = 1.0 / (1.0 + self.stiffness * softness)
+        weights = self.weights * reduction
+        others = csr_array(self.others + self.P.T @ diags_array(self.weights * weights * softness) @ self.P)
         others.eliminate_zeros()
-        return FieldCompliance(self.P, weights, self.stiffness * share, others, dense, self.bordered)
+        return FieldCompliance(self.P, weights, self.stiffness * reduction, others, dense, self.bordered)
 
     def of_field(self, B: csr_array, c: Array) -> FieldEquations:
         """Return the equivalent equations for the values of the field.
 
         B (m, n) and c (m,) are the matrix [-] and the right-hand sides [length] of the equations at the points.
         """
-        shares = csr_array(self.P.T @ diags_array(self.weights))
-        size = np.asarray(abs(shares).sum(axis=1))
-        touched = np.flatnonzero(size > 0.0)
+        PTW = csr_array(self.P.T @ diags_array(self.weights))
+        area = np.asarray(abs(PTW).sum(axis=1))
+        values = np.flatnonzero(area > 0.0)  # that the equations involve
         # Each equation is divided by its area, which may be small at the edge of the contact.
-        units = 1.0 / size[touched]
-        shares = csr_array(diags_array(units) @ shares[touched])
-        edge = (self.others.diagonal()[touched] > 0.0) | self.bordered
-        P = csr_array(self.P[:, touched] @ diags_array(units))
-        compliance = self._at_edge(touched[edge], units[edge])
-        return FieldEquations(csr_array(shares @ B), shares @ c, P, edge, compliance, touched[edge], units[edge])
+        units = 1.0 / area[values]
+        PTW = csr_array(diags_array(units) @ PTW[values])
+        edge = (self.others.diagonal()[values] > 0.0) | self.bordered
+        P = csr_array(self.P[:, values] @ diags_array(units))
+        compliance = self._at_edge(values[edge], units[edge])
+        return FieldEquations(csr_array(PTW @ B), PTW @ c, P, edge, compliance, values[edge], units[edge])
 
-    def _at_edge(self, given: Indices, units: Array) -> csr_array:
-        """Return E (e, e) for the values `given` (e,), scaled by `units` (e,).
+    def _at_edge(self, values: Indices, units: Array) -> csr_array:
+        """Return E (e, e) for the numbers `values` (e,) of values, scaled by `units` (e,).
 
-        Values of the field that occur in no equation are eliminated from E.
+        Values of the field that no equation involves are eliminated from E.
         """
-        rest = np.setdiff1d(np.flatnonzero(self.others.diagonal() > 0.0), given)
-        E = csr_array(self.others[given][:, given])
-        across = csr_array(self.others[given][:, rest])
-        if across.nnz:
-            linked = np.flatnonzero(np.diff(across.indptr))
-            of_linked = csr_array(across[linked])
-            correction = of_linked @ splu(csc_array(self.others[rest][:, rest])).solve(of_linked.T.toarray())
-            selection = csr_array((np.ones(len(linked)), (linked, np.arange(len(linked)))), (len(given), len(linked)))
+        rest = np.setdiff1d(np.flatnonzero(self.others.diagonal() > 0.0), values)
+        E = csr_array(self.others[values][:, values])
+        coupling = csr_array(self.others[values][:, rest])
+        if coupling.nnz:
+            coupled = np.flatnonzero(np.diff(coupling.indptr))
+            rows = csr_array(coupling[coupled])
+            correction = rows @ splu(csc_array(self.others[rest][:, rest])).solve(rows.T.toarray())
+            selection = csr_array(
+                (np.ones(len(coupled)), (coupled, np.arange(len(coupled)))), (len(values), len(coupled))
+            )
             E = csr_array(E - selection @ csr_array(correction) @ selection.T)
-        in_units = diags_array(units)
-        return csr_array(in_units @ E @ in_units)
+        scaling = diags_array(units)
+        return csr_array(scaling @ E @ scaling)
 
 
 @dataclass(frozen=True, eq=False)
 class FieldEquations:
-    """Equations ``rows u + E p = right`` for those values p (l,) of a field that the equations at points involve.
+    """Equations ``rows u + E p = right`` for the values p (l,) of a field that the equations at points involve.
 
     Attributes
     ----------

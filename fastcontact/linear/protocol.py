@@ -21,9 +21,9 @@ from fastcontact.linear.springs import Springs
 
 # Default relative residual at which iterative solvers stop.
 TOLERANCE = 1e-10
-# Largest `LinearSolver.contrast` that is ignored.
+# Largest `LinearSolver.contrast` that needs no special treatment.
 MILD = 10.0
-# Function of an unconverged solution u (n,) and multiplier (m,), and of its relative residual. It returns whether to stop.
+# Function of an unconverged solution u (n,), its multiplier (m,) and its relative residual, which returns whether to stop.
 Monitor = Callable[[Array, Array, float], bool]
 
 
@@ -46,7 +46,7 @@ class Counters:
     Attributes
     ----------
     setups : int
-        Number of factorisations or multigrid hierarchies.
+        Number of factorisations, or of multigrid hierarchies.
     iterations : int
         Number of solutions of a direct solver, or of iterations of an iterative one.
     """
@@ -97,15 +97,15 @@ class Loaded(Protocol):
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """Return ``K^-1 (f + force)`` (n,) [length], valid only at the `involved` unknowns of `LinearSolver.prepare`.
 
-        A solver for which the other unknowns cost extra copies them from `elsewhere` (n,), if this is given. Likewise,
-        `solve` copies them from its `guess`.
+        If computing the other unknowns takes additional work, a solver copies them from `elsewhere` (n,), if this is given.
+        Likewise, `solve` copies them from its `guess`.
         """
         ...
 
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """Return ``K^-1 (f + force)`` (n,) [length].
 
-        `u` (n,) is the result of `involved_solution` or `solve` with the same forces, if it is known [length].
+        `u` (n,) is the result of `involved_solution` or `solve` with the same forces, if available [length].
         """
         ...
 
@@ -119,7 +119,7 @@ class Loaded(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class FrictionTerms:
-    """Effect of sliding friction on the equilibrium, see `LoadedNonsymmetric.solve_nonsymmetric`.
+    """Terms of sliding friction in the equilibrium, see `LoadedNonsymmetric.solve_nonsymmetric`.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ class LoadedNonsymmetric(Loaded, Protocol):
         c : ndarray (m,)
             Right-hand sides [length].
         nodes : ndarray of int (m,)
-            The node of each equation. Equations of the same node may involve the same unknowns.
+            Node of each equation. Equations of the same node may involve the same unknowns.
         guess : ndarray (n,)
             Initial guess of u [length].
         tolerance : float
@@ -203,9 +203,9 @@ class LinearSolver(Protocol):
     gave_up : str
         Reason why a different method has replaced this one; empty if none has.
     contrast : float
-        Ratio of the stiffest to the softest deformation of a cell, such as dilatation and shear of nearly incompressible
-        material. Relative errors of displacements may exceed relative residuals by this factor, and the tolerances of inexact
-        solutions are divided by it [-].
+        Largest ratio of the stiffnesses of a cell in different deformations, such as dilatation and shear of a nearly
+        incompressible material. Relative errors of displacements may exceed relative residuals by this factor, and the
+        tolerances of inexact solutions are divided by it [-].
     """
 
     tolerance: float
@@ -236,7 +236,7 @@ class LinearSolver(Protocol):
         rigid_modes : ndarray (n, n_modes)
             Rigid-body modes, which span the near null space of K [length].
         involved : ndarray of int (k,), optional
-            Unknowns that equations may involve. Solvers may use this information to save work.
+            Unknowns that equations may involve; solvers may use them to save work. By default all unknowns.
         release : bool
             Whether a solver that stores K in a different format may release the memory of K and leave it empty. The returned
             object then replaces K in products.
@@ -249,7 +249,7 @@ class LinearSolver(Protocol):
         ...
 
     def near(self) -> Self:
-        """Return a copy to be prepared for a matrix of the same pattern that differs little, such as a tangent."""
+        """Return a copy of the solver that is to be prepared for a similar matrix of the same pattern, such as a tangent."""
         return copy.copy(self)
 
     def load(self, f: Array) -> Loaded:
@@ -268,5 +268,5 @@ class LinearSolver(Protocol):
         ...
 
     def improve(self, excess: float) -> bool:
-        """Reduce `tolerance`, because the residual exceeds its bound by the factor `excess`; return False if impossible."""
+        """Reduce `tolerance`, as the residual exceeds its bound by the factor `excess`; return whether this is possible."""
         return False

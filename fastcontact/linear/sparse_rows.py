@@ -1,4 +1,4 @@
-"""Functions for sparse matrices: assembly from cells or nodal values, sums, and scaling and selection of rows."""
+"""Sparse matrices: assembly from cells or nodal values, sums, and stacking, scaling and selection of rows."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fastcontact.arrays import AnyArray, Array, Indices, Numbers
 
 
 class Entries:
-    """Entries of a sparse matrix that is assembled from cells."""
+    """A sparse matrix that is assembled from dense blocks, such as the matrices of cells."""
 
     def __init__(self) -> None:
         self._rows: list[Numbers] = []
@@ -21,14 +21,14 @@ class Entries:
         self._values: list[Array] = []
 
     def add(self, rows: NDArray[np.integer], columns: NDArray[np.integer], values: Array) -> None:
-        """Add n dense blocks `values` (n, k, l) at `rows` (n, k) and `columns` (n, l); zeros are left out."""
+        """Add n dense blocks `values` (n, k, l) in `rows` (n, k) and `columns` (n, l); zeros are not stored."""
         nonzero = np.flatnonzero(values)
         self._rows.append(np.broadcast_to(rows[:, :, None].astype(np.int32), values.shape).ravel()[nonzero])
         self._columns.append(np.broadcast_to(columns[:, None, :].astype(np.int32), values.shape).ravel()[nonzero])
         self._values.append(values.ravel()[nonzero])
 
     def matrix(self, size: tuple[int, int]) -> csr_array:
-        """Return the matrix of the given size, in which entries at the same position are added."""
+        """Return the matrix of shape `size`; entries at the same position are added up."""
         if not self._rows:
             return csr_array(size)
         positions = np.concatenate(self._rows), np.concatenate(self._columns)
@@ -38,7 +38,7 @@ class Entries:
 def shapes_at(shape: Array, local: NDArray[np.integer], n_nodes: int) -> csr_array:
     """Return the shape functions (m, n_nodes) of all nodes at m points.
 
-    `shape` (m, n) are the shape functions of the n nodes `local` (m, n) of the cell of each point.
+    `shape` (m, n) contains the shape functions of the n nodes `local` (m, n) of the cell of each point.
     """
     m, n = shape.shape
     shapes = csr_array((shape.flatten(), local.flatten(), n * np.arange(m + 1)), shape=(m, n_nodes))
@@ -53,23 +53,23 @@ def sum_of_blocks(K: bsr_array, more: csr_array | bsr_array) -> bsr_array:
     return total
 
 
-def rows_of(mean: csr_array, direction: Array) -> csr_array:
-    """Return rows (m, n_dofs) of the components along `direction` (m, dim) of weighted sums of nodal vectors.
+def rows_of(weights: csr_array, direction: Array) -> csr_array:
+    """Return rows (m, n_dofs) that yield components along `direction` (m, dim) of weighted sums of nodal vectors.
 
-    `mean` (m, n_points) are the weights of the nodes.
+    `weights` (m, n_points) contains the weights of the nodes.
     """
     dim = direction.shape[1]
-    row = np.repeat(np.arange(mean.shape[0]), np.diff(mean.indptr))
-    values = mean.data[:, None] * direction[row]
-    columns = mean.indices[:, None] * dim + np.arange(dim)
-    size = (mean.shape[0], mean.shape[1] * dim)
-    rows = csr_array((values.ravel(), columns.ravel(), mean.indptr * dim), shape=size)
+    row = np.repeat(np.arange(weights.shape[0]), np.diff(weights.indptr))
+    values = weights.data[:, None] * direction[row]
+    columns = weights.indices[:, None] * dim + np.arange(dim)
+    size = (weights.shape[0], weights.shape[1] * dim)
+    rows = csr_array((values.ravel(), columns.ravel(), weights.indptr * dim), shape=size)
     rows.eliminate_zeros()
     return rows
 
 
 def nodal_rows(nodes: NDArray[np.integer], values: Array, n_dofs: int) -> csr_array:
-    """Return rows (m, n_dofs) with the `values` (m, k, dim) at the components of `nodes` (m, k)."""
+    """Return rows (m, n_dofs) with the entries `values` (m, k, dim) in the columns of `nodes` (m, k)."""
     m, k, dim = values.shape
     columns = nodes[:, :, None].astype(np.intp) * dim + np.arange(dim)
     rows = csr_array((values.flatten(), columns.ravel(), k * dim * np.arange(m + 1)), shape=(m, n_dofs))
@@ -84,7 +84,7 @@ def stacked_rows(items: Sequence[Any], n_dofs: int) -> csr_array:
 
 
 def scaled(matrix: csr_array, factor: AnyArray) -> csr_array:
-    """Return the matrix (m, n) with its rows multiplied by `factor` (m,); rows with a factor of zero are empty."""
+    """Return the matrix (m, n) with its rows multiplied by `factor` (m,); rows with the factor zero are empty."""
     values = matrix.data * np.repeat(factor, np.diff(matrix.indptr))
     result = csr_array((values, matrix.indices, matrix.indptr), shape=matrix.shape)
     if not factor.all():
@@ -99,9 +99,9 @@ def taken(matrix: csr_array, rows: Indices) -> csr_array:
 
 
 def without_remnants(matrix: csr_array, origin: csr_array, least: float) -> csr_array:
-    """Return the matrix (m, n) in which rows that are round-off are empty.
+    """Return the matrix (m, n) without the entries of rows that consist of round-off.
 
-    These are rows whose entries are less than `least` times the largest entry in the same row of `origin`.
+    In these rows, no entry exceeds `least` times the largest entry in the same row of `origin`, in absolute values.
     """
     largest, largest_in_origin = (np.ravel(abs(rows).max(axis=1).toarray()) for rows in (matrix, origin))
     significant = largest > least * largest_in_origin

@@ -12,8 +12,8 @@ from scipy.sparse import csr_array, vstack
 from fastcontact.arrays import AnyArray, Indices
 from fastcontact.linear.sparse_rows import scaled
 
-# Relative difference below which two sets of springs, or of weights of eliminated unknowns, are equally good in a
-# preconditioner.
+# Relative difference of two sets of springs, or of weights of eliminated unknowns, up to which a preconditioner for one set
+# serves for the other.
 ALIKE = 0.3
 
 
@@ -43,39 +43,39 @@ class Springs:
             return
         row = np.repeat(np.arange(len(self.stiffness)), np.diff(R.indptr))
         force = factor * self.stiffness * np.bincount(row, R.data * u[R.indices], len(self.stiffness))
-        # With another precision than that of r, `subtract.at` takes twenty times as long.
+        # If the precision is not that of r, `subtract.at` takes twenty times as long.
         np.subtract.at(r, R.indices, (R.data * force[row]).astype(r.dtype, copy=False))
 
-    def beside(self, others: Springs | None) -> Springs:
+    def joined(self, others: Springs | None) -> Springs:
         """Return these springs together with `others`."""
         if others is None:
             return self
-        pair = (self, others)
-        rows = csr_array(vstack([one.rows for one in pair], format="csr"))
+        both = (self, others)
+        rows = csr_array(vstack([springs.rows for springs in both], format="csr"))
         through = None
         if self.through is not None or others.through is not None:
-            rows_of_forces = [one.rows if one.through is None else one.through for one in pair]
+            rows_of_forces = [springs.rows if springs.through is None else springs.through for springs in both]
             through = csr_array(vstack(rows_of_forces, format="csr"))
-        return Springs(rows, np.concatenate([one.stiffness for one in pair]), through)
+        return Springs(rows, np.concatenate([springs.stiffness for springs in both]), through)
 
-    def under(self, pivots: Indices, weights: csr_array) -> Springs:
+    def reduced(self, pivots: Indices, weights: csr_array) -> Springs:
         """Return the springs after the elimination ``u[pivots] = weights @ u`` with weights (m, n).
 
-        Their rows are zero in the columns of the pivots.
+        Their rows are zero in the columns of the pivots. The springs must not have a separate matrix `through`.
         """
         R, W, n = self.rows, weights, self.rows.shape[1]
         number = np.full(n, -1, np.int32)
         number[pivots] = np.arange(len(pivots))
         column = number[R.indices]
-        follows = column >= 0
-        starts = np.concatenate([[0], np.cumsum(follows)])[R.indptr]
-        followed = csr_array((R.data[follows], column[follows], starts), shape=(R.shape[0], W.shape[0]))
-        unchanged = csr_array((R.data[~follows], R.indices[~follows], R.indptr - starts), shape=R.shape)
-        return Springs(csr_array(unchanged + followed @ W), self.stiffness)
+        is_pivot = column >= 0
+        starts = np.concatenate([[0], np.cumsum(is_pivot)])[R.indptr]
+        of_pivots = csr_array((R.data[is_pivot], column[is_pivot], starts), shape=(R.shape[0], W.shape[0]))
+        of_others = csr_array((R.data[~is_pivot], R.indices[~is_pivot], R.indptr - starts), shape=R.shape)
+        return Springs(csr_array(of_others + of_pivots @ W), self.stiffness)
 
-    def scaled(self, factor: float, kind: DTypeLike = float) -> Springs:
-        """Return the springs with the stiffness multiplied by `factor`, in the data type `kind`."""
-        return Springs(self.rows.astype(kind), (factor * self.stiffness).astype(kind))
+    def scaled(self, factor: float, dtype: DTypeLike = float) -> Springs:
+        """Return the springs with the stiffness multiplied by `factor`, in the data type `dtype`."""
+        return Springs(self.rows.astype(dtype), (factor * self.stiffness).astype(dtype))
 
     def to_dict(self) -> dict[str, AnyArray]:
         """Return the rows and the stiffness as arrays."""
@@ -89,8 +89,8 @@ class Springs:
         return cls(csr_array((arrays["data"], arrays["indices"], arrays["indptr"]), shape=shape), arrays["stiffness"])
 
     def alike(self, other: Springs | None) -> bool:
-        """Return whether `other` springs have nearly the same rows and stiffness, see ALIKE."""
+        """Return whether `other` springs have nearly the same rows and stiffnesses, see ALIKE."""
         if other is None or self.rows.shape != other.rows.shape:
             return False
-        scaled_self, scaled_other = (scaled(one.rows, np.sqrt(one.stiffness)) for one in (self, other))
-        return bool(abs(scaled_self - scaled_other).sum() <= ALIKE * abs(scaled_other).sum())
+        own_rows, other_rows = (scaled(springs.rows, np.sqrt(springs.stiffness)) for springs in (self, other))
+        return bool(abs(own_rows - other_rows).sum() <= ALIKE * abs(other_rows).sum())

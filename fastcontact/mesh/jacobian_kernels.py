@@ -49,6 +49,14 @@ def jacobian_3d(x, slopes, q):
     return j00, j01, j02, j10, j11, j12, j20, j21, j22
 
 
+@innermost_kernel
+def cofactors(j00, j01, j02, j10, j11, j12, j20, j21, j22):
+    """Return the nine cofactors of J (3, 3), row by row; divided by det J they are the transposed inverse."""
+    c00, c01, c02 = j11 * j22 - j12 * j21, j12 * j20 - j10 * j22, j10 * j21 - j11 * j20
+    c10, c11, c12 = j02 * j21 - j01 * j22, j00 * j22 - j02 * j20, j01 * j20 - j00 * j21
+    return c00, c01, c02, c10, c11, c12, j01 * j12 - j02 * j11, j02 * j10 - j00 * j12, j00 * j11 - j01 * j10
+
+
 @kernel
 def at_nodes(values, cells, c, x):
     """Fill `x` (n_nodes, dim) with the vectors of `values` (n_points, dim) at the nodes of cell `c`."""

@@ -1,8 +1,9 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Structure of the Cholesky factor of a sparse symmetric matrix: elimination tree, column counts, supernodes.
 
-The matrix A (n, n) is given by columns, both triangles: ``start`` (n + 1,) and ``rows`` (nnz,). In its elimination tree the
-parent of a column is the first row below the diagonal of that column of the factor, -1 for roots (Liu, 1990).
+The matrix A (n, n) is given by columns, with both triangles: ``start`` (n + 1,) and ``rows`` (nnz,). In its elimination tree,
+the parent of a column is the row of the first entry below the diagonal in this column of the factor, -1 for roots (Liu,
+1990).
 """
 
 from __future__ import annotations
@@ -35,12 +36,12 @@ def parents(start: Numbers, rows: Numbers, parent: Numbers) -> None:
 
 @interpretable_kernel
 def postordered(parent: Numbers, order: Numbers) -> None:
-    """Fill `order` (n,) with a postorder: columns of every subtree are contiguous, children before their parent."""
+    """Fill `order` (n,) with a postorder: columns of each subtree are contiguous, with children before their parent."""
     n, count = len(parent), 0
-    first, beside, stack = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.empty(n, np.int32)
+    first, sibling, stack = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.empty(n, np.int32)
     for j in range(n - 1, -1, -1):
         if parent[j] != -1:
-            beside[j] = first[parent[j]]
+            sibling[j] = first[parent[j]]
             first[parent[j]] = j
     for root in range(n):
         if parent[root] != -1:
@@ -53,16 +54,16 @@ def postordered(parent: Numbers, order: Numbers) -> None:
                 count += 1
                 top -= 1
             else:
-                first[stack[top]] = beside[child]
+                first[stack[top]] = sibling[child]
                 top += 1
                 stack[top] = child
 
 
 @interpretable_kernel
 def counts(start: Numbers, rows: Numbers, parent: Numbers, order: Numbers, count: Numbers) -> None:
-    """Fill `count` (n,) with the entries of each column of the factor, the diagonal included.
+    """Fill `count` (n,) with the number of entries of each column of the factor, including the diagonal.
 
-    `order` (n,) is that of `postordered`. By the leaves of row subtrees (Gilbert, Ng and Peyton, 1994).
+    `order` (n,) is the result of `postordered`. The algorithm counts leaves of row subtrees (Gilbert, Ng and Peyton, 1994).
     """
     n = len(parent)
     first, farthest, last = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.full(n, -1, np.int32)
@@ -111,19 +112,19 @@ def _common(j: int, ancestor: Numbers) -> int:
 def supernodes(
     parent: Numbers, count: Numbers, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets
 ) -> int:
-    """Find supernodes, runs of columns with (nearly) the same rows below them; return their number.
+    """Find supernodes, sequences of columns with (nearly) the same rows below them; return their number.
 
     Parameters
     ----------
     parent, count : ndarray of int (n,)
-        Tree and entries of columns that are numbered as in `postordered`.
+        Tree, and number of entries of each column, for columns numbered in postorder.
     given : ndarray of bool (n,)
-        No supernode has columns of both kinds.
+        Columns that are not put into the same supernode as other columns.
     widths : ndarray (k,), shares : ndarray (k + 1,)
         Adjacent supernodes are merged if the fraction of explicit zeros in the result is at most ``shares[i]``, i the
         first of the ascending `widths` not smaller than the width of the result. The last share applies to all wider ones.
     first, below : ndarray of int (n + 1,)
-        Filled: the first column of each supernode, n at the end, and the number of rows below.
+        Filled with the first column of each supernode, followed by n, and with the number of rows below each supernode.
     """
     n, top = len(parent), -1
     entries = np.empty(n, np.int64)
@@ -147,7 +148,7 @@ def _joined(
     parent: Numbers, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets, entries: Offsets,
     top: int, end: int,
 ) -> int:  # fmt: skip
-    """Merge the supernode `top`, which ends before column `end`, with its predecessors while that adds few zeros."""
+    """Merge the supernode `top`, which ends before column `end`, with its predecessors as long as this adds few zeros."""
     while top > 0 and first[top] <= parent[first[top] - 1] < end and given[first[top] - 1] == given[first[top]]:
         width = end - first[top - 1]
         all_entries = width * (width + 1) // 2 + width * below[top]
@@ -167,17 +168,17 @@ def rows_below(
     start: Numbers, rows: Numbers, order: Numbers, position: Numbers, parent: Numbers, first: Offsets, begin: Offsets,
     row_indices: Numbers,
 ) -> None:  # fmt: skip
-    """Fill `row_indices` with the rows below each supernode, ascending; those of supernode s begin at ``begin[s]``.
+    """Fill `row_indices` with the rows below each supernode in ascending order; those of supernode s begin at ``begin[s]``.
 
-    The matrix has its original numbering, everything else that of `postordered`: ``order[k]`` is column k, `position` the
-    inverse.
+    The matrix has its original numbering. In all other arrays columns are numbered in postorder: column k of the factor is
+    column ``order[k]`` of the matrix, and `position` is the inverse of `order`.
     """
     n, count = len(order), len(first) - 1
     members, seen, at = np.empty(n, np.int32), np.full(count, -1, np.int32), begin[:count].copy()
     for s in range(count):
         members[first[s] : first[s + 1]] = s
     for i in range(n):
-        # From each entry of the row, go up the tree to a column visited before, or to the diagonal.
+        # From each entry of the row, follow the tree to a supernode that was visited before, or to the diagonal.
         for k in range(start[order[i]], start[order[i] + 1]):
             j = position[rows[k]]
             if j >= i:

@@ -22,29 +22,29 @@ PANEL = 48
 
 @interpretable_kernel
 def block(
-    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, wanted: Offsets, out: Array
+    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, index: Offsets, out: Array
 ) -> None:
     """Copy the requested rows and columns of L to `out` (m, m), which is initially zero.
 
-    `wanted` (n,) contains the position in `out` of each row and column, or -1 if it is not requested.
+    `index` (n,) contains the index in `out` of each row and column, or -1 if it is not requested.
     """
     for s in range(len(first) - 1):
         high = first[s + 1]
         for j in range(first[s], high):
-            if wanted[j] < 0:
+            if index[j] < 0:
                 continue
             for i in range(j, high):
-                if wanted[i] >= 0:
-                    out[wanted[i], wanted[j]] = values[start[j] + i - j]
+                if index[i] >= 0:
+                    out[index[i], index[j]] = values[start[j] + i - j]
             for k in range(begin[s], begin[s + 1]):
-                if wanted[rows[k]] >= 0:
-                    out[wanted[rows[k]], wanted[j]] = values[start[j] + high - j + k - begin[s]]
+                if index[rows[k]] >= 0:
+                    out[index[rows[k]], index[j]] = values[start[j] + high - j + k - begin[s]]
 
 
 @interpretable_kernel
 def forward(start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, x: Array) -> None:
     """Replace x (n,) by ``L^-1 x``."""
-    moved = np.empty(len(x))
+    change = np.empty(len(x))
     for s in range(len(first) - 1):
         low, high = first[s], first[s + 1]
         below = begin[s + 1] - begin[s]
@@ -53,7 +53,7 @@ def forward(start: Offsets, values: Array, first: Offsets, begin: Offsets, rows:
             j += 1
         if j == high:
             continue
-        moved[:below] = 0.0
+        change[:below] = 0.0
         for j in range(low, high):
             xj = x[j]
             at = start[j] + 1
@@ -61,9 +61,9 @@ def forward(start: Offsets, values: Array, first: Offsets, begin: Offsets, rows:
                 x[k] -= values[at] * xj
                 at += 1
             for k in range(below):
-                moved[k] += values[at + k] * xj
+                change[k] += values[at + k] * xj
         for k in range(below):
-            x[rows[begin[s] + k]] -= moved[k]
+            x[rows[begin[s] + k]] -= change[k]
 
 
 @summing_kernel
@@ -85,18 +85,18 @@ def backward(
         below = begin[s + 1] - begin[s]
         for k in range(below):
             gathered[k] = x[rows[begin[s] + k]]
-        # Columns are processed in pairs, because both read the same entries of x. The last column may be single.
+        # Columns are processed in pairs that read the same entries of x. The last column may be single.
         while j >= low:
             single = j == low
             first_at = start[j] + 1
             second_at = first_at if single else start[j - 1] + 2
             first_sum, second_sum = 0.0, 0.0
-            # Slices tell the compiler that the entries are contiguous in memory.
+            # The compiler vectorises loops over slices, whose entries are contiguous in memory.
             n = high - 1 - j
-            a, b, beside = values[first_at : first_at + n], values[second_at : second_at + n], x[j + 1 : high]
+            a, b, x_inside = values[first_at : first_at + n], values[second_at : second_at + n], x[j + 1 : high]
             for k in range(n):
-                first_sum += a[k] * beside[k]
-                second_sum += b[k] * beside[k]
+                first_sum += a[k] * x_inside[k]
+                second_sum += b[k] * x_inside[k]
             a, b = values[first_at + n : first_at + n + below], values[second_at + n : second_at + n + below]
             for k in range(below):
                 first_sum += a[k] * gathered[k]
@@ -109,14 +109,14 @@ def backward(
 
 @kernel
 def solve_together(
-    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, d: Array, loaded: Mask, wanted: Mask,
+    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, d: Array, loaded: Mask, required: Mask,
     X: Array,
 ) -> None:  # fmt: skip
-    """Replace the rows `wanted` of X (n, k) by those of ``(L D L.T)^-1 X``, for all k columns at once.
+    """Replace the rows `required` of X (n, k) by those of ``(L D L.T)^-1 X``, for all k columns at once.
 
     Only the rows `loaded` (n,) of X may have nonzero entries; d (n,) is the diagonal of D. The forward substitution skips
     supernodes that are not `_reached` from the rows `loaded`, and the backward substitution those that are not `_reached`
-    from the rows `wanted` (n,). Both masks are overwritten, and the other rows of X are undefined afterwards.
+    from the rows `required` (n,). Both masks are overwritten, and the other rows of X are undefined afterwards.
     """
     widest = 0
     for s in range(len(first) - 1):
@@ -134,7 +134,7 @@ def solve_together(
             np.dot(room[: (high - low) * size].reshape(high - low, size).T, X[low:high], beside[:size])
             for k in range(size):
                 X[below[k]] -= beside[k]
-    reached = _reached(first, begin, rows, wanted)
+    reached = _reached(first, begin, rows, required)
     for s in range(len(reached) - 1, -1, -1):
         for high in range(first[s + 1], first[s] if reached[s] else first[s + 1], -PANEL):
             low = max(high - PANEL, first[s])

@@ -20,18 +20,18 @@ NONE = SparseInverse(csr_array((0, 0)))
 
 @dataclass(frozen=True, eq=False)
 class Elimination:
-    """Elimination of m equations from n unknowns.
+    """Elimination of m unknowns by m equations among n unknowns.
 
     The eliminated unknowns are ``u[pivots] = weights @ u + offset``. If pivots are coupled, so that P^-1 is a full matrix,
-    they are ``u[pivots] = P^-1 (weights @ u) + offset`` instead. Multipliers of the equations have the forces
-    ``F.T @ multiplier`` on the unknowns; F is B unless `eliminate` gets `force_rows`.
+    they are ``u[pivots] = P^-1 (weights @ u) + offset`` instead. The multipliers of the equations exert the forces
+    ``F.T @ multiplier`` on the unknowns; F is B unless `eliminate` is called with `force_rows`.
 
     Attributes
     ----------
     pivots : ndarray of int (m,)
         The eliminated unknown of each equation.
     weights : csr_array (m, n)
-        Weights of the other unknowns, zero in the columns of the pivots [-].
+        Weights of the other unknowns, without entries in the columns of the pivots [-].
     offset : ndarray (m,)
         Values of the pivots if all other unknowns are zero [length].
     force_weights : csr_array (m, n)
@@ -40,7 +40,7 @@ class Elimination:
     inverse : SparseInverse or CoupledPivots
         Inverse of the columns of F that belong to the pivots.
     own : SparseInverse or CoupledPivots
-        P^-1, the inverse of the columns of B that belong to the pivots.
+        P^-1, the inverse of the columns of B that belong to the pivots; equal to `inverse` if F is B.
     compliance : ndarray (m,), optional
         Compliance of the equations, ``B u + compliance * multiplier = c`` [length / force].
     """
@@ -55,15 +55,11 @@ class Elimination:
 
     @property
     def coupled(self) -> bool:
-        """Whether pivots are coupled: equations of many nodes involve the pivots of each other."""
+        """Whether pivots are coupled: equations of many nodes involve each other's pivots."""
         return isinstance(self.own, CoupledPivots)
 
-    def shifted(self, c: Array) -> Array:
-        """Return the change (m,) of the pivots [length] due to a change c (m,) of the right-hand sides [length]."""
-        return self.own.solve(c)
-
     def multiplier(self, forces: Array) -> Array:
-        """Return the multipliers (m,) [force] whose forces at the pivots are `forces` (m,), ``(K u - f)[pivots]`` [force]."""
+        """Return the multipliers (m,) [force], given their `forces` (m,) at the pivots, ``(K u - f)[pivots]`` [force]."""
         return self.inverse.solve_transposed(forces)
 
     def complete(self, x: Array, offset: Array | None = None) -> None:
@@ -76,7 +72,7 @@ class Elimination:
             x[self.pivots] += offset
 
     def move_forces(self, r: Array) -> None:
-        """Replace the forces `r` (n,), in place, by those on the other unknowns after the elimination; zero at the pivots."""
+        """Move the forces `r` (n,), in place, from the pivots to the other unknowns; at the pivots they become zero."""
         W = self.force_weights
         if isinstance(self.inverse, CoupledPivots):
             r[self.pivots] = self.inverse.solve_transposed(r[self.pivots])
@@ -84,7 +80,7 @@ class Elimination:
         np.add.at(r, W.indices, W.data * np.repeat(forces, np.diff(W.indptr)))
 
     def full_weights(self) -> csr_array:
-        """Return the matrix W (m, n) of ``u[pivots] = W @ u + offset``; if pivots are coupled, it has many entries."""
+        """Return the matrix W (m, n) with ``u[pivots] = W @ u + offset``; if pivots are coupled, it has many entries."""
         if not self.coupled:
             return self.weights
         columns = np.unique(self.weights.indices)
@@ -92,10 +88,7 @@ class Elimination:
         return csr_array((full.data, columns[full.indices], full.indptr), shape=self.weights.shape)
 
     def with_sparse_weights(self) -> Elimination:
-        """Return an elimination with sparse weights for a preconditioner.
-
-        If pivots are coupled, it is an approximation, otherwise this elimination.
-        """
+        """Return an elimination with sparse weights for a preconditioner: an approximation if pivots are coupled."""
         if not self.coupled:
             return self
         weights = _weighted(self.own.sparse, self.weights)
@@ -105,7 +98,7 @@ class Elimination:
 def eliminate(
     B: csr_array, c: Array, force_rows: csr_array | None = None, nodes: Indices | None = None, size: int = 1
 ) -> Elimination:
-    """Choose the pivots of the equations ``B u = c``, see `pivot_order`, and express them by the other unknowns.
+    """Choose the pivots of the equations ``B u = c``, see `pivot_order`, and express them in terms of the other unknowns.
 
     Parameters
     ----------
@@ -116,7 +109,7 @@ def eliminate(
     force_rows : csr_array (m, n), optional
         Matrix F of the equilibrium ``K u = f + F.T multiplier``; B by default [-].
     nodes : ndarray of int (m,), optional
-        The node of each equation. Equations of the same node may involve the same unknowns.
+        Node of each equation. Equations of the same node may involve the same unknowns.
     size : int
         Number of unknowns of a node.
 

@@ -19,7 +19,7 @@ from fastcontact.linear.protocol import LinearSolver, Monitor
 from fastcontact.round_off import SUM_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# Factor by which a reduced tolerance is smaller than necessary for the residual to reach its bound.
+# Ratio of a reduced tolerance to the tolerance at which the residual is expected to reach its bound.
 LEFT = 0.1
 
 
@@ -48,10 +48,10 @@ class LoadedIteration:
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Return the solution and the multipliers, see `Loaded`.
+        """Return the solution and the multipliers, see `Loaded.solve`.
 
         If equations are linearly dependent or have a compliance, they are not eliminated. The Delassus operator is formed
-        instead, from columns of K^-1.
+        from columns of K^-1 instead.
         """
         solver = self._solver
         if C is None or not B.shape[0]:
@@ -85,7 +85,7 @@ class LoadedIteration:
 def tighten(solver: LinearSolver, excess: float) -> bool:
     """Reduce the tolerance of `solver`, whose residual exceeds its bound by the factor `excess`.
 
-    Return False if the tolerance has its smallest value already, which round-off limits.
+    Return False if the tolerance is already as small as round-off permits.
     """
     tolerance = max(solver.tolerance * LEFT / excess, SUM_ROUND_OFF)
     if not tolerance < solver.tolerance:

@@ -23,7 +23,8 @@ Multiply = Callable[[Array, Array], None]
 Precondition = Callable[[Array, float, Array], None]
 # Number of earlier search directions of the conjugate residual method to which a new one is made orthogonal.
 KEPT = 20
-# A step of the conjugate residual method fails if the norm of the residual stays above this fraction of the last one.
+# A step of the conjugate residual method counts as failed if the norm of the residual stays above this fraction of the
+# previous norm.
 LOST = 0.98
 
 
@@ -33,7 +34,7 @@ def scaled(factor: float, a: AnyArray, b: AnyArray) -> None:
 
 
 class Iteration:
-    """An iterate and its residual.
+    """Base class of Krylov methods: an iterate and its residual.
 
     Parameters
     ----------
@@ -52,7 +53,8 @@ class Iteration:
         self.x, self.r, self.z, self.q = (np.zeros(n) for _ in range(4))
         self._sums = np.empty(-(-n // CHUNK))
         self.norm = 0.0
-        self._moved: tuple[float, Array, float] | None = None  # length and direction of the last step, residual before
+        # Length and direction of the last step, and the norm of the residual before it.
+        self._last_step: tuple[float, Array, float] | None = None
 
     def dot(self, a: Array, b: Array) -> float:
         """Return the dot product of two vectors (n,)."""
@@ -61,25 +63,26 @@ class Iteration:
 
     def start(self) -> None:
         """Restart from `x` and its residual `r`, both set by the caller."""
-        self.norm, self._moved = float(np.sqrt(self.dot(self.r, self.r))), None
+        self.norm, self._last_step = float(np.sqrt(self.dot(self.r, self.r))), None
 
     def change(self, n: int) -> float:
-        """Return the largest change of the first n unknowns in the last step, over the fall of the residual; 0 without one.
+        """Return the largest change of the first n unknowns in the last step, divided by the decrease of the residual norm.
 
-        At the same rate of convergence, the product with the residual is the error that is left.
+        If the rate of convergence persists, its product with the norm of the residual is the remaining error. It is zero
+        before the first step.
         """
-        if self._moved is None:
+        if self._last_step is None:
             return 0.0
-        alpha, p, before = self._moved
+        alpha, p, before = self._last_step
         return abs(alpha) * largest(p[:n]) / (before - self.norm) if self.norm < before else np.inf
 
     def _advance(self, alpha: float, p: Array, q: Array) -> None:
-        """Step ``x += alpha p``, ``r -= alpha q``."""
-        self._moved = alpha, p, self.norm
+        """Make the step ``x += alpha p``, ``r -= alpha q`` of the iterate and its residual."""
+        self._last_step = alpha, p, self.norm
         self.norm = float(np.sqrt(self._stepped(alpha, p, q, self.x, self.r)))
 
     def _stepped(self, alpha: float, p: Array, q: Array, x: Array, r: Array) -> float:
-        """Step ``x += alpha p``, ``r -= alpha q``; return the square of the norm of r."""
+        """Make the step ``x += alpha p``, ``r -= alpha q`` of any vectors; return the square of the norm of r."""
         spread(krylov_kernels.advance, len(self._sums), WORK_OF_NUMBER * CHUNK, alpha, p, q, x, r, self._sums)
         return float(krylov_kernels.total(self._sums))
 
@@ -87,8 +90,8 @@ class Iteration:
 class ConjugateGradients(Iteration):
     """Preconditioned conjugate gradients; see `Iteration`.
 
-    Round-off of a preconditioner in single precision makes it slightly variable; the search directions are therefore updated
-    with the Polak-Ribiere formula (flexible conjugate gradients; Notay, 2000), which costs one more dot product.
+    Round-off makes a preconditioner in single precision slightly variable. The search directions are therefore updated by the
+    Polak-Ribiere formula (flexible conjugate gradients; Notay, 2000), which takes one more dot product.
     """
 
     def __init__(self, n: int) -> None:
@@ -112,8 +115,7 @@ class ConjugateGradients(Iteration):
         rz = self.dot(self.r, self.z)
         beta = 0.0
         if self._rz > 0.0:
-            change = -self._alpha * self.dot(self.q, self.z)
-            beta = change / self._rz
+            beta = -self._alpha * self.dot(self.q, self.z) / self._rz
         self._rz = rz
         spread(krylov_kernels.turn, len(self.p), WORK_OF_NUMBER, beta, self.z, self.p)
         multiply(self.p, self.q)
@@ -126,35 +128,38 @@ class ConjugateGradients(Iteration):
 
 
 class ConjugateResiduals(Iteration):
-    """Preconditioned generalised conjugate residuals, truncated (Eisenstat, Elman and Schultz, 1983); see `Iteration`.
+    """Preconditioned, truncated generalised conjugate residuals (Eisenstat, Elman and Schultz, 1983); see `Iteration`.
 
-    For nonsymmetric matrices. Every iteration minimises the residual over the stored directions, so it never grows; the
-    preconditioner may vary.
+    The matrix may be nonsymmetric, and the preconditioner may vary. Each iteration minimises the norm of the residual along a
+    new search direction, whose image is made orthogonal to the stored images, so that the norm never increases.
     """
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
-        # Directions of unit image, and the negative of their images, so that `advance` orthogonalises.
+        # Search directions p with images A p of unit norm, and -A p, so that `_stepped` makes vectors orthogonal to A p.
         self._kept: deque[tuple[Array, Array]] = deque()
-        self._spare: list[tuple[Array, Array]] = []
-        self._lost = False  # whether the last step failed
+        self._unused: list[tuple[Array, Array]] = []  # memory for directions and images
+        self._failed = False  # whether the last step failed, see LOST
 
     @property
     def nbytes(self) -> int:
         """Memory [bytes]."""
-        return (4 + 2 * (len(self._kept) + len(self._spare))) * self.x.nbytes + self._sums.nbytes
+        return (4 + 2 * (len(self._kept) + len(self._unused))) * self.x.nbytes + self._sums.nbytes
 
     def start(self) -> None:
         """See `Iteration.start`."""
         super().start()
-        self._spare += self._kept
+        self._unused += self._kept
         self._kept.clear()
-        self._lost = False
+        self._failed = False
 
     def step(self, multiply: Multiply, precondition: Precondition) -> bool:
-        """Make one iteration; return False if no direction reduces the residual."""
+        """Make one iteration; return False if the new search direction depends on the stored ones up to round-off.
+
+        After a failed step, the preconditioner is applied to the last image instead of the residual.
+        """
         z, q, norm = self.z, self.q, self.norm
-        if self._lost:
+        if self._failed:
             precondition(self._kept[-1][1], 1.0, z)
         else:
             precondition(self.r, norm, z)
@@ -166,15 +171,15 @@ class ConjugateResiduals(Iteration):
             return False
         self._advance(self.dot(self.r, q) / square, z, q)
         self._keep(z, q, float(np.sqrt(square)))
-        self._lost = self.norm > LOST * norm
+        self._failed = self.norm > LOST * norm
         return True
 
     def _keep(self, z: Array, q: Array, size: float) -> None:
-        """Store a direction and its image, of norm `size`, replacing the oldest one when full."""
+        """Store a direction and its image of norm `size`; the oldest one is replaced if KEPT are stored."""
         if len(self._kept) == KEPT:
             pair = self._kept.popleft()
         else:
-            pair = self._spare.pop() if self._spare else (np.empty_like(z), np.empty_like(q))
+            pair = self._unused.pop() if self._unused else (np.empty_like(z), np.empty_like(q))
         scaled(1.0 / size, z, pair[0])
         scaled(-1.0 / size, q, pair[1])
         self._kept.append(pair)

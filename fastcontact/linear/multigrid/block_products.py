@@ -1,14 +1,14 @@
 """Products of small blocks with vectors and with each other, written in vector instructions.
 
-The compiler turns a plain loop over the nine numbers of a 3 x 3 block into nine scalar products, since it cannot see that
+The compiler turns a plain loop over the nine numbers of a 3 x 3 block into nine scalar products, because it cannot see that
 positions from an index array are contiguous. Here a row of a block is one vector instruction. This halves the time of a
 product with a matrix (16.7 to 8.5 ns per unknown in single precision, 311 469 unknowns, one thread). With plain compiled
-loops instead of `add_product` and `add_transposed`, results are bitwise identical, but the set-up takes 1.5 instead of 0.5 s,
-and an analysis of one step 3.7 to 4.4 instead of 3.0 to 3.4 s (sphere on a block, 279 447 unknowns).
+loops instead of the four functions, whose sizes are known to the compiler, an analysis takes 3.1 instead of 2.5 s of
+processor time (sphere on a block, 28 833 unknowns, three steps). With plain loops instead of `add_product` and
+`add_transposed` alone, it takes 3.7 to 4.4 instead of 3.0 to 3.4 s (279 447 unknowns, one step).
 
-No other module in `linear` has processor-specific code. `block_products_llvm` contains the instructions; the functions
-`..._plain` are their equivalents in NumPy, which run where kernels are not compiled. The tests compare both. Indices are not
-checked.
+`block_products_llvm` generates the instructions. The functions `..._plain` are their equivalents in NumPy, which are used if
+kernels are not compiled, and with which tests compare the instructions. Indices are not checked.
 """
 
 from __future__ import annotations
@@ -48,27 +48,27 @@ def row_times_plain(
 
 
 def row_times_both_ways_plain(
-    indices: Any, numbers: tuple[Any, ...], x: Any, begin: int, end: int, own: int, factor: Any, y: Any,
+    indices: Any, numbers: tuple[Any, ...], x: Any, begin: int, end: int, row: int, factor: Any, y: Any,
     rows: tuple[int, ...],
 ) -> tuple[Any, ...]:  # fmt: skip
-    """Return the product of blocks of a row with a vector, and add their transposed product with the row's part of it.
+    """Return the product of blocks of a row with x, and add the product of the transposed blocks with x in the row to y.
 
     Parameters
     ----------
     indices, numbers, x, begin, end
         As in `row_times_plain`; square blocks, all of different columns.
-    own : int
+    row : int
         Number of the block row.
     factor : float
-        Factor of the added product.
+        Factor of the product that is added to y.
     y : ndarray (n_columns * m,)
-        Changed in place at the columns of the blocks; not x.
+        Changed in place at the columns of the blocks; must not share memory with x.
     rows : tuple
         Tuple of m zeros.
     """
     m, columns = len(rows), indices[begin:end]
     blocks = sum(part[begin * m * m : end * m * m].astype(x.dtype) for part in numbers).reshape(-1, m, m)
-    y.reshape(-1, m)[columns] += np.einsum("kmn,m->kn", blocks, factor * x[own * m : (own + 1) * m])
+    y.reshape(-1, m)[columns] += np.einsum("kmn,m->kn", blocks, factor * x[row * m : (row + 1) * m])
     return tuple(np.einsum("kmn,kn->m", blocks, x.reshape(-1, m)[columns]))
 
 
@@ -80,7 +80,7 @@ def add_product_plain(
     Parameters
     ----------
     to : ndarray, at : int
-        Changed in place from number `at` on.
+        Array that is changed in place, from number `at` on.
     left : tuple of ndarray, first : int
         A (m, k), split or not, begins at number `first`.
     right : ndarray, second : int
@@ -89,22 +89,22 @@ def add_product_plain(
         Tuples of m, k and n zeros.
     """
     m, k, n = (len(size) for size in sizes)
-    one = sum(part[first : first + m * k].astype(float) for part in left).reshape(m, k)
-    to[at : at + m * n] += (one @ right[second : second + k * n].reshape(k, n).astype(float)).ravel()
+    A = sum(part[first : first + m * k].astype(float) for part in left).reshape(m, k)
+    to[at : at + m * n] += (A @ right[second : second + k * n].reshape(k, n).astype(float)).ravel()
 
 
 def add_transposed_plain(
     to: Any, at: int, left: tuple[Any, ...], first: int, right: Any, second: int, sizes: Sizes
 ) -> None:
-    """Add ``A.T B``, A (k, m); see `add_product_plain`."""
+    """Add ``A.T B`` with A (k, m); see `add_product_plain`."""
     m, k, n = (len(size) for size in sizes)
-    one = sum(part[first : first + k * m].astype(float) for part in left).reshape(k, m)
-    to[at : at + m * n] += (one.T @ right[second : second + k * n].reshape(k, n).astype(float)).ravel()
+    A = sum(part[first : first + k * m].astype(float) for part in left).reshape(k, m)
+    to[at : at + m * n] += (A.T @ right[second : second + k * n].reshape(k, n).astype(float)).ravel()
 
 
-def _kernel(written: Any, plain: Any) -> Any:
-    """Return the function that kernels call: the vector instructions, or the plain function if nothing is compiled."""
-    return numba.extending.intrinsic(written) if compiled() else plain
+def _kernel(vectorised: Any, plain: Any) -> Any:
+    """Return the function that kernels call: an intrinsic of vector instructions, or `plain` if nothing is compiled."""
+    return numba.extending.intrinsic(vectorised) if compiled() else plain
 
 
 row_times = _kernel(block_products_llvm.row_times, row_times_plain)

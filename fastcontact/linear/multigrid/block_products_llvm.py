@@ -1,7 +1,7 @@
-"""Numba intrinsics for `block_products`: functions that generate LLVM code while Numba compiles a kernel.
+"""Numba intrinsics for `block_products`, which generate LLVM code while Numba compiles a kernel.
 
-Each public function implements the function of the same name in `block_products`. It is called with the Numba types of the
-arguments, only during compilation, and returns the signature and a code generator.
+Each public function implements the function of the same name in `block_products`. Numba calls it during compilation with the
+types of the arguments; it returns the signature and a code generator.
 """
 
 from __future__ import annotations
@@ -9,12 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-# Vector length: most processors have four numbers in double precision, and blocks have three or six columns.
+from llvmlite import ir
+from numba.core import cgutils, types
+
+# Vector length: most processors have vectors of four numbers in double precision, and blocks have three or six columns.
 WIDTH = 4
 
 
 class Piece(NamedTuple):
-    """A part of a row of a block: `used` numbers from column `column` on, loaded in vectors of `width`."""
+    """A part of a row of a block: `used` numbers from `column` on, which are loaded as a vector of `width` numbers."""
 
     column: int
     width: int
@@ -23,7 +26,6 @@ class Piece(NamedTuple):
 
 def row_times(_context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end: Any, rows: Any, cols: Any) -> Any:
     """Return the signature and the code generator of `block_products.row_times`."""
-    from numba.core import types
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return _all_blocks(_Row(context, builder, signature, args, len(rows), len(cols)), signature, args)
@@ -33,10 +35,9 @@ def row_times(_context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end
 
 
 def row_times_both_ways(
-    _context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end: Any, own: Any, factor: Any, y: Any, rows: Any
+    _context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end: Any, row: Any, factor: Any, y: Any, rows: Any
 ) -> Any:
     """Return the signature and the code generator of `block_products.row_times_both_ways`."""
-    from numba.core import types
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return _all_blocks(_RowBothWays(context, builder, signature, args, len(rows), len(rows)), signature, args)
@@ -47,8 +48,6 @@ def row_times_both_ways(
 
 def _all_blocks(row: _Row, signature: Any, args: Any) -> Any:
     """Generate the loop over the blocks of a row, from ``args[3]`` to ``args[4]``, and return its sums."""
-    from numba.core import cgutils
-
     step = args[3].type(1)
     with cgutils.for_range_slice(row.builder, args[3], args[4], step, args[3].type, inc=True) as (k, _):
         row.add_block(k)
@@ -65,25 +64,24 @@ def add_transposed(_context: Any, to: Any, at: Any, left: Any, first: Any, right
     return _added(lambda r, t, m, _k: t * m + r, to, left, right, sizes)
 
 
-def _added(place: Callable[[int, int, int, int], int], to: Any, left: Any, right: Any, sizes: Any) -> Any:
-    """Return the signature and the code generator of an added product; `place` locates (row, inner) of the left factor."""
-    from numba.core import types
+def _added(index: Callable[[int, int, int, int], int], to: Any, left: Any, right: Any, sizes: Any) -> Any:
+    """Return the signature and the code generator of an added product; `index` locates (row, inner) in the left factor."""
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         m, k, n = (len(size) for size in sizes)
         write, pieces = _Writer(context, builder, signature.args[0].dtype), _pieces(n)
         out, right = (write.start(signature.args[number], args[number]) for number in (0, 4))
         left = write.starts(signature.args[2], args[2])
-        other = [
+        rows_of_right = [
             [write.numbers([right], args[5], t * n + piece.column, piece.width) for piece in pieces] for t in range(k)
         ]
         for r in range(m):
-            factors = [write.numbers(left, args[3], place(r, t, m, k), 1) for t in range(k)]
+            factors = [write.numbers(left, args[3], index(r, t, m, k), 1) for t in range(k)]
             for p, piece in enumerate(pieces):
                 total = write.numbers([out], args[1], r * n + piece.column, piece.width)
                 for t in range(k):
-                    total = write.plus(total, write.everywhere(factors[t], piece.width), other[t][p])
-                builder.store(total, write.where(out, args[1], r * n + piece.column, piece.width), align=8)
+                    total = write.plus(total, write.broadcast(factors[t], piece.width), rows_of_right[t][p])
+                builder.store(total, write.address(out, args[1], r * n + piece.column, piece.width), align=8)
         return context.get_dummy_value()
 
     return types.none(to, types.intp, left, types.intp, right, types.intp, sizes), code
@@ -93,8 +91,6 @@ class _Writer:
     """Generator of vector loads and operations in the precision `kind`."""
 
     def __init__(self, context: Any, builder: Any, kind: Any) -> None:
-        from llvmlite import ir
-
         self.context, self.builder = context, builder
         self.real, self.lane = context.get_value_type(kind), ir.IntType(32)
         triple, _, features = context.codegen().magic_tuple()
@@ -110,18 +106,16 @@ class _Writer:
         """Return the addresses of the first numbers of a tuple of arrays."""
         return [self.start(kind, self.builder.extract_value(arrays, k)) for k, kind in enumerate(kinds)]
 
-    def where(self, start: Any, at: Any, column: int, width: int) -> Any:
-        """Return the address of a vector that begins at `column` after `at`."""
-        place = self.builder.gep(start, [self.builder.add(at, at.type(column))])
-        return self.builder.bitcast(place, self.kind(start.type.pointee, width).as_pointer())
+    def address(self, start: Any, at: Any, column: int, width: int) -> Any:
+        """Return the address of the vector that begins at number ``at + column``."""
+        first = self.builder.gep(start, [self.builder.add(at, at.type(column))])
+        return self.builder.bitcast(first, self.kind(start.type.pointee, width).as_pointer())
 
     def numbers(self, starts: list[Any], at: Any, column: int, width: int) -> Any:
-        """Return the vector at `starts`, with the high and low parts of each number added."""
-        from llvmlite import ir
-
+        """Return the vector that begins at number ``at + column``, the sum of the high and low parts if they are split."""
         parts = [
             self.builder.load(
-                self.where(start, at, column, width), align=4 if start.type.pointee == ir.FloatType() else 8
+                self.address(start, at, column, width), align=4 if start.type.pointee == ir.FloatType() else 8
             )
             for start in starts
         ]
@@ -129,68 +123,56 @@ class _Writer:
             parts = [self.builder.fpext(part, self.kind(self.real, width)) for part in parts]
         return parts[0] if len(parts) == 1 else self.builder.fadd(*parts)
 
-    def plus(self, total: Any, one: Any, other: Any) -> Any:
-        """Return a total plus a product, as a fused multiply-add if the processor has one.
+    def plus(self, total: Any, a: Any, b: Any) -> Any:
+        """Return ``total + a * b``, as a fused multiply-add if the processor has one.
 
-        Left to the compiler, fusing would depend on the surrounding code, and copies of a kernel would differ in the
-        last bit.
+        If the compiler chose whether to fuse, this would depend on the surrounding code, and copies of a kernel would differ
+        in the last bit.
         """
         if not self.fused:
-            return self.builder.fadd(total, self.builder.fmul(one, other))
-        from llvmlite import ir
-
+            return self.builder.fadd(total, self.builder.fmul(a, b))
         kind = total.type
         letter = "f32" if self.real == ir.FloatType() else "f64"
         name = f"llvm.fma.{letter}" if kind == self.real else f"llvm.fma.v{kind.count}{letter}"
         module = self.builder.module
-        known = module.globals.get(name) or ir.Function(module, ir.FunctionType(kind, [kind] * 3), name)
-        return self.builder.call(known, [one, other, total])
+        function = module.globals.get(name) or ir.Function(module, ir.FunctionType(kind, [kind] * 3), name)
+        return self.builder.call(function, [a, b, total])
 
     def add(self, start: Any, at: Any, column: int, width: int, vector: Any) -> None:
-        """Add a vector to numbers in memory."""
+        """Add a vector to the numbers in memory that begin at number ``at + column``."""
         total = self.builder.fadd(self.numbers([start], at, column, width), vector)
         align = 4 if str(self.real) == "float" else 8
-        self.builder.store(total, self.where(start, at, column, width), align=align)
+        self.builder.store(total, self.address(start, at, column, width), align=align)
 
-    def everywhere(self, number: Any, width: int) -> Any:
-        """Return a vector with the same number in all lanes."""
-        from llvmlite import ir
-
+    def broadcast(self, number: Any, width: int) -> Any:
+        """Return a vector with `number` in all lanes."""
         if width == 1:
             return number
-        one = ir.Constant(ir.VectorType(number.type, width), ir.Undefined)
-        return self.shuffled(self.builder.insert_element(one, number, self.lane(0)), [0] * width)
+        undefined = ir.Constant(ir.VectorType(number.type, width), ir.Undefined)
+        return self.shuffled(self.builder.insert_element(undefined, number, self.lane(0)), [0] * width)
 
     def shuffled(self, vector: Any, lanes: list[int]) -> Any:
-        """Return a vector of lanes of another one."""
-        from llvmlite import ir
-
+        """Return the vector that consists of the given `lanes` of `vector`."""
         order = ir.Constant(ir.VectorType(self.lane, len(lanes)), lanes)
         return self.builder.shuffle_vector(vector, vector, order)
 
     def kind(self, number: Any, width: int) -> Any:
-        """Return the type of a vector."""
-        from llvmlite import ir
-
+        """Return the type of a vector of `width` numbers."""
         return number if width == 1 else ir.VectorType(number, width)
 
     def zeros(self, width: int) -> Any:
         """Return a vector of zeros."""
-        from llvmlite import ir
-
         return ir.Constant(self.kind(self.real, width), 0.0 if width == 1 else [0.0] * width)
 
 
 class _Row(_Writer):
-    """Generator of the loop over the blocks of a row, with a sum for every row of the blocks and lane of a vector.
+    """Generator of the loop over the blocks of a row, with a sum for each row of the blocks and each lane of a vector.
 
-    With three columns a vector has one number too many. In the last row of a block it is the number before the row, in other
-    rows the number after, so that nothing outside the block is read.
+    With three columns, a vector has one number too many. It is the number before the row in the last row of a block, and the
+    number after the row in the other rows, so that nothing outside the block is read.
     """
 
     def __init__(self, context: Any, builder: Any, signature: Any, args: Any, m: int, n: int) -> None:
-        from numba.core import cgutils
-
         super().__init__(context, builder, signature.args[2].dtype)
         self.offset = args[3].type
         self.m, self.n = m, n
@@ -211,26 +193,26 @@ class _Row(_Writer):
             column = builder.sext(column, self.offset)
         j = builder.mul(column, self.offset(n))
         at = builder.mul(k, self.offset(m * n))
-        meets = self._three(j) if self.shifted else [self.numbers([self.x], j, p.column, p.width) for p in self.pieces]
-        behind = [self.shuffled(meets[0], [0, 0, 1, 2])] if self.shifted else meets
+        x_j = self._three(j) if self.shifted else [self.numbers([self.x], j, p.column, p.width) for p in self.pieces]
+        x_of_last = [self.shuffled(x_j[0], [0, 0, 1, 2])] if self.shifted else x_j
         for r in range(m):
             last = self.shifted and r == m - 1
             for p, (piece, total, x) in enumerate(
-                zip(self.pieces, self.totals[r], behind if last else meets, strict=True)
+                zip(self.pieces, self.totals[r], x_of_last if last else x_j, strict=True)
             ):
                 numbers = self.numbers(self.data, at, r * n + piece.column - last, piece.width)
                 builder.store(self.plus(builder.load(total), numbers, x), total)
-                self.met(r, p, numbers, last)
-        self.leave(j)
+                self.process(r, p, numbers, last)
+        self.finish(j)
 
-    def met(self, r: int, p: int, numbers: Any, last: bool) -> None:
+    def process(self, r: int, p: int, numbers: Any, last: bool) -> None:
         """Process the numbers of row r and piece p of a block; `last` if they begin one number before the row."""
 
-    def leave(self, j: Any) -> None:
+    def finish(self, j: Any) -> None:
         """Finish a block whose first column is j."""
 
     def sums(self) -> list[Any]:
-        """Return the sum of every row of the blocks."""
+        """Return the sum for each row of the blocks."""
         return [self._sum(totals, int(self.shifted and r == self.m - 1)) for r, totals in enumerate(self.totals)]
 
     def _sum(self, totals: list[Any], first: int) -> Any:
@@ -248,31 +230,31 @@ class _Row(_Writer):
         return partial
 
     def _three(self, j: Any) -> list[Any]:
-        """Return three numbers of x and an arbitrary fourth, without reading beyond them."""
+        """Return the three numbers of x from j on and an arbitrary fourth, without reading beyond them."""
         pair = self.shuffled(self.numbers([self.x], j, 0, 2), [0, 1, 0, 1])
         return [self.builder.insert_element(pair, self.numbers([self.x], j, 2, 1), self.lane(2))]
 
 
 class _RowBothWays(_Row):
-    """Generator like `_Row` that also adds the product of the transposed blocks and the row's part of x to y."""
+    """Generator like `_Row` that also adds the product of the transposed blocks and the entries of x in the row to y."""
 
     def __init__(self, context: Any, builder: Any, signature: Any, args: Any, m: int, n: int) -> None:
         super().__init__(context, builder, signature, args, m, n)
         self.y = self.start(signature.args[7], args[7])
-        own = builder.mul(args[5], self.offset(n))
-        self.own = [builder.fmul(args[6], self.numbers([self.x], own, r, 1)) for r in range(m)]
+        first = builder.mul(args[5], self.offset(n))
+        self.x_of_row = [builder.fmul(args[6], self.numbers([self.x], first, r, 1)) for r in range(m)]
         self.added: list[Any] = []
 
-    def met(self, r: int, p: int, numbers: Any, last: bool) -> None:
+    def process(self, r: int, p: int, numbers: Any, last: bool) -> None:
         """Add a row of the block times a number of x."""
         if last:
             numbers = self.shuffled(numbers, [1, 2, 3, 3])
         width = self.pieces[p].width
         if r == 0:
             self.added.append(self.zeros(width))
-        self.added[p] = self.plus(self.added[p], numbers, self.everywhere(self.own[r], width))
+        self.added[p] = self.plus(self.added[p], numbers, self.broadcast(self.x_of_row[r], width))
 
-    def leave(self, j: Any) -> None:
+    def finish(self, j: Any) -> None:
         """Add the sums to y, without touching other entries."""
         for piece, vector in zip(self.pieces, self.added, strict=True):
             if piece.used == piece.width:

@@ -65,7 +65,7 @@ class ConstrainedHierarchy:
             elimination = None
         added = springs
         if springs is not None and elimination is not None:
-            added = springs.under(elimination.pivots, elimination.weights)
+            added = springs.reduced(elimination.pivots, elimination.weights)
         if added is not None and not added.rows.nnz:  # The springs act on supported unknowns or on pivots only.
             added = None
         if elimination is None and added is None:
@@ -144,7 +144,7 @@ class ConstrainedHierarchy:
         top.followers = replace(following, weights=rounded, force_weights=rounded)
         changes = [SymmetricChange.of_equations(self.A, *composed(elimination, following))]
         if springs is not None:
-            changes.append(SymmetricChange.of_springs(springs.under(following.pivots, following.weights), size))
+            changes.append(SymmetricChange.of_springs(springs.reduced(following.pivots, following.weights), size))
         return changes
 
     def _inverse_blocks(self, nodes: Indices, of_springs: list[LocalChange]) -> Array:

@@ -17,23 +17,10 @@ from fastcontact.linear.multigrid.block_products import row_times
 
 
 @kernel
-def _dot(a, at, x, j, length):
-    """Return the sum of ``a[at + c] * x[j + c]`` over c, from 0 to the length of the tuple `length`."""
-    s = a[at] * x[j]
-    for c in range(1, len(length)):
-        s += a[at + c] * x[j + c]
-    return s
-
-
-@kernel
-def _part(share, z, i):
-    """Return ``share * z[i]``. If `share` is zero, z need not be initialised."""
-    return share * z[i] if share != 0.0 else share
-
-
-@kernel
 def multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows, cols):
     """Fill `y` (n_rows * m,) with ``share * z + factor * A @ x``; z and y may be the same array.
+
+    If `share` is zero, z need not be initialised.
 
     The `numbers` are the entries of A, as a tuple of one or two arrays, see `split_matrix_kernels`.
     """
@@ -41,21 +28,24 @@ def multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows, 
     for i in range(low, high):
         sums = row_times(indices, numbers, x, indptr[i], indptr[i + 1], rows, cols)
         for r in range(m):
-            y[m * i + r] = _part(share, z, m * i + r) + factor * sums[r]
+            y[m * i + r] = (share * z[m * i + r] if share != 0.0 else share) + factor * sums[r]
 
 
 @kernel
 def relax(low, high, inverse, r, first, second, d, x, rows, begin):
     """Make one step of a Chebyshev iteration: ``d = first * d + second * D^-1 r`` and ``x = x + d``, with the residual r.
 
-    `inverse` (n_rows * m * m,) are the inverses of the diagonal blocks D. If `first` is zero, d need not be initialised. With
-    `begin`, the iteration starts at x = 0, and x need not be initialised (Saad, Iterative Methods for Sparse Linear Systems,
-    2003, algorithm 12.1).
+    `inverse` (n_rows * m * m,) contains the inverses of the diagonal blocks D. If `first` is zero, d need not be initialised.
+    If `begin` is true, the iteration starts at x = 0, and x need not be initialised (Saad, Iterative Methods for Sparse
+    Linear Systems, 2003, algorithm 12.1).
     """
     m = len(rows)
     for i in range(low, high):
         for a in range(m):
-            step = second * _dot(inverse, (m * i + a) * m, r, m * i, rows)
+            correction = inverse[(m * i + a) * m] * r[m * i]
+            for c in range(1, m):
+                correction += inverse[(m * i + a) * m + c] * r[m * i + c]
+            step = second * correction
             if first != 0.0:
                 step += first * d[m * i + a]
             d[m * i + a] = step
@@ -106,8 +96,8 @@ def solve_dense(L, reciprocal, b, work, x):
 def subtract_rows(low, high, numbers, indptr, indices, data, x, y, rows):
     """Subtract ``A x`` from the block rows `numbers` of `y`, in place, for a matrix A of square blocks.
 
-    The `numbers` (n_rows,) must be different. `indices` are numbers of blocks of x. `data` is a tuple of arrays, as
-    `numbers` in `multiply`.
+    The `numbers` (n_rows,) must be distinct. `indices` contains the numbers of the blocks of x, and `data` the entries of A,
+    as `numbers` in `multiply`.
     """
     m = len(rows)
     for i in range(low, high):

@@ -2,15 +2,15 @@
 """Set-up of a multigrid hierarchy: smoothed prolongators and Galerkin products.
 
 Block matrices are given by arrays, see `matrix.BlockMatrix`, and block sizes m and n by tuples of zeros, `rows` and `cols`.
-Numbers that may be split are tuples, see `split_matrix_kernels`, and `storage` defines which blocks are stored, see
-`symmetric_storage_kernels`. Kernels compute rows `low` to ``high - 1``, one by one in a fixed order.
+Numbers that may be split are tuples, see `split_matrix_kernels`. `storage` defines which blocks of the symmetric matrix A are
+stored, see `symmetric_storage_kernels`. Kernels compute rows `low` to ``high - 1`` in ascending order.
 """
 
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
 from fastcontact.linear.multigrid.block_products import add_product, add_transposed
-from fastcontact.linear.multigrid.symmetric_storage_kernels import part_of, place_of
+from fastcontact.linear.multigrid.symmetric_storage_kernels import part_of, slot_of
 
 
 @kernel
@@ -36,8 +36,8 @@ def smooth_prolongator(
             at = 0
             while columns[start[i] + at] != aggregate[j]:
                 at += 1
-            slot, turned = place_of(storage, part, i, j, k)
-            if turned:
+            slot, transposed = slot_of(storage, part, i, j, k)
+            if transposed:
                 add_transposed(sums, at * m * n, data, slot * m * m, tentative, j * m * n, (rows, rows, cols))
             else:
                 add_product(sums, at * m * n, data, slot * m * m, tentative, j * m * n, (rows, rows, cols))
@@ -53,8 +53,12 @@ def smooth_prolongator(
 
 @kernel
 def _reach(row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, reached):
-    """Find the fine neighbours of the nodes of a coarse node, and the coarse nodes of these; return both counts."""
-    n_near = n_found = 0
+    """Find the fine nodes and the coarse nodes that a coarse row of ``P.T A P`` involves; return both counts.
+
+    `near` receives the neighbours in A of the fine nodes of the row, and `reached` their coarse nodes. `seen` and
+    `seen_coarse` contain the last row that involved each node.
+    """
+    n_near = n_reached = 0
     for e in range(tstart[row], tstart[row + 1]):
         i = torigin[e]
         for k in range(indptr[i], indptr[i + 1]):
@@ -69,14 +73,14 @@ def _reach(row, indptr, indices, start, columns, tstart, torigin, seen, near, se
             J = columns[k]
             if seen_coarse[J] != row:
                 seen_coarse[J] = row
-                reached[n_found] = J
-                n_found += 1
-    return n_near, n_found
+                reached[n_reached] = J
+                n_reached += 1
+    return n_near, n_reached
 
 
 @kernel
 def count_galerkin(low, high, indptr, indices, start, columns, tstart, torigin, count, near_count):
-    """Fill, for coarse rows of ``P.T A P``, the numbers of their blocks and of fine nodes in their sums."""
+    """Fill the numbers of blocks (`count`) and of fine nodes (`near_count`) of the rows of ``P.T A P``."""
     n, n_coarse = indptr.shape[0] - 1, tstart.shape[0] - 1
     seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)
     seen_coarse, reached = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
@@ -88,29 +92,29 @@ def count_galerkin(low, high, indptr, indices, start, columns, tstart, torigin, 
 
 @kernel
 def _galerkin_row(
-    row, near, n_near, place, products, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot, first,
-    places, out, rows, cols,
+    row, near, n_near, position, products, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot, first,
+    coarse_position, out, rows, cols,
 ):  # fmt: skip
-    """Compute one row: first ``Z = A P_I`` for the fine nodes near it, then ``P.T Z``, transposed since A is symmetric."""
+    """Compute one row: first ``Z = A P_I`` for the fine nodes near it, then ``Z.T P``, since A is symmetric."""
     m, n = len(rows), len(cols)
     for e in range(n_near):
-        place[near[e]] = e
+        position[near[e]] = e
     for e in range(n_near * m * n):
         products[e] = 0.0
     for e in range(tstart[row], tstart[row + 1]):
         i, slot = torigin[e], tslot[e] * m * n
         part = part_of(storage, i)
         for k in range(indptr[i], indptr[i + 1]):  # A_ji = A_ij.T
-            at, turned = place_of(storage, part, i, indices[k], k)
-            if turned:
-                add_product(products, place[indices[k]] * m * n, data, at * m * m, P, slot, (rows, rows, cols))
+            block, transposed = slot_of(storage, part, i, indices[k], k)
+            if transposed:
+                add_product(products, position[indices[k]] * m * n, data, block * m * m, P, slot, (rows, rows, cols))
             else:
-                add_transposed(products, place[indices[k]] * m * n, data, at * m * m, P, slot, (rows, rows, cols))
+                add_transposed(products, position[indices[k]] * m * n, data, block * m * m, P, slot, (rows, rows, cols))
     for e in range(n_near):
         j, base = near[e], e * m * n
         for k in range(start[j], start[j + 1]):
-            block = (first + places[columns[k]]) * n * n
-            add_transposed(out, block, (products,), base, P, k * m * n, (cols, rows, cols))
+            target = (first + coarse_position[columns[k]]) * n * n
+            add_transposed(out, target, (products,), base, P, k * m * n, (cols, rows, cols))
 
 
 @kernel
@@ -125,17 +129,17 @@ def galerkin(
     n, n_coarse = indptr.shape[0] - 1, tstart.shape[0] - 1
     seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)
     seen_coarse, reached = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
-    place, places = np.empty(n, np.int32), np.empty(n_coarse, np.int32)
+    position, coarse_position = np.empty(n, np.int32), np.empty(n_coarse, np.int32)
     products = np.empty(largest * len(rows) * len(cols))
     for row in range(low, high):
-        n_near, n_found = _reach(
+        n_near, n_reached = _reach(
             row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, reached
         )
-        reached[:n_found].sort()
-        for e in range(n_found):
-            places[reached[e]] = e
+        reached[:n_reached].sort()
+        for e in range(n_reached):
+            coarse_position[reached[e]] = e
             out_columns[into[row] + e] = reached[e]
         _galerkin_row(
-            row, near, n_near, place, products, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot,
-            into[row], places, out, rows, cols,
+            row, near, n_near, position, products, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot,
+            into[row], coarse_position, out, rows, cols,
         )  # fmt: skip

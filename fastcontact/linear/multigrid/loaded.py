@@ -1,7 +1,8 @@
 """Multigrid solution under linear equations, some of which have a compliance.
 
-An equation with a compliance is equivalent to a spring along its row. Springs that are not much stiffer than the body are
-added to the matrix and to the hierarchy. Stiffer ones are eliminated like equations without compliance, see `reduced`.
+An equation with a compliance is equivalent to a spring along its row. Springs that are not much stiffer than the bodies are
+added to the matrix and to the hierarchy. Equations with stiffer springs are eliminated like equations without compliance, see
+`reduced`.
 """
 
 from __future__ import annotations
@@ -33,14 +34,14 @@ STIFF = MILD
 class LoadedMultigrid(LoadedIteration):
     """A matrix prepared by a `Multigrid` solver, with a right-hand side; see `LoadedIteration`."""
 
-    # Values of the pressure field at the edge of the contact in the last solution, from which the next one begins.
+    # Values of the pressure field at the edge of the contact in the last solution, the initial guess of the next one.
     _at_edge: Array = np.empty(0)
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Return the solution and the multipliers, see `Loaded`.
+        """Return the solution and the multipliers, see `Loaded.solve`.
 
         If equations are linearly dependent or have a full compliance matrix, the Delassus operator is formed.
         """
@@ -74,22 +75,18 @@ class LoadedMultigrid(LoadedIteration):
         if friction is None:
             return self._solved(parts, c, guess, None, tolerance)
         solver, elimination, springs = self._solver, parts.elimination, parts.springs
-        springs = friction.springs if springs is None else springs.beside(friction.springs)
+        springs = friction.springs if springs is None else springs.joined(friction.springs)
         f = self._f if friction.forces is None else self._f + friction.forces
-        f = parts.pushed(f, c)
+        f = parts.with_spring_forces(f, c)
         u = solver.nonsymmetric_solution(f, elimination, springs, guess, tolerance)
         return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), c)
 
     def _solved(
-        self,
-        parts: _Parts,
-        c: Array,
-        guess: Array | None,
-        monitor: Monitor | None,
-        tolerance: float | None,
+        self, parts: _Parts, c: Array, guess: Array | None, monitor: Monitor | None, tolerance: float | None
     ) -> tuple[Array, Array]:
         """Return u (n,) [length] and the multipliers (m,) [force] under equations without friction."""
-        solver, elimination, springs, f = self._solver, parts.elimination, parts.springs, parts.pushed(self._f, c)
+        solver, elimination, springs = self._solver, parts.elimination, parts.springs
+        f = parts.with_spring_forces(self._f, c)
 
         def watch(u: Array, multiplier: Array, error: float) -> bool:
             assert monitor is not None
@@ -103,9 +100,9 @@ class LoadedMultigrid(LoadedIteration):
         tolerance: float | None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return u (n,) [length] and the point forces (m,) [force] for a pressure field; see `field_compliance`."""
-        solver = self._solver
-        parts = _FieldParts.of(B, c, C, solver.K.blocksize[0])
-        elimination, springs, f, border = parts.elimination, parts.springs, parts.pushed(self._f, c), parts.border()
+        solver, parts = self._solver, _FieldParts.of(B, c, C, self._solver.K.blocksize[0])
+        elimination, springs, border = parts.elimination, parts.springs, parts.border()
+        f = parts.with_spring_forces(self._f, c)
 
         def watch(u: Array, inside: Array, error: float) -> bool:
             assert monitor is not None
@@ -130,7 +127,7 @@ class LoadedMultigrid(LoadedIteration):
     ) -> _Parts:
         """Return the equations, divided into eliminated ones and springs.
 
-        `through` (m, n) is the matrix F of the forces ``F.T @ multiplier``; B by default.
+        `through` (m, n) is the matrix F of the forces ``F.T @ multiplier`` on the unknowns; B by default.
 
         Raises
         ------
@@ -142,8 +139,8 @@ class LoadedMultigrid(LoadedIteration):
             elimination = eliminate(B, c, through, nodes, size) if len(c) else None
             return _Parts(np.ones(len(c), bool), elimination, None)
         diagonal = self._solver.diagonal()
-        yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
-        softness = B.multiply(B) @ yielding
+        flexibility = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
+        softness = B.multiply(B) @ flexibility
         try:
             return _Parts.of(B, c, C, softness > STIFF * C, nodes, size, through)
         except RepeatedError:
@@ -181,22 +178,22 @@ class _Parts:
         if stiff.all():
             elimination = eliminate(B, c, through, nodes, size) if len(c) else None
         else:
-            rows, acting = csr_array(B[stiff]), None if through is None else csr_array(through[stiff])
-            of_rows = None if nodes is None else nodes[stiff]
-            elimination = eliminate(rows, c[stiff], acting, of_rows, size) if stiff.any() else None
+            rows, force_rows = csr_array(B[stiff]), None if through is None else csr_array(through[stiff])
+            nodes_of_rows = None if nodes is None else nodes[stiff]
+            elimination = eliminate(rows, c[stiff], force_rows, nodes_of_rows, size) if stiff.any() else None
         if elimination is not None and C[stiff].any():
             elimination = dataclasses.replace(elimination, compliance=C[stiff])
         if stiff.all():
             return cls(stiff, elimination, None)
-        acting = None if through is None else csr_array(through[~stiff])
-        return cls(stiff, elimination, Springs(csr_array(B[~stiff]), 1.0 / C[~stiff], acting))
+        force_rows = None if through is None else csr_array(through[~stiff])
+        return cls(stiff, elimination, Springs(csr_array(B[~stiff]), 1.0 / C[~stiff], force_rows))
 
-    def pushed(self, f: Array, c: Array) -> Array:
-        """Return the forces f (n,) plus the forces of the springs at u = 0 [force]; c (m,) are the right-hand sides."""
+    def with_spring_forces(self, f: Array, c: Array) -> Array:
+        """Return f (n,) plus the forces of the springs at u = 0 [force]; c (m,) are the right-hand sides."""
         if self.springs is None:
             return f
-        acting = self.springs.rows if self.springs.through is None else self.springs.through
-        return f + acting.T @ (self.springs.stiffness * c[~self.stiff])
+        force_rows = self.springs.rows if self.springs.through is None else self.springs.through
+        return f + force_rows.T @ (self.springs.stiffness * c[~self.stiff])
 
     def multiplier(self, u: Array, of_stiff: Array, c: Array) -> Array:
         """Return the multipliers (m,) of all equations [force], given those of the eliminated ones, `of_stiff`."""
@@ -249,14 +246,14 @@ class _FieldParts:
             return None
         return Border(csr_array(field.rows[field.edge]), field.right[field.edge], field.compliance)
 
-    def pushed(self, f: Array, c: Array) -> Array:
-        """Return the forces f (n,) plus the forces of the springs at u = 0 [force]; c (m,) are the right-hand sides."""
+    def with_spring_forces(self, f: Array, c: Array) -> Array:
+        """Return f (n,) plus the forces of the springs at u = 0 [force]; c (m,) are the right-hand sides."""
         return f + self.springs.rows.T @ (self.springs.stiffness * c)
 
     def multiplier(self, u: Array, inside: Array, at_edge: Array, c: Array) -> Array:
         """Return the forces (m,) of the points [force].
 
-        `inside` and `at_edge` are the multipliers of the equations of the field, eliminated or at the edge of the contact.
+        `inside` contains the multipliers of the equations of the field that are eliminated, and `at_edge` the others.
         """
         p = np.empty(len(self.field.right))
         p[~self.field.edge], p[self.field.edge] = inside, at_edge

@@ -1,10 +1,10 @@
-"""Operator of the iteration: the matrix K and springs, after the elimination of equations with or without compliance.
+"""Operator of the iteration: the sum of K and springs, after the elimination of equations with or without compliance.
 
 Equations ``B u + C multiplier = c`` with a diagonal compliance C are eliminated like equations without compliance. Their
-violation ``s = B u - c = -C multiplier``, called excess, adds the displacement ``P^-1 s`` to the pivots, where P are the
-columns of B that belong to the pivots. The excess is an unknown with the stiffness ``1 / C``. It replaces the pivot in the
-vectors of the iteration. Since the preconditioner treats it separately, even a large stiffness costs neither accuracy nor
-iterations: the stiffer an equation, the weaker is the coupling of its excess with the other unknowns.
+violation ``s = B u - c = -C multiplier``, called excess, adds the displacement ``P^-1 s`` to the pivots, where P contains the
+columns of B that belong to the pivots. The excess is an unknown with the stiffness ``1 / C``, which replaces the pivot in the
+vectors of the iteration. Since the preconditioner treats it separately, a large stiffness impairs neither accuracy nor
+convergence: the stiffer an equation, the weaker is the coupling of its excess with the other unknowns.
 """
 
 from __future__ import annotations
@@ -58,22 +58,26 @@ class Reduced:
             self._excess.begin(x, self.multiplier(x, f) if x.any() else None)
         elif self.elimination is not None:
             self.elimination.complete(x, self.elimination.offset)
-        self._subtract(self.displacement(x), f, x, r)
+        u = self.displacement(x)
+        self._K.combine(-1.0, u, 1.0, f, r)
+        if self.springs is not None:
+            self.springs.subtract_forces(u, r)
+        self._reduce(x, r, -1.0)
 
-    def displacement(self, x: Array, moved: bool = True) -> Array:
+    def displacement(self, x: Array, increment: bool = False) -> Array:
         """Return the displacements (n,) of a vector x (n,) of the iteration [length].
 
-        If `moved` is False, x is an increment, and the offsets of the pivots are not added. The result may be x itself or an
-        array that the next call overwrites.
+        If x is an `increment`, the offsets of the pivots are not added. The result may be x itself or an array that the next
+        call overwrites.
         """
         if self._excess is None:
             return x
         assert self.elimination is not None
-        return self._excess.displacement(x, self.elimination.offset if moved else None)
+        return self._excess.displacement(x, None if increment else self.elimination.offset)
 
     def multiply(self, p: Array, q: Array) -> None:
         """Fill q (n,) with the product of the operator and p (n,)."""
-        u = self.displacement(p, moved=False)
+        u = self.displacement(p, increment=True)
         self._K.combine(1.0, u, 0.0, q, q)
         if self.springs is not None:
             self.springs.subtract_forces(u, q, -1.0)
@@ -96,17 +100,11 @@ class Reduced:
         """Return the multipliers (m,) of the equations [force], see the function `multiplier`."""
         return multiplier(self._K, self.elimination, self.springs, u, f)
 
-    def _subtract(self, u: Array, f: Array, x: Array, r: Array) -> None:
-        """Fill r (n,) with the residual for the displacements u (n,) of the vector x (n,), and the right-hand side f (n,)."""
-        self._K.combine(-1.0, u, 1.0, f, r)
-        if self.springs is not None:
-            self.springs.subtract_forces(u, r)
-        self._reduce(x, r, -1.0)
-
     def _reduce(self, x: Array, r: Array, sign: float) -> None:
         """Move the forces r (n,) from the pivots to the other unknowns, in place.
 
-        The entries of compliant equations become the forces on their excesses, with `sign` times those of their stiffness.
+        The entries of the pivots of compliant equations become the forces on the excesses, including `sign` times the forces
+        of the stiffness of the excesses x.
         """
         if self._excess is not None:
             self._excess.reduce(x, r, sign)
@@ -128,7 +126,7 @@ def multiplier(K: ScaledMatrix, elimination: Elimination | None, springs: Spring
 
 
 class _Excess:
-    """The excesses of compliant equations, which replace the pivots as unknowns. For parameters see `Reduced`."""
+    """The excesses of compliant equations, which replace the pivots as unknowns; parameters as in `Reduced`."""
 
     def __init__(self, diagonal: Array, elimination: Elimination, compliance: Array) -> None:
         self._elimination, self._pivots = elimination, elimination.pivots
@@ -145,11 +143,11 @@ class _Excess:
         x[self._pivots] = 0.0 if multiplier is None else -self._compliance * multiplier
 
     def displacement(self, x: Array, offset: Array | None) -> Array:
-        """Return the displacements (n,) of x (n,), with the `offset` (m,) of the pivots or without one [length]."""
-        moved = self._elimination.shifted(x[self._pivots])
+        """Return the displacements (n,) of x (n,) [length]; the `offset` (m,) of the pivots is added if it is given."""
+        shift = self._elimination.own.solve(x[self._pivots])
         u = self._u
         u[:] = x
-        self._elimination.complete(u, moved if offset is None else moved + offset)
+        self._elimination.complete(u, shift if offset is None else shift + offset)
         return u
 
     def reduce(self, x: Array, r: Array, sign: float) -> None:

@@ -1,4 +1,4 @@
-"""Conjugate gradient method with multigrid as preconditioner.
+"""Krylov methods with multigrid as preconditioner, for systems with linear equations.
 
 The aggregates and prolongators of the stiffness matrix K are used in the complete analysis. Equations ``B u = c`` are
 eliminated: the iterates satisfy them, the forces at the eliminated unknowns, the pivots, are moved to the other unknowns,
@@ -69,7 +69,9 @@ class TooManyIterationsError(StallError):
 
 
 class Multigrid:
-    """Conjugate gradient method with smoothed-aggregation multigrid as preconditioner.
+    """Krylov methods with smoothed-aggregation multigrid as preconditioner.
+
+    Symmetric systems are solved by conjugate gradients, nonsymmetric and bordered ones by conjugate residuals.
 
     Parameters
     ----------
@@ -103,10 +105,11 @@ class Multigrid:
         self.contrast = 1.0
         self.work = 0
         self.allowed: int | None = None
-        # Hierarchy of an earlier matrix to build that of the next one from, and whether the current one is such.
+        # Hierarchy of an earlier matrix, whose coarser levels the next one takes over, and whether the current hierarchy has
+        # taken over coarser levels.
         self._near: Hierarchy | None = None
         self._renewed = False
-        # Whether coarser levels of an earlier matrix serve for later ones, shared by all copies.
+        # Whether coarser levels may be taken over; shared by all copies.
         self._lasting = [True]
         self.begin()
 
@@ -132,16 +135,16 @@ class Multigrid:
         self.columns = InverseColumns(n, self._inverse_entries, MOST_COLUMNS)
 
     def near(self) -> Self:
-        """Return a copy to be prepared for a matrix that differs little: its coarser levels are kept.
+        """Return a copy that is to be prepared for a similar matrix, whose hierarchy takes over the coarser levels.
 
-        If they do not suffice in one solution, from then on all hierarchies are built anew.
+        If convergence is slow with them in one solution, all hierarchies are built anew from then on.
         """
         new = copy.copy(self)
         new._near = self.hierarchy if self._lasting[0] else None
         return new
 
     def _build(self, rigid_modes: Array, near: Hierarchy | None = None) -> None:
-        """Build the hierarchy of the stored matrix, with the coarser levels of one that is `near`."""
+        """Build the hierarchy of the stored matrix, if possible with the coarser levels of the hierarchy `near`."""
         renewed, self._near = None if near is None else near.renewed(self.K.scaled), None
         self._renewed = renewed is not None
         self.hierarchy = Hierarchy(self.K.scaled, rigid_modes) if renewed is None else renewed
@@ -153,7 +156,7 @@ class Multigrid:
         self.counters.setups += 1
 
     def _build_anew(self) -> None:
-        """Build the complete hierarchy of the matrix, and from now on those of all tangents."""
+        """Build all levels of the hierarchy, here and from now on for all matrices."""
         self._lasting[0], reduced = False, self._reduced
         self._build(self._modes.astype(float))
         self._worked(CHANGE)
@@ -178,9 +181,9 @@ class Multigrid:
         """
         if elimination is not self._reduced.elimination or springs is not self._reduced.springs:
             sparse = elimination and elimination.with_sparse_weights()
-            known = self._hierarchy_springs
-            alike = known is None if springs is None else springs.alike(known)
-            if not (alike and _alike(sparse, self._hierarchy_equations)):
+            old_springs = self._hierarchy_springs
+            springs_alike = old_springs is None if springs is None else springs.alike(old_springs)
+            if not (springs_alike and _alike(sparse, self._hierarchy_equations)):
                 self._change_hierarchy(sparse, springs)
                 self._worked(CHANGE)
             compliant = elimination is not None and elimination.compliance is not None
@@ -354,27 +357,30 @@ class Multigrid:
         therefore continues for some iterations, see WARM, or until the norm of the residual is `aim`, if that is smaller.
         """
         enough = tolerance * scale
-        made, wanted = 0, max(min(enough, WARM * iteration.norm, aim), WARM_LEAST * enough)
+        made, target = 0, max(min(enough, WARM * iteration.norm, aim), WARM_LEAST * enough)
         begun = iteration.norm
         if begun > WARM * self._cut_short and self._constrained.stiffening > MILD:
             self._most_warm = min(2 * self._most_warm, KEPT)
         self._cut_short = np.inf
-        while not (done := self._done(iteration, tolerance, scale)) or iteration.norm > wanted:
+        while not (done := self._done(iteration, tolerance, scale)) or iteration.norm > target:
             if done and made >= self._most_warm:
                 self._cut_short = begun
                 return
             if made >= MAX_ITERATIONS or not iteration.step(multiply, precondition):
                 if iteration.norm <= enough:
                     return
-                left = iteration.norm / enough
-                raise StallError(f"conjugate residuals stall at {left:.1e} times the tolerance after {made} iterations")
+                excess = iteration.norm / enough
+                raise StallError(
+                    f"conjugate residuals stall at {excess:.1e} times the tolerance after {made} iterations"
+                )
             made += 1
             self._count()
 
     def _done(self, iteration: Iteration, tolerance: float, scale: float) -> bool:
-        """Return whether the residual is at most `tolerance` times `scale`, and the displacements of a final solution settle.
+        """Return whether the residual is at most `tolerance` times `scale`, and final displacements have converged.
 
-        A small residual does not suffice: relative to forces in a stiff body, it may exceed all forces in a soft one.
+        A small residual alone does not suffice: if it is small relative to the forces in a stiff body, it may still exceed
+        all forces in a soft one.
         """
         if iteration.norm > tolerance * scale:
             return False
@@ -393,7 +399,7 @@ class Multigrid:
         """Add a number of iterations to `work`; raise TooManyIterationsError if it exceeds `allowed`."""
         self.work += iterations
         if self.allowed is not None and self.work > self.allowed:
-            raise TooManyIterationsError("the work allowed is done")
+            raise TooManyIterationsError(f"the iterations exceed the work limit of {self.allowed}")
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of K [force / length]."""
@@ -402,7 +408,7 @@ class Multigrid:
         return self._diagonal
 
     def _strengthen(self, times: int) -> None:
-        """Make the preconditioner positive definite again: by larger bounds, and at the last attempt by double precision."""
+        """Make the preconditioner positive definite again: by larger bounds and, at the last attempt, by double precision."""
         if self._renewed:
             self._build_anew()
             return
@@ -423,14 +429,17 @@ class Multigrid:
         """Return the 2-norm of the right-hand side, including forces due to the offsets of eliminated unknowns [force]."""
         square = self._cg.dot(f, f)
         if elimination is not None and elimination.offset.any():
-            moved = np.zeros(len(f))
-            moved[elimination.pivots] = elimination.offset
-            forces = self.K @ moved
+            offset = np.zeros(len(f))
+            offset[elimination.pivots] = elimination.offset
+            forces = self.K @ offset
             square += self._cg.dot(forces, forces)
         return float(np.sqrt(square))
 
     def _enough(self, tolerance: float) -> float:
-        """Return the relative residual at which to stop, for a requested `tolerance`: at least that of the solver [-]."""
+        """Return the relative residual [-] at which the iteration stops if `tolerance` is requested.
+
+        It is at least the tolerance of the solver.
+        """
         return max(self.tolerance, tolerance / self._contrast)
 
     @property
@@ -446,11 +455,11 @@ class Multigrid:
         self._reduced.precondition(r, norm, z, self._cycle)
 
     def _cycle(self, r: Array, norm: float, z: Array) -> None:
-        """Fill z (n,) with the result of one V-cycle for r (n,), scaled by its 2-norm to the range of single precision."""
-        top = self.hierarchy.levels[0]
-        scaled(1.0 / norm, r, top.b)
+        """Fill z (n,) with the result of one V-cycle for r (n,), which is divided by its 2-norm to fit single precision."""
+        finest = self.hierarchy.levels[0]
+        scaled(1.0 / norm, r, finest.b)
         self.hierarchy.cycle()
-        scaled(norm * self.K.unit, top.x, z)
+        scaled(norm * self.K.unit, finest.x, z)
 
     def multiplier(self, elimination: Elimination | None, u: Array, f: Array, springs: Springs | None = None) -> Array:
         """Return the multipliers (m,) of the equations [force] at the displacements `u` (n,), see `reduced.multiplier`."""

@@ -6,8 +6,7 @@ pivots is much stiffer, the nodes of the other side get its stiffness. This has 
 - Motions of these nodes that move no pivot are as soft as their body, but the smoother treats them as stiff. `FreeMotions`
   corrects them with the stiffness of their body alone.
 - Aggregates of these nodes and their softer neighbours would move the stiff body. Such motions have far too much energy, so
-that
-  coarse levels would correct neither side. In corrections from coarser levels the roles are therefore exchanged: the
+  that coarse levels would correct neither side. In corrections from coarser levels the roles are therefore exchanged: the
   unknowns of the stiffened nodes follow the pivots, ``u = S u`` (`followers`), and the pivots then follow these unknowns as
   usual. With the prolongator P, the coarse matrices are Galerkin products with ``T S P`` (`composed`).
 """
@@ -22,13 +21,12 @@ from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.round_off import SINGLE_PRECISION
 
-# An unknown follows the pivots of its equations if a unit translation of its side moves them by at least this much on
-# average.
+# An unknown follows the pivots of its equations if a unit translation of its side moves them on average at least so far.
 LEAST = 0.3
 
 
 class FreeMotions:
-    """Corrections of motions of stiffened nodes that move no pivot.
+    """Smoother corrections for motions of stiffened nodes that move no pivot.
 
     Let W be the weights by which the pivots depend on the stiffened nodes, and D the diagonal blocks of the stiffness
     matrix at these nodes, without equations. The correction for a residual r is
@@ -46,24 +44,24 @@ class FreeMotions:
 
     def __init__(self, weights: csr_array, nodes: Indices, inverse: Array) -> None:
         size, k = inverse.shape[1], len(nodes)
-        self._at = (nodes[:, None] * size + np.arange(size)).ravel()
-        self._yielding = csr_array(bsr_array((inverse, np.arange(k), np.arange(k + 1))))
-        W = csr_array(weights[:, self._at])
+        self._dofs = (nodes[:, None] * size + np.arange(size)).ravel()
+        self._inverse = csr_array(bsr_array((inverse, np.arange(k), np.arange(k + 1))))
+        W = csr_array(weights[:, self._dofs])
         W = W[np.diff(W.indptr) > 0]
-        self._moves = csr_array(self._yielding @ W.T)
-        self._pulls = csr_array(self._moves.T)  # stored by rows for fast products
-        compliance = csr_array(W @ self._moves)
+        self._inverse_WT = csr_array(self._inverse @ W.T)
+        self._W_inverse = csr_array(self._inverse_WT.T)  # stored by rows for fast products
+        compliance = csr_array(W @ self._inverse_WT)
         # Rows of W may be linearly dependent in the precision of the cycle; a small shift keeps the matrix regular.
         shifted = compliance + diags_array(SINGLE_PRECISION * compliance.diagonal(), format="csr")
         self._factors = splu(csc_array(shifted), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
     def correct(self, r: AnyArray, factor: float, step: AnyArray, x: AnyArray) -> None:
         """Add `factor` times the correction for the residual r (n,) to the last `step` (n,) and to x (n,), in place."""
-        residual = r[self._at].astype(float)
-        correction = self._yielding @ residual - self._moves @ self._factors.solve(self._pulls @ residual)
-        correction = (factor * correction).astype(x.dtype)
-        step[self._at] += correction
-        x[self._at] += correction
+        residual = r[self._dofs].astype(float)
+        multiplier = self._factors.solve(self._W_inverse @ residual)
+        correction = (factor * (self._inverse @ residual - self._inverse_WT @ multiplier)).astype(x.dtype)
+        step[self._dofs] += correction
+        x[self._dofs] += correction
 
 
 def followers(elimination: Elimination, nodes: Indices, size: int) -> Elimination:
@@ -85,22 +83,22 @@ def followers(elimination: Elimination, nodes: Indices, size: int) -> Eliminatio
     m, n = W.shape
     opposite, stiffened = np.ones(n // size, bool), np.zeros(n // size, bool)
     opposite[pivots // size], stiffened[nodes] = False, True
-    other, along = opposite[W.col // size], W.col % size
-    through = stiffened[W.col // size] & (along == (pivots % size)[W.row]) & (W.data > 0.0)
-    unknowns, column = np.unique(W.col[through], return_inverse=True)
-    share = csr_array((W.data[through], (column, W.row[through])), shape=(len(unknowns), m))
-    # Displacement of each pivot for unit translations of the opposite side along each direction.
-    together = csr_array((W.data[other], (W.row[other], along[other])), shape=(m, size))
-    moved = np.asarray((share @ together).toarray())
-    enough = moved[np.arange(len(unknowns)), unknowns % size] >= LEAST * np.asarray(share.sum(axis=1))
-    unknowns, share, moved = unknowns[enough], csr_array(share[enough]), moved[enough]
-    weights_of_followers = csr_array((-W.data[~other], (W.row[~other], W.col[~other])), shape=(m, n))
-    weights_of_followers = weights_of_followers + csr_array((np.ones(m), pivots, np.arange(m + 1)), shape=(m, n))
-    of_nodes = unknowns[:, None] // size * size + np.arange(size)
-    at, direction = np.nonzero(~np.isin(of_nodes, unknowns))
-    across = csr_array((moved[at, direction], (at, of_nodes[at, direction])), shape=(len(unknowns), n))
-    by = moved[np.arange(len(unknowns)), unknowns % size]
-    weights = csr_array(diags_array(1.0 / by, format="csr") @ (share @ weights_of_followers - across))
+    is_opposite, direction = opposite[W.col // size], W.col % size
+    follows = stiffened[W.col // size] & (direction == (pivots % size)[W.row]) & (W.data > 0.0)
+    unknowns, column = np.unique(W.col[follows], return_inverse=True)
+    mean = csr_array((W.data[follows], (column, W.row[follows])), shape=(len(unknowns), m))
+    # Displacement of each pivot due to unit translations of the opposite side along each direction.
+    translation = csr_array((W.data[is_opposite], (W.row[is_opposite], direction[is_opposite])), shape=(m, size))
+    moved = np.asarray((mean @ translation).toarray())
+    enough = moved[np.arange(len(unknowns)), unknowns % size] >= LEAST * np.asarray(mean.sum(axis=1))
+    unknowns, mean, moved = unknowns[enough], csr_array(mean[enough]), moved[enough]
+    of_pivots = csr_array((-W.data[~is_opposite], (W.row[~is_opposite], W.col[~is_opposite])), shape=(m, n))
+    of_pivots = of_pivots + csr_array((np.ones(m), pivots, np.arange(m + 1)), shape=(m, n))
+    dofs_of_nodes = unknowns[:, None] // size * size + np.arange(size)
+    row, other = np.nonzero(~np.isin(dofs_of_nodes, unknowns))
+    of_others = csr_array((moved[row, other], (row, dofs_of_nodes[row, other])), shape=(len(unknowns), n))
+    divisor = moved[np.arange(len(unknowns)), unknowns % size]
+    weights = csr_array(diags_array(1.0 / divisor, format="csr") @ (mean @ of_pivots - of_others))
     return Elimination(unknowns, weights, np.zeros(len(unknowns)), weights)
 
 
@@ -122,8 +120,8 @@ def composed(elimination: Elimination, following: Elimination) -> tuple[Indices,
         Weights of all n unknowns in these values [-].
     """
     T, S = elimination.weights, following.weights
-    through = csr_array(T[:, following.pivots])
+    T_of_followers = csr_array(T[:, following.pivots])
     free = np.ones(T.shape[1])
     free[following.pivots] = 0.0
     pivots = np.concatenate([elimination.pivots, following.pivots])
-    return pivots, csr_array(vstack([T @ diags_array(free) + through @ S, S], format="csr"))
+    return pivots, csr_array(vstack([T @ diags_array(free) + T_of_followers @ S, S], format="csr"))

@@ -1,15 +1,16 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Symmetric matrices of which most blocks are stored once.
 
-Block rows are divided into parts of equal length, the last one shorter. A block whose row and column lie in the same part is
-stored once, in the upper triangle; a block between two parts is stored in both rows, so that no part writes into another.
-With parts that contain several planes of a mesh, 0.55 to 0.65 of all blocks are stored.
+Block rows are divided into parts of equal length, of which the last one may be shorter. A block whose row and column lie in
+the same part is stored once, in the upper triangle. A block between two parts is stored in both rows, so that the product of
+a part with a vector only changes entries of this part. If parts contain several planes of a mesh, 55 to 65 % of all blocks
+are stored.
 
-The storage is a tuple ``storage = (start, upper, columns, length)``: the stored blocks of row i are ``start[i]`` to
-``start[i + 1] - 1``, `columns` their block columns, `length` is that of parts. Blocks between parts come first, then the
-diagonal block, then, from ``upper[i]`` on, those of the upper triangle; each group has ascending columns. With ``length =
-0`` every block of the pattern ``indptr``, ``indices`` is stored, in its order. Numbers come as a tuple, see
-`split_matrix_kernels`. Kernels with `low` and `high` process these rows.
+The storage is a tuple ``storage = (start, upper, columns, length)``. The stored blocks of row i are ``start[i]`` to
+``start[i + 1] - 1``, `columns` contains their block columns, and `length` is the number of rows of a part. Blocks between
+parts come first, then the diagonal block, and from ``upper[i]`` on the blocks of the upper triangle; each group has ascending
+columns. ``length = 0`` means that all blocks of the pattern ``indptr``, ``indices`` are stored, in its order. Numbers are a
+tuple, see `split_matrix_kernels`. Kernels with the arguments `low` and `high` process rows `low` to ``high - 1``.
 """
 
 import numpy as np
@@ -29,7 +30,7 @@ def part_of(storage, i):
 
 
 @innermost_kernel
-def place_of(storage, part, i, j, k):
+def slot_of(storage, part, i, j, k):
     """Return the slot of block (i, j), the `k`-th of the pattern, and whether its transpose is stored there.
 
     `part` is ``part_of(storage, i)``. The slot is -1 if the block is not stored, since the pattern is not symmetric.
@@ -59,7 +60,7 @@ def place_of(storage, part, i, j, k):
 
 @innermost_kernel
 def entry_of(numbers, slot, a, b, size):
-    """Return entry (a, b) of the block at `slot`, from `place_of`, in double precision."""
+    """Return entry (a, b) of a block in double precision; `slot` is the result of `slot_of`."""
     k = (slot[0] * size + b) * size + a if slot[1] else (slot[0] * size + a) * size + b
     if len(numbers) == 2:
         return np.float64(numbers[0][k]) + np.float64(numbers[-1][k])
@@ -68,27 +69,27 @@ def entry_of(numbers, slot, a, b, size):
 
 @kernel
 def _store_row(i, indptr, indices, storage, factor, row, square, high, low):
-    """Split the stored blocks of a row times `factor` into their high and low parts; `row` are the numbers of all blocks."""
+    """Store the high and low parts of the blocks of a row times `factor`; `row` contains the numbers of all its blocks."""
     first, end = part_of(storage, i)
-    outside = diagonal = behind = indptr[i]  # places of the next block
+    outside = diagonal = above = indptr[i]  # slots of the next block outside the part, on and above the diagonal
     if end:
-        outside, diagonal, behind = storage[0][i], storage[1][i] - 1, storage[1][i]
+        outside, diagonal, above = storage[0][i], storage[1][i] - 1, storage[1][i]
     for k in range(indptr[i + 1] - indptr[i]):
         j = indices[indptr[i] + k]
         if first <= j < i and end:
             continue
         if j < first or j >= end:
-            at = outside
+            slot = outside
             outside += 1
         elif j == i:
-            at = diagonal
+            slot = diagonal
         else:
-            at = behind
-            behind += 1
+            slot = above
+            above += 1
         for e in range(square):
             number = factor * row[k * square + e]
-            high[at * square + e] = number
-            low[at * square + e] = number - np.float64(high[at * square + e])
+            high[slot * square + e] = number
+            low[slot * square + e] = number - np.float64(high[slot * square + e])
 
 
 @kernel
@@ -111,7 +112,7 @@ def expand(low, high, indptr, indices, storage, numbers, size, out):
     for i in range(low, high):
         part = part_of(storage, i)
         for k in range(indptr[i], indptr[i + 1]):
-            slot = place_of(storage, part, i, indices[k], k)
+            slot = slot_of(storage, part, i, indices[k], k)
             for a in range(size):
                 for b in range(size):
                     out[(k * size + a) * size + b] = entry_of(numbers, slot, a, b, size)
@@ -125,7 +126,7 @@ def row_sums(low, high, indptr, indices, storage, numbers, x, size, out):
         for a in range(size):
             out[i * size + a] = 0.0
         for k in range(indptr[i], indptr[i + 1]):
-            slot = place_of(storage, part, i, indices[k], k)
+            slot = slot_of(storage, part, i, indices[k], k)
             for a in range(size):
                 for b in range(size):
                     out[i * size + a] += abs(entry_of(numbers, slot, a, b, size) * x[indices[k] * size + b])
@@ -133,15 +134,16 @@ def row_sums(low, high, indptr, indices, storage, numbers, x, size, out):
 
 @kernel
 def _multiply_part(low, high, storage, numbers, x, factor, share, z, y, rows):
+    """Fill the rows `low` to ``high - 1`` of y, which are a part; see `multiply`."""
     start, upper, columns = storage[0], storage[1], storage[2]
     m = len(rows)
     for i in range(m * low, m * high):
         y[i] = share * z[i] if share != 0.0 else share
     for i in range(low, high):
-        of_row = row_times(columns, numbers, x, start[i], upper[i], rows, rows)
-        both = row_times_both_ways(columns, numbers, x, upper[i], start[i + 1], i, factor, y, rows)
+        stored_twice = row_times(columns, numbers, x, start[i], upper[i], rows, rows)
+        stored_once = row_times_both_ways(columns, numbers, x, upper[i], start[i + 1], i, factor, y, rows)
         for r in range(m):
-            y[m * i + r] += factor * (of_row[r] + both[r])
+            y[m * i + r] += factor * (stored_twice[r] + stored_once[r])
 
 
 @kernel

@@ -1,8 +1,8 @@
 """Multigrid as a linear solver, and the factorisation that replaces it if multigrid does not converge.
 
-Constraint equations ``B u = c`` are eliminated (`multigrid.solver`), also if they have a diagonal compliance
-(`multigrid.loaded`). Equations with a full compliance matrix cannot be eliminated. They need columns of K^-1, each of which
-takes one linear solution; the columns are stored for the complete analysis.
+Constraint equations ``B u = c`` are eliminated (`multigrid.solver`). Those with a diagonal compliance are eliminated or
+replaced by springs (`multigrid.loaded`). Equations with a full compliance matrix cannot be eliminated. They need columns of
+K^-1, each of which takes one linear solution; the columns are stored for the complete analysis.
 
 A factorisation replaces multigrid for the rest of the analysis if too many columns are needed, if the iteration stalls on
 thin or nearly incompressible parts, or if a load step has taken more work than a factorisation. Very large matrices are not
@@ -112,7 +112,7 @@ class Amg(Multigrid, LinearSolver):
     def snapshot(self) -> dict[str, Any]:
         """Return equations, springs and bounds of the hierarchy, and requested columns of K^-1; see `LinearSolver.snapshot`.
 
-        Result files store the snapshot under these keys.
+        The keys are names in result files and must not be changed.
         """
         instead = None if self.instead is None else {"why": self.gave_up, **self.instead.snapshot()}
         return {
@@ -140,10 +140,10 @@ class Amg(Multigrid, LinearSolver):
         if snapshot["precision"] != self.precision:
             self.build_in(snapshot["precision"])
         self.columns.put_back(snapshot["asked"])
-        now, then = self._constrained_by(), {name: snapshot.get(name) for name in ("tied", "springs")}
-        if not all(_equal(now[name], then[name]) for name in then):
+        current, saved = self._constrained_by(), {name: snapshot.get(name) for name in ("tied", "springs")}
+        if not all(_equal(current[name], saved[name]) for name in saved):
             n = self.hierarchy.n
-            equations, springs = then["tied"], then["springs"]
+            equations, springs = saved["tied"], saved["springs"]
             self._reduced = Reduced(self.K, None)
             equations, springs = equations and _elimination(equations, n), springs and Springs.from_dict(springs, n)
             self._change_hierarchy(equations, springs)
@@ -197,7 +197,7 @@ def _equal(first: Mapping[str, Any] | None, second: Mapping[str, Any] | None) ->
 
 
 def _elimination(tied: Mapping[str, Any], n: int) -> Elimination:
-    """Return the elimination stored as ``tied`` in `Amg.snapshot`, for n unknowns, without offsets, which are not needed."""
+    """Return the elimination of n unknowns that is stored as ``tied`` in `Amg.snapshot`; its offsets are not used."""
     m = len(tied["pivots"])
     rows = csr_array((tied["data"], tied["indices"], tied["indptr"]), shape=(m, n))
     return Elimination(tied["pivots"], rows, np.zeros(m), rows)

@@ -1,8 +1,8 @@
-"""Reference solver: pyamg's smoothed aggregation as preconditioner of SciPy's conjugate gradients.
+"""Reference solver: conjugate gradients of SciPy, preconditioned by the smoothed aggregation of pyamg.
 
-This solver is deliberately simple and slow. It serves to verify the solver "amg" and to compare with it: everything except
-the choice of pivots is done by pyamg and SciPy. Equations are eliminated, ``u = T v + t``, and each set of equations requires
-a new hierarchy for the matrix ``T.T K T``.
+This solver is deliberately simple and slow. It serves to verify the solver "amg" and as a basis of comparison: except for the
+choice of pivots, it consists of calls of pyamg and SciPy. Equations are eliminated, ``u = T v + t``, and each set of
+equations requires a new hierarchy for the matrix ``T.T K T``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from fastcontact.linear.elimination.loaded import LoadedIteration, put_back_tole
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS
 from fastcontact.linear.protocol import TOLERANCE, Counters, LinearSolver, Monitor
 
-# All connections are strong, as in "amg"; rigid-body modes need no improvement; Chebyshev is the cheapest smoother.
+# All connections are strong, as in "amg", candidates are not improved because rigid-body modes need no improvement, and the
+# smoother with the shortest solution time is used.
 SMOOTHER = ("chebyshev", {"degree": 2, "iterations": 1})
 OPTIONS: dict[str, Any] = {
     "strength": ("symmetric", {"theta": 0.0}), "max_coarse": 200, "improve_candidates": None,
@@ -71,8 +72,8 @@ class Pyamg(LinearSolver):
         if elimination is not None:
             pivots, free = elimination.pivots, np.ones(n)
             free[pivots] = 0.0
-            spread = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
-            self._T = csr_array(diags_array(free) + spread @ elimination.full_weights())
+            rows_of_pivots = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
+            self._T = csr_array(diags_array(free) + rows_of_pivots @ elimination.full_weights())
             A = self._T.T @ self.K @ self._T + diags_array((1.0 - free) * self.K.diagonal())
             modes = free[:, None] * modes
         self._A = bsr_matrix(A.tobsr(self.K.blocksize))
@@ -99,11 +100,11 @@ class Pyamg(LinearSolver):
         if elimination is not None:
             t[elimination.pivots] = elimination.offset
         right = self._T.T @ (f - self.K @ t)
-        start = None if guess is None else guess - t
-        if start is not None and elimination is not None:
-            start[elimination.pivots] = 0.0
+        v0 = None if guess is None else guess - t
+        if v0 is not None and elimination is not None:
+            v0[elimination.pivots] = 0.0
         v, failed = cg(
-            self._A, right, start, rtol=max(self.tolerance, tolerance or 0.0), maxiter=MAX_ITERATIONS,
+            self._A, right, v0, rtol=max(self.tolerance, tolerance or 0.0), maxiter=MAX_ITERATIONS,
             M=self._hierarchy.aspreconditioner(), callback=self._count,
         )  # fmt: skip
         if failed:

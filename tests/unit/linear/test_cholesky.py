@@ -126,12 +126,12 @@ def test_factors_are_those_of_the_matrix(A, m):
     made = factors(bsr_array(A, blocksize=(1, 1)), last)
     L, wanted = np.zeros((n, n)), np.arange(n)
     triangular_kernels.block(*made._L, wanted, L)
-    order = np.argsort(made._place)
+    order = np.argsort(made._position)
     dense = A.toarray()[np.ix_(order, order)]
     np.testing.assert_allclose((L * made._d) @ L.T, dense, atol=1e-13 * np.abs(dense).max())
     np.testing.assert_allclose(L, ldl(dense, lower=True)[0], atol=1e-13)
     late = np.zeros(n, bool)
-    late[made._place[last]] = True
+    late[made._position[last]] = True
     assert not L[np.ix_(~late, late)].any()
     np.testing.assert_allclose(A @ made.solve(np.ones(n)), np.ones(n), atol=1e-12)
     inverse = np.linalg.inv(A.toarray())[np.ix_(last, last)]

@@ -112,7 +112,7 @@ def test_an_unknown_solver_is_refused():
 def test_auto_says_why(caplog):
     with caplog.at_level(logging.INFO, logger="fastcontact"):
         linear.make("auto", dim=3, n_dofs=60_000)
-    assert "linear solver: amg, for 60000 unknowns in 3D a factorisation is dearer than multigrid" in caplog.text
+    assert "linear solver: amg, for 60000 unknowns in 3D a factorisation costs more than multigrid" in caplog.text
 
 
 @pytest.mark.parametrize(("name", "package", "extra"), [("cholmod", "kvxopt", "cholmod")])

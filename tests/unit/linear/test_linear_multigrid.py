@@ -322,11 +322,11 @@ def test_springs_side_by_side_may_push_along_other_rows():
     u, one, other = rng.normal(size=9), 1.0 + rng.random(4), 1.0 + rng.random(3)
     for through in (None, F):
         r = np.zeros(9)
-        Springs(R, one, through).beside(Springs(S, other)).subtract_forces(u, r, 0.5)
+        Springs(R, one, through).joined(Springs(S, other)).subtract_forces(u, r, 0.5)
         pushed = R if through is None else through
         expected = pushed.T @ (one * (R @ u)) + S.T @ (other * (S @ u))
         assert r == pytest.approx(-0.5 * expected)
-    assert Springs(R, one).beside(None).rows is R
+    assert Springs(R, one).joined(None).rows is R
 
 
 def test_rows_subtracted_from_others():
