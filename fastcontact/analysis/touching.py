@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.inequalities import Iterate, StepContext, pair_surfaces
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
@@ -22,6 +21,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Shear of nodes that close and slide, relative to the friction capacity, that is neglected by default.
 NEGLIGIBLE = 1e-3
+# Relative change of the displacements below which the geometry has nearly converged. The slips of all increments but the last
+# depend on it, with 1e-2 by up to 4e-6 of the displacements.
+NEAR = 1e-4
 
 
 class Touching:
@@ -45,7 +47,7 @@ class Touching:
     """
 
     def __init__(self, step: StepContext, newton: bool) -> None:
-        self._allowed, self._near = _allowed(step.problem), NOTABLE if newton else 0.0
+        self._allowed, self._near = _allowed(step.problem), NEAR if newton else 0.0
         self.due = self.done = self.unfinished = False
 
     def step(
