@@ -17,13 +17,10 @@ from fastcontact.analysis.solution import Path, Solution
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Shear of nodes that close and slide, relative to the friction capacity, that is neglected by default.
 NEGLIGIBLE = 1e-3
-# Relative change of the displacements below which the geometry has nearly converged. The slips of all increments but the last
-# depend on it, with 1e-2 by up to 4e-6 of the displacements.
-NEAR = 1e-4
 
 
 class Touching:
@@ -34,7 +31,7 @@ class Touching:
     step : StepContext
     newton : bool
         Whether the geometry converges quadratically. The increments are then solved once it has nearly converged, otherwise
-        once it has.
+        once it has; the slips of all but the last increment are no more accurate.
 
     Attributes
     ----------
@@ -47,7 +44,7 @@ class Touching:
     """
 
     def __init__(self, step: StepContext, newton: bool) -> None:
-        self._allowed, self._near = _allowed(step.problem), NEAR if newton else 0.0
+        self._allowed, self._near = _allowed(step.problem), SINGLE_PRECISION if newton else 0.0
         self.due = self.done = self.unfinished = False
 
     def step(
