@@ -1,11 +1,12 @@
 """Contact with Coulomb friction on a dense Delassus operator.
 
-The gaps g and the slips s depend on the normal forces n and the tangential forces t as ``(g, s) = free + F (n, t)``. Two
+The gaps g and the slips s depend on the normal forces n and the tangential forces t as ``(g, s) = free + F (n, t)``. Three
 methods are tried in turn:
 
 1. Newton's method, see `cone_newton`, from several initial forces. In 2D it is an active set method, in which the state of a
    constraint is open, stick, or slip in one of two directions.
-2. Newton's method from the solution for a polyhedral friction cone with few edges. With such a cone the problem is a linear
+2. Newton's method with a compliance that decreases to zero.
+3. Newton's method from the solution for a polyhedral friction cone with few edges. With such a cone the problem is a linear
    complementarity problem, which Lemke's method solves for every positive definite F and every coefficient of friction mu
    (Klarbring, 1986; Stewart and Trinkle, 1996; Klarbring and Pang, 1998).
 
