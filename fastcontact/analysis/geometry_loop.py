@@ -30,7 +30,7 @@ from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.tolerances import Scatter, Tolerances, Watch
 from fastcontact.analysis.touching import Touching
-from fastcontact.arrays import AnyArray, Array
+from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.linearised_geometry import Linearised
 from fastcontact.errors import ConvergenceError
@@ -175,13 +175,11 @@ def _settle(
         mixed = mixing.next(settled, moved, displacement, tolerances)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative, solution.residual)
-        if update == max(limit // 2, PATIENT_UPDATES):
-            mixing.across = True
-            if any(pair.faceted for pair in problem.pairs.values()):
-                log.info("nodes flip between facets: from now on the edges of facets are rounded")
-                iterate.rounded = True
-                mixing.restart()
-                watch.forget()
+        if update == max(limit // 2, PATIENT_UPDATES) and any(pair.faceted for pair in problem.pairs.values()):
+            log.info("nodes flip between facets: from now on the edges of facets are rounded")
+            iterate.rounded = True
+            mixing.restart()
+            watch.forget()
     if problem.until_settled:
         changed = step.dofs.put(np.zeros_like(iterate.u), displacement - moved.before)
         raise ConvergenceError(geometry_moves(problem, iterate.history, changed, limit), iterate.history)
@@ -242,7 +240,8 @@ def _move(
 class _Mixing:
     """Choice of the next iterate: by Newton's method while it converges, and by Anderson acceleration otherwise.
 
-    Anderson acceleration uses only iterates with the same active set, between which the geometry varies smoothly.
+    Anderson acceleration uses only iterates with the same active set, between which the geometry varies smoothly, unless an
+    active set returns after another one: each of them is then the solution with the geometry of the other.
 
     Parameters
     ----------
@@ -256,8 +255,7 @@ class _Mixing:
 
     def __init__(self, step: StepContext) -> None:
         self._step, self._accelerated = step, None
-        self._known: AnyArray | None = None
-        self.across = False
+        self._known, self._earlier, self._cycles = b"", set[bytes](), False
         self._newton, self._change, self.contraction = _linearises(step.problem), np.inf, np.inf
 
     _accelerated: Anderson | None
@@ -281,10 +279,12 @@ class _Mixing:
             if stepped is not None:
                 next_pairing, self.contraction = stepped
                 return next_pairing
-        state = settled.constraints.state(solution.active)
-        same = self._known is not None and np.array_equal(self._known, state)
-        self._known = state if solution.settled else None
-        if tolerances.inexact or not (same or self.across):
+        state = settled.constraints.state(solution.active).tobytes()
+        same = self._known == state
+        self._cycles |= not (same or self._newton) and state in self._earlier
+        self._known = state if solution.settled else b""
+        self._earlier.add(self._known)
+        if tolerances.inexact or not (same or self._cycles or settled.iterate.rounded):
             self.restart()
         if tolerances.inexact:
             return None

@@ -160,7 +160,7 @@ class Watch:
         # Displacements that move in one direction are apart by about WINDOW changes.
         if declining or scatter.displacement * size > half * float(np.median(changes)):
             return None
-        acceptable = scatter.displacement <= SINGLE_PRECISION and scatter.force <= 10 * SINGLE_PRECISION
+        acceptable = scatter.displacement <= SINGLE_PRECISION and scatter.force <= NOTABLE
         return scatter if acceptable else None
 
     def forget(self) -> None:

@@ -1,11 +1,12 @@
 """Contact with Coulomb friction on a dense Delassus operator.
 
-The gaps g and the slips s depend on the normal forces n and the tangential forces t as ``(g, s) = free + F (n, t)``. Two
+The gaps g and the slips s depend on the normal forces n and the tangential forces t as ``(g, s) = free + F (n, t)``. Three
 methods are tried in turn:
 
 1. Newton's method, see `cone_newton`, from several initial forces. In 2D it is an active set method, in which the state of a
    constraint is open, stick, or slip in one of two directions.
-2. Newton's method from the solution for a polyhedral friction cone with few edges. With such a cone the problem is a linear
+2. Newton's method with a compliance that decreases to zero.
+3. Newton's method from the solution for a polyhedral friction cone with few edges. With such a cone the problem is a linear
    complementarity problem, which Lemke's method solves for every positive definite F and every coefficient of friction mu
    (Klarbring, 1986; Stewart and Trinkle, 1996; Klarbring and Pang, 1998).
 
@@ -28,11 +29,14 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION,
 EDGES, LARGEST = (8, 32), 2500
 # If slips are linearly dependent, tangential forces are not unique. Examples are nodes that belong to several surfaces, and
 # nodes that supports hold on one side of the contact. F counts as singular if a squared pivot of its scaled Cholesky factor
-# is below LENGTH_ROUND_OFF. A compliance, relative to that of the gaps, is then added to all slips: the first value of
-# REGULARISATION and, if it does not suffice, the second. If the elastic slip due to this compliance exceeds SINGLE_PRECISION,
-# relative to the gaps and slips without forces, the forces are not in equilibrium: the bodies jam.
+# is below LENGTH_ROUND_OFF. A compliance, relative to that of the gaps, is then added to slips and equations: the first value
+# of REGULARISATION and, if it does not suffice, the second. If the elastic slip due to this compliance exceeds
+# SINGLE_PRECISION, relative to the gaps and slips without forces, the forces are not in equilibrium: the bodies jam.
 REGULARISATION = 10 * ROUND_OFF, LENGTH_ROUND_OFF
-SOFT, HARDER = 1e-2, 0.1
+# Where constraints are nearly dependent, such as those of two pairs on one facet, Newton's method may alternate between
+# contact states. It does not with a compliance SOFT, relative to that of the gaps, which is then reduced by the factor FALL,
+# or by less where the method fails, until the factor is SMALLEST_STEP.
+SOFT, FALL, SMALLEST_STEP = 1e-2, 0.1, 0.8
 
 
 def solve(
@@ -74,7 +78,8 @@ def solve(
     if guess is not None:
         guess = guess / (length * unit)
     for compliance in REGULARISATION if _dependent(F) else (0.0,):
-        F[np.diag_indices_from(F)] += compliance
+        given = np.append(np.flatnonzero(equality), np.arange(m, len(F)))
+        F[given, given] += compliance
         problem = _Problem(F, free * unit / length, law)
         for start, line_search in problem.starts(closed, guess):
             # At least one iteration: the residual of forces of an earlier geometry update may be below the round-off bound,
@@ -82,7 +87,7 @@ def solve(
             forces = newton(problem, start, problem.gaps(start), line_search=line_search, least=1)
             iterations += 1 + forces.iterations
             if best is None or forces.residual < best.residual:
-                best, elastic_slip = forces, compliance * float(np.abs(forces.y[1:]).max(initial=0.0))
+                best, elastic_slip = forces, compliance * float(np.abs(forces.y.ravel()[given]).max(initial=0.0))
             if forces.settled:
                 break
         if best is not None and best.settled and elastic_slip <= SINGLE_PRECISION:
@@ -149,15 +154,15 @@ class _Problem:
                 yield edge_forces, True
 
     def _softened(self, y: Array) -> Array:
-        """Return forces (1 + k, m) close to the solution: those with a compliance, which decreases from SOFT to ROUND_OFF.
-
-        The solution with a large compliance is unique and easily found from any forces y, and it varies continuously with it.
-        """
-        compliance = SOFT
-        while compliance > ROUND_OFF:
+        """Return forces (1 + k, m) near a solution: those with a compliance that decreases to round-off, from `y` on."""
+        compliance, last = SOFT, 1.0
+        while ROUND_OFF < compliance < SMALLEST_STEP * last:
             softened = _Problem(self.F + compliance * np.eye(len(self.F)), self.free, self.law)
-            y = newton(softened, y, softened.gaps(y), least=1).y
-            compliance *= HARDER
+            forces = newton(softened, y, softened.gaps(y), least=1)
+            if forces.settled:
+                y, last, compliance = forces.y, compliance, FALL * compliance
+            else:
+                compliance = float(np.sqrt(compliance * last))
         return y
 
 
