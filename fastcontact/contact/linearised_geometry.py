@@ -286,6 +286,9 @@ class _SurfacePoints:
         inverse = np.linalg.inv(np.einsum("ntd,nid->nti", frame, self.axes + self._gap[:, :, None] * bend))
         self._inverse = inverse @ frame
         self._foot = self.axes if rise is None else self.axes + rise[:, :, None] * self.normal[:, None]
+        self._smooth = rise is not None and isinstance(direction, PolygonNormals)
+        if self._smooth:  # the smooth surfaces touch, so that only the facets are apart
+            self.apart = np.zeros_like(self.apart)
 
     def _facet_bend(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, at: Places) -> Array:
         """Return the derivatives (n, dim - 1, dim) of facet normals along facets, and store the dual axes of the facets."""
@@ -316,6 +319,8 @@ class _SurfacePoints:
             turned = self._direction.along(du)
         xi = np.einsum("nid,nd->ni", self._inverse, moved - self._gap * turned)
         foot = np.einsum("nid,ni->nd", self._foot, xi)
+        if self._smooth:
+            foot += self._gap * turned
         return Variation(xi, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._bend, xi))
 
     def spread(self, force: Array, varied: Array, xi: Array) -> Array:

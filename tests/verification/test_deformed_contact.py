@@ -318,8 +318,8 @@ def loose_blocks(mesh, **options):
     return model
 
 
-# The derivative of weighted gaps leaves out how weights move. In 3D four points integrate over a segment; the segments of
-# quadratic facets, and of warped facets far from each other, are not those of their polygons.
+# The derivative of weighted gaps leaves out how weights move. In 3D points in a rectangle replace a segment; the segments of
+# quadratic facets are not those of their polygons.
 EXACT, WEIGHTED, IN_SPACE, CURVED = 1e-7, 0.01, 1e-3, 0.1
 # The axes of curvature of two cylinders turn against each other, which changes the height of smooth surfaces a little.
 TURNING = 1e-5
@@ -483,4 +483,4 @@ def test_load_steps_take_few_pairings_and_converge_quadratically(make, mesh, opt
     for step in steps[-2:]:
         changes = [entry["displacement_change"] for entry in step.iterations["history"]]
         for before, after in list(pairwise(changes))[-2:]:
-            assert after < max(10.0 * before**2 if before < 1e-2 else 0.01 * before, 0.02 * min(before, 1e-6), 1e-11)
+            assert after < max(10.0 * before**2 if before < 1e-2 else 0.01 * before, 0.03 * min(before, 1e-6), 1e-11)

@@ -42,7 +42,7 @@ from fastcontact.contact.search.limits import BEYOND
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Entries, rows_of, scaled
-from fastcontact.mesh import elements
+from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
 MULTIPLIERS = ("standard", "dual")
@@ -237,8 +237,8 @@ class WeightedMortar(Formulation):
     def _points_of(self, number: int, overlap: Overlap) -> OverlapPoints:
         """Return integration points of the facets of a block, on the parts that face the other side.
 
-        Against obstacles they are Gauss points of whole facets. In 3D each segment has the four points that have its second
-        moments of area in the reference facet; in a rectangle these are Gauss points.
+        Against obstacles they are Gauss points of whole facets. In 3D they are those of the rectangle that has the second
+        moments of area of a segment in the reference facet: exact on flat triangles, whose integrand is quadratic.
         """
         block = self.secondary.blocks[number]
         segments = [
@@ -260,11 +260,12 @@ class WeightedMortar(Formulation):
         mean = mass.sum(axis=2) @ element.nodes / size[:, None]
         moments = element.nodes.T @ (mass / size[:, None, None]) @ element.nodes - mean[:, :, None] * mean[:, None]
         variance, axes = np.linalg.eigh(moments)
-        corners = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
-        xi = mean[:, None] + corners @ (axes * np.sqrt(np.maximum(variance, 0.0))[:, None]).transpose(0, 2, 1)
-        facet, opposite = np.repeat(pairs, len(corners), axis=0).T
-        area = np.repeat(size / len(corners), len(corners))
-        return OverlapPoints(facet, element.shape(xi.reshape(-1, 2)), area, opposite)
+        square, share = quadrature.square(quadrature.gauss_line(2 if element.n_nodes == 3 else 3))
+        stretched = axes * np.sqrt(3.0 * np.maximum(variance, 0.0))[:, None]
+        xi = mean[:, None] + square @ stretched.transpose(0, 2, 1)
+        facet, opposite = np.repeat(pairs, len(share), axis=0).T
+        area = 0.25 * size[:, None] * share
+        return OverlapPoints(facet, element.shape(xi.reshape(-1, 2)), area.ravel(), opposite)
 
     def _slip0(self, mean: csr_array, closing: Array, directions: tuple[Array, ...], at: Configuration) -> Array:
         """Return the slip (k, m) not due to displacements: that of a rigid obstacle, or minus that of `closing`."""
