@@ -112,6 +112,7 @@ class _Newton:
         self._iterate = Iterate.of(begin.state) if settled is None else settled.iterate
         self._settled: SettledContact | None = None
         self._kept: Problem | None = None  # the last tangent, if another iteration may use it
+        self._old = False  # whether the last iteration used it
         self._moved_fully = False  # whether displacements are those of the last contact solution
         self._by = Regularisation()  # of the last tangent
         self._replaces = bool(begin.problem.force_driven.pairs)  # see `Regularisation.replaces`
@@ -187,10 +188,13 @@ class _Newton:
         """Return whether relative `changes` leave an error below the criterion, or are round-off.
 
         A change that is small enough to be round-off (SINGLE_PRECISION, reached in slender bodies) counts as such if it
-        exceeds the fraction DECLINE of the previous one.
+        exceeds the fraction DECLINE of the previous one. With an old tangent the ratio of the last changes says nothing about
+        points whose plastic flow began or ended since; that of the changes before does.
         """
         before, last = changes[-2:]
         rate = min(last / before, 1.0) if before else 1.0
+        if self._old and changes[-3]:
+            rate = min(max(rate, before / changes[-3]), 1.0)
         if self._by.linear:
             return last * rate <= self._enough * (1.0 - rate) or (last <= SINGLE_PRECISION and rate == 1.0)
         return last * rate <= self._enough or (last <= SINGLE_PRECISION and rate > DECLINE)
@@ -273,6 +277,7 @@ class _Newton:
         """Return the result of `_solve` for a tangent."""
         terms, iterate = self._terms, self._iterate
         problem, self._kept = (self._kept, None) if self._serves_again(changes) else (None, None)
+        self._old = problem is not None
         if problem is not None:
             problem = replace(problem, linearised_at=None if problem.linearised_at is None else u)
         else:

@@ -273,7 +273,7 @@ def count(number: int, noun: str) -> str:
 def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str]) -> Iterator[str]:
     """Yield the lines of a contact pair or a rigid obstacle."""
     lower, upper = contact["radius"]
-    force = force_text(contact["force_parts"], contact["normal_force"], unit)
+    force = force_text(contact["force_vector"], contact["force_parts"], contact["normal_force"], unit)
     yield (
         f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {force}, largest pressure "
         f"{valued(contact['pressure_max'], unit, 'pressure', 6)}, {_extent_text(contact['extent'], lower, upper, unit)}"

@@ -25,7 +25,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, Pairing, tangents
 from fastcontact.contact.projection import (
@@ -39,6 +39,7 @@ from fastcontact.contact.projection import (
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.mesh import elements
+from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.round_off import DIFFERENCES, TINY
 
 
@@ -157,6 +158,37 @@ class InterpolatedNormals:
         return across(self.normal, self._local @ self._nodal.along(du)) / self._length
 
 
+class PolygonNormals:
+    """Unit normals of polygons, and their variation.
+
+    Parameters
+    ----------
+    corners : ndarray of int (n, k)
+        Points of the mesh at the corners of the polygons.
+    coordinates : ndarray (n_points, 3)
+        Coordinates of all points [length].
+
+    Attributes
+    ----------
+    normal : ndarray (n, 3)
+        Normals, with the orientation of `flat_area_vectors` [-].
+    """
+
+    def __init__(self, corners: AnyArray, coordinates: Array) -> None:
+        self._corners, at = corners, coordinates[corners]
+        self._spokes = at[:, 1:] - at[:, :1]
+        vector = flat_area_vectors(at)
+        self._area = np.linalg.norm(vector, axis=1, keepdims=True)
+        self.normal = vector / self._area
+
+    def along(self, du: Array) -> Array:
+        """See `NodalNormals.along`."""
+        moved, spokes = du[self._corners], self._spokes
+        varied = moved[:, 1:] - moved[:, :1]
+        vector = 0.5 * (np.cross(varied[:, :-1], spokes[:, 1:]) + np.cross(spokes[:, :-1], varied[:, 1:])).sum(axis=1)
+        return across(self.normal, vector) / self._area
+
+
 def across(normal: Array, vector: Array) -> Array:
     """Return the components of vectors (n, dim) perpendicular to unit vectors (n, dim)."""
     return np.asarray(vector - np.einsum("nd,nd->n", normal, vector)[:, None] * normal)
@@ -196,9 +228,9 @@ class _SurfacePoints:
         Coordinates of the pairing [length].
     normals : str or tuple of float
         Normals of the primary side: ``"facet"``, ``"averaged"``, or a fixed vector.
-    closest : bool
-        Whether the points face their closest points on the primary side, instead of the points along the normals. Both
-        coincide for facet normals.
+    direction : PolygonNormals or bool
+        Direction of the projection: False for the normals, True for the closest points on the primary side, which coincide
+        for facet normals, or other directions.
     rise : ndarray (n, dim - 1), optional
         Derivatives along facets of the heights of a smooth primary surface above them, see `surface_smoothing` [length].
 
@@ -218,7 +250,7 @@ class _SurfacePoints:
 
     def __init__(
         self, candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface, coordinates: Array,
-        normals: object, closest: bool, rise: Array | None,
+        normals: object, direction: PolygonNormals | bool, rise: Array | None,
     ) -> None:  # fmt: skip
         at, n_points, facet = pairing.places(primary, rows), len(coordinates), pairing.facet[rows]
         nodes, shape = np.hstack([candidates.nodes[rows], at.nodes]), np.hstack([candidates.shape[rows], -at.shape])
@@ -230,6 +262,7 @@ class _SurfacePoints:
         self.normal, self.averaged = pairing.normal[rows], None
         self._bend = np.zeros_like(self.axes)
         self._facet: Array | None = None  # facet normals, where these vary
+        closest = direction is True
         if normals == "facet" or closest:
             self._facet, bend = self.normal, self._facet_bend(primary, coordinates, facet, pairing.xi[rows], at)
         if normals == "facet":
@@ -242,12 +275,17 @@ class _SurfacePoints:
         # With the tangent vectors a_i, the distance g along the direction d of the projection, and the motion v of points
         # relative to the facing points, ``a_i dxi_i + g dd = dv``. The component along d is eliminated.
         along, bend = (pairing.normal[rows], bend) if closest else (self.normal, self._bend)
+        if isinstance(direction, PolygonNormals):
+            along, bend = direction.normal, np.zeros_like(self.axes)
         frame = np.stack(tangents(along), axis=1)
-        self._closest, self._bent = closest, normals == "facet"
+        self._direction, self._bent = direction, normals == "facet"
         self._gap = np.einsum("nd,nd->n", self.apart, along)[:, None]
         inverse = np.linalg.inv(np.einsum("ntd,nid->nti", frame, self.axes + self._gap[:, :, None] * bend))
         self._inverse = inverse @ frame
         self._foot = self.axes if rise is None else self.axes + rise[:, :, None] * self.normal[:, None]
+        self._smooth = rise is not None and isinstance(direction, PolygonNormals)
+        if self._smooth:  # the smooth surfaces touch, so that only the facets are apart
+            self.apart = np.zeros_like(self.apart)
 
     def _facet_bend(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, at: Places) -> Array:
         """Return the derivatives (n, dim - 1, dim) of facet normals along facets, and store the dual axes of the facets."""
@@ -273,8 +311,13 @@ class _SurfacePoints:
         at_fixed_xi = of_facet if self._bent else np.zeros_like(of_facet)
         if self.averaged is not None:
             at_fixed_xi = self.averaged.along(du)
-        xi = np.einsum("nid,nd->ni", self._inverse, moved - self._gap * (of_facet if self._closest else at_fixed_xi))
+        turned = of_facet if self._direction is True else at_fixed_xi
+        if isinstance(self._direction, PolygonNormals):
+            turned = self._direction.along(du)
+        xi = np.einsum("nid,nd->ni", self._inverse, moved - self._gap * turned)
         foot = np.einsum("nid,ni->nd", self._foot, xi)
+        if self._smooth:
+            foot += self._gap * turned
         return Variation(xi, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._bend, xi))
 
     def spread(self, force: Array, varied: Array, xi: Array) -> Array:
@@ -608,14 +651,14 @@ Geometry = Callable[[Array, Array, Array], Linearised]
 
 def faced(
     candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface | RigidSide, coordinates: Array,
-    normals: object, pose: Pose, closest: bool = False, rise: Array | None = None,
+    normals: object, pose: Pose, direction: PolygonNormals | bool = False, rise: Array | None = None,
 ) -> Points:  # fmt: skip
     """Return the points in the rows `rows` (n,) of `pairing`, which was computed at `coordinates` (n_points, dim) [length].
 
-    `pose` applies to obstacles. `normals`, `closest` and `rise` apply to meshed primary sides, see `_SurfacePoints`.
+    `pose` applies to obstacles. `normals`, `direction` and `rise` apply to meshed primary sides, see `_SurfacePoints`.
     """
     if not isinstance(primary, RigidSide):
-        return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, closest, rise)
+        return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, direction, rise)
     return _ObstaclePoints(
         shapes_at(candidates.shape[rows], candidates.nodes[rows], len(coordinates)), primary, coordinates, pose
     )

@@ -36,6 +36,8 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 # and with any edge in 3D by default. When a body slides beyond an edge or a plane of symmetry, its nodes lose contact one
 # after the other. With a smaller tolerance, nodes near the edge alternate between paired and unpaired.
 OVERHANG = 0.5
+# Newton iterations of projections onto facets that points are known to face; one is exact on flat triangles.
+PROJECTIONS = 4
 # Fraction of each of the two facets at an edge over which the normals vary if edges are rounded.
 ROUNDED = 0.1
 
@@ -202,6 +204,23 @@ def pair(
     return _straight_on(
         Pairing(facet, xi, normal, paired), candidates, primary, coordinates, paired & (overhang > LENGTH_ROUND_OFF)
     )
+
+
+def onto(points: Array, primary: Surface, facet: Indices, coordinates: Array, along: Array) -> Pairing:
+    """Project points (n, 3) onto given facets (n,) and their extensions along unit vectors `along` (n, 3).
+
+    `coordinates` (n_points, 3) are those of all points of the mesh [length].
+    """
+    xi = np.zeros((len(points), 2))
+    xi[primary.triangular[facet]] = 1.0 / 3.0
+    for _ in range(PROJECTIONS):
+        at = places(primary, facet, xi)
+        nodes = coordinates[at.nodes]
+        axes = np.einsum("nki,nkd->ndi", at.gradient, nodes)
+        apart = points - np.einsum("nk,nkd->nd", at.shape, nodes)
+        xi += np.linalg.solve(np.concatenate([axes, along[:, :, None]], axis=2), apart[:, :, None])[:, :2, 0]
+    normal = np.cross(axes[:, :, 0], axes[:, :, 1])
+    return Pairing(facet, xi, normal / np.linalg.norm(normal, axis=1, keepdims=True), np.ones(len(points), bool))
 
 
 def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array, mean: Array) -> Array:

@@ -92,16 +92,22 @@ def by_largest_von_mises(
 CANCELLED = 1e-3
 
 
-def force_text(parts: Sequence[float], normal_force: float, units: Mapping[str, str]) -> str:
+def force_text(force: Sequence[float], parts: Sequence[float], normal_force: float, units: Mapping[str, str]) -> str:
     """Return a contact force as text.
 
-    `parts` are `ContactResult.force_parts` [force]. The normal and tangential parts are included if there is friction. The
-    sum of the nodal normal forces, `normal_force` [force], is included instead if these forces balance each other.
+    `parts` are `ContactResult.force_parts` [force]. The normal and tangential parts are included if there is friction,
+    otherwise the components of the vector `force` (dim,) [force] if it is not along an axis: in half of a symmetric model,
+    the other half balances the component across the plane of symmetry. The sum of the nodal normal forces, `normal_force`
+    [force], is included instead if these forces balance each other.
     """
     total, normal, tangential, normal_sum = (valued(part, units, "force", 6) for part in (*parts, normal_force))
     if parts[0] < CANCELLED * normal_force:
         return f"{total}, sum of normal forces {normal_sum}"
-    return total + f" (normal {normal}, tangential {tangential})" * (parts[2] > LENGTH_ROUND_OFF * parts[0])
+    if parts[2] > LENGTH_ROUND_OFF * parts[0]:
+        return f"{total} (normal {normal}, tangential {tangential})"
+    along_an_axis = f"{max(map(abs, force)):.6g}" == f"{parts[0]:.6g}"
+    components = ", ".join(f"{axis} {part:.6g}" for axis, part in zip("xyz", force, strict=False))
+    return total if along_an_axis else f"{total} ({components})"
 
 
 def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple[float, float]:
@@ -291,7 +297,7 @@ class ContactResult(Suggesting):
         inside, outside = (with_unit(f"{end:.4g}", self.units, "length") for end in (low, high))
         radius = f"{low:.4g} to {outside}" if np.isfinite(high) else f"{inside}, to its end"
         return {
-            "force": force_text(self.force_parts, self.normal_force, self.units),
+            "force": force_text(self.force.tolist(), self.force_parts, self.normal_force, self.units),
             "largest pressure": with_unit(f"{self.pressure_max:.6g}", self.units, "pressure"),
             "closed": f"{int(self.active.sum())} of {len(self.points)} nodes",
             "contact radius": radius if np.isfinite(low) else "none",
@@ -624,7 +630,7 @@ class Steps(_Steps, list[StepResult]):
 
     def __repr__(self) -> str:
         lines = (f"  {step!r}" for step in _shown(self))
-        return "\n".join([f"{len(self)} steps", *lines, *(["  ..."] if len(self) > MOST_SHOWN else [])])
+        return "\n".join([f"{len(self)} steps", *(["  ..."] if len(self) > MOST_SHOWN else []), *lines])
 
     def _repr_html_(self) -> str:
         """Return an HTML table with a row for each contact pair of each step."""
@@ -655,11 +661,15 @@ def phases(shape: StepResult, count: int) -> list[StepResult]:
     """
     if count < 2:
         raise ModelError(f"count = {count}: a period needs two phases or more")
+    materials = shape.material_stress
     return [
         replace(
             shape, index=k + 1, load_factor=k / count, displacement=factor * shape.displacement,
             stress=factor * shape.stress, von_mises=abs(factor) * shape.von_mises,
-            von_mises_signed=factor * shape.von_mises_signed, restart=None, iterations={"parameter": "phase"},
+            von_mises_signed=factor * shape.von_mises_signed, reaction=factor * shape.reaction,
+            contact={},  # contact only pushes and does not vibrate
+            material_stress=None if materials is None else replace(materials, stress=factor * materials.stress),
+            restart=None, iterations={"parameter": "phase"},
         )
         for k, factor in enumerate(np.cos(2.0 * np.pi * np.arange(count) / count).tolist())
     ]  # fmt: skip

@@ -138,3 +138,8 @@ def test_an_image_has_the_image_of_the_result(name: str, what: str) -> None:
 @pytest.mark.parametrize("name", ["steel, hex8", "rubber, hex8"])
 def test_multigrid_finds_what_factors_do(name: str) -> None:
     agrees(name, solved(name, Image(), "amg"), 1e-8)
+
+
+def test_a_point_that_unloads_last_is_in_balance() -> None:
+    """Plastic flow that ends in the last iteration changes a tangent that is otherwise still good enough."""
+    agrees("kinematic, quad8", solved("kinematic, quad8", Image(Q=TURN)), 1e-10)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fastcontact._jit import parallel
 from fastcontact.arrays import Array, Indices
@@ -201,12 +202,13 @@ def _integrated(
     one, other = elements.get(secondary.block.element), elements.get(primary.block.element)
     to_terms, other_to_terms = tables(one.n_nodes).to_terms, tables(other.n_nodes).to_terms
     n, k = secondary.block.facets.shape
-    mass, integrals, closer = np.empty((n, k, k)), np.empty((len(pairs), k, other.n_nodes)), np.empty((n, k))
+    mass, integrals = np.empty((len(pairs), k, k)), np.empty((len(pairs), k, other.n_nodes))
+    closer, start = np.empty((n, k)), np.searchsorted(pairs[:, 0], np.arange(n + 1))
     degree = DEGREE[one.n_nodes] + max(DEGREE[one.n_nodes], DEGREE[other.n_nodes])
     if one.n_nodes == other.n_nodes == 3:  # exact quadrature, so that the result does not depend on the first corner
         degree = max(degree, heights[0].shape[1])
     given = (
-        np.searchsorted(pairs[:, 0], np.arange(n + 1)), secondary.nodes, secondary.count, secondary.origin, secondary.axes,
+        start, secondary.nodes, secondary.count, secondary.origin, secondary.axes,
         to_terms @ secondary.nodes, to_terms @ reference[secondary.block.facets], to_terms, _middle(one),
         primary.nodes, primary.count, other_to_terms @ primary.nodes, other_to_terms, _middle(other),
         pairs, *quadrature.triangle(min(degree + degree % 2, 8)), *heights, mass, integrals, closer,
@@ -217,7 +219,9 @@ def _integrated(
     if max(failed) >= 0:
         first, second = (side.origin[row] for side, row in zip((secondary, primary), pairs[max(failed)], strict=True))
         raise ContactError(f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there")
-    return Coupling(secondary.block, primary.block, pairs, integrals), mass, closer
+    of_facets = csr_array((np.ones(len(pairs)), np.arange(len(pairs)), start), shape=(n, len(pairs)))
+    whole = (of_facets @ mass.reshape(-1, k * k)).reshape(-1, k, k)
+    return Coupling(secondary.block, primary.block, pairs, integrals, mass), whole, closer
 
 
 def _middle(element: elements.Element) -> Array:

@@ -272,11 +272,11 @@ def _fill_shape(to_terms, terms, shape):
 
 
 @inlined_kernel
-def _add_products(area, shape, other_shape, mass, coupling, s, i):
-    """Add products of shape functions at a point to the lower triangle of ``mass[s]`` and to ``coupling[i]``."""
+def _add_products(area, shape, other_shape, mass, coupling, i):
+    """Add products of shape functions at a point to the lower triangle of ``mass[i]`` and to ``coupling[i]``."""
     for a in range(shape.shape[0]):
         for b in range(a + 1):
-            mass[s, a, b] += area * shape[a] * shape[b]
+            mass[i, a, b] += area * shape[a] * shape[b]
         for b in range(other_shape.shape[0]):
             coupling[i, a, b] += area * shape[a] * other_shape[b]
 
@@ -321,8 +321,8 @@ def integrate(
     `to_terms` (n_terms, n_nodes) computes them from nodal values, `middle` (2,) is the initial guess of the reference
     coordinates; the same with `other` for the primary facets. `points` (n_q, 2) and `weights` (n_q,) are a rule on the
     triangle. `heights` (n_facets, k, k) of both sides' smooth surfaces, k = 0 for none, are weighted by the `factor`
-    (n_pairs, 2) of the pair. Filled in place: `mass` (n_facets, n_nodes, n_nodes) of the secondary shape functions over
-    the part that faces the primary side, `coupling` (n_pairs, n_nodes, n_other_nodes), secondary times primary shape
+    (n_pairs, 2) of the pair. Filled in place: `mass` (n_pairs, n_nodes, n_nodes), products of the secondary shape
+    functions over the segment, `coupling` (n_pairs, n_nodes, n_other_nodes), secondary times primary shape
     functions, and `closer` (n_facets, n_nodes), the former times the sum of both heights.
 
     Returns -1, or the number of a pair with a facet too distorted to be projected.
@@ -332,7 +332,7 @@ def integrate(
     n, m = to_terms.shape[0], other_to_terms.shape[0]
     terms, other_terms, shape, other_shape = np.empty((n, 3)), np.empty((m, 3)), np.empty(n), np.empty(m)
     flat, other_flat, xi, other_xi = np.empty((n, 2)), np.empty((m, 2)), np.empty(2), np.empty(2)
-    mass[low:high], coupling[start[low] : start[high]], closer[low:high] = 0.0, 0.0, 0.0
+    mass[start[low] : start[high]], coupling[start[low] : start[high]], closer[low:high] = 0.0, 0.0, 0.0
     exact = n == 3 and m == 3
     for i in range(start[low], start[high]):
         s, p = pairs[i, 0], pairs[i, 1]
@@ -358,11 +358,11 @@ def integrate(
                 _fill_shape(to_terms, terms, shape)
                 _fill_shape(other_to_terms, other_terms, other_shape)
                 area = weights[q] * twice * _stretch(reference[s], terms) / seen
-                _add_products(area, shape, other_shape, mass, coupling, s, i)
+                _add_products(area, shape, other_shape, mass, coupling, i)
                 if heights.shape[1] > 0:
                     above = factor[i, 0] * _height(heights[s], xi)
                     above += factor[i, 1] * _height(other_heights[p], other_xi)
                     for a in range(n):
                         closer[s, a] += area * above * shape[a]
-    _symmetrise(mass[low:high])
+    _symmetrise(mass[start[low] : start[high]])
     return -1

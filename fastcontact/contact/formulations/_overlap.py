@@ -28,12 +28,15 @@ class Coupling:
         Numbers of the secondary and the primary facet of each pair, each in its block.
     integrals : ndarray (n, n_nodes, n_primary_nodes)
         Integrals of secondary times primary shape functions over the overlap [area].
+    mass : ndarray (n, n_nodes, n_nodes), optional
+        In 3D, integrals of products of two secondary shape functions over the overlap [area].
     """
 
     secondary: FacetBlock
     primary: FacetBlock
     pairs: Indices
     integrals: Array
+    mass: Array | None = None
 
 
 class OverlapPoints(NamedTuple):
@@ -47,11 +50,14 @@ class OverlapPoints(NamedTuple):
         Shape functions of the k nodes of the facet at the point [-].
     area : ndarray (n,)
         Undeformed area of the point, zero outside of the overlap [area].
+    opposite : ndarray of int (n,), optional
+        Number of the opposite facet, counted through the blocks of the primary side.
     """
 
     facet: Indices
     shape: Array
     area: Array
+    opposite: Indices | None = None
 
 
 @dataclass(frozen=True, eq=False)

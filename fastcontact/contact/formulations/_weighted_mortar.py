@@ -34,14 +34,15 @@ from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, OverlapPoints, obstacle_overlap
 from fastcontact.contact.integration import areas_of_rule, nodal_areas
-from fastcontact.contact.linearised_geometry import Closing, Linearised, NodalNormals, Points, faced
+from fastcontact.contact.linearised_geometry import Closing, Linearised, NodalNormals, Points, PolygonNormals, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import FACING, Candidates, Normals, filled_up, pair, tangents
+from fastcontact.contact.pairing import FACING, Candidates, Normals, filled_up, onto, pair, tangents
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.contact.search.limits import BEYOND
+from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Entries, rows_of, scaled
-from fastcontact.mesh import elements
+from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
 MULTIPLIERS = ("standard", "dual")
@@ -185,30 +186,40 @@ class WeightedMortar(Formulation):
     ) -> Linearised:  # fmt: skip
         """Return the linearisation of contact forces, mean gaps and slips; see `linearised_geometry`.
 
-        `slipping` are tangents (k, m, dim), mean relative motions (m, n_points), and lengths by which gaps close (m,). Where
-        the points of the segments are not known, Gauss points of whole facets replace them: the integrand is continuous
-        across the cuts.
+        `slipping` are tangents (k, m, dim), mean relative motions (m, n_points), and lengths by which gaps close (m,). The
+        segments are fixed: the integrand is continuous across the cuts.
         """
         at, acts, overlap = replace(at, displacement=displacement), multiplier != 0.0, coverage.overlap
         deformed = self.points + displacement
-        nodes, shapes, facets, functions, tests, first, blocks_end = [], [], [], Entries(), Entries(), 0, 0
+        functions, tests, first, first_facet = Entries(), Entries(), 0, 0
+        nodes, shapes, facets, opposite, corners = [], [], [], [], []
         of_blocks = zip(self.secondary.blocks, self._test, coverage.functions, strict=True)
         for number, (block, T, (psi, _)) in enumerate(of_blocks):
             inside = self._points_of(number, overlap) if overlap.points is None else overlap.points[number]
-            facet, shape, area = (values[acts[block.local].any(axis=1)[inside.facet]] for values in inside)
+            kept = acts[block.local].any(axis=1)[inside.facet]
+            facet, shape, area = (values[kept] for values in inside[:3])
+            if inside.opposite is not None:
+                opposite.append(inside.opposite[kept])
+                corners.append(block.facets[facet, : elements.get(block.element).n_corners])
             columns = first + np.arange(len(facet))[:, None]
             functions.add(block.local[facet], columns, np.einsum("qak,qk,q->qa", psi[facet], shape, area)[:, :, None])
             tests.add(block.local[facet], columns, (area[:, None] * (shape @ T.T))[:, :, None])
             nodes.append(block.facets[facet])
             shapes.append(shape)
-            facets.append(blocks_end + facet)
-            first, blocks_end = first + len(facet), blocks_end + len(block.facets)
+            facets.append(first_facet + facet)
+            first, first_facet = first + len(facet), first_facet + len(block.facets)
         candidates = Candidates(filled_up(nodes), filled_up(shapes), np.concatenate(facets))
-        pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", at.pose)
+        positions = candidates.positions(deformed)
+        direction: PolygonNormals | bool = True
+        if opposite and isinstance(self.primary, Surface):
+            direction = across = PolygonNormals(filled_up(corners), deformed)
+            pairing = onto(positions, self.primary, np.concatenate(opposite), deformed, across.normal)
+        else:
+            pairing = pair(positions, self.primary, deformed, BEYOND, "facet", at.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), first)
         along = "facet" if self.normals == "secondary" else self.normals
         rise = self.rise(candidates, pairing, rows, deformed)
-        points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, True, rise)
+        points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, direction, rise)
         weighted = scaled(csr_array(functions.matrix(size)[:, rows]), 1.0 / weight)
         mean = csr_array(tests.matrix(size)[:, rows])
         own_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
@@ -230,26 +241,35 @@ class WeightedMortar(Formulation):
     def _points_of(self, number: int, overlap: Overlap) -> OverlapPoints:
         """Return integration points of the facets of a block, on the parts that face the other side.
 
-        They are Gauss points, except on linear facets that are partly covered. There they are at the mean of the shape
-        functions over the covered part, plus and minus displacements along the principal axes of their covariance (Julier and
-        Uhlmann, 1997), so that products of two shape functions are integrated exactly, as dual functions require.
+        Against obstacles they are Gauss points of whole facets. In 3D they are those of the rectangle that has the second
+        moments of area of a segment in the reference facet: exact on flat triangles, whose integrand is quadratic.
         """
-        N, area = areas_of_rule(self.secondary.blocks[number], self.points, self.axisymmetric)
-        mass = overlap.mass[number]
+        block = self.secondary.blocks[number]
+        segments = [
+            (part, part.mass) for part in overlap.couplings if part.secondary is block and part.mass is not None
+        ]
+        if not segments:
+            N, area = areas_of_rule(block, self.points, self.axisymmetric)
+            facet = np.repeat(np.arange(len(area)), len(N))
+            return OverlapPoints(facet, np.tile(N, (len(area), 1)), area.ravel())
+        assert isinstance(self.primary, Surface)
+        starts, first = {}, 0
+        for other in self.primary.blocks:
+            starts[other.element], first = first, first + len(other.facets)
+        pairs = np.concatenate([np.add(part.pairs, (0, starts[part.primary.element])) for part, _ in segments])
+        mass = np.concatenate([products for _, products in segments])
         size = mass.sum(axis=(1, 2))
-        whole = (size >= (1.0 - SINGLE_PRECISION) * area.sum(axis=1)) | (self.secondary.order > 1)
-        facets, cut = np.flatnonzero(whole), np.flatnonzero(~whole & (size > 0.0))
-        mean = mass[cut].sum(axis=2) / size[cut, None]
-        covariance = mass[cut] / size[cut, None, None] - mean[:, :, None] * mean[:, None, :]
-        variance, axes = np.linalg.eigh(covariance)  # the first variance is zero: the functions sum to one
-        count = 2 * (N.shape[1] - 1)
-        along = np.sqrt(0.5 * count * np.maximum(variance, 0.0))[:, None, 1:] * axes[:, :, 1:]
-        shapes = mean[:, None] + np.concatenate([along, -along], axis=2).transpose(0, 2, 1)
-        return OverlapPoints(
-            np.concatenate([np.repeat(facets, len(N)), np.repeat(cut, count)]),
-            np.concatenate([np.tile(N, (len(facets), 1)), shapes.reshape(-1, N.shape[1])]),
-            np.concatenate([area[facets].ravel(), np.repeat(size[cut] / count, count)]),
-        )
+        pairs, mass, size = pairs[size > 0.0], mass[size > 0.0], size[size > 0.0]
+        element = elements.get(block.element)
+        mean = mass.sum(axis=2) @ element.nodes / size[:, None]
+        moments = element.nodes.T @ (mass / size[:, None, None]) @ element.nodes - mean[:, :, None] * mean[:, None]
+        variance, axes = np.linalg.eigh(moments)
+        square, share = quadrature.square(quadrature.gauss_line(2 if element.n_nodes == 3 else 3))
+        stretched = axes * np.sqrt(3.0 * np.maximum(variance, 0.0))[:, None]
+        xi = mean[:, None] + square @ stretched.transpose(0, 2, 1)
+        facet, opposite = np.repeat(pairs, len(share), axis=0).T
+        area = 0.25 * size[:, None] * share
+        return OverlapPoints(facet, element.shape(xi.reshape(-1, 2)), area.ravel(), opposite)
 
     def _nodal(self, weight: Array) -> WeightedPressures:
         """Return the nodal interpretation of forces; `weight` (m,) are the areas of the gaps [area]."""

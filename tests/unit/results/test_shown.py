@@ -10,6 +10,7 @@ import os
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from fastcontact._tools.html_table import html_table
 from fastcontact.analysis.progress import Progress, StatusLine
 from fastcontact.errors import CaseError, FileError, MeshError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.step import HEAD, MOST_SHOWN, ContactResult, StepResult, Steps
+from fastcontact.results.step import HEAD, MOST_SHOWN, ContactResult, MaterialStress, StepResult, Steps, phases
 from fastcontact.results.tables import (
     contact_table,
     line_table,
@@ -81,7 +82,25 @@ def test_a_long_analysis_shows_its_last_steps(steps):
     assert len(repr(many)) < 3 * SCREEN
     assert f"{MOST_SHOWN + 10} steps, 10 of them not shown" in many._repr_html_()
     assert many._repr_html_().count("<tr>") == MOST_SHOWN + 1
-    assert "StepResult(3" in repr(many)
+    first, *_, last = repr(many).splitlines()[1:]
+    assert first == "  ..."
+    assert "StepResult(3" in last
+
+
+def test_phases_scale_all_that_vibrates(steps):
+    step = replace(steps[-1], material_stress=MaterialStress(*[np.arange(2)] * 3, np.ones((2, 4))))
+    back = phases(step, 2)[1]
+    for name in ("displacement", "stress", "reaction", "von_mises_signed"):
+        assert np.array_equal(getattr(back, name), -getattr(step, name))
+    assert np.array_equal(back.material_stress.stress, -step.material_stress.stress)
+    assert not back.contact
+
+
+def test_components_of_forces_that_lean(steps):
+    """As in half of a symmetric model, whose other half balances the component across."""
+    assert " (" not in steps[-1].contact["hertz & co"].shown["force"]
+    leaning = replace(steps[-1].contact["hertz & co"], force=np.array([-3e5, 4e5]))
+    assert leaning.shown["force"] == "500000 (x -300000, y 400000)"
 
 
 def test_one_step_and_one_contact(steps):
