@@ -60,7 +60,7 @@ class SettledContact:
     nodes : SharedNodes, optional
         Nodes of several pairs, or at both ends of a period, whose constraints are merged.
     paired_at : ndarray (k,), optional
-        Displacements of the last pairing, in the components of `StepContext.dofs` [length].
+        Displacements of the last pairing, the components `Problem.contact_dofs` [length].
     """
 
     constraints: StackedConstraints
@@ -132,7 +132,7 @@ def _settle(
         iterate.u = step.extrapolation.displacement(iterate.u)
     for update in range(limit + 1):
         if update == 0 and paired is not None and paired.paired_at is not None:
-            iterate.u, constraints = step.dofs.put(iterate.u, paired.paired_at), paired.constraints
+            iterate.u[problem.contact_dofs], constraints = paired.paired_at, paired.constraints
         else:
             constraints = pair_surfaces(problem, step.state, step.load, iterate)
         active = initially_active(constraints, iterate, step.extrapolation if extrapolates and update == 0 else None)
@@ -161,7 +161,8 @@ def _settle(
             continue
         if not tolerances.inexact:
             touching.check(step, constraints, solution, moved.change - tolerances.enough(moved.size), moved.size)
-        settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=moved.before)
+        paired_at = moved.before[step.dofs.compared]
+        settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=paired_at)
         if not solution.settled or tolerances.inexact:
             watch.forget()
         elif moved.change <= tolerances.enough(moved.size) and not (touching.due or touching.unfinished):
