@@ -11,12 +11,13 @@ from fastcontact.errors import ModelError
 # Relative error of displacements or forces above which a warning is given. It is also the largest admissible value of
 # criteria, because with larger ones the result need not be close to the solution.
 NOTABLE = 1e-2
-# Largest number of halvings of an iteration: of displacements that invert cells, or of positions of floating bodies.
+# Largest number of times that a step of an iteration is shortened: of displacements, of positions of floating bodies, and of
+# forces of friction.
 HALVINGS = 6
 # Steps are halved until they reduce a norm by this fraction of the expected reduction (Nocedal and Wright, 2006, equation
 # 3.4).
 DECREASE = 1e-4
-# Largest number of Newton iterations, of a load step and for a friction law.
+# Largest number of Newton iterations: of a load step, for a friction law, and of the positions of floating bodies.
 MAX_NEWTON_ITERATIONS = 40
 
 

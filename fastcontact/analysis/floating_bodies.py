@@ -28,7 +28,7 @@ from scipy.sparse import bsr_array
 
 from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.anderson import Anderson
-from fastcontact.analysis.criteria import DECREASE, HALVINGS
+from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS
 from fastcontact.analysis.solution import Response, Solution
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
@@ -44,11 +44,6 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 # stiffer than the softer one of its bodies (for a layer that is softer by 2e5, 100 positions did not suffice with the
 # stiffness of the other body).
 SOFT = 1e-3
-# Largest number of positions for one pairing.
-MAX_POSITIONS = 100
-# Weight of the displacements that springs held before, in the choice of new ones: with it, multigrid takes 142 iterations
-# in two steps of a rubber block that is pressed on another one, and 157 without.
-KEPT = 4.0
 
 
 @dataclass(frozen=True)
@@ -67,8 +62,6 @@ class RigidPosition:
         Number of positions, each of which takes one contact solution.
     slack : bool
         Whether the springs are slack: their forces are negligible.
-    dofs : ndarray of int (k,)
-        Displacement component to which each spring is attached.
     """
 
     state: Solution
@@ -76,7 +69,6 @@ class RigidPosition:
     spring_force: Array
     positions: int
     slack: bool
-    dofs: Indices
 
 
 @dataclass(frozen=True)
@@ -133,8 +125,6 @@ class FloatingBodies:
     system : System
     soft : bool
         Whether the springs are softer than the softest body by the factor SOFT; otherwise they are as stiff.
-    before : ndarray of int, optional
-        Displacement components to which earlier springs were attached. They are kept unless others are much better.
 
     Attributes
     ----------
@@ -148,7 +138,7 @@ class FloatingBodies:
         Stiffness of each spring [force / length].
     """
 
-    def __init__(self, motions: FreeMotions, system: System, soft: bool, before: Indices | None = None) -> None:
+    def __init__(self, motions: FreeMotions, system: System, soft: bool) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
         # The smallest median of the diagonal over the unknowns that each mode moves, and over those that no mode moves.
         solid, moving = system.free & ~weightless, motions.displacement != 0.0
@@ -158,8 +148,6 @@ class FloatingBodies:
         self._dim = system.matrix.blocksize[0]
         self.names = motions.names()
         weights = np.sqrt(np.maximum(diagonal, 0.0))
-        if before is not None:
-            weights[before] *= KEPT
         # The unknowns with springs determine the amplitudes of the modes, are far apart and have large weights.
         modes = system.unknowns_of(motions.displacement)
         _, _, order = qr((modes * weights[:, None]).T, mode="economic", pivoting=True)
@@ -282,7 +270,7 @@ class FloatingBodies:
         position, before, iterations, relaxed = start, np.inf, 0, 0.0
         step, length = None, 1.0
         mixing = Anderson(len(start) + 1, np.arange(len(start)))
-        for positions in range(1, MAX_POSITIONS + 1):
+        for positions in range(1, MAX_NEWTON_ITERATIONS + 1):
             state = solve_at(position)
             elongation, iterations = state.u[springs], iterations + state.iterations
             left = float(np.abs(elongation).max())
@@ -294,7 +282,7 @@ class FloatingBodies:
             # If the forces of the springs no longer decrease, a larger tolerance applies.
             if not slack and left >= 0.5 * before and positions > 3:
                 slack = left <= max(LENGTH_ROUND_OFF * force, round_off)
-            if slack or not state.settled or positions == MAX_POSITIONS:
+            if slack or not state.settled or positions == MAX_NEWTON_ITERATIONS:
                 break
             if step is not None and length > 0.5**HALVINGS and left > before - DECREASE * length * (before - step[1]):
                 length *= 0.5
@@ -308,7 +296,7 @@ class FloatingBodies:
             position = mixing.mixed(position, position + elongation) if step is None else position + step[0]
             before, relaxed = left, 0.0 if step is None else left
         state = dataclasses.replace(state, iterations=iterations)
-        return RigidPosition(state, position, self.stiffness * elongation, positions, slack, self.dofs)
+        return RigidPosition(state, position, self.stiffness * elongation, positions, slack)
 
 
 def _newton_step(

@@ -23,6 +23,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_moves, nearest_nodes
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.inequalities import Iterate, StepContext, initially_active, pair_surfaces, solve_inequalities
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
@@ -279,11 +280,6 @@ class _Mixing:
         return self._accelerated.mixed(moved.before, displacement)
 
 
-# Relative residual of the change over what suffices at the end. With as much as suffices, steps of plastic bodies take a
-# tenth more pairings.
-AT_END = 0.01
-
-
 def newton_step(
     step: StepContext, constraints: StackedConstraints, solution: Solution, before: Array, image: Array, accuracy: float,
     nodes: SharedNodes | None = None,
@@ -334,7 +330,8 @@ def newton_step(
     changed = (image - before)[where]
     system = LinearOperator((len(changed),) * 2, matvec=lambda v: v - varied(v)[where], dtype=float)
     size = largest(changed) or 1.0
-    v, _ = gmres(system, changed / size, rtol=max(SINGLE_PRECISION, AT_END * accuracy), atol=0.0, maxiter=1)
+    # With as much as suffices at the end, steps of plastic bodies take a tenth more pairings.
+    v, _ = gmres(system, changed / size, rtol=max(SINGLE_PRECISION, NOTABLE * accuracy), atol=0.0, maxiter=1)
     responding = largest_difference(size * v, changed)
     # Far from the solution, a step in which the response exceeds the change itself is unreliable.
     if not responding <= size:

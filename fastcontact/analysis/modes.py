@@ -31,12 +31,7 @@ from fastcontact.linear import choice
 from fastcontact.linear.sparse_rows import sum_of_blocks
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
-
-# Shift that regularises free bodies, over the eigenvalue of a uniform deformation: below the eigenvalues of all but thin
-# bodies.
-SHIFT = 1e-4
-# A mode shape slides if its slip is more than this fraction of the motion; smaller slip is round-off.
-SLIDES = 1e-3
+from fastcontact.round_off import SINGLE_PRECISION
 
 
 @typed(ModelError)
@@ -169,13 +164,13 @@ class _Vibration:
         contact = held_contact(model, step, held, hold_sliding)
         slides = step is not None and any((pair.active & ~pair.sticking).any() for pair in step.contact.values())
         further = held_contact(model, step, held, True) if slides and not hold_sliding else []
-        return cls(model, field, K, M, contact, supported, SHIFT * _uniform(model, K, M), further)
+        return cls(model, field, K, M, contact, supported, SINGLE_PRECISION * _uniform(model, K, M), further)
 
     def warn_of_slides(self, values: Array, vectors: Array) -> None:
         """Warn of eigenvalues (n,) close to zero whose shapes (n_dofs, n) slide where friction holds small motions."""
         low = vectors[:, np.abs(values) < self.shift]
         moved = [
-            np.abs(held.rows @ low) > SLIDES * (abs(held.rows) @ np.abs(low)).max(initial=0.0)
+            np.abs(held.rows @ low) > SINGLE_PRECISION * (abs(held.rows) @ np.abs(low)).max(initial=0.0)
             for held in self.with_sliding
         ]
         if low.shape[1] and (count := int(np.any([slides.any(axis=0) for slides in moved], axis=0).sum())):

@@ -21,7 +21,9 @@ from fastcontact.model.rigid_motions import body_name
 from fastcontact.results.step import StepResult
 from fastcontact.round_off import SINGLE_PRECISION, TINY
 
-# Work of the stresses on neglected strains over that on strains, above which a warning is given.
+# Work of the stresses on neglected strains over that on strains, and equivalent strain, above which linear kinematics give a
+# warning: the fraction that they neglect of a strain is about as large as that strain. So does wear of this part of
+# the size of the model.
 NEGLECTED = 0.1
 
 

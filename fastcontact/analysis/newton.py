@@ -31,7 +31,7 @@ from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import Iterate, StepContext
 from fastcontact.analysis.problem import Problem, StepLoad, linearised
-from fastcontact.analysis.tolerances import DECLINE
+from fastcontact.analysis.tolerances import DECLINE, WINDOW
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import WHOLE
 from fastcontact.errors import ConvergenceError, ModelError
@@ -39,14 +39,10 @@ from fastcontact.linear.protocol import TOLERANCE, Loaded
 from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
-# Trials of a line search.
-SEARCHES = 3
-# Number of iterations within which the change of the displacement must have decreased at least once by the factor DECLINE.
-PATIENCE = 12
-# Stiffnesses of springs along closed gaps, over the largest stiffness of the bodies. Motions that contact does not constrain,
+# Stiffness of springs along closed gaps, over the largest stiffness of the bodies. Motions that contact does not constrain,
 # such as gaps between values of a pressure field, creep with stiff springs: an O-ring takes 5 and 7 iterations with 5e-5 and
 # 2e-4, and an O-ring under fluid pressure, for which the first is too soft, takes 13 with the second.
-HELD = 5e-5, 2e-4
+HELD = 2e-4
 # The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
 FORCING = 1e-3
 
@@ -152,7 +148,7 @@ class _Newton:
             if fraction == 1.0 and balanced.excess <= 1.0 and small:
                 return StepEquilibrium(self._settled, u, balanced, self._terms, history)
             u = self._accelerated(before, u, changes) if fraction == 1.0 else u
-            if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > DECLINE * min(changes[:-PATIENCE]):
+            if len(changes) > WINDOW and min(changes[-WINDOW:]) > DECLINE * min(changes[:-WINDOW]):
                 break
         raise ConvergenceError(
             f"Newton's method does not converge: after {len(history)} iterations displacements change by {changes[-1]:.1e} "
@@ -263,7 +259,7 @@ class _Newton:
             Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + (floats and self._problem.solver.iterative)]
         ]
         replaces = self._replaces or (settled is not None and settled.constraints.tangents != ())
-        held = [Regularisation(held=k, stiff=floats, replaces=replaces) for k in HELD] if closed else []
+        held = [Regularisation(held=HELD, stiff=floats, replaces=replaces)] if closed else []
         if self._by in held:
             held.remove(self._by)
             whole, held = [], [self._by, *held]  # the whole tangent failed in an earlier iteration
@@ -280,7 +276,7 @@ class _Newton:
         else:
             K = terms.tangent(u, by.geometric)
             contact = self._stiffness_of_contact(K, u, by) if by.geometric == WHOLE else None
-            problem = linearised(self._problem, K, u, iterate.rigid, contact, by.stiff, by.replaces)
+            problem = linearised(self._problem, K, u, contact, by.stiff, by.replaces)
             if by.geometric == WHOLE:
                 self._kept = problem
         force, floating = self._load.force - terms.residual(u)[0] + problem.system.K @ u, problem.floating_bodies
@@ -377,7 +373,7 @@ class _Newton:
             return float(system.reduced(out) @ along)
 
         first, last, fraction = slope(u), slope(target), 1.0
-        for _ in range(SEARCHES):
+        for _ in range(HALVINGS):
             if not last > abs(first):
                 break
             fraction *= abs(first) / (abs(first) + last)

@@ -12,7 +12,7 @@ from scipy.sparse import bsr_array, csr_array
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
+from fastcontact.analysis.floating_bodies import FloatingBodies
 from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import at_points
@@ -340,9 +340,8 @@ def prepare(
 
 
 def linearised(
-    problem: Problem, K: bsr_array, u: Array, rigid: RigidPosition | None, contact: csr_array | None, stiff: bool,
-    replaces: bool,
-) -> Problem:  # fmt: skip
+    problem: Problem, K: bsr_array, u: Array, contact: csr_array | None, stiff: bool, replaces: bool
+) -> Problem:
     """Return the problem whose system and linear solver use the tangent of the terms at displacements u.
 
     In finite strain, rigid-body modes of floating bodies are those of the deformed configuration.
@@ -354,8 +353,6 @@ def linearised(
         Tangent of the terms, see `Terms.tangent`; it is modified [force / length].
     u : ndarray (n_dofs,)
         Displacements about which the terms are linearised [length].
-    rigid : RigidPosition, optional
-        Last position of floating bodies.
     contact : csr_array (n_dofs, n_dofs), optional
         Stiffness due to contact, which is added to K [force / length].
     stiff : bool
@@ -376,8 +373,7 @@ def linearised(
         if model.kinematics != "axisymmetric":
             turned = _floating_motions(model, model.prescribed_by_ramp()[0], displacement)
             motions = turned if len(turned) == len(motions) else motions
-        before, soft = floating.dofs if rigid is None else rigid.dofs, problem.solver.iterative and not stiff
-        floating = FloatingBodies(motions, system, soft, before)
+        floating = FloatingBodies(motions, system, problem.solver.iterative and not stiff)
     if replaces and floating is not None and contact is not None:
         modes = floating.motions.displacement
         values = np.linalg.eigvalsh(modes.T @ (contact @ modes))

@@ -11,8 +11,8 @@ import numpy as np
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
-from fastcontact.analysis.locking import locking_warning, nonlinear_scatter_warnings, scatter_warnings
-from fastcontact.analysis.neglected_rotation import neglected_rotation
+from fastcontact.analysis.locking import ALTERNATING, locking_warning, nonlinear_scatter_warnings, scatter_warnings
+from fastcontact.analysis.neglected_rotation import NEGLECTED, neglected_rotation
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import too_fast
@@ -29,8 +29,6 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Equivalent strain, and wear depth over the size of the model, beyond which linear kinematics give a warning.
-STRAIN = 0.1
 # Rotation [radian] beyond which linear kinematics give a warning: they neglect a strain of half its square.
 ROTATION = 0.3
 # Rotation [radian] from which its effect is compared with that of the strains.
@@ -41,17 +39,11 @@ MANY_STEPS = 1000
 ACROSS = 4
 # Relative residual of the displacement or of the forces above which a warning is given.
 LOOSE = 1e-4
-# Fraction of the largest energy or work that the energy balance may lack.
-IMBALANCE = 0.02
-# A warning is given if more than the first fraction of the frictional work is dissipated at nodes in the step in which they
-# close, and this part exceeds the second fraction of the strain energy. Under a sphere that sticks, with a coefficient of
-# 0.6, the frictional work is 2e-4 of the strain energy in long steps, and 1e-5 if slip counts from first contact.
-WHILE_TOUCHING, NOTABLE_WORK = 0.1, 1e-4
-# Median difference of a nodal pressure from the mean of its neighbours, over the mean pressure, above which a warning is
-# given. On rings of tri3 cells 4.6 times as deep as wide it is 0.30, with pressure errors of 0.16 to 0.27; on wider ones
-# 0.16 (0.09 to 0.13), on quadrangles 0.002; under punches of hex8 and tet4, whose pressures are singular at the edges,
-# 0.10 to 0.12, and under a wearing hex8 sole 0.22.
-WAVERING = 0.25
+# A warning is given if more than this fraction of the frictional work is dissipated at nodes in the step in which they close,
+# and this part exceeds the energy, NOTABLE squared, of a notable error of the displacement, over the strain energy. Under a
+# sphere that sticks, with a coefficient of 0.6, the frictional work is 2e-4 of the strain energy in long steps, and 1e-5 if
+# slip counts from first contact.
+WHILE_TOUCHING = 0.1
 # Smallest number of nodes for which the median is meaningful.
 MANY = 10
 
@@ -119,7 +111,7 @@ def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
     if name not in state.worn or (many := too_fast(pair, state.worn[name])) <= 1.0:
         return
     depth, size = float(state.worn[name].depth.max()), float(np.ptp(pair.points, axis=0).max())
-    if many > MANY_STEPS or depth > STRAIN * size:
+    if many > MANY_STEPS or depth > NEGLECTED * size:
         yield (
             f"contact '{name}' wears off {depth:.3g}, {depth / size:.2g} times the size of the model, in steps "
             f"{many:.2g} times as long as pressures can follow: is its wear Archard's coefficient divided by the hardness, "
@@ -135,7 +127,7 @@ def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
 def _unbalanced(state: State) -> Iterator[str]:
     """Yield a warning where the energy balance of all steps is violated by more than round-off."""
     work, round_off = state.work, LENGTH_ROUND_OFF * state.largest_force * float(np.abs(state.u).max(initial=0.0))
-    if work is not None and abs(work.imbalance) > IMBALANCE * work.largest and work.largest > round_off:
+    if work is not None and abs(work.imbalance) > NOTABLE * work.largest and work.largest > round_off:
         yield (
             f"the energy of these load steps is out of balance: {work.imbalance:.3g} of the external work "
             f"{work.external:.4g} is neither strain energy ({work.strain_energy:.4g}), nor frictional work "
@@ -147,7 +139,7 @@ def _unbalanced(state: State) -> Iterator[str]:
 def _slipping_before(state: State) -> Iterator[str]:
     """Yield a warning where nodes that close and slide in one step do much of the frictional work."""
     work = state.work
-    if work is not None and work.touching > max(WHILE_TOUCHING * work.friction, NOTABLE_WORK * work.strain_energy, 0.0):
+    if work is not None and work.touching > max(WHILE_TOUCHING * work.friction, NOTABLE**2 * work.strain_energy, 0.0):
         share = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
         yield (
             f"{share:.0%} of the work of friction is done at nodes in the load step in which they "
@@ -241,9 +233,10 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
         mean = last.stress[block[others]].mean(axis=1)
         strains = np.einsum("cij,cj->ci", field.compliance[field.rows[name][others]], mean)
         strain = max(strain, float(recovery.equivalent_strain(strains).max(initial=0.0)))
-    if strain > STRAIN:
+    if strain > NEGLECTED:
         yield (
-            f"the largest equivalent strain is {strain:.3f}, beyond the {STRAIN} up to which linear kinematics are accurate"
+            f"the largest equivalent strain is {strain:.3f}, beyond the {NEGLECTED} up to which linear kinematics are "
+            "accurate"
         )
     else:
         yield from _large_stress_free_strain(problem, last)
@@ -263,9 +256,9 @@ def _large_stress_free_strain(problem: Problem, last: StepResult) -> Iterator[st
     moduli = np.eye(problem.field.moduli.shape[1])[None]  # unit moduli: stresses are strains
     rows = {name: np.zeros(len(block), np.int32) for name, block in model.mesh.solids.items()}
     strain = float(np.abs(recovery.nodal_stress(model.mesh, model.kinematics, moduli, rows, last.displacement)).max())
-    if strain > STRAIN:
+    if strain > NEGLECTED:
         yield (
-            f"temperatures and initial states cause strains of {strain:.3g}, beyond the {STRAIN} up to which linear "
+            f"temperatures and initial states cause strains of {strain:.3g}, beyond the {NEGLECTED} up to which linear "
             "kinematics are accurate: are they in the units of the model?"
         )
 
@@ -376,6 +369,11 @@ def across(side: Surface, closed: Mask, excluded: Mask) -> int | None:
 def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     """Yield a warning where pressures of nodes whose neighbours are all closed oscillate by a large fraction of their mean.
 
+    The measure is the median difference from the mean of the neighbours, over the mean pressure. On rings of tri3 cells 4.6
+    times as deep as wide it is 0.30, with pressure errors of 0.16 to 0.27; on wider ones 0.16 (0.09 to 0.13), on quadrangles
+    0.002; under punches of hex8 and tet4, whose pressures are singular at the edges, 0.10 to 0.12, and under a wearing hex8
+    sole 0.22.
+
     Sides that never separate, or adhere, carry tension, too: their mean may be zero or round-off, and is not meaningful.
     """
     if pair.options.always_closed or pair.options.cohesion is not None:
@@ -389,7 +387,7 @@ def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     pressure = contact.pressure[inside]
     deviation = pressure - ((neighbours @ contact.pressure)[inside] - pressure) / others[inside]
     size, mean = float(np.median(np.abs(deviation))), float(pressure.mean())
-    if not size > WAVERING * mean > 0.0:
+    if not size > ALTERNATING * mean > 0.0:
         return
     cells = f"quadrangles or hexahedra along '{pair.secondary.group}', or triangles or tetrahedra there about as deep as wide"
     yield (

@@ -23,12 +23,9 @@ from typing import Protocol
 
 import numpy as np
 
-from fastcontact.analysis.criteria import DECREASE, MAX_NEWTON_ITERATIONS
+from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.round_off import ROUND_OFF, TINY
-
-# Smallest damping factor.
-SHORTEST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +196,9 @@ def newton(
             > (1 - DECREASE * damping) * size
         ):
             damping *= 0.5
-            if damping < SHORTEST:  # at a kink there may be no step that decreases the residual: take the full step
+            if (
+                damping < 0.5**HALVINGS
+            ):  # at a kink there may be no step that decreases the residual: take the full step
                 damping = 1.0
                 break
         y, gaps = (trial, gaps_there) if damping == 1.0 else (y + damping * step, gaps + damping * change)

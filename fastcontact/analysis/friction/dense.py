@@ -22,7 +22,7 @@ from scipy.linalg import lu_solve
 from fastcontact.analysis.friction.cone_newton import Forces, Law, newton
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.linear.delassus import lu_factors
-from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION, SUM_ROUND_OFF
 
 # Numbers of edges of the polyhedral cones that are tried in 3D, and largest size of a linear complementarity problem.
 EDGES, LARGEST = (8, 32), 2500
@@ -31,7 +31,7 @@ EDGES, LARGEST = (8, 32), 2500
 # is below LENGTH_ROUND_OFF. A compliance, relative to that of the gaps, is then added to all slips: the first value of
 # REGULARISATION and, if it does not suffice, the second. If the elastic slip due to this compliance exceeds SINGLE_PRECISION,
 # relative to the gaps and slips without forces, the forces are not in equilibrium: the bodies jam.
-REGULARISATION = 10 * ROUND_OFF, LENGTH_ROUND_OFF
+REGULARISATION = ROUND_OFF, LENGTH_ROUND_OFF
 
 
 def solve(
@@ -111,7 +111,7 @@ class _Problem:
 
     def __init__(self, F: Array, free: Array, law: Law) -> None:
         self.F, self.free, self.law = F, free, law
-        self.round_off = float(16 * np.finfo(float).eps * np.abs(free).max())
+        self.round_off = SUM_ROUND_OFF * float(np.abs(free).max())
 
     def gaps(self, y: Array) -> Array:
         """Return gaps and slips (1 + k, m) for forces y (1 + k, m)."""

@@ -29,8 +29,6 @@ UNSTABLE = (
     "tightened bolt, hold them (hold_sliding=True); beyond a buckling load use a lower load, or neglect the geometric "
     "stiffness (stress_stiffening=False)"
 )
-# Iterations between checks of the error.
-ROUND = 20
 
 
 def lowest(
@@ -116,10 +114,10 @@ def _by_multigrid(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Ar
 
     unit = LinearOperator(shifted.shape, matvec=lambda r: cycle(r.reshape(-1, 1)).ravel(), matmat=cycle, dtype=float)
     vectors = start
-    for _ in range(MAX_ITERATIONS // ROUND):
+    for _ in range(MAX_ITERATIONS // 20):  # of the 20 iterations that LOBPCG makes by default
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # a warning that a round has few iterations
-            values, vectors = lobpcg(shifted, vectors, M, unit, tol=1e-300, maxiter=ROUND, largest=False)
+            values, vectors = lobpcg(shifted, vectors, M, unit, tol=1e-300, largest=False)
         residuals = shifted @ vectors[:, :n] - (M @ vectors[:, :n]) * values[:n]
         # The error is measured by its energy, independent of units; the error of eigenvalues is of second order.
         if (np.einsum("ij,ij->j", residuals, cycle(residuals)) <= TOLERANCE * values[:n]).all():

@@ -142,7 +142,7 @@ class SymbolicFactors:
     def _planned(self, A: csc_array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """Return `source` and `target` (n_supernodes,) of `factorisation_kernels.plan`, and an array for update matrices."""
         nodes, kept, size = self._nodes, self._kept, 0
-        source, target = np.full(len(self._above), factorisation_kernels.ANEW), np.full(len(self._above), -1)
+        source, target = np.full((2, len(self._above)), -1)
         if len(kept.entries):
             size = factorisation_kernels.plan(
                 A.indptr, A.data, kept.entries, self._tree.order, self._above, nodes.first, nodes.begin, kept.offsets,

@@ -17,8 +17,6 @@ from fastcontact.linear.cholesky.triangular_kernels import PANEL, Offsets
 
 # Smallest number of multiplications for which a product is passed to BLAS.
 SMALL = 20_000
-# Supernodes that are factorised, and those below the root of a subtree that keeps its columns, in `plan`.
-ANEW, BELOW = -2, -1
 
 
 @interpretable_kernel
@@ -59,7 +57,8 @@ def plan(
     kept : ndarray of int (n_supernodes,)
         Offsets of the update matrices that are kept from the last factorisation, or -1.
     source : ndarray of int (n_supernodes,)
-        Filled with `ANEW`, `BELOW`, or for the root of a subtree that keeps its columns, the offset of its update matrix.
+        Filled with -1 for supernodes that are factorised, -2 for those below the root of a subtree that keeps its columns,
+        and for the root itself with the offset of its update matrix.
     target : ndarray of int (n_supernodes,)
         Filled with the offsets of the update matrices to keep, those of the largest subtrees without a change, or -1.
     """
@@ -73,11 +72,11 @@ def plan(
             changed[above[s]] = True
     for s in range(count - 1, -1, -1):
         root = above[s] < 0
-        source[s], target[s] = ANEW, -1
-        if not root and source[above[s]] != ANEW:
-            source[s] = BELOW
+        source[s], target[s] = -1, -1
+        if not root and source[above[s]] != -1:
+            source[s] = -2
         elif not changed[s]:
-            source[s] = kept[s] if kept[s] >= 0 else ANEW
+            source[s] = kept[s]
         if not changed[s] and (root or changed[above[s]]):
             target[s] = size
             size += (begin[s + 1] - begin[s]) ** 2
@@ -130,7 +129,7 @@ def factorise(
     for s in range(count):
         low, high, rest = first[s], first[s + 1], below[begin[s] : begin[s + 1]]
         m = len(rest)
-        if source[s] == ANEW:
+        if source[s] == -1:
             size = high - low + m
             F = front[: size * size].reshape(size, size)
             _gather(start, rows, values, order, position, low, high, rest, local, F)
@@ -148,7 +147,7 @@ def factorise(
         else:
             _copy(last[0], begins[low], L, begins[low], begins[high] - begins[low])
             _copy(last[1], low, d, low, high - low)
-            if source[s] == BELOW:
+            if source[s] == -2:
                 continue
             _copy(last[2], source[s], waiting, used, m * m)
         if target[s] >= 0:

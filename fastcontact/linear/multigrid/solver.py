@@ -41,9 +41,6 @@ MAX_ITERATIONS = 1000
 MOST_COLUMNS = 300
 # Number of iterations between two calls of a monitor.
 WATCH_EVERY = 2
-# Number of iterations before the first call of a monitor if `_contrast` is large, because errors of soft parts are not yet
-# known.
-WATCH_CONTRAST_FROM = 6
 # Largest estimated error of displacements, relative to the largest one, over the tolerance of the residual. It is reached
 # only if bodies differ in stiffness: forces in the stiff body dominate the residual, and the soft body converges later.
 DISPLACEMENT_ERROR = 3e3
@@ -225,7 +222,6 @@ class Multigrid:
         self._begin(cg, f)
         enough = self._enough(tolerance or 0.0)
         made, raised = 0, 0
-        watched_from = WATCH_EVERY if self._contrast <= MILD else WATCH_CONTRAST_FROM
         while not self._done(cg, enough, scale):
             if self._renewed and made >= CHANGE:
                 self._build_anew()
@@ -238,7 +234,7 @@ class Multigrid:
                     f"conjugate gradients stall at a relative residual of {cg.norm / scale:.1e} after {made} iterations, "
                     f"above {self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
                 )
-            if monitor is not None and above and made >= watched_from and made % WATCH_EVERY == 0:
+            if monitor is not None and above and made and made % WATCH_EVERY == 0:
                 u = self._reduced.displacement(cg.x)
                 if monitor(u, self._reduced.multiplier(u, f), self._contrast * cg.norm / scale):
                     break

@@ -28,6 +28,7 @@ from fastcontact.linear.factor_solver import AFFORDABLE
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
 from fastcontact.linear.multigrid.reduced import Reduced
 from fastcontact.linear.multigrid.solver import (
+    MAX_ITERATIONS,
     Multigrid,
     StallError,
     TooManyIterationsError,
@@ -38,11 +39,11 @@ from fastcontact.linear.springs import Springs
 from fastcontact.round_off import ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# Number of iterations in one load step above which a factorisation is cheaper: a constant plus a number for each unknown,
-# which depends on the number of components per node. In 3D, a factorisation and a load step with it cost as much as 300
-# iterations plus 0.04 per unknown for two bodies in contact, and three times as much in stacks with friction (measured, see
-# bench/README.md).
-COST, COST_OF_UNKNOWN = 1000, {1: 0.0, 2: 0.0, 3: 0.08}
+# Number of iterations in one load step above which a factorisation is cheaper, for each unknown, in addition to the largest
+# number in one solution. It depends on the number of components per node. In 3D, a factorisation and a load step with it cost
+# as much as 300 iterations plus 0.04 per unknown for two bodies in contact, and three times as much in stacks with friction
+# (measured, see bench/README.md).
+COST_OF_UNKNOWN = {1: 0.0, 2: 0.0, 3: 0.08}
 
 
 class Amg(Multigrid, LinearSolver):
@@ -94,7 +95,7 @@ class Amg(Multigrid, LinearSolver):
     def affordable(self) -> int:
         """Number of iterations that cost more than a factorisation and a load step with it."""
         n, size = self.K.shape[0], self.K.blocksize[0]
-        return COST + int(COST_OF_UNKNOWN[size] * n)
+        return MAX_ITERATIONS + int(COST_OF_UNKNOWN[size] * n)
 
     def improve(self, excess: float) -> bool:
         """Reduce the tolerance or, if it is near round-off, replace multigrid by a factorisation; see `LinearSolver`."""

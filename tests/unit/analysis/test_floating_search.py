@@ -8,7 +8,7 @@ from models import elastic_model
 from pairwise import first_of
 
 import fastcontact as fc
-from fastcontact.analysis.floating_bodies import MAX_POSITIONS, FloatingBodies, Freed
+from fastcontact.analysis.floating_bodies import MAX_NEWTON_ITERATIONS, FloatingBodies, Freed
 from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import prepare
 from fastcontact.analysis.solution import Solution
@@ -81,7 +81,7 @@ def test_newton_steps_that_overshoot_are_halved(start):
 def test_what_nothing_holds_is_not_slack():
     found = bodies_at(DOFS).settle(lambda position: solution(1.0), None, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
     assert not found.slack
-    assert found.positions == MAX_POSITIONS
+    assert found.positions == MAX_NEWTON_ITERATIONS
     np.testing.assert_array_equal(found.spring_force, [1.0])
 
 

@@ -76,7 +76,7 @@ def test_elimination_and_compliance_agree_and_no_column_is_asked_for(formulation
 
 def test_what_fails_on_eliminated_constraints_is_solved_on_their_compliance(monkeypatch, caplog):
     monkeypatch.setattr(eliminated, "solve", lambda *args, **options: None)
-    monkeypatch.setattr(amg, "COST", 100_000)  # columns of multigrid, not of factors
+    monkeypatch.setattr(amg, "MAX_ITERATIONS", 100_000)  # columns of multigrid, not of factors
     caplog.set_level("INFO", "fastcontact")
     model = small_blocks()
     one, other = (fc.solve(model, fc.linear_ramp(2), linear_solver=name)[-1] for name in ("direct", "amg"))

@@ -43,7 +43,7 @@ def test_multigrid_that_costs_more_than_factors_hands_over_in_time_and_says_at_w
 
 
 def test_after_factors_took_over_solutions_are_as_accurate_as_theirs(monkeypatch):
-    monkeypatch.setattr(amg, "COST", 0)
+    monkeypatch.setattr(amg, "MAX_ITERATIONS", 0)
     monkeypatch.setattr(amg, "COST_OF_UNKNOWN", {3: 0.0})
     solver, found = solved(pressed(friction=0.3, ratio=1e-3, n=6), "amg")
     assert solver.gave_up
@@ -53,7 +53,7 @@ def test_after_factors_took_over_solutions_are_as_accurate_as_theirs(monkeypatch
 
 
 def test_without_factors_that_fit_any_work_is_allowed(monkeypatch):
-    monkeypatch.setattr(amg, "COST", 0)
+    monkeypatch.setattr(amg, "MAX_ITERATIONS", 0)
     monkeypatch.setattr(amg, "COST_OF_UNKNOWN", {3: 0.0})
     monkeypatch.setattr(amg, "AFFORDABLE", {3: 100})
     solver, _ = solved(pressed(friction=0.3, n=6), "amg")
@@ -66,11 +66,11 @@ def test_work_is_that_of_one_load_step_with_changes_of_the_hierarchy(monkeypatch
     solver, _ = solved(model, "amg")
     assert solver.work > solver.counters.iterations
     monkeypatch.setattr(amg, "COST_OF_UNKNOWN", {3: 0.0})
-    monkeypatch.setattr(amg, "COST", 2 * solver.work)
+    monkeypatch.setattr(amg, "MAX_ITERATIONS", 2 * solver.work)
     again, _ = solved(model, "amg", steps=8)
     assert again.work > again.affordable
     assert not again.gave_up
-    monkeypatch.setattr(amg, "COST", solver.work // 2)
+    monkeypatch.setattr(amg, "MAX_ITERATIONS", solver.work // 2)
     assert solved(model, "amg")[0].gave_up
 
 
