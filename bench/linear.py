@@ -31,7 +31,7 @@ from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import Problem, near_nullspace, prepare
 from fastcontact.contact.configuration import Configuration
 from fastcontact.linear.krylov import krylov_kernels
-from fastcontact.linear.multigrid import smoother
+from fastcontact.linear.multigrid.level import DEGREE
 from fastcontact.linear.solvers.amg import Amg
 from fastcontact.linear.solvers.pyamg import Pyamg
 
@@ -93,7 +93,7 @@ def sphere(dofs: int) -> fc.Model:
 
 def bytes_per_iteration(solver: Amg) -> int:
     """Return what one iteration must read of matrices at least: K once, levels and prolongators as the cycle does."""
-    own = 2 * smoother.DEGREE * sum(level.A.nbytes + level.inverse.nbytes for level in solver.hierarchy.levels[:-1])
+    own = 2 * DEGREE * sum(level.A.nbytes + level.inverse.nbytes for level in solver.hierarchy.levels[:-1])
     across = 2 * sum(level.P.nbytes for level in solver.hierarchy.levels if level.P is not None)
     K = solver.K.scaled
     return K.nbytes + (0 if K.low is None else K.low.nbytes) + own + across

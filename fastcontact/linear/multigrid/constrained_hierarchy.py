@@ -20,10 +20,9 @@ from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.hierarchy import Hierarchy, Level
-from fastcontact.linear.multigrid.local_change import LocalChange, merged
+from fastcontact.linear.multigrid.local_change import LocalChange, SymmetricChange, merged
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, composed, followers
-from fastcontact.linear.multigrid.symmetric_change import SymmetricChange
 from fastcontact.linear.springs import Springs
 
 # Largest eigenvalue of ``D^-1 A`` on the finest level above which its spectrum counts as wide. It is 3 to 4 for well-shaped

@@ -22,10 +22,8 @@ from scipy.sparse import csr_matrix
 from fastcontact._jit.parallel import spread
 from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
-from fastcontact.linear.multigrid.coarse import COARSEST, Coarse
-from fastcontact.linear.multigrid.level import Level
+from fastcontact.linear.multigrid.level import COARSEST, DEGREE, SAFETY, Coarse, Level, chebyshev, largest_eigenvalue
 from fastcontact.linear.multigrid.matrix import ALL, WORK_OF_ROW, BlockMatrix, pointers
-from fastcontact.linear.multigrid.smoother import DEGREE, SAFETY, chebyshev, largest_eigenvalue
 
 
 class Hierarchy:

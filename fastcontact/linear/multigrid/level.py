@@ -1,4 +1,13 @@
-"""A level of the multigrid hierarchy: matrix, smoother, and transfer to the next coarser level."""
+"""A level of the multigrid hierarchy: matrix, smoother, and transfer to the next coarser level; solver of the coarsest level.
+
+Let A be the matrix of a level, D its diagonal blocks, and `bound` an upper bound of the eigenvalues of ``D^-1 A``. The
+smoother is a Chebyshev iteration, preconditioned by D, that reduces the components of the error that belong to eigenvalues
+between ``SMOOTHED * bound`` and `bound` (Adams, Brezina, Hu and Tuminaro, 2003). Unlike with the Gauss-Seidel method, results
+do not depend on the number of threads. `Level.relax` makes one step.
+
+The coarsest level has a dense Cholesky factor or, if aggregation stopped early so that it is large, sparse factors by
+SuperLU.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +15,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import splu
 
 from fastcontact._jit.parallel import NODES, spread
 from fastcontact.arrays import AnyArray
@@ -14,6 +25,16 @@ from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.matrix import WORK_OF_ROW, BlockMatrix
 from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions
 from fastcontact.linear.springs import Springs
+from fastcontact.round_off import ROUND_OFF
+
+# Number of Lanczos steps for the largest eigenvalue, and safety factor of its estimate.
+LANCZOS_STEPS = 8
+SAFETY = 1.08
+# Lower end of the interval of eigenvalues that is smoothed, relative to its upper end; number of Chebyshev steps.
+SMOOTHED = 1 / 24
+DEGREE = 3
+# Number of unknowns up to which a level is not coarsened. Its factors are then dense.
+COARSEST = 200
 
 
 @dataclass(eq=False)
@@ -134,3 +155,107 @@ class Level:
         """Memory of the level [bytes]."""
         total = self.A.nbytes + self.diagonal.nbytes + self.inverse.nbytes + 4 * self.b.nbytes
         return total + sum(A.nbytes for A in (self.P, self.R) if A is not None)
+
+
+def chebyshev(bound: float, degree: int) -> list[tuple[float, float]]:
+    """Return the coefficients of `degree` Chebyshev steps for eigenvalues between ``SMOOTHED * bound`` and `bound`.
+
+    The two coefficients of a step multiply the last step and the preconditioned residual, see `cycle_kernels.relax`.
+    """
+    centre, half = 0.5 * (1 + SMOOTHED) * bound, 0.5 * (1 - SMOOTHED) * bound
+    factors = [(0.0, 1.0 / centre)]
+    rho = half / centre
+    for _ in range(1, degree):
+        new = 1.0 / (2.0 * centre / half - rho)
+        factors.append((new * rho, 2.0 * new / half))
+        rho = new
+    return factors
+
+
+def largest_eigenvalue(level: Level) -> float:
+    """Return a lower estimate of the largest eigenvalue of ``D^-1 A`` by the Lanczos method.
+
+    The tridiagonal matrix of the Lanczos method follows from the coefficients of the conjugate gradient method with the
+    preconditioner D (Golub and Van Loan, Matrix Computations, 2013, section 11.3).
+    """
+    r = np.random.default_rng(0).normal(size=level.n).astype(level.b.dtype)
+    z, q, p = np.empty_like(r), np.empty_like(r), np.zeros_like(r)
+    scratch, zero = np.empty_like(r), np.zeros_like(r)
+    if level.eliminated is not None:
+        level.eliminated.move_forces(r)
+    diagonal, off_diagonal = [], []
+    old_alpha, beta, rz = 1.0, 0.0, 0.0
+    kind = r.dtype.type
+    for step in range(min(LANCZOS_STEPS, level.n)):
+        level.scale(r, kind(0), kind(1), scratch, z, True)
+        if level.free_motions is not None:
+            level.free_motions.correct(r, 1.0, scratch, z)
+        if level.eliminated is not None:
+            level.eliminated.complete(z)
+        new = float(r @ z)
+        if not new > ROUND_OFF * abs(rz):
+            break
+        beta = new / rz if step else 0.0
+        rz = new
+        p = z + kind(beta) * p
+        level.subtract_product(p, zero, q)
+        q *= -1
+        alpha = rz / float(p @ q)
+        diagonal.append(1 / alpha + beta / old_alpha)
+        off_diagonal.append(np.sqrt(beta) / old_alpha)
+        r -= kind(alpha) * q
+        old_alpha = alpha
+    T = np.diag(diagonal) + np.diag(off_diagonal[1:], 1) + np.diag(off_diagonal[1:], -1)
+    return float(np.linalg.eigvalsh(T).max()) if diagonal else 1.0
+
+
+class Coarse:
+    """Direct solver for a symmetric positive semidefinite matrix; unknowns without stiffness are set to zero.
+
+    Parameters
+    ----------
+    A : csc_array (n, n)
+
+    Attributes
+    ----------
+    matrix : csc_array (n, n)
+        The matrix A without the change by `set`.
+    """
+
+    def __init__(self, A: csc_array) -> None:
+        self.n, self.matrix = A.shape[0], A
+        self._lu: Any = None
+        self._factor: AnyArray = np.empty((0, 0))
+        self._reciprocal, self._work = np.empty(self.n), np.empty(self.n)
+        self._changed = True
+        self.set(None)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the factors [bytes]."""
+        return self._factor.nbytes if self._lu is None else 12 * int(self._lu.nnz)
+
+    def set(self, change: csc_array | None) -> None:
+        """Factorise the sum of the matrix and the symmetric matrix `change` (n, n); None means zero."""
+        if change is None and not self._changed:
+            return
+        self._changed = change is not None
+        A = self.matrix if change is None else csc_array(self.matrix + change)
+        if self.n <= COARSEST:
+            self._factor = A.toarray(order="C")
+            cycle_kernels.factorise_dense(self._factor, self._reciprocal)
+            return
+        diagonal = A.diagonal()
+        self._idle = np.flatnonzero(diagonal <= ROUND_OFF * diagonal.max())
+        active = np.ones(self.n)
+        active[self._idle] = 0.0
+        K = diags_array(active) @ A @ diags_array(active) + diags_array(1.0 - active)
+        self._lu = splu(csc_array(K), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+
+    def solve(self, b: AnyArray, x: AnyArray) -> None:
+        """Fill `x` (n,) with the solution for the right-hand side `b` (n,)."""
+        if self._lu is None:
+            cycle_kernels.solve_dense(self._factor, self._reciprocal, b, self._work, x)
+            return
+        x[:] = self._lu.solve(b.astype(float))
+        x[self._idle] = 0.0

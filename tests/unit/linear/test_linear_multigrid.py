@@ -19,11 +19,10 @@ from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.krylov import krylov_kernels
 from fastcontact.linear.krylov.iterations import ConjugateGradients
 from fastcontact.linear.multigrid import cycle_kernels
-from fastcontact.linear.multigrid.coarse import Coarse
 from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierarchy
 from fastcontact.linear.multigrid.hierarchy import Hierarchy, by_columns, graph, product
+from fastcontact.linear.multigrid.level import Coarse, chebyshev, largest_eigenvalue
 from fastcontact.linear.multigrid.matrix import BlockMatrix
-from fastcontact.linear.multigrid.smoother import chebyshev, largest_eigenvalue
 from fastcontact.linear.solvers.amg import Amg
 from fastcontact.linear.solvers.pyamg import Pyamg
 from fastcontact.linear.springs import Springs

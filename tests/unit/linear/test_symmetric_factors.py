@@ -17,8 +17,8 @@ from fastcontact.linear.cholesky.factorisation import fill_reducing, reordered
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.factor_solver import KnownLoads
 from fastcontact.linear.multigrid.hierarchy import by_columns, transposed
+from fastcontact.linear.multigrid.local_change import SymmetricChange
 from fastcontact.linear.multigrid.matrix import BlockMatrix
-from fastcontact.linear.multigrid.symmetric_change import SymmetricChange
 from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
 
