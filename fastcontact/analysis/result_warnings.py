@@ -42,8 +42,6 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 NEGLECTED = 0.1
 # Rotation [radian] beyond which linear kinematics give a warning: they neglect a strain of half its square.
 ROTATION = 0.3
-# Rotation [radian] from which its effect is compared with that of the strains.
-NOTICED = 0.02
 # Largest factor on the number of steps that is recommended; a larger one indicates a wrong coefficient.
 MANY_STEPS = 1000
 # Number of elements across the radius of a contact that resolve its pressure.
@@ -281,7 +279,7 @@ def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterato
             f"the largest rotation is {angle:.3f} radian, near {np.array2string(where, precision=4)}: linear kinematics "
             f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
         )
-    elif angle > NOTICED:
+    elif angle > 2.0 * NOTABLE:  # the part of the displacement by a rotation that they neglect is half the angle
         yield from neglected_rotation(problem, last, angle)
 
 

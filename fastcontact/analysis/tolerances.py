@@ -27,6 +27,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 # Relative residual of the solutions of a step by an iterative solver, over the last relative change of the displacements or
 # the last residual, whichever is smaller: the pairing is no more accurate. It is NOTABLE in the first solution.
 RESIDUAL = 0.03
+# With friction the tolerance decreases at least by this factor, because inaccurate linear solutions may prevent the
+# residual of the friction law from decreasing.
+LEAST_FALL = 0.2
 # Number of updates, or of Newton iterations, within which changes must decline.
 WINDOW = 8
 # Changes, or distances, below this fraction of earlier ones count as decreasing: the iteration counts as converging if those
@@ -68,8 +71,7 @@ class Tolerances:
         """
         worth = RESIDUAL * min(self._residual, relative_change)
         if RESIDUAL * law_residual > worth:
-            # Inaccurate linear solutions may prevent the residual of the friction law from decreasing.
-            worth = min(RESIDUAL * law_residual, DECLINE * self._residual)
+            worth = min(RESIDUAL * law_residual, LEAST_FALL * self._residual)
         self._residual = max(self._solver.tolerance, worth)
 
     def accuracy(self, scale: float) -> Accuracy:

@@ -14,11 +14,6 @@ from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
-# A point counts as beyond the border of an open surface if it overhangs by more than BESIDE times the size of the facet and
-# by more than this fraction of its height, so that borders on a plane of symmetry, to which facets are never exactly normal,
-# remain in contact.
-LARGEST_INCLINATION = 0.27
-
 
 @typed(ContactError)
 @dataclass(frozen=True, eq=False)
@@ -113,7 +108,9 @@ class MeshedSurface:
         normal[corrected] = offset[corrected] / distance[corrected, None]
         height = np.abs(np.einsum("nd,nd->n", offset, pseudonormal))
         overhang = np.sqrt(np.maximum(closest.distance**2 - height**2, 0.0))
-        beyond_border = on_border & (overhang > BESIDE * size) & (overhang > LARGEST_INCLINATION * height)
+        # Borders on a plane of symmetry, to which facets of a smooth surface lean by up to half of a crease, stay in contact.
+        leaning = np.tan(np.radians(0.5 * MeshedSurface.crease))
+        beyond_border = on_border & (overhang > BESIDE * size) & (overhang > leaning * height)
         return np.where(beyond_border, np.inf, distance), normal
 
     def _frames(self, closest: Closest) -> tuple[Array, Array, Mask, Mask]:

@@ -31,7 +31,8 @@ from fastcontact.linear.elimination.coupled_pivots import (
 # Smallest ratio of a pivot to the largest entry of its equation.
 SMALLEST = 0.25
 # Largest size of a block that is inverted instead of factorised, and largest size of a block that is inverted if it cannot be
-# factorised. The latter is also the largest number of equations whose pivots are chosen by a dense QR factorisation.
+# factorised (`test_many_coupled_equations_are_assigned_unknowns`). The latter is also the largest number of equations whose
+# pivots are chosen by a dense QR factorisation.
 LARGEST_BLOCK, FULL_UP_TO = 64, 500
 # Largest number of layers of equations: the inverse is a sum of that many products of sparse matrices.
 MOST_LAYERS = 4
@@ -111,7 +112,14 @@ def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInvers
     )
     diagonal.eliminate_zeros()
     beyond.eliminate_zeros()
-    return _layered_inverse(block_inverse(diagonal), beyond, layers)
+    # The inverse of a block triangular matrix is a finite Neumann series.
+    total = term = inner = block_inverse(diagonal)
+    for _ in range(layers):
+        term = csr_array(-(inner @ beyond @ term))
+        if not term.nnz:
+            return SparseInverse(total)
+        total = csr_array(total + term)
+    return None
 
 
 def of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indices | None:
@@ -233,21 +241,6 @@ def _place_in_group(group: Indices) -> Indices:
     position = np.empty(len(group), np.intp)
     position[order] = np.arange(len(group)) - np.searchsorted(group[order], group[order])
     return position
-
-
-def _layered_inverse(inner: csr_array, beyond: csr_array, layers: int) -> SparseInverse | None:
-    """Return the inverse of a block triangular matrix (m, m) as a finite Neumann series.
-
-    `inner` is the inverse of the diagonal blocks, and `beyond` contains the other blocks. None if the series has more than
-    `layers` terms.
-    """
-    total = term = inner
-    for _ in range(layers):
-        term = csr_array(-(inner @ beyond @ term))
-        if not term.nnz:
-            return SparseInverse(total)
-        total = csr_array(total + term)
-    return None
 
 
 def assigned(B: csr_array) -> Indices:

@@ -2,7 +2,7 @@
 
 The matrix of the system for displacements and multipliers, ``[A, -B.T; B, C]``, is not symmetric positive definite. It is
 solved by the conjugate residual method. The preconditioner is block lower triangular, with multigrid for A and the factors
-of ``C + SOFTER * B D^-1 B.T`` for the multipliers, where D is the diagonal of A.
+of ``C + B D^-1 B.T`` for the multipliers, where D is the diagonal of A.
 """
 
 from __future__ import annotations

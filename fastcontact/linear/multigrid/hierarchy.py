@@ -2,7 +2,7 @@
 
 Neighbouring nodes form aggregates. The tentative prolongator of an aggregate consists of the rigid-body modes, restricted
 to its nodes. One step of the block Jacobi method smooths it (Vanek, Mandel and Brezina, 1996), and the coarse matrix is the
-Galerkin product. The levels are smoothed by a Chebyshev iteration (`smoother`).
+Galerkin product. The levels are smoothed by a Chebyshev iteration (`level`).
 
 Two functions come from pyamg: `standard_aggregation` forms the aggregates, and `fit_candidates` computes an orthonormal
 basis of the rigid-body modes of each aggregate. `linear.solvers.pyamg` uses the complete multigrid method of pyamg, for
