@@ -100,7 +100,7 @@ def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Itera
             iterate.fluid[name] = wet, displaced + (before & ~wet)
         if problem.force_driven.pairs:
             rotates = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
-            moved = configuration.obstacle_motion if rotates else None
+            moved = configuration.pose.displacement - configuration.pose_start.displacement if rotates else None
             parts[name] = problem.force_driven.constraints(name, parts[name], configuration.pose.displacement, moved)
     return stacked(parts)
 

@@ -363,11 +363,8 @@ def linearised(
     """
     K, model, floating = problem.force_driven.stiffness(K), problem.model, problem.floating_bodies
     system = problem.system.renewed(K if contact is None else sum_of_blocks(K, contact))
-    solver, displacement, finite = (
-        problem.solver.near(),
-        problem.displacement(u),
-        problem.bodies and problem.bodies.finite,
-    )
+    solver, displacement = problem.solver.near(), problem.displacement(u)
+    finite = problem.bodies and problem.bodies.finite
     if floating is not None and finite:
         motions = floating.motions
         if model.kinematics != "axisymmetric":

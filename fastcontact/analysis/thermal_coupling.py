@@ -165,10 +165,8 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
                 matrix = csr_array(matrix + link.matrix(h))
             else:
                 obstacle_rise = pair.options.obstacle_temperature - problem.model.reference_temperature
-                obstacles, given = (
-                    csr_array(obstacles + link.matrix(h)),
-                    given + link.secondary.T @ (h * link.area * obstacle_rise),
-                )
+                obstacles = csr_array(obstacles + link.matrix(h))
+                given = given + link.secondary.T @ (h * link.area * obstacle_rise)
             crossings[name] = link, constraints.nodal, h, obstacle_rise, grown[pair.secondary.points]
         if pair.options.friction_heat:
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)

@@ -18,7 +18,7 @@ from scipy.sparse import csr_array, diags_array
 
 from fastcontact._tools.neighbours import nearest
 from fastcontact.analysis.solution import Solution
-from fastcontact.arrays import AnyArray, Array, Mask
+from fastcontact.arrays import AnyArray, Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
@@ -198,7 +198,10 @@ def contact_work(
     work = np.where(normal != 0.0, (1.0 + ratio) * along, np.maximum(earlier, 0.0))
     closing = pressure == 0.0
     if along[closing].any():
-        closing &= _apart(pair, at, constraints.positions)
+        # The secondary nodes nearest to these constraints were open at the beginning of the step.
+        gap = pair.nodal_gap(replace(at, displacement=at.start, pose=at.pose_start))[0]
+        apart = gap > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
+        closing &= apart[nearest(pair.points[pair.secondary.points], constraints.positions)[1]]
     touching = float(along[closing].sum())
     if solution.work is not None:
         work, touching = solution.work[rows], 0.0
@@ -206,19 +209,15 @@ def contact_work(
     over_slip = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(moved, axis=1)
     np.divide(work, mu, out=over_slip, where=mu > 0.0)
     sliding = float((along + earlier).sum())
-    moved = _relative(pair, at)
+    moved = at.displacement - at.start
+    if isinstance(pair.primary, RigidSide):  # relative to the obstacle
+        points = pair.secondary.points
+        moved[points] -= pair.carried(Candidates(points[:, None], np.ones((len(points), 1))), at)
     gained = now.kept(before, moved) + before.kept(now, moved) + now.alone(before) - before.alone(now)
     wider = np.where((now.pressing != 0.0) & (before.pressing != 0.0), now.added - before.added, 0.0)
     gained -= 0.5 * float((now.pressing + before.pressing) @ wider)
     gained -= 0.5 * float(((now.tangential + before.tangential) * moved).sum())
     return now, (friction, touching, gained - (now.stored - before.stored) - sliding), over_slip
-
-
-def _apart(pair: Formulation, at: Configuration, positions: Array) -> Mask:
-    """Return whether the secondary nodes nearest to reference positions (m, dim) were open at the beginning of the step."""
-    gap = pair.nodal_gap(replace(at, displacement=at.start, pose=at.pose_start))[0]
-    size = float(np.ptp(pair.points, axis=0).max())
-    return np.asarray(gap > LENGTH_ROUND_OFF * size)[nearest(pair.points[pair.secondary.points], positions)[1]]
 
 
 def _forces(
@@ -274,15 +273,6 @@ def _stored(constraints: Constraints, normal: Array, tangents: Array, give: Arra
     all_forces = np.column_stack([normal, tangents]).T
     along = np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)])
     return 0.5 * (total + float((along**2).sum()))
-
-
-def _relative(pair: Formulation, at: Configuration) -> Array:
-    """Return the displacements (n_points, dim) in the step; at secondary nodes relative to a rigid obstacle [length]."""
-    moved = at.displacement - at.start
-    if isinstance(pair.primary, RigidSide):
-        points = pair.secondary.points
-        moved[points] -= pair.carried(Candidates(points[:, None], np.ones((len(points), 1))), at)
-    return moved
 
 
 def _nothing(now: ContactForces) -> ContactForces:

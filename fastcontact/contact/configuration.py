@@ -62,11 +62,6 @@ class Configuration:
     linearised: Array | None = None
     friction_factor: float = 1.0
 
-    @property
-    def obstacle_motion(self) -> Array:
-        """Displacement (dim,) of a rigid obstacle in the load step [length]."""
-        return self.pose.displacement - self.pose_start.displacement
-
     @classmethod
     def displaced(cls, displacement: Array) -> Configuration:
         """Return the configuration with displacements (n_points, dim) [length] that begins with the undeformed state."""

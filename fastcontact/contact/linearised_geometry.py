@@ -240,11 +240,8 @@ class _SurfacePoints:
         # relative to the facing points, ``a_i dxi_i + g dd = dv``. The component along d is eliminated.
         along, bend = (pairing.normal[rows], bend) if closest else (self.normal, self._bend)
         frame = np.stack(tangents(along), axis=1)
-        self._closest, self._bent, self._gap = (
-            closest,
-            normals == "facet",
-            np.einsum("nd,nd->n", self.apart, along)[:, None],
-        )
+        self._closest, self._bent = closest, normals == "facet"
+        self._gap = np.einsum("nd,nd->n", self.apart, along)[:, None]
         inverse = np.linalg.inv(np.einsum("ntd,nid->nti", frame, self.axes + self._gap[:, :, None] * bend))
         self._inverse = inverse @ frame
 

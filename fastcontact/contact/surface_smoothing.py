@@ -77,10 +77,8 @@ class Smoothing:
         smooth_secondary = None if smooth_primary is None else smooth_side(secondary, points)
         if smooth_secondary is None or smooth_primary is None:
             return None
-        made, axes = (
-            cls(smooth_secondary, smooth_primary),
-            [frames(side, points, points) for side in (secondary, primary)],
-        )
+        made = cls(smooth_secondary, smooth_primary)
+        axes = [frames(side, points, points) for side in (secondary, primary)]
         middles = [points[b.facets[:, : elements.get(b.element).n_corners]].mean(axis=1) for b in secondary.blocks]
         opposite = closest_of_kinds(np.concatenate(middles), primary.corners(points)).facet
         factor = made.shared(np.arange(len(opposite)), opposite, axes)

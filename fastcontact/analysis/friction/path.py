@@ -86,7 +86,9 @@ def along(
         end, forces = 1.0, increment(1.0)
         iterations += forces.iterations
         if (waiting & (forces.gaps[0] < 0.0)).any():
-            instants, touching = _touching(now, forces.gaps[0], waiting, _together(len(slip), int(closed.sum())))
+            # In 3D as many constraints close together as a row at the edge of the closed ones has.
+            together = max(int(closed.sum() ** (1.0 - 1.0 / len(slip))), int(GROWTH * closed.sum()), 1)
+            instants, touching = _touching(now, forces.gaps[0], waiting, together)
             part = min(float(instants[touching].max()), 1.0)
             end = begin + part * (1.0 - begin)
             slip = np.where(
@@ -104,11 +106,6 @@ def along(
         settled &= forces.settled
     gaps = np.vstack([forces.gaps[:1], whole])
     return replace(forces, iterations=iterations, settled=settled), gaps, before
-
-
-def _together(k: int, closed: int) -> int:
-    """Return the number of constraints that close together: in 3D (k = 2) as many as a row at the edge of `closed` ones."""
-    return max(int(closed ** (1.0 - 1.0 / k)), int(GROWTH * closed), 1)
 
 
 def _touching(now: Array, end: Array, waiting: Mask, count: int) -> tuple[Array, Mask]:

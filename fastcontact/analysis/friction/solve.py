@@ -189,10 +189,8 @@ def _among(
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
     u = loaded.involved_solution(R.T @ y.ravel(), u)
-    full, gaps = (
-        np.zeros((1 + k, m)),
-        at_rest + np.stack([matrix @ u for matrix in (constraints.B, *constraints.tangents)]),
-    )
+    full = np.zeros((1 + k, m))
+    gaps = at_rest + np.stack([matrix @ u for matrix in (constraints.B, *constraints.tangents)])
     full[:, rows], gaps[:, rows] = y, relative
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = result.closed, result.sticking

@@ -458,11 +458,8 @@ class Formulation(ABC):
             return closer
         deformed = self.points + at.displacement
         axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
-        on_secondary, on_primary = (
-            (candidates.facet[rows], candidates.xi[rows]),
-            (pairing.facet[rows], pairing.xi[rows]),
-        )
-        closer[rows] = self.smoothing.overlap(on_secondary, on_primary, axes)
+        on_secondary = candidates.facet[rows], candidates.xi[rows]
+        closer[rows] = self.smoothing.overlap(on_secondary, (pairing.facet[rows], pairing.xi[rows]), axes)
         return closer
 
     def carried(self, candidates: Candidates, at: Configuration) -> Array:

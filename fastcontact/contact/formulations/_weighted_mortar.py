@@ -159,7 +159,13 @@ class WeightedMortar(Formulation):
         slips, additional = self._slips(rubbing, held, coverage, mean, rows, weight)
         length, between = self._closing(constraints, normal, at)
         closing = length[:, None] * between
-        slip0 = self._slip0(mean, closing, rubbing, at)
+        # The slip that is not due to displacements is that of a rigid obstacle, or minus that of closing.
+        if not isinstance(self.primary, RigidSide):
+            moved = -closing if self.slip == "symmetric" else np.zeros_like(closing)
+        else:
+            now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
+            moved = self.primary.carried(now, before, at.pose, at.pose_start)
+        slip0 = -np.stack([np.einsum("nd,nd->n", t, moved) for t in rubbing])
         for along, still, more in additional:
             remaining = closing - np.where(still, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
             apparent_slip = np.einsum("md,md->m", more @ remaining, along)
@@ -242,15 +248,6 @@ class WeightedMortar(Formulation):
             np.concatenate([np.tile(N, (len(facets), 1)), shapes.reshape(-1, N.shape[1])]),
             np.concatenate([area[facets].ravel(), np.repeat(size[cut] / count, count)]),
         )
-
-    def _slip0(self, mean: csr_array, closing: Array, directions: tuple[Array, ...], at: Configuration) -> Array:
-        """Return the slip (k, m) not due to displacements: that of a rigid obstacle, or minus that of `closing`."""
-        if not isinstance(self.primary, RigidSide):
-            moved = -closing if self.slip == "symmetric" else np.zeros_like(closing)
-        else:
-            now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-            moved = self.primary.carried(now, before, at.pose, at.pose_start)
-        return -np.stack([np.einsum("nd,nd->n", t, moved) for t in directions])
 
     def _nodal(self, weight: Array) -> WeightedPressures:
         """Return the nodal interpretation of forces; `weight` (m,) are the areas of the gaps [area]."""

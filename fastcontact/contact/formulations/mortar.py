@@ -127,23 +127,16 @@ def determined(
         kept[field.block.local[degree == 1][:, : len(field.to_corners)]] = True
     kept &= ~excluded
     for field, degree, mass in zip(fields, degrees, masses, strict=True):
-        _give_each_a_value(kept, field.block.local[degree >= 0], mass[degree >= 0], excluded)
+        # A facet without an independent node gets one: that with the largest covered area.
+        for facet in np.flatnonzero((degree >= 0) & ~kept[field.block.local].any(axis=1)):
+            nodes = field.block.local[facet]
+            if not (kept[nodes].any() or excluded[nodes].all()):
+                kept[nodes[np.argmax(np.where(excluded[nodes], -np.inf, mass[facet].sum(axis=1)))]] = True
     independent = np.flatnonzero(kept)
     values = spread(side, excluded, independent) if excluded.any() else csr_array(diags_array(kept.astype(float)))
     if any((degree[degree >= 0] < 2).any() for degree in degrees):
         values = _interpolated(csr_array(values), fields, degrees, kept, excluded)
     return csr_array(csr_array(values)[:, independent]), independent
-
-
-def _give_each_a_value(kept: Mask, local: Indices, mass: Array, excluded: Mask) -> None:
-    """Make one node independent in each facet that has no independent node, by setting `kept` (m,) in place.
-
-    The node with the largest covered area is chosen.
-    """
-    for row in np.flatnonzero(~kept[local].any(axis=1)):
-        nodes = local[row]
-        if not (kept[nodes].any() or excluded[nodes].all()):
-            kept[nodes[np.argmax(np.where(excluded[nodes], -np.inf, mass[row].sum(axis=1)))]] = True
 
 
 def _interpolated(

@@ -57,16 +57,13 @@ class NodeToSegment(Formulation):
         if self.opposite == "node" and not isinstance(self.primary, Surface):
             raise ContactError("a rigid obstacle has no nodes: leave out opposite = 'node'")
         for block in self.secondary.blocks:
-            self._check_areas(block.element)
+            # A uniform pressure on a facet must have compressive forces at all nodes.
+            if not all_nodes_carry(block.element):
+                raise ContactError(
+                    f"node_to_segment cannot have facets of {block.element} on its secondary side '{self.secondary.group}', "
+                    "whose corner nodes carry no pressure: use formulation 'continuous' or 'mortar', or swap the sides"
+                )
         self._candidates = Candidates.nodes_of(self.secondary)
-
-    def _check_areas(self, element: str) -> None:
-        """Check that a uniform pressure on a facet has compressive forces at all nodes; raise a ContactError otherwise."""
-        if not all_nodes_carry(element):
-            raise ContactError(
-                f"node_to_segment cannot have facets of {element} on its secondary side '{self.secondary.group}', "
-                "whose corner nodes carry no pressure: use formulation 'continuous' or 'mortar', or swap the sides"
-            )
 
     def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
         """Return the pairing of candidates with facets or, by the option `opposite`, with the nearest primary nodes."""

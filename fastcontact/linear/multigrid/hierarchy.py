@@ -109,10 +109,8 @@ class Hierarchy:
         tentative[member] = T.data.reshape(len(member), -1)
         del T
         omega = 4.0 / 3.0 / (level.bound / SAFETY)
-        cols, neighbours = (
-            (0,) * n_modes,
-            csr_matrix((np.ones(len(A.indices), bool), A.indices, A.indptr), shape=(n, n)),
-        )
+        cols = (0,) * n_modes
+        neighbours = csr_matrix((np.ones(len(A.indices), bool), A.indices, A.indptr), shape=(n, n))
         pattern = neighbours @ aggregates.astype(bool)
         pattern.sort_indices()
         # The prolongator is stored in the precision of the cycle before the coarse matrix is computed, so that the latter is

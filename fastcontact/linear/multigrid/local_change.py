@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 from scipy.sparse import bsr_array, csc_array, csr_array
 
-from fastcontact.arrays import AnyArray, Array, Indices
+from fastcontact.arrays import AnyArray, Indices
 from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
 from fastcontact.linear.sparse_rows import scaled
 from fastcontact.linear.springs import Springs
@@ -35,12 +35,6 @@ class LocalChange:
 
     nodes: Indices
     blocks: bsr_array
-
-    @classmethod
-    def of_diagonal(cls, nodes: Indices, blocks: Array) -> LocalChange:
-        """Return the change that consists of the diagonal `blocks` (k, size, size) of `nodes` (k,)."""
-        n = blocks.shape[0] * blocks.shape[1]
-        return cls(nodes, bsr_array((blocks, np.arange(len(nodes)), np.arange(len(nodes) + 1)), shape=(n, n)))
 
     @property
     def size(self) -> int:
@@ -142,7 +136,8 @@ class SymmetricChange:
         nodes, slot = np.unique(D.indices, return_inverse=True)
         blocks = np.zeros((len(nodes), self.size, self.size))
         np.add.at(blocks, slot[in_D], half + half.transpose(0, 2, 1))
-        return LocalChange.of_diagonal(nodes, blocks)
+        n, each = len(nodes) * self.size, np.arange(len(nodes) + 1)
+        return LocalChange(nodes, bsr_array((blocks, each[:-1], each), shape=(n, n)))
 
     @staticmethod
     def _numbers(rows: bsr_array) -> Indices:

@@ -266,7 +266,7 @@ def _store(
     The low parts overwrite the beginning of the `numbers` of all blocks.
     """
     start, low = indptr if storage is ALL else storage[0], numbers.view(np.float32)
-    end, n, widest = 0, len(indptr) - 1, widest_row(indptr)
+    end, n, widest = 0, len(indptr) - 1, int(np.diff(indptr).max(initial=0))
     while end < n:  # rows whose low parts lie before unread numbers: in parallel; otherwise few rows
         first = end
         behind = int(np.searchsorted(start, 2 * int(indptr[first]), side="right")) - 1
@@ -304,8 +304,3 @@ def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
 def pointers(count: Numbers | Indices) -> Numbers:
     """Return the row pointers (n + 1,) of rows with `count` (n,) entries."""
     return np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
-
-
-def widest_row(indptr: Numbers) -> int:
-    """Return the largest number of entries in a row."""
-    return int(np.diff(indptr).max(initial=0))
