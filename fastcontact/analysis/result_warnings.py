@@ -36,9 +36,9 @@ from fastcontact.model.rigid_motions import body_name
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
-# Work of the stresses on neglected strains over that on strains, and equivalent strain, above which linear kinematics give a
-# warning: the fraction that they neglect of a strain is about as large as that strain. So does wear of this part of
-# the size of the model.
+# Part of the frictional work that is wrong, work of the stresses on neglected strains over that on strains, and equivalent
+# strain, above which a warning is given: the fraction of a strain that linear kinematics neglect is about as large as the
+# strain. So does wear of this part of the size of the model.
 NEGLECTED = 0.1
 # Rotation [radian] beyond which linear kinematics give a warning: they neglect a strain of half its square.
 ROTATION = 0.3
@@ -48,11 +48,6 @@ MANY_STEPS = 1000
 ACROSS = 4
 # Relative residual of the displacement or of the forces above which a warning is given.
 LOOSE = 1e-4
-# A warning is given if more than this fraction of the frictional work is dissipated at nodes in the step in which they close,
-# and this part exceeds the energy, NOTABLE squared, of a notable error of the displacement, over the strain energy. Under a
-# sphere that sticks, with a coefficient of 0.6, the frictional work is 2e-4 of the strain energy in long steps, and 1e-5 if
-# slip counts from first contact.
-WHILE_TOUCHING = 0.1
 # Smallest number of nodes for which the median is meaningful.
 MANY = 10
 
@@ -146,9 +141,14 @@ def _unbalanced(state: State) -> Iterator[str]:
 
 
 def _slipping_before(state: State) -> Iterator[str]:
-    """Yield a warning where nodes that close and slide in one step do much of the frictional work."""
+    """Yield a warning where nodes that close and slide in one step do much of the frictional work.
+
+    This part must also exceed the energy of a notable error of the displacement: NOTABLE squared over the strain energy.
+    Under a sphere that sticks, with a coefficient of 0.6, the frictional work is 2e-4 of the strain energy in long steps,
+    and 1e-5 if slip counts from first contact.
+    """
     work = state.work
-    if work is not None and work.touching > max(WHILE_TOUCHING * work.friction, NOTABLE**2 * work.strain_energy, 0.0):
+    if work is not None and work.touching > max(NEGLECTED * work.friction, NOTABLE**2 * work.strain_energy, 0.0):
         share = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
         yield (
             f"{share:.0%} of the work of friction is done at nodes in the load step in which they "

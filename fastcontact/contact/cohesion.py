@@ -16,6 +16,9 @@ import numpy as np
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 
+# Default ratio of the opening at the largest traction to the opening at break.
+ELASTIC = 0.01
+
 
 @dataclass(frozen=True)
 class CohesiveLaw:
@@ -86,8 +89,8 @@ class CohesiveLaw:
 
 
 def cohesive_law(strength: float, energy: float, *, reversible: bool = False, **given: Any) -> CohesiveLaw:
-    """Return a law; by default sliding is like opening, and damage begins at a hundredth of the opening at break."""
-    stiffness = given.pop("stiffness", strength**2 / (0.02 * energy))
+    """Return a law; by default sliding is like opening, and damage begins at ELASTIC of the opening at break."""
+    stiffness = given.pop("stiffness", strength**2 / (2.0 * ELASTIC * energy))
     shear = {"shear_strength": given.pop("shear_strength", strength), "shear_energy": given.pop("shear_energy", energy)}
     return CohesiveLaw(strength, energy, stiffness, **shear, **given, reversible=reversible)
 

@@ -459,8 +459,8 @@ class Formulation(ABC):
             return closer
         deformed = self.points + at.displacement
         axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
-        on_secondary, on_primary = ((side.facet[rows], side.xi[rows]) for side in (candidates, pairing))
-        closer[rows] = self.smoothing.overlap(on_secondary, on_primary, axes)
+        on_secondary = candidates.facet[rows], candidates.xi[rows]
+        closer[rows] = self.smoothing.overlap(on_secondary, (pairing.facet[rows], pairing.xi[rows]), axes)
         return closer
 
     def rise(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
