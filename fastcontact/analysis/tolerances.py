@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
-from fastcontact.analysis.criteria import NOTABLE, Criteria
+from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.arrays import Array
 from fastcontact.linear.protocol import LinearSolver
@@ -160,7 +160,7 @@ class Watch:
         # Displacements that move in one direction are apart by about WINDOW changes.
         if declining or scatter.displacement * size > half * float(np.median(changes)):
             return None
-        acceptable = scatter.displacement <= SINGLE_PRECISION and scatter.force <= NOTABLE
+        acceptable = scatter.displacement <= SINGLE_PRECISION and scatter.force <= 100 * SINGLE_PRECISION
         return scatter if acceptable else None
 
     def forget(self) -> None:

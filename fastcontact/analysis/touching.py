@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.inequalities import Iterate, StepContext, pair_surfaces
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
@@ -17,7 +18,7 @@ from fastcontact.analysis.solution import Path, Solution
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
-from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Shear of nodes that close and slide, relative to the friction capacity, that is neglected by default.
 NEGLIGIBLE = 1e-3
@@ -31,7 +32,7 @@ class Touching:
     step : StepContext
     newton : bool
         Whether the geometry converges quadratically. The increments are then solved once it has nearly converged, otherwise
-        once it has; the slips of all but the last increment are no more accurate.
+        once it has.
 
     Attributes
     ----------
@@ -44,7 +45,7 @@ class Touching:
     """
 
     def __init__(self, step: StepContext, newton: bool) -> None:
-        self._allowed, self._near = _allowed(step.problem), SINGLE_PRECISION if newton else 0.0
+        self._allowed, self._near = _allowed(step.problem), NOTABLE if newton else 0.0
         self.due = self.done = self.unfinished = False
 
     def step(
