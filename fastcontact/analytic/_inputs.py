@@ -31,7 +31,7 @@ def number(name: str, value: object) -> float:
 
 
 def array(name: str, values: ArrayLike) -> Array:
-    """Return `values` (...), in the unit of the quantity, as floats (...), or raise ModelError."""
+    """Return `values` (...) [unit of the quantity] as floats (...) [unit of the quantity], or raise ModelError."""
     if is_masked(values):
         raise ModelError(f"{name} {REFUSAL}")
     try:
