@@ -47,7 +47,7 @@ def integrated(secondary, primary, kinds, reference=None, heights=None):
     origin, axes = planes(corners)
     to_terms, other_to_terms = tables(one.n_nodes).to_terms, tables(other.n_nodes).to_terms
     reference = secondary if reference is None else reference
-    mass = np.empty((len(secondary), one.n_nodes, one.n_nodes))
+    of_pairs = np.empty((len(pairs), one.n_nodes, one.n_nodes))
     coupling = np.empty((len(pairs), one.n_nodes, other.n_nodes))
     closer = np.empty((len(secondary), one.n_nodes))
     above = [np.tile(powers, (len(side), 1, 1)) for powers, side in zip(
@@ -59,9 +59,11 @@ def integrated(secondary, primary, kinds, reference=None, heights=None):
         corners, one.n_corners, origin, axes, to_terms @ secondary, to_terms @ reference, to_terms,
         one.nodes[: one.n_corners].mean(axis=0), opposite, other.n_corners, other_to_terms @ primary,
         other_to_terms, other.nodes[: other.n_corners].mean(axis=0), pairs, *quadrature.triangle(8), *above, factor,
-        mass, coupling, closer,
+        of_pairs, coupling, closer,
     )  # fmt: skip
     assert wrong == -1
+    mass = np.zeros((len(secondary), *of_pairs.shape[1:]))
+    np.add.at(mass, pairs[:, 0], of_pairs)
     return (pairs, mass, coupling) if heights is None else (pairs, mass, coupling, closer)
 
 
