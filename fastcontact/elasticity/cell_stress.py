@@ -60,8 +60,8 @@ class CellStress:
     def at(self, name: str, xi: Array, cells: Numbers, material: Numbers, rows: Indices) -> Array:
         """Return the stresses (n_cells, n, n_components) [pressure] at points `xi` (n, dim) [-] of cells of an element.
 
-        The integer arrays are the nodes `cells` (n_cells, n_nodes), the numbers `rows` (n_cells,) of the cells, and
-        `material`, the material number of each cell (n_cells,) or of each quadrature point (n_cells, n_q).
+        The integer arrays are the nodes `cells` (n_cells, n_nodes), the numbers `rows` (n_cells,) of the cells, and the
+        material numbers `material` (n_cells,) of cells, or (n_cells, n_q) of quadrature points.
         """
         out = np.empty((len(cells), len(xi), self._moduli.shape[1]))
         self.fill(name, xi, cells, material, out, rows)

@@ -23,9 +23,9 @@ def elastic_energy(stress: Array, compliance: Array) -> Array:
 
 
 def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Array:
-    """Return det J (n_cells, n_q), the ratio of the volume of a cell to that of the reference cell at its points.
+    """Return det J (n_cells, n_q) [length^dim], the ratio of volumes in a cell and in the reference cell at its points.
 
-    The unit is length^dim. In axisymmetry, det J is multiplied by the circumference 2 pi r, and the unit is length^3.
+    In axisymmetry, det J is multiplied by the circumference 2 pi r [length^3].
 
     The arguments are the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], the shape functions
     `N` (n_q, n_nodes) [-], and their derivatives `dN` (n_q, n_nodes, dim) [-].

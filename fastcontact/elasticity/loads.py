@@ -294,7 +294,7 @@ def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:
 
 
 def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
-    """Return the facets `block` (n, n_nodes) of an element type with normals that point out of the solid.
+    """Return the facets (n, n_nodes) of `block` (n, n_nodes), oriented such that their normals point out of the solid.
 
     Raises ModelError if a facet does not lie on the outside of a solid; the message names the `group`.
     """

@@ -67,9 +67,9 @@ class TemporaryConstraint(MultiPointConstraint):
         return self.begins <= begin < self.ends
 
     def after(self, reached: Array) -> list[MultiPointConstraint]:
-        """Return the constraints that continue from `reached` (m,), the values of ``rows @ u`` at the beginning.
+        """Return the constraints that continue from `reached` (m,) [length], the values of ``rows @ u`` at the beginning.
 
-        The unit of `reached` is length times the unit of the coefficients.
+        If coefficients have a unit, that of `reached` is multiplied by it.
         """
         if self.keeps:
             return [MultiPointConstraint(self.name, self.rows, reached, ((0.0, 1.0),))]
@@ -94,8 +94,8 @@ class Elimination:
     S : csr_array (n, m)
         Derivatives of the pivots with respect to the right-hand sides [length / unit of r].
     conditions : csr_array (k, n + m)
-        Rows that only involve known components and right-hand sides: solutions exist if ``conditions @ (w, r) = 0``.
-        Coefficients of components have the unit of R, and those of right-hand sides are dimensionless.
+        Rows that only involve known components [unit of R] and right-hand sides [-]: solutions exist if
+        ``conditions @ (w, r) = 0``.
     origin : ndarray of int (k,)
         Row of R from which each condition originates.
     """

@@ -196,7 +196,7 @@ class OwnConstants(Hyperelastic):
     Parameters
     ----------
     volumetric, density, expansion, conductivity
-        As for `LinearElastic`.
+        Further properties, as for `LinearElastic`.
     """
 
     E: Constant = field(init=False, default=0.0)

@@ -79,7 +79,7 @@ def joined(
 ) -> Springs:
     """Return springs between pairs of the `points` (n_points, dim) [length].
 
-    `ends` contains the first and the second points, (n,) of int each. Springs act along each axis in `stiffness`
+    `ends` (n,) of int each are the first and the second points of the pairs. Springs act along each axis in `stiffness`
     [force / length]; those with the stiffnesses ``along["axial"]`` and ``along["transverse"]`` [force / length] act along
     and across the line of a pair, or the unit vector `direction` (dim,) [-]. Raises ModelError if the points of a pair are
     the same point, or coincide where the line between them is needed.
@@ -128,7 +128,7 @@ def _directions(
 
 
 def stiffened(K: bsr_array, springs: Sequence[Springs]) -> bsr_array:
-    """Return the sum (n, n) of the stiffness matrix `K` (n, n) and the stiffness of springs [force / length]."""
+    """Return the stiffness matrix `K` (n, n) [force / length] plus that of the springs, (n, n) [force / length]."""
     if not springs:
         return K
     return sum_of_blocks(K, spring_stiffness(springs, K.shape[0]))

@@ -176,8 +176,8 @@ def is_isotropic(moduli: Array) -> Mask:
 def of_cells(material: Numbers) -> Numbers:
     """Return one material number for each cell, shape (n_cells,) of int.
 
-    The numbers `material` are given for cells (n_cells,) and returned unchanged, or for quadrature points (n_cells, n_q), of
-    which the first one counts.
+    The numbers `material` (n_cells,) of cells are returned unchanged; of numbers at quadrature points (n_cells, n_q), the
+    first one of each cell is returned.
     """
     return material if material.ndim == 1 else np.ascontiguousarray(material[:, 0])
 
@@ -259,8 +259,8 @@ def rigid_modes(points: Array, kinematics: str) -> Array:
     """Return the rigid-body modes (n_points * dim, n_modes) at `points` (n_points, dim) [length].
 
     The columns are the translation along the axis in axisymmetry, two translations and one rotation in plane models, and
-    three translations and three rotations in 3D. Translations are dimensionless, and rotations, about the mean of the points,
-    have the unit of length.
+    three translations and three rotations in 3D. The unit of translations is [-], and that of rotations, about the mean of
+    the points, [length].
     """
     (n, dim), x = points.shape, points - points.mean(axis=0)
     planes = [(0, 1)] if dim == 2 else [(1, 2), (2, 0), (0, 1)]
