@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
-from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.criteria import NOTABLE, Criteria
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.arrays import Array
 from fastcontact.linear.protocol import LinearSolver
