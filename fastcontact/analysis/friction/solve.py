@@ -199,8 +199,9 @@ def _with_chosen(
     mu = np.where(equations, 0.0, mu)
     at_end = replace(result, sticking=result.sticking & ~equations)
     return Solution(
-        u, all_forces[0], gaps[0], active, active, result.settled, result.iterations, all_forces[1:].T,
-        gaps[1:].T, sticking, result.residual, constraints.directions, slid=None if before is None else _slid(before, Q, rows, constraints),
+        u, all_forces[0], gaps[0], active, active, result.settled, result.iterations, all_forces[1:].T, gaps[1:].T,
+        sticking, result.residual, constraints.directions,
+        slid=None if before is None else _slid(before, Q, rows, constraints),
         response=partial(_response, loaded, (R, rows, Q), idle_slips, (F, Law(mu, equations), at_end)),
     )  # fmt: skip
 
