@@ -139,7 +139,9 @@ def _settle(
         # Constraints of several pairs, or of both ends of a period, may be at one node.
         ends = problem.model.periodic_interfaces
         nodes = SharedNodes.of(constraints, ends) if len(problem.pairs) > 1 or ends else None
-        merged, closed = (constraints, active) if nodes is None else (nodes.once(constraints), nodes.closed(active))
+        merged, closed = (
+            (constraints, active) if nodes is None else (nodes.merged_constraints(constraints), nodes.closed(active))
+        )
         step_on_path = touching.step(step, constraints, iterate, nodes)
         if touching.unfinished:
             accuracy = Accuracy(0.0, residual=problem.solver.tolerance)
@@ -337,7 +339,7 @@ def newton_step(
             forces, slips = part.along(nodal)
             gaps[: len(slips), rows] = slips
             force[: forces.size] += forces.ravel()
-        merged = gaps if nodes is None else nodes.merged(gaps)
+        merged = gaps if nodes is None else nodes.merged_gaps(gaps)
         return step.dofs.varied(respond(step.dofs.reduced(force), merged))
 
     changed = (image - before)[where]

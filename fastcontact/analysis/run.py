@@ -14,7 +14,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.problem import Problem, prepare
 from fastcontact.analysis.progress import Progress
 from fastcontact.analysis.result_warnings import result_warnings
-from fastcontact.analysis.stages import go_on, stage_of
+from fastcontact.analysis.stages import next_stage, stage_of
 from fastcontact.errors import ModelError, warn
 from fastcontact.linear.choice import DIRECT_UP_TO, check_tolerance
 from fastcontact.linear.protocol import TOLERANCE
@@ -192,7 +192,7 @@ def _solved_steps(
     if last is not None:
         begin, before, last = last.load_factor, last.index, None  # to free the memory of the step
     for index, instant in enumerate(instants, start=before + 1):
-        problem, state = go_on(prepare_model, model, problem, state, begin)
+        problem, state = next_stage(prepare_model, model, problem, state, begin)
         state, step = step_halving.advance(problem, state, index, begin, instant)
         free = free or (index, step.iterations.get("regularised", {}).get("undetermined", {}))
         free = free if free[1] else None
