@@ -346,5 +346,5 @@ def _rows(problem: Problem, contact: ContactResult, interface: PeriodicInterface
     """Return the rows, in a contact result, of first and second nodes of a periodic interface that both are its nodes."""
     row_of_node = np.full(problem.model.mesh.n_points, -1, np.intp)
     row_of_node[contact.points] = np.arange(len(contact.points))
-    both = (row_of_node[interface.first] >= 0) & (row_of_node[interface.second] >= 0)
-    return row_of_node[interface.first[both]], row_of_node[interface.second[both]]
+    on_side = (row_of_node[interface.first] >= 0) & (row_of_node[interface.second] >= 0)
+    return row_of_node[interface.first[on_side]], row_of_node[interface.second[on_side]]

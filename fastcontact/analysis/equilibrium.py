@@ -206,10 +206,10 @@ class Terms:
                 force, tangent = (lambda u, index=index, at=pressure.at: at(u)[index] for index in (0, 1))
                 self._terms.append(FollowingForce(problem, force, tangent, np.zeros_like(start.u), factor))
 
-    def residual(self, u: Array, more: Sequence[Term] = ()) -> tuple[Array, Energies]:
-        """Return the sums of the nodal forces and of the energies of all terms, including the terms `more`; see `Term`."""
+    def residual(self, u: Array, others: Sequence[Term] = ()) -> tuple[Array, Energies]:
+        """Return the sums of the nodal forces and of the energies of all terms, including the terms `others`; see `Term`."""
         force, energy = self._terms[0].residual(u)
-        for term in (*self._terms[1:], *more):
+        for term in (*self._terms[1:], *others):
             added, stored = term.residual(u)
             force, energy = force + added, (energy[0] + stored[0], energy[1] + stored[1])
         return force, energy

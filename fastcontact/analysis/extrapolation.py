@@ -87,15 +87,15 @@ class Extrapolation:
 
     def _continued(self, degree: int) -> Array:
         """Return the displacements (n,) of the polynomial through the last ``degree + 1`` states, at the current load."""
-        states, out = [u for u, _ in self.states[-degree - 1 :][::-1]], self.states[-1][0]
+        states, extrapolated = [u for u, _ in self.states[-degree - 1 :][::-1]], self.states[-1][0]
         increments = 1.0 / np.cumprod([1.0, *self.ratios[len(self.ratios) - degree : -1][::-1]])
         loads = np.concatenate(
             [[0.0], -np.cumsum(increments)]
         )  # relative to the last load, in units of the last increment
         for k in range(1, degree + 1):  # Lagrange polynomials
             others = np.delete(loads[: degree + 1], k)
-            out = out + np.prod((self.ratio - others) / (loads[k] - others)) * (states[k] - states[0])
-        return out
+            extrapolated = extrapolated + np.prod((self.ratio - others) / (loads[k] - others)) * (states[k] - states[0])
+        return extrapolated
 
     def active(self, name: str, last_active: Mask) -> Mask:
         """Return the initial active set (m,) of the pair `name`; without extrapolation `last_active` (m,)."""

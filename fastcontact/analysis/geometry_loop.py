@@ -344,31 +344,33 @@ def newton_step(
 
     changed = (image - before)[where]
     system = LinearOperator((len(changed),) * 2, matvec=lambda v: v - varied(v)[where], dtype=float)
-    size = largest(changed) or 1.0
+    largest_change = largest(changed) or 1.0
     # With the tolerance `accuracy` itself, load steps of plastic bodies take 10 % more pairings.
-    v, _ = gmres(system, changed / size, rtol=max(SINGLE_PRECISION, NOTABLE * accuracy), atol=0.0, maxiter=1)
-    response_size = largest_difference(size * v, changed)
+    v, _ = gmres(system, changed / largest_change, rtol=max(SINGLE_PRECISION, NOTABLE * accuracy), atol=0.0, maxiter=1)
+    response_size = largest_difference(largest_change * v, changed)
     # Far from the solution, a step in which the response exceeds the change itself is unreliable.
-    if not response_size <= size:
+    if not response_size <= largest_change:
         return None
     next_pairing, determined = image.copy(), step.dofs.determined
     if len(determined) > len(where):  # there are springs of floating bodies
-        next_pairing[determined] += size * varied(v)[determined]
+        next_pairing[determined] += largest_change * varied(v)[determined]
     else:
-        next_pairing[where] = before[where] + size * v
-    return next_pairing, response_size / (size * largest(v) or 1.0)
+        next_pairing[where] = before[where] + largest_change * v
+    return next_pairing, response_size / (largest_change * largest(v) or 1.0)
 
 
 def _linearised(
     constraints: StackedConstraints, solution: Solution, displacement: Array
 ) -> list[tuple[slice, Linearised]]:
     """Return the rows and the linearised geometry of each pair in contact; empty if one of them has no derivatives."""
-    parts = []
+    geometries = []
     for name, rows in constraints.rows.items():
         part, multiplier = constraints.parts[name], solution.multiplier[rows]
         if part.tied is not None or not multiplier.any():
             continue
         if part.geometry is None:
             return []
-        parts.append((rows, part.geometry(multiplier, solution.tangential[rows, : len(part.tangents)], displacement)))
-    return parts
+        geometries.append(
+            (rows, part.geometry(multiplier, solution.tangential[rows, : len(part.tangents)], displacement))
+        )
+    return geometries

@@ -203,10 +203,10 @@ class Heat:
 
     def _check_reached(self, contact: csr_array | None, films: csr_array) -> None:
         """Raise ConvergenceError if the temperature of a body is undetermined."""
-        held = self.merged @ self.fixed + films.diagonal() > 0.0
+        determined = self.merged @ self.fixed + films.diagonal() > 0.0
         pairs = coo_array(self.merged if contact is None else self.merged + contact)
         joined = np.stack([pairs.row, pairs.col], axis=1)[pairs.data != 0.0]
-        cut_off = not_reached(self.body, held, joined)
+        cut_off = not_reached(self.body, determined, joined)
         if len(cut_off):
             raise ConvergenceError(
                 f"no heat reaches body {body_name(self.model.mesh, self.body, cut_off[0])}: its contacts are open or conduct "

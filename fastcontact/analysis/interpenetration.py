@@ -58,8 +58,8 @@ def _without_contact(
     mesh = problem.model.mesh
     _, body = bodies(mesh)
     texts: dict[frozenset[int], str] = {}
-    for number, other, points, depth in sorted(overlaps, key=lambda entry: -float(entry[3].max())):
-        body_pair, row = frozenset((number, other)), int(np.argmax(depth))
+    for first, second, points, depth in sorted(overlaps, key=lambda entry: -float(entry[3].max())):
+        body_pair, row = frozenset((first, second)), int(np.argmax(depth))
         if (
             body_pair not in between
             and body_pair not in texts
@@ -67,7 +67,7 @@ def _without_contact(
         ):
             where = mesh.points[points[row]]
             texts[body_pair] = (
-                f"bodies {body_name(mesh, body, number)} and {body_name(mesh, body, other)} interpenetrate by "
+                f"bodies {body_name(mesh, body, first)} and {body_name(mesh, body, second)} interpenetrate by "
                 f"{depth[row]:.6g} near {np.array2string(where, precision=4)}, and no contact is defined between them: "
                 "add_contact for the groups that meet"
             )
@@ -85,10 +85,10 @@ def _beside_contact(
         if not entries or any(problem.pairs[name].options.wear for name in names):  # worn material is still in the mesh
             continue
         points, depth = np.concatenate([entry[2] for entry in entries]), np.concatenate([entry[3] for entry in entries])
-        held, faced = (mask[points] for mask in _held(problem, last, names))
+        secondary, primary = (mask[points] for mask in _points_of_sides(problem, last, names))
         deformed = max(float(np.ptp(last.displacement[body == number], axis=0).max()) for number in body_pair)
-        limit = max(NOTABLE * deformed, HELD * float(depth[held].max(initial=0.0)))
-        depth[held | faced] = 0.0
+        limit = max(NOTABLE * deformed, HELD * float(depth[secondary].max(initial=0.0)))
+        depth[secondary | primary] = 0.0
         row = int(np.argmax(depth))
         if depth[row] > limit and depth[row] - _at_rest(problem, entries, int(points[row])) > limit:
             label = " and ".join(body_name(mesh, body, number) for number in sorted(body_pair))
@@ -98,22 +98,22 @@ def _beside_contact(
     return texts
 
 
-def _held(problem: Problem, last: StepResult, names: Sequence[str]) -> tuple[Mask, Mask]:
+def _points_of_sides(problem: Problem, last: StepResult, names: Sequence[str]) -> tuple[Mask, Mask]:
     """Return masks (n_points,) of secondary points that face the other side or are excluded, and of all primary points."""
-    held, faced = np.zeros((2, problem.model.mesh.n_points), bool)
+    secondary, primary = np.zeros((2, problem.model.mesh.n_points), bool)
     for name in names:
         pair = problem.pairs[name]
         facing = np.isfinite(last.contact[name].gap) | pair.options.excluded_nodes(pair.secondary)
-        held[pair.secondary.points[facing]] = True
-        faced[pair.primary.points] = True
-    return held, faced
+        secondary[pair.secondary.points[facing]] = True
+        primary[pair.primary.points] = True
+    return secondary, primary
 
 
 def _at_rest(problem: Problem, overlaps: Sequence[Inside], point: int) -> float:
     """Return the depth of a point of one of two bodies in the other before any load [length]."""
     mesh = problem.model.mesh
-    for number, other, points, depth in depths(mesh, problem.model.kinematics, mesh.points):
-        if any((number, other) == entry[:2] for entry in overlaps) and point in points:
+    for first, second, points, depth in depths(mesh, problem.model.kinematics, mesh.points):
+        if any((first, second) == entry[:2] for entry in overlaps) and point in points:
             return float(depth[points == point][0])
     return 0.0
 

@@ -143,10 +143,10 @@ class _Newton:
             if history and fraction == 1.0 and balanced.excess > 1.0:
                 u, fraction = self._line_search(before, u, contact_force)
                 balanced = self._balanced(u, contact_force, before) if fraction < 1.0 else balanced
-            moved = largest_difference(u, before)
-            changes.append(self._relative(moved, u))
+            change = largest_difference(u, before)
+            changes.append(self._relative(change, u))
             history.append(_history_entry(self._iterate, changes[-1], balanced, fraction))
-            small = self._has_converged(changes) or moved <= self._start.gap_round_off
+            small = self._has_converged(changes) or change <= self._start.gap_round_off
             if fraction == 1.0 and balanced.excess <= 1.0 and small:
                 return StepEquilibrium(self._settled, u, balanced, self._terms, history)
             self._moved_fully = fraction == 1.0 and not self._regularisation.linear
@@ -174,10 +174,10 @@ class _Newton:
         balanced.check(self._begin.index, self._problem, self._iterate.history)
         return True
 
-    def _relative(self, moved: float, u: Array) -> float:
-        """Return the largest change of displacements to u (n_dofs,), `moved` [length], relative to their size."""
+    def _relative(self, change: float, u: Array) -> float:
+        """Return the largest `change` [length] of displacements, relative to the largest displacement, after it u (n_dofs,)."""
         size = max(map(largest, (u, self._load.lift, self._start.u)))
-        return moved / size if size else 0.0
+        return change / size if size else 0.0
 
     @property
     def _tolerance(self) -> float:
@@ -329,7 +329,7 @@ class _Newton:
         and along the slips of sticking constraints. These displacements hardly change as iterations converge, so that the
         springs affect iterations only to second order (as in the augmented Lagrangian method: Alart and Curnier, 1991).
         """
-        parts = [fluid.tangent(u) for fluid in self._fluid(u)]
+        matrices = [fluid.tangent(u) for fluid in self._fluid(u)]
         if regularisation.held and self._settled is not None:
             constraints, solution = self._settled.constraints, self._settled.solution
             dry = np.concatenate([part.contact_forces(np.ones(len(part))) for part in constraints.parts.values()])
@@ -338,10 +338,10 @@ class _Newton:
             rows = csr_array(vstack([constraints.B[np.flatnonzero(closed)], *sticking_rows]))
             squares = np.asarray(rows.multiply(rows).sum(axis=1)).ravel()  # zero for tangents of pairs without friction
             stiffness = regularisation.held * float(K.diagonal().max()) / np.where(squares > 0.0, squares, np.inf)
-            parts.append(csr_array(rows.T @ diags_array(stiffness) @ rows))
-        for part in parts:
-            part.resize((len(u), len(u)))
-        return sum(parts[1:], parts[0]) if parts else None
+            matrices.append(csr_array(rows.T @ diags_array(stiffness) @ rows))
+        for matrix in matrices:
+            matrix.resize((len(u), len(u)))
+        return sum(matrices[1:], matrices[0]) if matrices else None
 
     def _fluid(self, at: Array) -> list[FollowingForce]:
         """Return the fluid pressures of the last contact that follow bodies, linearised `at` displacements (n_dofs,)."""

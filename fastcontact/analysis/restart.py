@@ -95,7 +95,7 @@ def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> Sta
 def _slips_from_tractions(problem: Problem, pairs: Mapping[str, Any]) -> dict[str, tuple[Array, Array]]:
     """Return the elastic slips [length] of pairs with a penalty from files that contain tangential tractions instead."""
     slips = {}
-    for name in [name for name, kept in pairs.items() if kept.get("traction")]:
+    for name in [name for name, data in pairs.items() if data.get("traction")]:
         (positions, traction), stiffness = pairs[name]["traction"], problem.pairs[name].options.tangential_penalty
         if stiffness is None:
             raise ValueError(f"tractions of contact '{name}', which has no tangential penalty")
@@ -123,10 +123,10 @@ def remaining(ramp: Ramp, last: StepResult | None) -> list[float]:
     return [t for t in ramp.instants if t > end and abs(t - end) > ROUND_OFF * max(abs(t), abs(end))]
 
 
-def _history(table: Sequence[Sequence[float]], end: float, other: Sequence[Sequence[float]]) -> list[float]:
+def _history(table: Sequence[Sequence[float]], end: float, other_table: Sequence[Sequence[float]]) -> list[float]:
     """Return the multipliers of a load at `end` and at earlier breakpoints of either of two tables."""
     rows = tuple((float(t), float(value)) for t, value in table)
-    instants = sorted({*(t for t, _ in (*rows, *other) if t < end), end})
+    instants = sorted({*(t for t, _ in (*rows, *other_table) if t < end), end})
     return [float(f"{table_value(rows, t):.12g}") for t in instants]
 
 

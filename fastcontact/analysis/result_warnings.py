@@ -102,8 +102,8 @@ def _undetermined_tractions(pair: Formulation, contact: ContactResult, undetermi
 
     `undetermined` (n_nodes,) are the nodes of such facets.
     """
-    near = contact.gap <= LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
-    nodes = undetermined & (contact.active | near | pair.options.always_closed)
+    nearly_closed = contact.gap <= LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
+    nodes = undetermined & (contact.active | nearly_closed | pair.options.always_closed)
     count = sum(int(nodes[block.local].all(axis=1).sum()) for block in pair.secondary.blocks)
     if count:
         where = np.array2string(pair.points[pair.secondary.points[nodes]].mean(axis=0), precision=4)
@@ -182,7 +182,7 @@ def _loose(problem: Problem, last: StepResult) -> Iterator[str]:
             f"the contact geometry counts as converged although the displacement still changed by {change:.1e} of its "
             f"largest component (Criteria.geometry = {criteria.geometry:g}): results are no more accurate than that"
         )
-    flipped = next((before for before, after in pairwise(history) if "rounded" in after), None)
+    flipped = next((previous for previous, following in pairwise(history) if "rounded" in following), None)
     if flipped is not None:
         yield (
             "nodes alternated between two facets of the primary side, which changed the displacement by "

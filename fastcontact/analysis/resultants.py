@@ -394,36 +394,36 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     array([0., 2.])
     """
     _check(model, step)
-    n, (held, _) = model.n_dofs, model.prescribed()
+    n, (supported, _) = model.n_dofs, model.prescribed()
     related = [relation for _, relation in model.related_supports]
     coupling = [relation for relation in model.relations if not any(relation is other for other in related)]
     reaction = step.reaction.ravel() - ground_force(model.springs, step.displacement.ravel())
     rows = [relation.rows for relation in (*related, *coupling)]
     rows += [section.row(n) for section in model.pretensions]  # a locked section transmits a force like a constraint
-    forces = multipliers(reaction, rows, held.ravel())
+    forces = multipliers(reaction, rows, supported.ravel())
     reaction = reaction - sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(n))
     by_support: dict[str, Array] = {}
-    unassigned = np.where(held, reaction.reshape(held.shape), 0.0)
+    unassigned = np.where(supported, reaction.reshape(supported.shape), 0.0)
     for support in model.supports:
         nodes, k = model.mesh.points_of(support.group), support.component
-        by_support.setdefault(support.group, np.zeros(held.shape[1]))[k] += unassigned[nodes, k].sum()
+        by_support.setdefault(support.group, np.zeros(supported.shape[1]))[k] += unassigned[nodes, k].sum()
         unassigned[nodes, k] = 0.0
     for (group, relation), force in zip(model.related_supports, forces, strict=False):
-        resultant = (relation.rows.T @ force).reshape(held.shape).sum(axis=0)
+        resultant = (relation.rows.T @ force).reshape(supported.shape).sum(axis=0)
         by_support[group] = by_support.get(group, 0.0) + resultant
     return by_support
 
 
-def multipliers(reaction: Array, rows: Sequence[csr_array], held: Mask) -> list[Array]:
+def multipliers(reaction: Array, rows: Sequence[csr_array], supported: Mask) -> list[Array]:
     """Return the Lagrange multipliers (m,) of multi-point constraints with rows (m, n_dofs) [force].
 
     They follow from the balance of forces at components without supports. `reaction` (n_dofs,) contains the forces of
-    supports and constraints [force], and `held` (n_dofs,) marks the components with supports.
+    supports and constraints [force], and `supported` (n_dofs,) marks the components with supports.
     """
     if not rows:
         return []
-    free = csr_array(csr_array(vstack(rows, format="csr"))[:, np.flatnonzero(~held)])
-    multiplier = lsqr(free.T, reaction[~held], atol=1e-14, btol=1e-14, iter_lim=20 * sum(free.shape))[0]
+    free = csr_array(csr_array(vstack(rows, format="csr"))[:, np.flatnonzero(~supported)])
+    multiplier = lsqr(free.T, reaction[~supported], atol=1e-14, btol=1e-14, iter_lim=20 * sum(free.shape))[0]
     return np.split(multiplier, np.cumsum([block.shape[0] for block in rows])[:-1])
 
 

@@ -187,11 +187,11 @@ def _solved_steps(
         warn(text)
     doubtful += problem.doubtful
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
-    begin, before = problem.ramp.table[0][0], 0
+    begin, last_index = problem.ramp.table[0][0], 0
     free: tuple[int, dict[str, list[str]]] | None = None  # first step in which nothing determines positions
     if last is not None:
-        begin, before, last = last.load_factor, last.index, None  # to free the memory of the step
-    for index, instant in enumerate(instants, start=before + 1):
+        begin, last_index, last = last.load_factor, last.index, None  # to free the memory of the step
+    for index, instant in enumerate(instants, start=last_index + 1):
         problem, state = next_stage(prepare_model, model, problem, state, begin)
         state, step = step_halving.advance(problem, state, index, begin, instant)
         free = free or (index, step.iterations.get("regularised", {}).get("undetermined", {}))

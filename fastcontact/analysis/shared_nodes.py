@@ -107,15 +107,15 @@ class SharedNodes:
     def _tangents(self, constraints: Constraints) -> tuple[csr_array, ...]:
         """Return the rows (m, n_dofs) of the mean slip of each representative along its own tangents."""
         products = np.einsum("mjd,mkd->jkm", self.frame, self.frame[self.representative])
-        sums = [[self._summation(self.tangential_fraction * each) for each in along] for along in products]
+        sums = [[self._summation(self.tangential_fraction * factor) for factor in factors] for factors in products]
         return tuple(
-            csr_array(sum(each[k] @ T for each, T in zip(sums, constraints.tangents, strict=True)))
+            csr_array(sum(matrices[k] @ T for matrices, T in zip(sums, constraints.tangents, strict=True)))
             for k in range(len(sums))
         )
 
-    def _mean(self, along: Array, weight: Array) -> Array:
+    def _mean(self, components: Array, weight: Array) -> Array:
         """Return the weighted means, along the representatives' tangents, of components along the tangents (m, k)."""
-        vectors = np.einsum("mk,mkd->md", weight[:, None] * along, self.frame)
+        vectors = np.einsum("mk,mkd->md", weight[:, None] * components, self.frame)
         return np.einsum("md,mkd->mk", self.summed(vectors), self.frame)
 
     def merged_gaps(self, gaps: Array) -> Array:
@@ -145,9 +145,9 @@ class SharedNodes:
         active = solution.active[representative]
         frame = self.frame
 
-        def along_own_tangents(along: Array) -> Array:
-            at_first = np.einsum("md,mkd->mk", np.einsum("mk,mkd->md", along, frame)[representative], frame)
-            return np.where(self.idle[:, None], at_first, along)
+        def along_own_tangents(components: Array) -> Array:
+            at_first = np.einsum("md,mkd->mk", np.einsum("mk,mkd->md", components, frame)[representative], frame)
+            return np.where(self.idle[:, None], at_first, components)
 
         return replace(
             solution,
@@ -267,8 +267,8 @@ def _dependent(constraints: StackedConstraints) -> tuple[Indices, Indices, Indic
     )
     behind = np.setdiff1d(second[~equal_gap & (constraints.softness[first] == 0.0)], [])
     first, second = first[equal_gap], second[equal_gap]
-    kept = ~(np.isin(first, behind) | np.isin(second, behind))
-    return first[kept], second[kept], behind
+    free = ~(np.isin(first, behind) | np.isin(second, behind))
+    return first[free], second[free], behind
 
 
 def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
@@ -279,8 +279,8 @@ def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
     order = order[np.lexsort((constraints.gap0[order], nodes[order]))]
     node, pairs = nodes[order], [np.empty((2, 0), np.intp)]
     shift = 1
-    while len(same := np.flatnonzero(node[shift:] == node[:-shift])):
-        pairs.append(np.stack([order[same], order[same + shift]]))
+    while len(coincident := np.flatnonzero(node[shift:] == node[:-shift])):
+        pairs.append(np.stack([order[coincident], order[coincident + shift]]))
         shift += 1
     first, second = np.concatenate(pairs[::-1], axis=1)
     return first, second

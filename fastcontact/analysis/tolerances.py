@@ -96,8 +96,8 @@ class Tolerances:
         """
         # The errors of iterative solutions are about the tolerance times the contrast of cells, so that changes need not
         # become smaller.
-        least = self._solver.tolerance * (self._solver.contrast if self._solver.iterative else 1.0)
-        return max(max(self._criteria.geometry, least) * size, self._round_off)
+        relative_error = self._solver.tolerance * (self._solver.contrast if self._solver.iterative else 1.0)
+        return max(max(self._criteria.geometry, relative_error) * size, self._round_off)
 
 
 @dataclass(frozen=True)

@@ -66,9 +66,9 @@ class Touching:
 
         `excess` is the change of the displacements beyond the tolerance, and `size` the largest displacement [length].
         """
-        near = solution.settled and excess <= self._near * size
+        settled = solution.settled and excess <= self._near * size
         self.due = (
-            near and not self.done and self._allowed < 1.0 and _slides(step, constraints, solution, self._allowed)
+            settled and not self.done and self._allowed < 1.0 and _slides(step, constraints, solution, self._allowed)
         )
 
 

@@ -82,8 +82,8 @@ class Law:
             the norm of t - s, at most 1.
         """
         _, t, reach, radius = self.trial(y, gaps)
-        along = np.maximum(reach[sliding], TINY)
-        return t[:, sliding] / along, np.minimum(radius[sliding] / along, 1.0)
+        length = np.maximum(reach[sliding], TINY)
+        return t[:, sliding] / length, np.minimum(radius[sliding] / length, 1.0)
 
     def linearised(self, y: Array, gaps: Array, rows: Indices, sticking: Mask) -> tuple[Array, Array]:
         """Return E and D (1 + k, 1 + k, q) of the equations ``E y + D gaps = 0`` of the closed constraints `rows` (q,).

@@ -235,8 +235,8 @@ def _on_edges(problem: _Problem, edges: int) -> Array | None:
     if size > LARGEST:
         return None
     angle = 2 * np.pi * np.arange(edges) / edges
-    along = np.column_stack([np.cos(angle), np.sin(angle)])[:, :k]
-    X = np.kron(np.block([[np.ones((1, 1)), np.zeros((1, edges))], [np.zeros((k, 1)), along.T]]), np.eye(m))
+    edge_directions = np.column_stack([np.cos(angle), np.sin(angle)])[:, :k]
+    X = np.kron(np.block([[np.ones((1, 1)), np.zeros((1, edges))], [np.zeros((k, 1)), edge_directions.T]]), np.eye(m))
     X = np.hstack([X, -np.eye(len(X))[:, equations]])
     M = np.zeros((size, size))
     M[:last, :last] = X.T @ problem.F @ X

@@ -99,13 +99,13 @@ def _eliminated(
         result.gaps[:, ~usable] = 0.0
         return result
 
-    def increment(offset: Array, among: Mask, closed: Mask, forces: Array | None) -> dense.Forces:
+    def increment(offset: Array, carrying: Mask, closed: Mask, forces: Array | None) -> dense.Forces:
         gaps = constraints.gaps_at_rest() + offset
-        gaps[0, ~among] += distance
+        gaps[0, ~carrying] += distance
         result = solved(
             replace(constraints, gap0=gaps[0], slip0=gaps[1:], elastic_slip=np.empty(0)), closed, accuracy, forces
         )
-        result.gaps[0, ~among] -= distance
+        result.gaps[0, ~carrying] -= distance
         return result
 
     try:
@@ -168,10 +168,10 @@ def _with_chosen(
         free, y0, closing = ((Q @ values.ravel()).reshape(free.shape) for values in (free, y0, closing))
         guess = None if guess is None else (Q @ guess.ravel()).reshape(free.shape)
     if len(idle_rows):
-        moved = idle_slips & constraints.moved_past(rows, Q)
+        prescribed = idle_slips & constraints.moved_past(rows, Q)
         F[idle_rows], F[:, idle_rows] = 0.0, 0.0
-        F[idle_rows, idle_rows] = np.where(moved, GIVING * C[0, 0], np.diag(F).max())[idle_slips]
-        free[1:][idle_slips & ~moved] = 0.0
+        F[idle_rows, idle_rows] = np.where(prescribed, GIVING * C[0, 0], np.diag(F).max())[idle_slips]
+        free[1:][idle_slips & ~prescribed] = 0.0
         y0[1:][idle_slips], closing[1:][idle_slips] = 0.0, 0.0
     mu, equations = constraints.friction[rows], constraints.equality[rows]
     if path is None:
@@ -181,8 +181,8 @@ def _with_chosen(
         lag = -free - (F @ y0.ravel()).reshape(free.shape)
         lag[0] += closing[0]
 
-        def increment(offset: Array, among: Mask, closed: Mask, guess: Array | None) -> dense.Forces:
-            return _with_forces_among(F, free + offset, mu, among, closed, equations, guess)
+        def increment(offset: Array, carrying: Mask, closed: Mask, guess: Array | None) -> dense.Forces:
+            return _with_forces_among(F, free + offset, mu, carrying, closed, equations, guess)
 
         result, gaps_of_chosen, before = along(lag, closing, y0, path.waiting[rows], increment)
     y = result.y
@@ -207,7 +207,8 @@ def _with_chosen(
 
 
 def _response(
-    loaded: Loaded, among: tuple[csr_array, Indices, csr_array | None], held: Mask, forces: tuple[Array, Law, dense.Forces]
+    loaded: Loaded, among: tuple[csr_array, Indices, csr_array | None], idle_slips: Mask,
+    forces: tuple[Array, Law, dense.Forces],
 ) -> Response:  # fmt: skip
     """Return the linear response of a solution to additional forces and gaps.
 
@@ -216,7 +217,7 @@ def _response(
     loaded : Loaded
     among : (csr_array ((1 + k) q, n), ndarray of int (q,), csr_array or None)
         R, and the numbers of its q constraints; rotation Q of their tangents.
-    held : ndarray of bool (k, q)
+    idle_slips : ndarray of bool (k, q)
         Idle tangents, along which slips do not vary.
     forces : tuple
         Arguments of `dense.response`.
@@ -224,8 +225,8 @@ def _response(
     (R, rows, Q), varied = among, dense.response(*forces)
 
     def forces_of(values: Array) -> Array:
-        values = (values if Q is None else Q @ values).reshape(1 + len(held), len(rows))
-        values[1:][held] = 0.0
+        values = (values if Q is None else Q @ values).reshape(1 + len(idle_slips), len(rows))
+        values[1:][idle_slips] = 0.0
         change = varied(values).ravel()
         return change if Q is None else np.asarray(Q.T @ change)
 
@@ -253,11 +254,11 @@ def _slid(
     m, dim = constraints.positions.shape
     slid = Slid(np.zeros((m, dim)), np.zeros((m, dim)), np.zeros(m), np.zeros(m))
     for vectors, slip in zip((slid.slip, slid.approach), slips, strict=True):
-        turned = slip
+        unrotated = slip
         if Q is not None:
-            turned = (Q.T @ np.vstack([np.zeros(len(rows)), slip]).ravel()).reshape(-1, len(rows))[1:]
+            unrotated = (Q.T @ np.vstack([np.zeros(len(rows)), slip]).ravel()).reshape(-1, len(rows))[1:]
         tangents = np.stack([tangent[rows] for tangent in constraints.directions])
-        vectors[rows] = np.einsum("km,kmd->md", turned, tangents)
+        vectors[rows] = np.einsum("km,kmd->md", unrotated, tangents)
     slid.work[rows], slid.normal[rows] = work, normal
     return slid
 
@@ -274,16 +275,16 @@ def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
 
 
 def _with_forces_among(
-    F: Array, free: Array, mu: Array, among: Mask, closed: Mask, equality: Mask, start: Array | None
+    F: Array, free: Array, mu: Array, carrying: Mask, closed: Mask, equality: Mask, start: Array | None
 ) -> dense.Forces:
-    """Return the solution of `dense.solve` if only the constraints `among` (m,) carry forces."""
-    rows = np.flatnonzero(among)
-    unknown = (np.arange(len(free))[:, None] * len(among) + rows).ravel()
+    """Return the solution of `dense.solve` if only the constraints `carrying` (m,) carry forces."""
+    rows = np.flatnonzero(carrying)
+    unknown = (np.arange(len(free))[:, None] * len(carrying) + rows).ravel()
     start = None if start is None else start[:, rows]
     result = dense.solve(F[np.ix_(unknown, unknown)], free[:, rows], mu[rows], closed[rows], start, equality[rows])
     y = np.zeros_like(free)
     y[:, rows] = result.y
-    closed_of_all, sticking = np.zeros((2, len(among)), bool)
+    closed_of_all, sticking = np.zeros((2, len(carrying)), bool)
     closed_of_all[rows], sticking[rows] = result.closed, result.sticking
     gaps = free + (F[:, unknown] @ result.y.ravel()).reshape(free.shape)
     return replace(result, y=y, gaps=gaps, closed=closed_of_all, sticking=sticking)

@@ -79,12 +79,12 @@ class Sectors:
         return diameters
 
 
-def _sense(interface: PeriodicInterface, turn: Array) -> int:
-    """Return 1 if the rotation of an interface is `turn` (dim, dim), -1 if it is the inverse, and 0 otherwise."""
+def _sense(interface: PeriodicInterface, rotation: Array) -> int:
+    """Return 1 if the rotation of an interface is `rotation` (dim, dim), -1 if it is the inverse, and 0 otherwise."""
     assert interface.turn is not None
-    if np.allclose(interface.turn, turn, atol=LENGTH_ROUND_OFF):
+    if np.allclose(interface.turn, rotation, atol=LENGTH_ROUND_OFF):
         return 1
-    return -1 if np.allclose(interface.turn, turn.T, atol=LENGTH_ROUND_OFF) else 0
+    return -1 if np.allclose(interface.turn, rotation.T, atol=LENGTH_ROUND_OFF) else 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,61 +139,68 @@ class Wave:
         ]
         return [*(MultiPointConstraint(constraint.name, self.real(constraint.rows)) for constraint in others), *ends]
 
-    def on_ring(self, held: Conditions) -> Conditions:
+    def on_ring(self, conditions: Conditions) -> Conditions:
         """Return contact conditions in the real form, one at each point of the ring.
 
         The test function of a condition at one end of a sector extends into the next sector, which is represented by the
         other end; at the axis it extends over all sectors.
         """
-        P, kept = self._combined(held)
-        nodes = held.nodes[kept]
-        n_points = held.rows.shape[1] // self.sectors.turn.shape[0]
-        compliance = None if held.compliance is None else self.real(P @ held.compliance @ P.conj().T)
+        P, main = self._combined(conditions)
+        nodes = conditions.nodes[main]
+        n_points = conditions.rows.shape[1] // self.sectors.turn.shape[0]
+        compliance = None if conditions.compliance is None else self.real(P @ conditions.compliance @ P.conj().T)
         ring_nodes = nodes if self.single else np.concatenate([nodes, nodes + n_points])
-        return Conditions(self.real(P @ held.rows), ring_nodes, self.repeated(held.areas[kept]), compliance=compliance)
+        return Conditions(
+            self.real(P @ conditions.rows), ring_nodes, self.repeated(conditions.areas[main]), compliance=compliance
+        )
 
-    def _combined(self, held: Conditions) -> tuple[csr_array, Indices]:
+    def _combined(self, conditions: Conditions) -> tuple[csr_array, Indices]:
         """Return the matrix (k, q) that maps conditions to those of the ring, and the main condition (k,) of each."""
-        is_single, blocks = np.ones(len(held.nodes), bool), []
+        is_single, blocks = np.ones(len(conditions.nodes), bool), []
         for interface in self.sectors.periodic_interfaces:
-            on_interface = np.flatnonzero(np.isin(held.nodes, interface.first) | np.isin(held.nodes, interface.second))
+            on_interface = np.flatnonzero(
+                np.isin(conditions.nodes, interface.first) | np.isin(conditions.nodes, interface.second)
+            )
             for a, b in zip(interface.first.tolist(), interface.second.tolist(), strict=True):
-                first, second = on_interface[held.nodes[on_interface] == a], on_interface[held.nodes[on_interface] == b]
+                first, second = (
+                    on_interface[conditions.nodes[on_interface] == a],
+                    on_interface[conditions.nodes[on_interface] == b],
+                )
                 if a == b and len(first):
-                    blocks.append((self._around(held, first), first, first))
+                    blocks.append((self._around(conditions, first), first, first))
                     is_single[first] = False
                 elif len(first) and len(second):
-                    block = self._across(held, interface, first, second)
+                    block = self._across(conditions, interface, first, second)
                     blocks.append((block, first, np.concatenate([first, second])))
                     is_single[first] = is_single[second] = False
         single = np.flatnonzero(is_single)
         rows, columns, values = [np.arange(len(single))], [single], [np.ones(len(single), complex)]
-        kept, count = [single], len(single)
+        main_conditions, count = [single], len(single)
         for block, main, members in blocks:
             rows.append(np.repeat(count + np.arange(len(block)), len(members)))
             columns.append(np.tile(members, len(block)))
             values.append(block.ravel())
-            kept.append(main[: len(block)])
+            main_conditions.append(main[: len(block)])
             count += len(block)
         entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-        return csr_array(coo_array(entries, shape=(count, len(held.nodes)))), np.concatenate(kept)
+        return csr_array(coo_array(entries, shape=(count, len(conditions.nodes)))), np.concatenate(main_conditions)
 
     def _across(
-        self, held: Conditions, interface: PeriodicInterface, at_first: Indices, at_second: Indices
+        self, conditions: Conditions, interface: PeriodicInterface, at_first: Indices, at_second: Indices
     ) -> AnyArray:
         """Return the combinations (k, k + l) of the k and l conditions at the first and second node of an interface."""
         assert interface.turn is not None
-        areas = np.nan_to_num(held.areas[np.concatenate([at_first, at_second])], posinf=0.0)
+        areas = np.nan_to_num(conditions.areas[np.concatenate([at_first, at_second])], posinf=0.0)
         first, second = areas[: len(at_first)].max(), areas[len(at_first) :].max()
         weight = first / (first + second) if first + second > 0.0 else 0.5
         products = np.ones((len(at_first), len(at_second)))
-        if held.directions is not None:
-            products = held.directions[at_first] @ (held.directions[at_second] @ interface.turn).T
+        if conditions.directions is not None:
+            products = conditions.directions[at_first] @ (conditions.directions[at_second] @ interface.turn).T
         return np.hstack([weight * np.eye(len(at_first)), (1.0 - weight) * np.conj(self.phase(interface)) * products])
 
-    def _around(self, held: Conditions, at_node: Indices) -> AnyArray:
+    def _around(self, conditions: Conditions, at_node: Indices) -> AnyArray:
         """Return the combinations (k, q) of the conditions of a node on the axis that do not cancel over the ring."""
-        directions = None if held.directions is None else held.directions[at_node]
+        directions = None if conditions.directions is None else conditions.directions[at_node]
         total, rotation = np.zeros((len(at_node), len(at_node)), complex), np.eye(len(self.sectors.turn))
         for k in range(self.sectors.number):
             products = np.eye(len(at_node)) if directions is None else directions @ (directions @ rotation.T).T

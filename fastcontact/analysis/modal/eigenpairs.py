@@ -159,9 +159,9 @@ class Reduced:
         self._T = csr_array(free_part if system.T is None else system.T @ free_part)
         self.K, self.free = system.matrix, system.free.copy()
         rows_of_unknowns = system.rows(rows, np.zeros(rows.shape[0]), np.zeros(n))[0]
-        kept = np.flatnonzero(np.diff(rows_of_unknowns.indptr) > 0)
-        if len(kept):
-            pivots, weights = _eliminated(csr_array(rows_of_unknowns[kept]), nodes[kept], size)
+        nonempty = np.flatnonzero(np.diff(rows_of_unknowns.indptr) > 0)
+        if len(nonempty):
+            pivots, weights = _eliminated(csr_array(rows_of_unknowns[nonempty]), nodes[nonempty], size)
             self.free[pivots] = False
             at_pivots = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
             projection = csr_array(diags_array(self.free.astype(float)) + at_pivots @ weights)

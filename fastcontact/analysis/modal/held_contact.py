@@ -81,12 +81,14 @@ def joined(
     """Return all conditions together, for `n_dofs` displacements; `join` may first map each to those of a whole ring."""
     equations, nodes, springs = [csr_array((0, n_dofs))], [np.empty(0, np.intp)], []
     for conditions in map(join, held):
-        kept = np.flatnonzero(np.diff(conditions.rows.indptr) > 0)
+        nonempty = np.flatnonzero(np.diff(conditions.rows.indptr) > 0)
         if conditions.compliance is None:
-            equations.append(csr_array(conditions.rows[kept]))
-            nodes.append(conditions.nodes[kept])
-        elif len(kept):
-            springs.append((csr_array(conditions.rows[kept]), conditions.compliance.toarray()[np.ix_(kept, kept)]))
+            equations.append(csr_array(conditions.rows[nonempty]))
+            nodes.append(conditions.nodes[nonempty])
+        elif len(nonempty):
+            springs.append(
+                (csr_array(conditions.rows[nonempty]), conditions.compliance.toarray()[np.ix_(nonempty, nonempty)])
+            )
     return HeldContact(csr_array(vstack(equations, format="csr")), np.concatenate(nodes), springs)
 
 
@@ -155,15 +157,17 @@ def _conditions(
 
 
 def _along(
-    directions: Sequence[Array], rows: Sequence[csr_array], kept: Indices, nodes: Indices, areas: Array,
+    directions: Sequence[Array], rows: Sequence[csr_array], selected: Indices, nodes: Indices, areas: Array,
     compliance: csr_array | None = None,
 ) -> Conditions:  # fmt: skip
-    """Return the conditions along all tangents, with rows (k, n_dofs) for the `kept` (k,) of the q multipliers of a pair."""
+    """Return the conditions along all tangents, with rows (k, n_dofs) for `selected` (k,) multipliers of a pair."""
     count = len(rows)
     stacked_compliance = None if compliance is None else csr_array(block_diag([compliance] * count, format="csr"))
     stacked = csr_array(vstack(rows, format="csr"))
-    tangents = np.concatenate([direction[kept] for direction in directions])
-    return Conditions(stacked, np.tile(nodes[kept], count), np.tile(areas[kept], count), tangents, stacked_compliance)
+    tangents = np.concatenate([direction[selected] for direction in directions])
+    return Conditions(
+        stacked, np.tile(nodes[selected], count), np.tile(areas[selected], count), tangents, stacked_compliance
+    )
 
 
 def _compliance(weights: csr_array, softness: Array) -> csr_array | None:
