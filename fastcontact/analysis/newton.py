@@ -175,7 +175,7 @@ class _Newton:
         return True
 
     def _relative(self, change: float, u: Array) -> float:
-        """Return the largest `change` [length] of displacements, relative to the largest displacement, after it u (n_dofs,)."""
+        """Return the largest `change` [length] of displacements relative to the largest one; u (n_dofs,) are the new ones."""
         size = max(map(largest, (u, self._load.lift, self._start.u)))
         return change / size if size else 0.0
 
