@@ -92,8 +92,8 @@ def friction_exceeded(bodies: FloatingBodies, factor: float, coefficients: Array
         else f"about {factor:.3g} times the coefficients given, which are from {distinct[0]:.3g} to {distinct[-1]:.3g}"
     )
     return (
-        f"friction cannot hold {', '.join(bodies.motions.by_body())} against the loads: that would take {needed}. Lower the "
-        "loads along the contact, press harder, or support the bodies along the contact"
+        f"friction cannot hold {', '.join(bodies.motions.by_body())} against the loads: this would require {needed}. Lower "
+        "the loads along the contact, press harder, or support the bodies along the contact"
     )
 
 
@@ -127,7 +127,7 @@ def limit_load(problem: Problem, state: State) -> str:
         return ""
     validity = (
         f", beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics are valid: "
-        "the model bears less load than the body"
+        "the model then bears smaller loads than the real body"
         if strain > LARGEST_PLASTIC_STRAIN and problem.model.strain == "small"
         else ""
     )

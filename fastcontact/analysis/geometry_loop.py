@@ -178,7 +178,7 @@ def _settle(
         iterate.u = iterate.u if next_pairing is None else step.dofs.put(iterate.u, next_pairing)
         tolerances.tighten(moved.relative, solution.residual)
         if update == max(limit // 2, PATIENT_UPDATES) and any(pair.faceted for pair in problem.pairs.values()):
-            log.info("nodes flip between facets: from now on the edges of facets are rounded")
+            log.info("nodes alternate between facets: from now on the edges of facets are rounded")
             iterate.rounded = True
             mixing.restart()
             watch.forget()

@@ -195,7 +195,8 @@ class Heat:
         if residual > max(self.criteria.relative * largest, round_off):
             raise ConvergenceError(
                 f"heat is out of balance by {residual:.3g} at a node, above {self.criteria.relative:g} of the largest heat "
-                f"flow {largest:.3g}: use the direct solver, or look for conductivities of very different magnitudes",
+                f"flow {largest:.3g}: use the direct solver, or check for conductivities that differ by many "
+                "orders of magnitude",
                 smaller_steps_help=False,
             )
         sums = {"supports": reaction, "loads": loads, "films": film_power, "friction": friction_power}

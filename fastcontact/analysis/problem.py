@@ -305,8 +305,8 @@ def prepare(
             tabulated or pair.options.cohesion is not None or pair.options.source is not None
         ):
             raise ContactError(
-                f"contact '{name}' has a table of penalties, a cohesive layer, adhesion, or a fluid, which updates of the "
-                "geometry follow: leave keep_pairing out"
+                f"contact '{name}' has a table of penalties, a cohesive layer, adhesion, or a fluid, which require updates "
+                "of the geometry: omit keep_pairing"
             )
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,

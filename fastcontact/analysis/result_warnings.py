@@ -109,8 +109,8 @@ def _undetermined_tractions(pair: Formulation, contact: ContactResult, undetermi
         where = np.array2string(pair.points[pair.secondary.points[nodes]].mean(axis=0), precision=4)
         yield (
             f"contact '{contact.name}': supports hold {count} of the {pair.secondary.n_facets} facets of "
-            f"'{pair.secondary.group}' and what they face, about {where}: nothing determines what goes from one to the other "
-            "in the held directions, and 0 is reported; the reactions contain it. Free the nodes of one side there"
+            f"'{pair.secondary.group}' and the opposite facets, near {where}: tractions in the held directions are "
+            "undetermined there and reported as 0, and the reactions include their forces. Free the nodes of one side there"
         )
 
 
@@ -404,8 +404,8 @@ def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
         return
     cells = f"quadrangles or hexahedra along '{pair.secondary.group}', or triangles or tetrahedra there about as deep as wide"
     yield (
-        f"contact '{contact.name}': nodal pressures waver from node to node, by {0.5 * size:.3g} up and down about a mean of "
-        f"{mean:.3g}: trust means over neighbouring nodes, or use {cells if pair.name == 'mortar' else 'formulation mortar'}"
+        f"contact '{contact.name}': nodal pressures waver from node to node, with an amplitude of {0.5 * size:.3g} about a "
+        f"mean of {mean:.3g}: trust means over neighbouring nodes, or use {cells if pair.name == 'mortar' else 'formulation mortar'}"
     )
 
 
