@@ -404,8 +404,9 @@ def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
         return
     cells = f"quadrangles or hexahedra along '{pair.secondary.group}', or triangles or tetrahedra there about as deep as wide"
     yield (
-        f"contact '{contact.name}': nodal pressures waver from node to node, with an amplitude of {0.5 * size:.3g} about a "
-        f"mean of {mean:.3g}: trust means over neighbouring nodes, or use {cells if pair.name == 'mortar' else 'formulation mortar'}"
+        f"contact '{contact.name}': nodal pressures waver from node to node, by {0.5 * size:.3g} above and below "
+        f"a mean of {mean:.3g}: trust means over neighbouring nodes, or use "
+        f"{cells if pair.name == 'mortar' else 'formulation mortar'}"
     )
 
 
