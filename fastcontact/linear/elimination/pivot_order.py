@@ -127,8 +127,9 @@ def of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indic
 
     An unknown is exclusive to a group if no other group of the same and of later layers involves it. The first layer
     contains the groups with enough exclusive unknowns among all groups, the second layer those with enough among the
-    remaining ones, and so on, up to `layers` layers. An example is the set of weighted gaps of quadratic facets with dual multipliers:
-    no other midside node involves the unknowns of a midside node, and without the midside nodes the same holds for corners.
+    remaining ones, and so on, up to `layers` layers. An example is the set of weighted gaps of quadratic facets with dual
+    multipliers: no other midside node involves the unknowns of a midside node, and without the midside nodes the same holds
+    for the corners.
 
     Parameters
     ----------
@@ -208,13 +209,13 @@ def _pivots_in_groups(B: csr_array, group: Indices, eligible: Mask) -> Indices:
     if not len(entries):
         return pivots
     pivot_columns = B.indices[np.sort(entries[np.unique(B.indices[entries], return_index=True)[1]])]
-    row_rank, column_rank, column_group = _rank_in_group(group), np.zeros(n, np.intp), np.zeros(n, np.intp)
-    column_group[B.indices[entries]] = group[row[entries]]
-    column_rank[pivot_columns] = _rank_in_group(column_group[pivot_columns])
+    row_rank, column_rank, group_of = _rank_in_group(group), np.zeros(n, np.intp), np.zeros(n, np.intp)
+    group_of[B.indices[entries]] = group[row[entries]]
+    column_rank[pivot_columns] = _rank_in_group(group_of[pivot_columns])
     blocks = np.zeros((group.max() + 1, row_rank.max() + 1, column_rank.max() + 1))
     blocks[group[row[entries]], row_rank[row[entries]], column_rank[B.indices[entries]]] = B.data[entries]
     equation, unknown = np.zeros(blocks.shape[:2], np.intp), np.zeros((len(blocks), blocks.shape[2]), np.intp)
-    equation[group, row_rank], unknown[column_group[pivot_columns], column_rank[pivot_columns]] = (
+    equation[group, row_rank], unknown[group_of[pivot_columns], column_rank[pivot_columns]] = (
         np.arange(m),
         pivot_columns,
     )
