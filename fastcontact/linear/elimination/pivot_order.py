@@ -209,16 +209,13 @@ def _pivots_in_groups(B: csr_array, group: Indices, eligible: Mask) -> Indices:
     if not len(entries):
         return pivots
     pivot_columns = B.indices[np.sort(entries[np.unique(B.indices[entries], return_index=True)[1]])]
-    row_rank, column_rank, group_of = _rank_in_group(group), np.zeros(n, np.intp), np.zeros(n, np.intp)
+    row_rank, col_rank, group_of = _rank_in_group(group), np.zeros(n, np.intp), np.zeros(n, np.intp)
     group_of[B.indices[entries]] = group[row[entries]]
-    column_rank[pivot_columns] = _rank_in_group(group_of[pivot_columns])
-    blocks = np.zeros((group.max() + 1, row_rank.max() + 1, column_rank.max() + 1))
-    blocks[group[row[entries]], row_rank[row[entries]], column_rank[B.indices[entries]]] = B.data[entries]
+    col_rank[pivot_columns] = _rank_in_group(group_of[pivot_columns])
+    blocks = np.zeros((group.max() + 1, row_rank.max() + 1, col_rank.max() + 1))
+    blocks[group[row[entries]], row_rank[row[entries]], col_rank[B.indices[entries]]] = B.data[entries]
     equation, unknown = np.zeros(blocks.shape[:2], np.intp), np.zeros((len(blocks), blocks.shape[2]), np.intp)
-    equation[group, row_rank], unknown[group_of[pivot_columns], column_rank[pivot_columns]] = (
-        np.arange(m),
-        pivot_columns,
-    )
+    equation[group, row_rank], unknown[group_of[pivot_columns], col_rank[pivot_columns]] = np.arange(m), pivot_columns
     count, largest = np.bincount(group), abs(B).max(axis=1).toarray().ravel()
     failed = np.zeros(len(count), bool)
     for n_chosen in range(blocks.shape[1]):

@@ -1,7 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Vector operations of the conjugate gradient method, with sums that do not depend on the number of threads.
 
-Sums are taken over chunks of fixed length. Kernels process the chunks, or the entries, `low` to ``high - 1``; see `_jit.parallel.spread`.
+Sums are taken over chunks of fixed length. Kernels process the chunks, or the entries, `low` to ``high - 1``; see
+`_jit.parallel.spread`.
 """
 
 import numpy as np
