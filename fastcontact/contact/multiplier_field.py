@@ -24,9 +24,9 @@ class Projection:
     Attributes
     ----------
     P : csr_array (m, k)
-        Values, at the m integration points, of the functions that belong to the k independent values of the field [-].
+        Values at the m integration points of the functions that belong to the k independent values of the field [-].
     areas : ndarray (m,)
-        Areas W of the points [area]. A point without area, on the axis, has no compliance; it may carry a single force.
+        Areas W of the points [area]. Points on the axis have no area and no compliance, and may carry concentrated forces.
     rho : float
         The constant of the augmented Lagrangian [pressure / length].
     mass : SuperLU, optional
