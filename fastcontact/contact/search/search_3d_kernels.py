@@ -19,10 +19,10 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, clo
     is also -1.
     """
     stack, squares, leaves = np.empty(DEPTH, np.int64), np.empty(DEPTH), len(tree.low) // 2
-    midst = facets.midst[0], facets.midst[1], facets.midst[2]
+    centre = facets.centre[0], facets.centre[1], facets.centre[2]
     for k in range(begin, end):
         i = order[k]
-        point = minus((points[i, 0], points[i, 1], points[i, 2]), midst)
+        point = minus((points[i, 0], points[i, 1], points[i, 2]), centre)
         closest, best, same, certain, converged = -1, np.inf, 0.0, False, True
         best_s, best_t, place, reach, top = 0.0, 0.0, point, FAR, 0
         if np.isfinite(point[0] + point[1] + point[2]):
@@ -69,7 +69,7 @@ def _write(closest, i, facets, f, domain, s, t, point, place, inside, converged)
     if converged and np.isfinite(normal[0]):
         closest.distance[i] = np.sqrt(dot(gap, gap))
     for d in range(3):
-        closest.normal[i, d], closest.position[i, d] = normal[d], place[d] + facets.midst[d]
+        closest.normal[i, d], closest.position[i, d] = normal[d], place[d] + facets.centre[d]
 
 
 @inlined_kernel
