@@ -181,28 +181,26 @@ def _faced_by(
     (low, high), size = outside.boxes, outside.size
     of_body = outside.body == body
     reach = float(size.max()) if distance is None else distance
-    of_others = ~of_body & (
-        (high >= low[of_body].min(axis=0) - reach) & (low <= high[of_body].max(axis=0) + reach)
-    ).all(axis=1)
+    others = ~of_body & ((high >= low[of_body].min(axis=0) - reach) & (low <= high[of_body].max(axis=0) + reach)).all(
+        axis=1
+    )
     candidates = np.flatnonzero((of_body & among)[facet_of_point])
-    if of_others.any():
+    if others.any():
         at = point[candidates]
         candidates = candidates[
-            ((at >= low[of_others].min(axis=0) - reach) & (at <= high[of_others].max(axis=0) + reach)).all(axis=1)
+            ((at >= low[others].min(axis=0) - reach) & (at <= high[others].max(axis=0) + reach)).all(axis=1)
         ]
-    if not of_others.any() or not len(candidates):
+    if not others.any() or not len(candidates):
         return np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0)
-    kinds = [
-        block[of_others[first : first + len(block)]] for block, first in zip(outside.blocks.values(), outside.first)
-    ]
+    kinds = [block[others[first : first + len(block)]] for block, first in zip(outside.blocks.values(), outside.first)]
     closest = closest_of_kinds(point[candidates], [outside.mesh.points[block] for block in kinds if len(block)])
-    facet, other = facet_of_point[candidates], np.flatnonzero(of_others)[closest.facet]
+    facet, opposite = facet_of_point[candidates], np.flatnonzero(others)[closest.facet]
     difference = point[candidates] - closest.position
     gap = np.einsum("nd,nd->n", difference, closest.normal)
     offset = np.linalg.norm(difference - gap[:, None] * closest.normal, axis=1)
-    larger = np.maximum(size[facet], size[other])
+    larger = np.maximum(size[facet], size[opposite])
     opposed = np.einsum("nd,nd->n", normal[candidates], closest.normal) <= -np.cos(np.radians(angle))
     near = closest.distance <= (larger if distance is None else distance) + LENGTH_ROUND_OFF * larger
     ahead = offset <= np.abs(gap) * np.tan(np.radians(angle)) + LENGTH_ROUND_OFF * larger
     kept = opposed & near & ahead
-    return facet[kept], other[kept], gap[kept]
+    return facet[kept], opposite[kept], gap[kept]

@@ -170,12 +170,12 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
     weight = np.concatenate([angle.ravel() for angle in angles])
     normal = np.concatenate([normals.reshape(-1, coordinates.shape[1]) for normals in facet_normals_of_blocks])
     joined = np.concatenate([normals.reshape(-1, coordinates.shape[1]) for normals in smooth])
-    places_of, start = np.argsort(node, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(node))])
+    by_node, start = np.argsort(node, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(node))])
     for at in np.flatnonzero(corner):
-        here = places_of[start[at] : start[at + 1]]
-        similar = normal[here] @ normal[here].T > np.cos(np.radians(CORNER))
-        total = (similar * weight[here]) @ normal[here]
-        joined[here] = total / np.linalg.norm(total, axis=1, keepdims=True)
+        entries = by_node[start[at] : start[at + 1]]
+        similar = normal[entries] @ normal[entries].T > np.cos(np.radians(CORNER))
+        total = (similar * weight[entries]) @ normal[entries]
+        joined[entries] = total / np.linalg.norm(total, axis=1, keepdims=True)
     ends = np.cumsum([normals.shape[0] * normals.shape[1] for normals in facet_normals_of_blocks])[:-1]
     return [
         means.reshape(like.shape) for means, like in zip(np.split(joined, ends), facet_normals_of_blocks, strict=True)

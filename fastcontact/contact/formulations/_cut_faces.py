@@ -221,8 +221,8 @@ def _integrated(
         first, second = (side.origin[row] for side, row in zip((secondary, primary), pairs[max(failed)], strict=True))
         raise ContactError(f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there")
     of_facets = csr_array((np.ones(len(pairs)), np.arange(len(pairs)), start), shape=(n, len(pairs)))
-    whole = (of_facets @ mass.reshape(-1, k * k)).reshape(-1, k, k)
-    return Coupling(secondary.block, primary.block, pairs, integrals, mass), whole, closer
+    total = (of_facets @ mass.reshape(-1, k * k)).reshape(-1, k, k)
+    return Coupling(secondary.block, primary.block, pairs, integrals, mass), total, closer
 
 
 def _middle(element: elements.Element) -> Array:

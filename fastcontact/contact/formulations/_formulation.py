@@ -398,10 +398,10 @@ class Formulation(ABC):
         moved, turning = at.displacement - at.start, None
         total = mean @ moved
         if isinstance(self.primary, RigidSide):
-            now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-            total -= self.primary.carried(now, before, at.pose, at.pose_start)
+            current, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
+            total -= self.primary.carried(current, before, at.pose, at.pose_start)
             if at.pose.angle != at.pose_start.angle:  # The motion is an affine function of the positions.
-                ends = np.vstack([np.zeros(now.shape[1]), np.eye(now.shape[1])])
+                ends = np.vstack([np.zeros(current.shape[1]), np.eye(current.shape[1])])
                 varied = self.primary.carried(ends, ends[:1], at.pose, at.pose_start)
                 turning = varied[1:] - varied[0]
         return Slips(directions, tangential, total, moved, self.points + at.start, turning=turning)
@@ -474,8 +474,8 @@ class Formulation(ABC):
     def carried(self, candidates: Candidates, at: Configuration) -> Array:
         """Return the displacements (n, dim) of the points of an obstacle opposite to candidates in the step [length]."""
         assert isinstance(self.primary, RigidSide)
-        now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
-        return self.primary.carried(now, before, at.pose, at.pose_start)
+        current, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
+        return self.primary.carried(current, before, at.pose, at.pose_start)
 
     @cached_property
     def _held_nodes(self) -> Indices:

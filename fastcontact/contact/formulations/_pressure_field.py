@@ -291,7 +291,9 @@ class PressureFieldFormulation(Formulation):
                     [np.einsum("nd,nd->n", along, at_points) for along in (normals(directions), *directions)]
                 )
                 factor = components[:, :, None] * Z
-                pressure, shear = (np.linalg.norm(part, axis=(0, 1)) for part in (factor[:1], factor[1:]))
+                pressure, shear = (
+                    np.linalg.norm(components_of_force, axis=(0, 1)) for components_of_force in (factor[:1], factor[1:])
+                )
                 factor[0, :, pressure > PART_OF_CONE * constraints.friction.max() * shear] = 0.0
                 factors.append(factor)
         return np.concatenate(factors, axis=2) if factors else np.empty(0)

@@ -164,8 +164,8 @@ class WeightedMortar(Formulation):
         if not isinstance(self.primary, RigidSide):
             moved = -closing if self.slip == "symmetric" else np.zeros_like(closing)
         else:
-            now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-            moved = self.primary.carried(now, before, at.pose, at.pose_start)
+            current, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
+            moved = self.primary.carried(current, before, at.pose, at.pose_start)
         slip0 = -np.stack([np.einsum("nd,nd->n", t, moved) for t in rubbing])
         for along, is_held, motion in additional:
             remaining = closing - np.where(is_held, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along

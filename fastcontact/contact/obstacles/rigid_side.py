@@ -68,7 +68,7 @@ class RigidSide:
             raise ContactError("the distance from a rigid obstacle must be real numbers, not complex ones")
         return distance_and_normal
 
-    def carried(self, positions: Array, before: Array, now: Pose, then: Pose) -> Array:
+    def carried(self, positions: Array, before: Array, end_pose: Pose, start_pose: Pose) -> Array:
         """Return the displacements (n, dim) of points on the surface of the obstacle due to its motion [length].
 
         The slip of a point that moves from `before` to `positions` (n, dim) [length] is its displacement minus this result.
@@ -76,11 +76,14 @@ class RigidSide:
         scaled from the chord to the arc. It vanishes where a point sticks, and is tangential to the circle for a point at
         rest.
         """
-        angle, moved = now.angle - then.angle, np.tile(now.displacement - then.displacement, (len(positions), 1))
+        angle, moved = (
+            end_pose.angle - start_pose.angle,
+            np.tile(end_pose.displacement - start_pose.displacement, (len(positions), 1)),
+        )
         if self.rotation is None or angle == 0.0:
             return moved
         half, centre = self.rotation.matrix(0.5 * angle), np.array(self.rotation.centre)
-        end, start = positions - centre - now.displacement, before - centre - then.displacement
+        end, start = positions - centre - end_pose.displacement, before - centre - start_pose.displacement
         slip = (end @ half - start @ half.T) * (0.5 * angle / math.sin(0.5 * angle))
         return np.asarray(moved + ((end - start) - slip))
 
@@ -100,7 +103,7 @@ class Rotation:
     centre : tuple of float (dim,)
         A point of the axis before any motion [length].
     axis : tuple of float (3,)
-        Direction of the axis, of any length [-]; (0, 0, 1) in the plane.
+        Direction of the axis, of any length [-]; (0, 0, 1) in 2D.
     angle : float
         Angle at multiplier 1, by the right-hand rule [radian].
     """

@@ -60,8 +60,8 @@ def _fill_curved(nodes, centre, i, d, to_terms, terms, low, high):
         value = 0.0
         for a in range(nodes.shape[1]):
             value += to_terms[k, a] * (nodes[i, a, d] - centre[d])
-        terms[i, k, d], place = value, nodes[i, k, d] - centre[d]
-        low[i, d], high[i, d] = min(low[i, d], place), max(high[i, d], place)
+        terms[i, k, d], x = value, nodes[i, k, d] - centre[d]
+        low[i, d], high[i, d] = min(low[i, d], x), max(high[i, d], x)
 
 
 @inlined_kernel

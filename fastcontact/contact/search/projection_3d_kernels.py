@@ -241,8 +241,8 @@ def project(facets, f, domain, point, reach):
         return s, t, best, True
     for k in range(triangles.shape[0] if bend > 0.0 else 0):
         a, b, square = _on_triangle(facets, f, nodes, triangles, k, point)
-        most = np.sqrt(2.0 * best) + bend
-        if square > most * most or abs(a - tried_s) + abs(b - tried_t) < 1e-3:
+        largest = np.sqrt(2.0 * best) + bend
+        if square > largest * largest or abs(a - tried_s) + abs(b - tried_t) < 1e-3:
             continue
         a, b, success = descend(terms, f, a, b, sides, point)
         value = half_square(terms, f, a, b, point)

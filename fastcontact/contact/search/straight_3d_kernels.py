@@ -141,7 +141,7 @@ def on_bilinear(r, a, b, c, reach):
 
 @kernel
 def _stationary(aa, ab, bb, ac, bc, cc, ar, br, cr, s, t):
-    """Return where Newton's method gets from (s, t), and whether that is a stationary point inside the facet."""
+    """Return the point that Newton's method reaches from (s, t), and whether it is a stationary point inside the facet."""
     for _ in range(8):
         if not (abs(s) < 1.0 - ROUND_OFF and abs(t) < 1.0 - ROUND_OFF):
             return s, t, False
