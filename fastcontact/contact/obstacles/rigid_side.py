@@ -68,7 +68,7 @@ class RigidSide:
             raise ContactError("the distance from a rigid obstacle must be real numbers, not complex ones")
         return distance_and_normal
 
-    def carried(self, positions: Array, before: Array, end_pose: Pose, start_pose: Pose) -> Array:
+    def carried(self, positions: Array, before: Array, pose: Pose, pose0: Pose) -> Array:
         """Return the displacements (n, dim) of points on the surface of the obstacle due to its motion [length].
 
         The slip of a point that moves from `before` to `positions` (n, dim) [length] is its displacement minus this result.
@@ -76,14 +76,11 @@ class RigidSide:
         scaled from the chord to the arc. It vanishes where a point sticks, and is tangential to the circle for a point at
         rest.
         """
-        angle, moved = (
-            end_pose.angle - start_pose.angle,
-            np.tile(end_pose.displacement - start_pose.displacement, (len(positions), 1)),
-        )
+        angle, moved = pose.angle - pose0.angle, np.tile(pose.displacement - pose0.displacement, (len(positions), 1))
         if self.rotation is None or angle == 0.0:
             return moved
         half, centre = self.rotation.matrix(0.5 * angle), np.array(self.rotation.centre)
-        end, start = positions - centre - end_pose.displacement, before - centre - start_pose.displacement
+        end, start = positions - centre - pose.displacement, before - centre - pose0.displacement
         slip = (end @ half - start @ half.T) * (0.5 * angle / math.sin(0.5 * angle))
         return np.asarray(moved + ((end - start) - slip))
 
