@@ -125,11 +125,9 @@ def frames(side: Surface, points: Array, coordinates: Array) -> Array:
     """
     frames_of_blocks = []
     for block in side.blocks:
-        reference, current = (
-            x[block.facets[:, : elements.get(block.element).n_corners]] for x in (points, coordinates)
-        )
+        initial, current = (x[block.facets[:, : elements.get(block.element).n_corners]] for x in (points, coordinates))
         axes = _axes(block, points, _normals(block, points))[:, :-1]
-        local = (reference - reference.mean(axis=1, keepdims=True)) @ axes.transpose(0, 2, 1)
+        local = (initial - initial.mean(axis=1, keepdims=True)) @ axes.transpose(0, 2, 1)
         centred = current - current.mean(axis=1, keepdims=True)
         frames_of_blocks.append(np.linalg.solve(local.transpose(0, 2, 1) @ local, local.transpose(0, 2, 1) @ centred))
     return np.concatenate(frames_of_blocks)
