@@ -1,7 +1,7 @@
-r"""Nodal pressures that are not negative, vanish at open nodes, and have the contact force as their integral.
+r"""Non-negative nodal pressures that vanish at open nodes and integrate to the contact force.
 
 A pressure field :math:`p_h` with the nodal values :math:`p_j`, which is obtained by projection, is not zero beyond the edge
-of the contact. Its values at open nodes contribute to the contact force :math:`\int p_h\,dA = \sum_j A_j p_j`, where
+of the contact. Its values at open nodes also contribute to the contact force :math:`\int p_h\,dA = \sum_j A_j p_j`, where
 :math:`A_j` are the integrals of the shape functions. The share :math:`A_j p_j` of an open node is therefore moved to the
 closed nodes of its facets and of the adjacent facets. The pressures of all these nodes change by the same amount, which is
 the smallest change for this set of nodes. A smaller set would cause a kink of the pressure, and a larger one would change
@@ -17,7 +17,7 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.surface import Surface
 from fastcontact.round_off import SUM_ROUND_OFF
 
-# Areas below this fraction of the typical area count as zero: the pressure of such a node would be nearly arbitrary.
+# Nodal areas below this fraction of the mean count as zero, because the pressures of such nodes would be nearly arbitrary.
 NO_AREA = 1e-3
 
 
@@ -27,7 +27,7 @@ def carried(constraints: Constraints, forces: Array, closed: Mask, side: Surface
     Parameters
     ----------
     constraints : Constraints
-        The m constraints of the pair. With equality constraints, pressures of closed nodes may be negative.
+        The m constraints of the pair. If some are equations, pressures of closed nodes may be negative.
     forces : ndarray (m,)
         Normal forces of the constraints [force].
     closed : ndarray of bool (n,)
@@ -38,38 +38,38 @@ def carried(constraints: Constraints, forces: Array, closed: Mask, side: Surface
     field, may_pull = constraints.nodal, bool(constraints.equality.any())
     assert field is not None
     nodal, shares, areas = field.over_whole_side(forces), field.shares(forces), field.nodal_areas
-    with_area = areas > NO_AREA * np.abs(areas).mean()  # these may receive shares of other nodes
+    with_area = areas > NO_AREA * np.abs(areas).mean()  # nodes that may receive shares of others
     while True:
         if not may_pull:
             closed = closed & (nodal >= 0.0)
             if shares.sum() > 0.0 and not (closed & with_area).any():
-                most = np.argmax(np.where(with_area, shares, -np.inf))
-                alone = np.arange(len(areas)) == most
-                return alone, np.where(alone, shares.sum() / areas[most], 0.0)
-        takers = closed & with_area
-        moving = np.where(closed, shares - nodal * areas, shares)
-        moving[takers | (np.abs(moving) <= SUM_ROUND_OFF * np.abs(shares).max(initial=0.0))] = 0.0
-        pressure = nodal + (_received(takers, moving, areas, side) if moving.any() else np.zeros_like(moving))
+                largest = np.argmax(np.where(with_area, shares, -np.inf))
+                single_node = np.arange(len(areas)) == largest
+                return single_node, np.where(single_node, shares.sum() / areas[largest], 0.0)
+        receivers = closed & with_area
+        moved = np.where(closed, shares - nodal * areas, shares)
+        moved[receivers | (np.abs(moved) <= SUM_ROUND_OFF * np.abs(shares).max(initial=0.0))] = 0.0
+        pressure = nodal + (_received(receivers, moved, areas, side) if moved.any() else np.zeros_like(moved))
         tension = closed & (pressure < 0.0)
         if may_pull or not tension.any():
             return closed, np.where(closed, pressure, 0.0)
         closed = closed & ~tension
 
 
-def _received(takers: Mask, moving: Array, areas: Array, side: Surface) -> Array:
-    """Return the changes (n,) of pressures at the nodes `takers` (n,) by the shares `moving` (n,) of other nodes [pressure].
+def _received(receivers: Mask, moved: Array, areas: Array, side: Surface) -> Array:
+    """Return the changes (n,) of pressures at the `receivers` (n,) due to the shares `moved` (n,) of other nodes [pressure].
 
     Shares move from ring to ring of neighbours towards the receiving nodes, beginning with the ring that is farthest away.
     """
-    rings, reached = [takers], takers.copy()
-    while (moving[~reached] != 0.0).any():
+    rings, reached = [receivers], receivers.copy()
+    while (moved[~reached] != 0.0).any():
         ring = (side.near @ rings[-1].astype(np.float64) > 0.0) & ~reached
         if not ring.any():
             break
         rings.append(ring)
         reached |= ring
     for inner, outer in zip(rings[-2::-1], rings[:0:-1], strict=True):
-        room = np.where(inner, areas if inner is takers else 1.0, 0.0)
-        given = np.divide(moving, side.near @ room, out=np.zeros_like(moving), where=outer)
-        moving = np.where(outer, 0.0, moving) + room * (side.near @ given)
-    return np.divide(moving, areas, out=np.zeros_like(moving), where=takers)
+        weights = np.where(inner, areas if inner is receivers else 1.0, 0.0)
+        per_weight = np.divide(moved, side.near @ weights, out=np.zeros_like(moved), where=outer)
+        moved = np.where(outer, 0.0, moved) + weights * (side.near @ per_weight)
+    return np.divide(moved, areas, out=np.zeros_like(moved), where=receivers)

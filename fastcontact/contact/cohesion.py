@@ -2,7 +2,7 @@
 
 Traction is ``(1 - damage) stiffness`` times the opening and the sliding of the sides (Camanho and Davila,
 NASA/TM-2002-211737, with the mixed-mode limits of Turon, Camanho, Costa and Davila, 2006). Damage grows so that the traction
-falls linearly with the largest separation; unloading follows the secant. In compression the layer has its undamaged
+decreases linearly as the separation increases. Unloading follows the secant. In compression the layer has its undamaged
 stiffness.
 """
 
@@ -16,33 +16,34 @@ import numpy as np
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 
-# Default ratio of the opening at the largest traction to the opening at break.
+# Default ratio of the opening at the largest traction to that at break.
 ELASTIC = 0.01
 
 
 @dataclass(frozen=True)
 class CohesiveLaw:
-    """A bilinear law of traction and separation.
+    """Bilinear traction-separation law.
 
     Parameters
     ----------
     strength, shear_strength : float
         Largest traction in pure opening and in pure sliding [pressure].
     energy, shear_energy : float
-        Fracture energies per area in pure opening and in pure sliding: the areas below the law [pressure length].
+        Fracture energies per area in pure opening and in pure sliding, the areas under the traction curves
+        [pressure length].
     stiffness : float
-        Slope of the law before any damage [pressure / length].
+        Slope of the traction curves before any damage [pressure / length].
     exponent : float
-        Exponent of the mixed-mode criterion: Benzeggagh and Kenane's, or that of the power law [-].
+        Exponent of the interpolation of Benzeggagh and Kenane, or of the power law [-].
     reversible : bool
-        Whether the law has no memory, and no resistance to sliding: adhesion.
+        Whether damage heals when the sides approach each other, as for adhesion.
     initiation : str
-        Criterion of damage initiation in mixed mode: ``"bk"``, the squares of the limits are interpolated like the
-        energies; ``"quadratic"``, the squares of the tractions over their limits sum to one; ``"maximum"``, one traction
-        reaches its limit.
+        Criterion of damage initiation in mixed mode. With ``"bk"``, the squares of the limits are interpolated like the
+        energies; with ``"quadratic"``, the squares of the tractions over their limits sum to one; with ``"maximum"``, one
+        traction reaches its limit.
     mixed_mode : str
-        Fracture energy in mixed mode: ``"bk"``, Benzeggagh and Kenane's interpolation; ``"power"``, powers of the energies
-        over their limits sum to one.
+        Fracture energy in mixed mode: ``"bk"`` for the interpolation of Benzeggagh and Kenane, or ``"power"`` for the power
+        law, in which powers of the energies over their limits sum to one.
     """
 
     strength: float
@@ -56,43 +57,46 @@ class CohesiveLaw:
     mixed_mode: str = "bk"
 
     def limits(self, opening: Array, sliding: Array) -> tuple[Array, Array]:
-        """Return the separations (m,) at damage initiation and at break for a mode ratio opening to sliding (m,) [length]."""
+        """Return the separations (m,) at damage initiation and at break, for ratios of opening to sliding (m,) [length]."""
         normal, shear = self.strength / self.stiffness, self.shear_strength / self.stiffness
         square = np.maximum(opening, 0.0) ** 2 + sliding**2
-        share = np.divide(sliding**2, square, out=np.zeros_like(square), where=square > 0.0)
-        mixed = share**self.exponent
+        shear_fraction = np.divide(sliding**2, square, out=np.zeros_like(square), where=square > 0.0)
+        interpolation = shear_fraction**self.exponent
         if self.initiation == "quadratic":
-            onset = ((1.0 - share) / normal**2 + share / shear**2) ** -0.5
+            onset = ((1.0 - shear_fraction) / normal**2 + shear_fraction / shear**2) ** -0.5
         elif self.initiation == "maximum":
-            onset = np.maximum((1.0 - share) / normal**2, share / shear**2) ** -0.5
+            onset = np.maximum((1.0 - shear_fraction) / normal**2, shear_fraction / shear**2) ** -0.5
         else:
-            onset = np.sqrt(normal**2 + (shear**2 - normal**2) * mixed)
+            onset = np.sqrt(normal**2 + (shear**2 - normal**2) * interpolation)
         if self.mixed_mode == "power":
-            of_opening = ((1.0 - share) / self.energy) ** self.exponent
-            energy = (of_opening + (share / self.shear_energy) ** self.exponent) ** (-1.0 / self.exponent)
+            opening_term = ((1.0 - shear_fraction) / self.energy) ** self.exponent
+            energy = (opening_term + (shear_fraction / self.shear_energy) ** self.exponent) ** (-1.0 / self.exponent)
         else:
-            energy = self.energy + (self.shear_energy - self.energy) * mixed
+            energy = self.energy + (self.shear_energy - self.energy) * interpolation
         return onset, 2.0 * energy / (self.stiffness * onset)
 
-    def damage(self, opening: Array, sliding: Array, before: Array) -> Array:
-        """Return the damage (m,) at openings and slidings (m,) [length], at least the earlier damage `before` (m,) [-]."""
-        onset, end = self.limits(opening, sliding)
+    def damage(self, opening: Array, sliding: Array, previous: Array) -> Array:
+        """Return the damage (m,) [-] at openings and slidings (m,) [length], unless reversible at least `previous` (m,)."""
+        onset, final = self.limits(opening, sliding)
         separation = np.maximum(np.hypot(np.maximum(opening, 0.0), sliding), onset)
-        now = np.minimum(end * (separation - onset) / (separation * (end - onset)), 1.0)
-        return now if self.reversible else np.maximum(now, before)
+        damage = np.minimum(final * (separation - onset) / (separation * (final - onset)), 1.0)
+        return damage if self.reversible else np.maximum(damage, previous)
 
     def released(self, opening: Array, sliding: Array, damage: Array) -> Array:
         """Return the energy per area dissipated by damage (m,), at the mode ratio of opening and sliding (m,)."""
-        onset, end = self.limits(opening, sliding)
-        separation = onset * end / (end - damage * (end - onset))
-        return 0.5 * self.stiffness * onset * end * (separation - onset) / (end - onset)
+        onset, final = self.limits(opening, sliding)
+        separation = onset * final / (final - damage * (final - onset))
+        return 0.5 * self.stiffness * onset * final * (separation - onset) / (final - onset)
 
 
-def cohesive_law(strength: float, energy: float, *, reversible: bool = False, **given: Any) -> CohesiveLaw:
-    """Return a law; by default sliding is like opening, and damage begins at ELASTIC of the opening at break."""
-    stiffness = given.pop("stiffness", strength**2 / (2.0 * ELASTIC * energy))
-    shear = {"shear_strength": given.pop("shear_strength", strength), "shear_energy": given.pop("shear_energy", energy)}
-    return CohesiveLaw(strength, energy, stiffness, **shear, **given, reversible=reversible)
+def cohesive_law(strength: float, energy: float, *, reversible: bool = False, **options: Any) -> CohesiveLaw:
+    """Return a law; by default, sliding has the limits of opening, and damage begins at ELASTIC of the opening at break."""
+    stiffness = options.pop("stiffness", strength**2 / (2.0 * ELASTIC * energy))
+    shear = {
+        "shear_strength": options.pop("shear_strength", strength),
+        "shear_energy": options.pop("shear_energy", energy),
+    }
+    return CohesiveLaw(strength, energy, stiffness, **shear, **options, reversible=reversible)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +108,11 @@ class Bond:
     positions : ndarray (m, dim)
         Reference positions [length].
     sliding : ndarray (m, dim)
-        Relative tangential displacement since the beginning [length].
+        Relative tangential displacement since the beginning of the analysis [length].
     damage : ndarray (m,)
         Damage, from 0 (intact) to 1 (broken) [-].
     released : float
-        Energy dissipated by damage so far [energy]; for adhesion, that of the law less `stored`.
+        Energy dissipated by damage so far [energy]; for adhesion, the energy of the law minus `stored`.
     stored : float
         Elastic energy of the undamaged fraction [energy].
     """

@@ -1,8 +1,8 @@
-"""A cohesive layer between the sides of a contact pair: equality constraints whose compliance follows its law.
+"""Cohesive layer between the sides of a contact pair, by equality constraints whose compliance follows a traction law.
 
-In each pairing the law is linearised: by the secant where the layer unloads or reloads, and by a nearly constant traction
-where it softens. Matrices then stay positive definite, and the pairings converge to every state that is stable under
-prescribed displacements.
+In each pairing the law is linearised, by the secant where the layer unloads or reloads, and by a nearly constant traction
+where it softens. Matrices then remain positive definite, and the iteration over pairings converges to every state that is
+stable under prescribed displacements.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from fastcontact.contact.cohesion import Bond, CohesiveLaw
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 
-# Stiffness of the linearised layer where it softens, over that of the intact layer; with a smaller one, the iteration for a
-# beam glued by nodes does not converge.
+# Ratio of the stiffness of the linearised layer where it softens to that of the intact layer. With a smaller ratio, the
+# iteration for a beam glued by nodes does not converge.
 LEVEL = 1e-2
 
 
@@ -38,7 +38,7 @@ class Layer:
     damage : ndarray (m,)
         Damage at which the law is linearised [-].
     separation, rest : ndarray (1 + k, m)
-        Opening and sliding at which the law is linearised, and those of zero traction in the linearised law [length].
+        Opening and sliding at which the law is linearised, and at which the traction of the linearised law vanishes [length].
     """
 
     law: CohesiveLaw
@@ -51,67 +51,65 @@ class Layer:
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
         """Return normal (m,) and tangential (m, k) forces [force]."""
-        normal, *along = multiplier.reshape(-1, len(self.damage))
-        return normal, np.stack(along, axis=1) if along else np.zeros((len(normal), 0))
+        normal, *tangential = multiplier.reshape(-1, len(self.damage))
+        return normal, np.stack(tangential, axis=1) if tangential else np.zeros((len(normal), 0))
 
     def after(self, constraints: Constraints, u: Array) -> Bond:
-        """Return the layer at the end of a step with displacements u (n_dofs,) [length]."""
+        """Return the state of the layer at the end of a step with displacements u (n_dofs,) [length]."""
         end = (constraints.gap0 + constraints.B @ u).reshape(self.rest.shape) + self.rest
-        opening, *slides = np.where(self.damage < 1.0, end, self.separation)  # broken: no tangential rows
-        sliding = sum((s[:, None] * t for s, t in zip(slides, self.directions)), np.zeros_like(self.before.sliding))
-        size, law = np.linalg.norm(sliding, axis=1), self.law
+        # Broken constraints have no tangential rows.
+        opening, *slips = np.where(self.damage < 1.0, end, self.separation)
+        sliding = sum((s[:, None] * t for s, t in zip(slips, self.directions)), np.zeros_like(self.before.sliding))
+        slip, law = np.linalg.norm(sliding, axis=1), self.law
         areas = np.where(np.isfinite(self.areas), self.areas, 0.0)
         integrity = np.where(self.damage < 1.0, 1.0 - self.damage, 0.0)
-        stretched = np.where(opening < 0.0, 1.0, integrity) * opening**2 + integrity * size**2
-        grown = law.released(opening, size, self.damage) - law.released(opening, size, self.before.damage)
-        released = self.before.released + float(areas @ grown)
-        return Bond(
-            self.before.positions, sliding, self.damage, released, 0.5 * law.stiffness * float(areas @ stretched)
-        )
+        squares = np.where(opening < 0.0, 1.0, integrity) * opening**2 + integrity * slip**2
+        dissipated = law.released(opening, slip, self.damage) - law.released(opening, slip, self.before.damage)
+        released = self.before.released + float(areas @ dissipated)
+        return Bond(self.before.positions, sliding, self.damage, released, 0.5 * law.stiffness * float(areas @ squares))
 
 
-def bonded(law: CohesiveLaw, constraints: Constraints, at: Configuration, lying: Array) -> Constraints:
+def bonded(law: CohesiveLaw, constraints: Constraints, at: Configuration, initial_gap: Array) -> Constraints:
     """Return `constraints`, which have tangents, as a cohesive layer: equations whose compliance follows its law.
 
-    `lying` (m,) are the initial gaps [length]. Cohesive layers have no traction there, while adhesion acts across them.
-    Broken constraints may close again, with the full stiffness.
+    Cohesive layers have no traction at the initial gaps `initial_gap` (m,), while adhesion acts across them [length]. Broken
+    constraints may close again, with the stiffness of the intact layer.
     """
     assert constraints.areas is not None
     m, u, start = len(constraints), at.displacement.ravel(), at.start.ravel()
-    none = np.zeros(m)
+    zero = np.zeros(m)
     before = at.bond
     if before is None:
-        begun = law.damage(lying, none, none) if law.reversible else none
-        before = Bond(constraints.positions, np.zeros_like(constraints.positions), begun)
-    lying = none if law.reversible else lying
+        initial_damage = law.damage(initial_gap, zero, zero) if law.reversible else zero
+        before = Bond(constraints.positions, np.zeros_like(constraints.positions), initial_damage)
+    initial_gap = zero if law.reversible else initial_gap
     sliding, damage = before.at(constraints.positions)
     before = Bond(constraints.positions, sliding, damage, before.released)
-    known = zip(constraints.tangents, constraints.directions, constraints.slip0, strict=True)
-    along = [slip0 + np.einsum("md,md->m", t, sliding) - T @ start for T, t, slip0 in known]
-    slides = [rest + T @ u for T, rest in zip(constraints.tangents, along, strict=True)]
-    opening = constraints.gaps(at.displacement) - lying
-    damage = law.damage(opening, np.sqrt(sum((s**2 for s in slides), none)), damage)
-    if at.bond is not None and np.array_equal(
-        u, start
-    ):  # an obstacle has moved, and the body follows in this pairing only
+    tangential = zip(constraints.tangents, constraints.directions, constraints.slip0, strict=True)
+    slip0 = [s0 + np.einsum("md,md->m", t, sliding) - T @ start for T, t, s0 in tangential]
+    slips = [s0 + T @ u for T, s0 in zip(constraints.tangents, slip0, strict=True)]
+    opening = constraints.gaps(at.displacement) - initial_gap
+    damage = law.damage(opening, np.sqrt(sum((s**2 for s in slips), zero)), damage)
+    # At the beginning of a step an obstacle may have moved, which the body follows in this pairing only.
+    if at.bond is not None and np.array_equal(u, start):
         damage = np.minimum(damage, before.damage)
-    intact, now = damage < 1.0, np.stack([opening, *slides])
-    secant = np.tile(np.where(intact, 1.0 - damage, 1.0), (len(now), 1))
+    intact, jump = damage < 1.0, np.stack([opening, *slips])
+    secant = np.tile(np.where(intact, 1.0 - damage, 1.0), (len(jump), 1))
     secant[0, opening < 0.0] = 1.0
-    falls = intact & (damage > (0.0 if law.reversible else before.damage)) & (secant > LEVEL)
-    slope = np.where(falls, LEVEL, secant)
+    softening = intact & (damage > (0.0 if law.reversible else before.damage)) & (secant > LEVEL)
+    slope = np.where(softening, LEVEL, secant)
     unused = np.empty(0)
-    layer = Layer(law, constraints.directions, constraints.areas, before, damage, now, now * (1.0 - secant / slope))
+    layer = Layer(law, constraints.directions, constraints.areas, before, damage, jump, jump * (1.0 - secant / slope))
     return replace(
         constraints,
         B=csr_array(vstack([constraints.B, *constraints.tangents], format="csr")),
-        gap0=np.concatenate([constraints.gap0 - np.where(intact, lying, 0.0), *along]) - layer.rest.ravel(),
-        equality=np.tile(intact, len(now)),
+        gap0=np.concatenate([constraints.gap0 - np.where(intact, initial_gap, 0.0), *slip0]) - layer.rest.ravel(),
+        equality=np.tile(intact, len(jump)),
         softness=1.0 / (slope * law.stiffness * constraints.areas).ravel(),
-        positions=np.tile(constraints.positions, (len(now), 1)),
-        areas=np.tile(constraints.areas, len(now)),
-        nodes=None if constraints.nodes is None else np.tile(constraints.nodes, len(now)),
+        positions=np.tile(constraints.positions, (len(jump), 1)),
+        areas=np.tile(constraints.areas, len(jump)),
+        nodes=None if constraints.nodes is None else np.tile(constraints.nodes, len(jump)),
         compliance=None, tangents=(), directions=(), tied=layer,
         friction=unused, slip0=unused, tangential_softness=unused, elastic_slip=unused, low_rank_compliance=unused,
-        branches=(falls + 2 * (opening < 0.0) + 4 * ~intact).ravel().astype(np.int8),
-    ).without(np.concatenate([none > 0.0, *[~intact] * len(along)]))  # fmt: skip
+        branches=(softening + 2 * (opening < 0.0) + 4 * ~intact).ravel().astype(np.int8),
+    ).without(np.concatenate([zero > 0.0, *[~intact] * len(slip0)]))  # fmt: skip

@@ -1,8 +1,8 @@
-"""Thermal contact conductance as a function of pressure and gap, and the temperatures on both sides.
+"""Thermal contact conductance as a function of pressure and gap, and the discrete heat transfer between both sides.
 
-The heat flow at a constraint is ``h * area * (T_secondary - T_primary)``, the temperatures weighted with the test functions
-of the constraint's gap; the transpose gives the nodal powers. Mortar functions sum to one, so that a uniform flux is
-transmitted exactly between non-matching meshes (Hueber and Wohlmuth, 2009, section 3).
+The heat flow at a constraint is ``h * area * (T_secondary - T_primary)``, where temperatures are weighted with the test
+functions of the gap of the constraint. The transpose distributes heat flows to the nodes. Mortar functions sum to one, so
+that a uniform flux is transmitted exactly between non-matching meshes (Hueber and Wohlmuth, 2009, section 3).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ TABLES = ("pressure", "gap")
 
 
 class Conductance:
-    """The heat flow across a contact, per area and temperature difference.
+    """Heat flow across a contact per area and temperature difference.
 
     Raises ContactError if `given` is not a valid conductance.
 
@@ -35,10 +35,10 @@ class Conductance:
     name : str
         Name of the contact pair, for messages.
     given : float, callable, sequence or mapping
-        A number, which applies where the sides touch; a function of pressures and gaps (m,), which also applies where they
-        are open; pairs (pressure, conductance), which apply where they touch; or a mapping of ``"pressure"`` to such pairs
-        and of ``"gap"`` to pairs (gap, conductance), which apply where the sides are open, or everywhere if there are no
-        pairs for pressure [power / (area temperature)].
+        A number, which applies where the sides touch; a function of pressures and gaps (m,), which also applies where the
+        sides are open; pairs (pressure, conductance), which apply where the sides touch; or a mapping of ``"pressure"`` to
+        such pairs and of ``"gap"`` to pairs (gap, conductance), which apply where the sides are open, or everywhere if there
+        are no pairs for pressure [power / (area temperature)].
     """
 
     def __init__(self, name: str, given: Any) -> None:
@@ -77,7 +77,7 @@ class Conductance:
 
     @property
     def sampled(self) -> Any:
-        """Values that identify the conductance: the number or tables as given, or sampled values of a function."""
+        """Values that identify the conductance: the argument `given` itself or, for a function, samples of its values."""
         if not callable(self.given):
             return self.given
         scale = np.concatenate([[0.0], np.logspace(-9, 9, 37)])
@@ -92,13 +92,13 @@ class Conductance:
         if self._number is not None:
             return np.where(touching, self._number, 0.0)
         if not callable(self.given):
-            by = {
+            interpolated = {
                 key: np.interp(at, *self._tables[key].T)
                 for key, at in zip(TABLES, (pressure, gap))
                 if key in self._tables
             }
-            closed = by.get("pressure", by.get("gap", 0.0))
-            return np.where(touching, closed, by.get("gap", 0.0))
+            closed = interpolated.get("pressure", interpolated.get("gap", 0.0))
+            return np.where(touching, closed, interpolated.get("gap", 0.0))
         try:
             h = np.asarray(self.given(pressure, gap), float)
         except Exception as error:
@@ -121,9 +121,9 @@ class Crossing:
     Attributes
     ----------
     secondary, primary : csr_array (m, n_points)
-        Weights of the temperatures on both sides of each constraint, which sum to one [-].
+        Weights of the nodal temperatures on both sides of each constraint, which sum to one on each meshed side [-].
     area : ndarray (m,)
-        Area of each constraint, zero where the other side is not faced [area].
+        Area of each constraint, zero for constraints that face no primary point [area].
     """
 
     secondary: csr_array
@@ -149,7 +149,7 @@ def crossing(
 ) -> Crossing:
     """Return the heat transfer between two sides at constraints, whose rows weight displacements along one normal each.
 
-    A rigid primary side has no points, and no weights. `shape` is that of the points of the mesh, (n_points, dim).
+    A rigid primary side has no points and thus no weights. `shape` is that of the points of the mesh, (n_points, dim).
     """
     n, dim = shape
     on_secondary = np.zeros(n, bool)

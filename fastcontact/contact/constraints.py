@@ -1,7 +1,7 @@
 """Contact constraints: ``gap >= 0``, ``multiplier >= 0`` and ``gap * multiplier = 0`` for each row of a matrix B.
 
 In this module m is the number of constraints, n_dofs the number of displacement components of the mesh, n_nodes the number of
-secondary nodes, and k the number of tangents: one in 2D, two in 3D, none without friction.
+secondary nodes, and k the number of tangents, which is one in 2D, two in 3D, and zero without friction.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ class NodalField(Protocol):
     nodal_areas : ndarray (n_nodes,)
         Integrals of the shape functions of the nodes over the secondary side [area].
     covered : ndarray (n_nodes,) or float
-        Fraction of the area of each node in which contact is possible: parts of facets without an opposite facet, and parts
-        that options of the pair exclude, do not count [-].
+        Fraction of the area of each node in which contact is possible. Parts of facets without an opposite facet and parts
+        that options of the pair exclude do not count [-].
     """
 
     nodal_areas: Array
@@ -123,7 +123,7 @@ class NodalField(Protocol):
     def initially_active(self, gap: Array, pressure: Array) -> Mask | None:
         """Return an initial active set (m,) for gaps (m,) [length] and the last nodal pressures (n_nodes,) [pressure].
 
-        None means that each constraint exists in every pairing: the last active set then is a better initial guess.
+        None means that each constraint exists in every pairing, so that the last active set is a better initial guess.
         """
         return None
 
@@ -154,7 +154,7 @@ class Wetted(Protocol):
 
 
 class Tied(Protocol):
-    """Linear equations instead of contact inequalities, see `tied.TiedPair`; multipliers belong to these equations."""
+    """Linear equations with their multipliers instead of contact inequalities, see `tied.TiedPair`."""
 
     @property
     def directions(self) -> tuple[Array, ...]:
@@ -171,10 +171,10 @@ class Tied(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """Inequality constraints ``gap = gap0 + B u + C multiplier >= 0`` with multipliers that are not negative.
+    """Inequality constraints ``gap = gap0 + B u + C multiplier >= 0`` with non-negative multipliers, and equations.
 
-    An optional attribute that is None means zero, or means that the constraints do not have the feature. An empty array means
-    zero for all constraints, and is replaced by zeros.
+    If an optional attribute is None, it is zero, or the constraints do not have the feature. Empty arrays are replaced by
+    zeros for all constraints.
 
     Attributes
     ----------
@@ -206,15 +206,15 @@ class Constraints:
     tangential_softness : ndarray (m,)
         Compliance of each constraint along its tangents [length / force].
     elastic_slip : ndarray (k, m)
-        Minus the elastic slip of the tangential compliance under the forces at the beginning of the load step. It is added to
-        the slip of the step, so that only the change of the forces since then causes elastic slip [length].
+        Minus the elastic slip of the tangential compliance at the beginning of the load step. It is added to the slip of the
+        step, so that only the change of the forces in the step causes elastic slip [length].
     low_rank_compliance : ndarray (1 + k, m, h)
-        Factor Z of a compliance ``Z @ Z.T`` in addition to C. Its rows belong to the normal forces, then to the forces along
-        each tangent.
+        Factor Z of a compliance ``Z @ Z.T`` in addition to C. ``Z[0]`` belongs to the normal forces, ``Z[1:]`` to the forces
+        along the tangents [(length / force)^(1/2)].
     driven : ndarray (k, m), optional
         Slips that supports and obstacles impose, relative to the largest imposed displacement [-].
     law : OverclosureLaw, optional
-        Law of pressure and overclosure, if `gap0` and `softness` are its linearisation.
+        Pressure-overclosure law of which `gap0` and `softness` are the linearisation.
     branches : ndarray of int, optional
         Branch of the cohesive law at each point of a cohesive layer.
     wetted : Wetted, optional
@@ -388,7 +388,7 @@ class StackedConstraints(Constraints):
 
     @cached_property
     def rows(self) -> dict[str, slice]:
-        """Return the range of rows of each pair, by the name of the pair."""
+        """Range of rows of each pair, by the name of the pair."""
         ends = np.cumsum([0, *(len(pair) for pair in self.parts.values())]).tolist()
         return {name: slice(first, end) for name, first, end in zip(self.parts, ends[:-1], ends[1:], strict=True)}
 
@@ -436,7 +436,7 @@ def _stacked_directions(pairs: list[Constraints], coupled: bool = False) -> tupl
 
     With `coupled`, `coupled_directions` take precedence over `directions`.
     """
-    directions = [(part.coupled_directions if coupled else ()) or part.directions for part in pairs]
+    directions = [(pair.coupled_directions if coupled else ()) or pair.directions for pair in pairs]
     return tuple(
         np.vstack(
             [along[j] if along else np.zeros_like(p.positions) for along, p in zip(directions, pairs, strict=True)]
@@ -462,20 +462,20 @@ class _Softened:
         return self.block(rows)
 
     def apply(self, multiplier: Array) -> Array:
-        compliance = self._softness * multiplier
-        return compliance if self._inner is None else compliance + self._inner.apply(multiplier)
+        elastic = self._softness * multiplier
+        return elastic if self._inner is None else elastic + self._inner.apply(multiplier)
 
 
 class _BlockDiagonal:
     """Block-diagonal compliance of several pairs; see `Compliance`."""
 
     def __init__(self, pairs: list[Constraints]) -> None:
-        self._parts = [pair.compliance for pair in pairs]
+        self._compliances = [pair.compliance for pair in pairs]
         self._start = np.cumsum([0] + [len(pair) for pair in pairs])
 
     def block(self, rows: Indices) -> Array:
         values = np.zeros((len(rows), len(rows)))
-        for compliance, first, end in zip(self._parts, self._start[:-1], self._start[1:], strict=True):
+        for compliance, first, end in zip(self._compliances, self._start[:-1], self._start[1:], strict=True):
             in_block = np.flatnonzero((rows >= first) & (rows < end))
             if compliance is not None and len(in_block):
                 values[np.ix_(in_block, in_block)] = compliance.block(rows[in_block] - first)
@@ -483,10 +483,10 @@ class _BlockDiagonal:
 
     def among(self, rows: Indices) -> Array | FieldCompliance:
         blocks = []
-        for part, first, end in zip(self._parts, self._start[:-1], self._start[1:], strict=True):
+        for inner, first, end in zip(self._compliances, self._start[:-1], self._start[1:], strict=True):
             in_block = rows[(rows >= first) & (rows < end)] - first
             compliance = (
-                FieldCompliance.none(len(in_block)) if part is None or not len(in_block) else part.among(in_block)
+                FieldCompliance.none(len(in_block)) if inner is None or not len(in_block) else inner.among(in_block)
             )
             if not isinstance(compliance, FieldCompliance):
                 return self.block(rows)
@@ -495,7 +495,7 @@ class _BlockDiagonal:
 
     def apply(self, multiplier: Array) -> Array:
         values = np.zeros(len(multiplier))
-        for part, first, end in zip(self._parts, self._start[:-1], self._start[1:], strict=True):
-            if part is not None:
-                values[first:end] = part.apply(multiplier[first:end])
+        for inner, first, end in zip(self._compliances, self._start[:-1], self._start[1:], strict=True):
+            if inner is not None:
+                values[first:end] = inner.apply(multiplier[first:end])
         return values

@@ -1,16 +1,16 @@
 """Centre of a contact zone, and distances from it on the secondary surface.
 
-In axisymmetry the middle is the axis where no two points of the surface have the same radius. Otherwise it is the centre of
-pressure of the contact, completed by reflection at the planes of symmetry that it reaches: a half or quarter model has its
-middle on these planes. A plane of symmetry is one in which supports hold the nodes at an end of the surface normal to the
-plane.
+In axisymmetry the middle lies on the axis if the surface reaches the axis, or if it faces along the axis and its radius
+changes monotonically. Otherwise the middle is the centre of pressure of the contact, completed by reflection at the planes of
+symmetry that it reaches: a half or quarter model has its middle on these planes. In a plane of symmetry, supports hold the
+nodes at an end of the surface in the direction normal to the plane.
 
-In the plane, coordinates are arc lengths along the surface: a ring is unrolled. The same holds in axisymmetry where the
-surface runs along the axis rather than across it, as in a press fit of cylinders, or closes on itself, as that of an O-ring.
-In 3D they are distances from the line through the middle along the mean normal.
+In plane models, positions are arc lengths along the surface, so that a ring is unrolled. The same holds in axisymmetry where
+the surface runs along the axis rather than across it, as in a press fit of cylinders, or closes on itself, like that of an
+O-ring. In 3D, positions are distances from the line through the middle along the mean normal.
 
-The half-width of a contact in the plane is that of its projection along the mean normal: half the chord of a pin in its hole,
-not half the arc.
+The half-width of a contact in a plane model is that of its projection along the mean normal. For a pin in a hole it is half
+the chord, not half the arc.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 @dataclass(frozen=True, eq=False)
 class UnrolledLine:
-    """A line through nodes.
+    """A polygonal line through nodes.
 
     Attributes
     ----------
     nodes : ndarray (k, 2)
-        In order; the first is repeated at the end of a closed line [length].
+        Positions of the nodes in order; the first is repeated at the end of a closed line [length].
     abscissa : ndarray (k,)
-        Length along the line to each of them [length].
+        Arc length along the line to each node [length].
     closed : bool
     """
 
@@ -55,7 +55,7 @@ class UnrolledLine:
 
     @classmethod
     def straight(cls, middle: Array, direction: Array, reach: float) -> UnrolledLine:
-        """Return a straight line on both sides of `middle` (2,) along `direction` (2,), each `reach` long [length]."""
+        """Return the straight line along `direction` (2,) that extends from `middle` (2,) by `reach` both ways [length]."""
         return cls(middle + np.outer([-reach, reach], direction), np.array([0.0, 2.0 * reach]))
 
     def at(self, length: float) -> Array:
@@ -71,17 +71,17 @@ class UnrolledLine:
             begin, along = self.nodes[piece], self.nodes[piece + 1] - self.nodes[piece]
             size = np.einsum("nd,nd->n", along, along)
             fraction = np.clip(np.einsum("nd,nd->n", positions - begin, along) / size, 0.0, 1.0)
-            away = np.linalg.norm(begin + fraction[:, None] * along - positions, axis=1)
-            nearer = away < best
-            best[nearer] = away[nearer]
+            distance = np.linalg.norm(begin + fraction[:, None] * along - positions, axis=1)
+            nearer = distance < best
+            best[nearer] = distance[nearer]
             arc_length[nearer] = (self.abscissa[piece] + fraction * np.sqrt(size))[nearer]
         return arc_length
 
 
 def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> UnrolledLine | None:
-    """Return a surface in the plane as one line; None where it is in several pieces or branches.
+    """Return a surface in a plane model as one line; None if it has several pieces or branches.
 
-    A closed line is cut open opposite to `middle` (2,) [length], or at its lowest point without one.
+    A closed line is cut open at the node farthest from `middle` (2,) [length] or, without a middle, at its lowest node.
     """
     if surface.abscissa.any():
         return UnrolledLine(coordinates[surface.points], surface.abscissa)
@@ -89,8 +89,8 @@ def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> Unro
     if order is None:
         return None
     nodes = coordinates[surface.points][order]
-    away = -nodes[:, 1] if middle is None else np.linalg.norm(nodes - middle, axis=1)
-    nodes = np.roll(nodes, -int(np.argmax(away)), axis=0)
+    distance = -nodes[:, 1] if middle is None else np.linalg.norm(nodes - middle, axis=1)
+    nodes = np.roll(nodes, -int(np.argmax(distance)), axis=0)
     nodes = np.concatenate([nodes, nodes[:1]])
     lengths = np.linalg.norm(np.diff(nodes, axis=0), axis=1)
     return UnrolledLine(nodes, np.concatenate([[0.0], np.cumsum(lengths)]), closed=True)
@@ -98,21 +98,21 @@ def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> Unro
 
 def _loop(surface: Surface) -> list[int] | None:
     """Return the nodes of a surface, as rows of its points, in order around one closed line; None if it is open."""
-    following: dict[int, int] = {}
+    next_node: dict[int, int] = {}
     for block in surface.blocks:
         middles = block.local[:, 2:]
         chains = np.concatenate([block.local[:, :1], middles, block.local[:, 1:2]], axis=1).tolist()
         for chain in chains:
             for begin, end in pairwise(chain):
-                if begin in following:
+                if begin in next_node:
                     return None
-                following[begin] = end
-    first = next(iter(following))
-    order, here = [first], following.get(first)
-    while here is not None and here != first and len(order) <= len(following):
-        order.append(here)
-        here = following.get(here)
-    return order if here == first and len(order) == len(surface.points) else None
+                next_node[begin] = end
+    first = next(iter(next_node))
+    order, node = [first], next_node.get(first)
+    while node is not None and node != first and len(order) <= len(next_node):
+        order.append(node)
+        node = next_node.get(node)
+    return order if node == first and len(order) == len(surface.points) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,16 +122,18 @@ class ContactMiddle:
     Attributes
     ----------
     position : ndarray (dim,)
-        On the surface [length].
+        Position of the middle on the surface, or on the axis [length].
     line : UnrolledLine, optional
-        The surface as a line, where coordinates are arc lengths; `start` is the arc length at the middle [length].
+        The surface as a line along which positions are arc lengths; `start` is the arc length at the middle [length].
+    reversed : bool
+        Whether arc lengths are counted in the opposite direction of the line.
     direction : ndarray (dim,), optional
         Direction of the line from which distances are measured [-].
     ignored : tuple of int
         Coordinates along which the model represents an infinite surface.
     tangent : ndarray (dim,), optional
-        Direction along which half-widths are measured [-]. If None, as in axisymmetry, in 3D, and on a ring in contact all
-        round, half-widths are measured by the distances of `places`.
+        Direction along which half-widths are measured [-]. If None, as for a middle on the axis, in 3D, and on a ring that
+        is in contact along its whole circumference, half-widths are measured by `places`.
     """
 
     position: Array
@@ -143,11 +145,11 @@ class ContactMiddle:
     tangent: Array | None = None
 
     def across(self, positions: Array) -> Array:
-        """Return the distances (n,) of reference positions (n, dim) from the middle, projected along its normal [length]."""
+        """Return the distances (n,) of reference positions (n, dim) along `tangent` or, without it, `places` [length]."""
         return self.places(positions) if self.tangent is None else (positions - self.position) @ self.tangent
 
     def places(self, positions: Array) -> Array:
-        """Return the distances (n,) of reference positions (n, dim) from the middle, signed along a line [length]."""
+        """Return the distances (n,) of reference positions (n, dim) from the middle, with a sign along a line [length]."""
         if self.line is not None:
             along = self.line.lengths(positions) - self.start
             if self.line.closed:
@@ -167,12 +169,13 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     ----------
     pair : Formulation
     normal : ndarray (n_nodes, dim)
-        Unit normals that the secondary nodes face [-].
+        Unit normals of the primary side at the points that the secondary nodes face [-].
     force : ndarray (n_nodes,)
-        Their normal contact forces [force].
+        Normal contact forces at the secondary nodes [force].
     closed : ndarray of bool (n_nodes,)
+        Nodes in contact.
     gap : ndarray (n_nodes,)
-        Gaps; an open contact has its middle where the gap is smallest [length].
+        Gaps; the middle of an open contact is where the gap is smallest [length].
     """
     surface, points = pair.secondary, pair.points[pair.secondary.points]
     weight = _weights(force, gap)
@@ -180,7 +183,7 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     dim = points.shape[1]
     meets_axis = np.abs(points[:, 0]).min() <= LENGTH_ROUND_OFF * np.ptp(points, axis=0).max()
     if pair.axisymmetric and (
-        meets_axis or (abs(mean[0]) <= abs(mean[1]) and _told_apart_by_radius(surface, pair.points))
+        meets_axis or (abs(mean[0]) <= abs(mean[1]) and _radius_is_monotone(surface, pair.points))
     ):
         return ContactMiddle(np.array([0.0, float(weight @ points[:, 1])]), direction=np.array([0.0, 1.0]))
     planes = symmetry_planes(surface, pair.points, pair.held)
@@ -189,14 +192,14 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
             any(closed[block.local[np.isin(block.local, nodes).any(axis=1)]].any() for block in surface.blocks)
             for _, nodes in planes
         ]
-        planes = [plane for plane, counts in zip(planes, reached, strict=True) if counts]
+        planes = [plane for plane, is_reached in zip(planes, reached, strict=True) if is_reached]
     if dim == 2:
         return _along_line(surface, pair.points, weight, planes, mean)
     return _in_space(points, weight, planes, mean)
 
 
 def _in_space(points: Array, weight: Array, planes: list[tuple[int, Indices]], mean: Array) -> ContactMiddle:
-    """Return the centre on a surface in 3D; parallel planes of symmetry at both ends represent an infinite surface."""
+    """Return the middle on a surface in 3D; parallel planes of symmetry at both ends represent an infinite surface."""
     centre = weight @ points
     ends: dict[int, list[float]] = {}
     for axis, nodes in planes:
@@ -211,8 +214,8 @@ def _in_space(points: Array, weight: Array, planes: list[tuple[int, Indices]], m
     return ContactMiddle(centre, direction=mean / length if length > FACING else None, ignored=ignored)
 
 
-def _told_apart_by_radius(surface: Surface, coordinates: Array) -> bool:
-    """Return whether no two points of a surface have the same radius, or it has no order along it."""
+def _radius_is_monotone(surface: Surface, coordinates: Array) -> bool:
+    """Return whether the radius changes monotonically along a surface; True for a surface that is not one line."""
     line = unrolled(surface, coordinates, None)
     if line is None:
         return True
@@ -221,7 +224,7 @@ def _told_apart_by_radius(surface: Surface, coordinates: Array) -> bool:
 
 
 def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions | None) -> list[tuple[int, Indices]]:
-    """Return the planes of symmetry at the ends of a surface: their axis, and the nodes of the surface on them.
+    """Return the planes of symmetry at the ends of a surface, by the axis normal to each and the nodes of the surface on it.
 
     `coordinates` (n_points, dim) are those of all points; without supports there are no planes.
     """
@@ -259,7 +262,7 @@ def _weights(force: Array, gap: Array) -> Array:
 def _along_line(
     surface: Surface, coordinates: Array, weight: Array, planes: list[tuple[int, Indices]], mean: Array
 ) -> ContactMiddle:
-    """Return the middle on a surface in the plane; a surface in several pieces is projected along its mean normal."""
+    """Return the middle on a surface in a plane model; a surface in several pieces is projected along its mean normal."""
     points, length = coordinates[surface.points], float(np.linalg.norm(mean))
     centre, tangent = weight @ points, np.array([-mean[1], mean[0]]) / (length or 1.0)
     line = unrolled(surface, coordinates, centre if length > FACING else None)
@@ -270,7 +273,7 @@ def _along_line(
         axis, on_plane = planes[0]
         ends = lengths[on_plane]  # both ends of a half ring lie on the plane
         start = float(ends[np.argmin(np.abs(ends - weight @ lengths))])
-        other_way = start > 0.5 * (lengths.min() + lengths.max())
-        return ContactMiddle(line.at(start), line, start, other_way, tangent=np.eye(2)[axis])
+        backward = start > 0.5 * (lengths.min() + lengths.max())
+        return ContactMiddle(line.at(start), line, start, backward, tangent=np.eye(2)[axis])
     start = float(weight @ lengths)
     return ContactMiddle(line.at(start), line, start, tangent=tangent if length > FACING else None)

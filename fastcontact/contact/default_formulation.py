@@ -1,15 +1,15 @@
-"""Default formulation of a contact pair: between bodies, mortar with dual Lagrange multipliers.
+"""Default formulation of a contact pair, between bodies mortar with dual Lagrange multipliers.
 
-It is the only choice that is accurate on any two surfaces (``bench/defaults.py``, docs/reference/accuracy.md).
-Where two nodes face each other, node-to-segment contact uses the normal of one of two facets, and nodes that coincide
-initially no longer do when the bodies slide. Even with averaged normals it does not transmit a uniform pressure between
-non-matching meshes. Quadrature over whole facets is inaccurate where the other side ends or bends. Standard multipliers gain
-one digit on smooth quadratic facets in two dimensions, but each of their gaps involves the neighbouring nodes, so that with
-multigrid every closed constraint costs a linear solution.
+This formulation is the only one that is accurate on any two surfaces (``bench/defaults.py``, docs/reference/accuracy.md).
+Where two nodes face each other, node-to-segment contact uses the normal of one of two facets, and initially coincident nodes
+separate when the bodies slide. Even with averaged normals it does not transmit a uniform pressure between
+non-matching meshes. Quadrature over whole facets is inaccurate where the other side ends or bends. Standard multipliers are
+more accurate by one digit on smooth quadratic facets in 2D, but each of their gaps involves the neighbouring nodes, so that
+with multigrid every closed constraint costs a linear solution.
 
 Against rigid obstacles the default is the continuous formulation, which also enforces contact between nodes, with two
-exceptions. Node-to-segment is used on linear triangles and tetrahedra, and in 3D on all facets whose nodes all carry
-pressure, corners included. Triangles and tetrahedra cannot satisfy all conditions of the continuous formulation, and its
+exceptions. Node-to-segment is used on linear triangles and tetrahedra, and in 3D on facets whose nodes, including corners,
+all carry pressure. Triangles and tetrahedra cannot satisfy all conditions of the continuous formulation, and its
 pressures oscillate by up to 40 %; in 3D each of its integration points costs a linear solution. On the other facets in 3D,
 which are quadratic, mortar is used with friction, because integration points with friction cannot be eliminated.
 """

@@ -1,4 +1,4 @@
-"""Facets of different bodies that face each other, determined by the closest facet to sample points of each."""
+"""Facets of different bodies that face each other, by projection of sample points onto the closest facets."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import cells_of_outer_facets, outer_facets
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Distance of the sample points beside nodes from these nodes, relative to the distance to the middle of the facet.
+# Distance of the sample points near nodes from these nodes, relative to that of the nodes from the middle of the facet.
 INSET = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class OuterFacets:
-    """The outer facets of bodies, numbered consecutively through blocks of one kind each.
+    """The outer facets of bodies, in blocks of one element type and numbered consecutively.
 
     Attributes
     ----------
@@ -60,18 +60,18 @@ class OuterFacets:
     @cached_property
     def samples(self) -> tuple[Indices, Array, Array]:
         """Sample points inside the facets: facet (m,), position (m, dim) [length] and outward normal (m, dim) of each."""
-        owner, point, normal = [], [], []
+        facet, point, normal = [], [], []
         for (name, facets), first in zip(self.blocks.items(), self.first):
             element = elements.get(name)
             inside = element.nodes + INSET * (element.nodes.mean(axis=0) - element.nodes)
-            xi = np.concatenate([element.quadrature[0], inside])  # nodes too: facets may overlap by a narrow strip
+            xi = np.concatenate([element.quadrature[0], inside])  # facets may overlap only by a narrow strip
             shape, gradient = element.shape(xi), element.gradient(xi)
             corners = self.mesh.points[facets]
             point.append((shape @ corners).reshape(-1, self.mesh.dim))
             normal.append(area_vectors(corners, gradient).reshape(-1, self.mesh.dim))
-            owner.append(np.repeat(first + np.arange(len(facets)), len(shape)))
+            facet.append(np.repeat(first + np.arange(len(facets)), len(shape)))
         normals = np.concatenate(normal)
-        return np.concatenate(owner), np.concatenate(point), normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        return np.concatenate(facet), np.concatenate(point), normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
     @cached_property
     def area(self) -> Array:
@@ -111,12 +111,12 @@ class OuterFacets:
                 keys.append(np.sort(facets[:, ends], axis=1))
                 normal.append(at_nodes[:, ends].sum(axis=1))
                 facet.append(first + np.arange(len(facets)))
-        key, along, number = np.concatenate(keys), np.concatenate(normal), np.concatenate(facet)
-        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        key, edge_normal, number = np.concatenate(keys), np.concatenate(normal), np.concatenate(facet)
+        edge_normal /= np.linalg.norm(edge_normal, axis=1, keepdims=True)
         order = np.lexsort(key.T)
         row, next_row = order[:-1], order[1:]
         joined = (key[row] == key[next_row]).all(axis=1)
-        joined &= np.einsum("nd,nd->n", along[row], along[next_row]) > np.cos(np.radians(CORNER))
+        joined &= np.einsum("nd,nd->n", edge_normal[row], edge_normal[next_row]) > np.cos(np.radians(CORNER))
         first_of, second_of = number[row[joined]], number[next_row[joined]]
         graph = coo_array((np.ones(len(first_of)), (first_of, second_of)), shape=(len(self.body),) * 2)
         return np.asarray(connected_components(graph, directed=False)[1], np.intp)
@@ -137,14 +137,14 @@ class Facing:
 
     Attributes
     ----------
-    facet, other : ndarray of int (n,)
+    facet, opposite : ndarray of int (n,)
         The facet of each point, and the closest facet of all other bodies.
     gap : ndarray (n,)
-        Distance between them, negative where bodies overlap [length].
+        Distance of the point from the opposite facet, negative where bodies overlap [length].
     """
 
     facet: Indices
-    other: Indices
+    opposite: Indices
     gap: Array
 
 
@@ -157,13 +157,13 @@ def facing(outside: OuterFacets, distance: float | None, angle: float) -> Facing
     near = _search(outside, distance, angle, everywhere)
     if distance is not None:
         return near
-    # Smooth faces that are close somewhere face each other wherever their normals are opposite.
+    # Smooth faces that are close to each other somewhere also face each other where their gap is larger.
     face = outside.smooth_face
-    key = np.sort(np.column_stack([face[near.facet], face[near.other]]), axis=1) @ [len(face), 1]
-    far = _search(outside, np.inf, angle, np.isin(face, face[np.concatenate([near.facet, near.other])]))
-    both = np.sort(np.column_stack([face[far.facet], face[far.other]]), axis=1) @ [len(face), 1]
-    ahead, touching = np.isin(both, key) & (far.gap > 0.0), near.gap <= 0.0
-    fields = ((near.facet, far.facet), (near.other, far.other), (near.gap, far.gap))
+    key = np.sort(np.column_stack([face[near.facet], face[near.opposite]]), axis=1) @ [len(face), 1]
+    far = _search(outside, np.inf, angle, np.isin(face, face[np.concatenate([near.facet, near.opposite])]))
+    far_key = np.sort(np.column_stack([face[far.facet], face[far.opposite]]), axis=1) @ [len(face), 1]
+    ahead, touching = np.isin(far_key, key) & (far.gap > 0.0), near.gap <= 0.0
+    fields = ((near.facet, far.facet), (near.opposite, far.opposite), (near.gap, far.gap))
     return Facing(*(np.concatenate([from_near[touching], from_far[ahead]]) for from_near, from_far in fields))
 
 
@@ -177,30 +177,30 @@ def _faced_by(
     outside: OuterFacets, body: int, distance: float | None, angle: float, among: Mask
 ) -> tuple[Indices, Indices, Array]:
     """Return the arrays of `Facing` for the points in those facets of one body that are `among` (n,)."""
-    owner, point, normal = outside.samples
+    facet_of_point, point, normal = outside.samples
     (low, high), size = outside.boxes, outside.size
     of_body = outside.body == body
     reach = float(size.max()) if distance is None else distance
-    rest = ~of_body & ((high >= low[of_body].min(axis=0) - reach) & (low <= high[of_body].max(axis=0) + reach)).all(
+    others = ~of_body & ((high >= low[of_body].min(axis=0) - reach) & (low <= high[of_body].max(axis=0) + reach)).all(
         axis=1
     )
-    candidates = np.flatnonzero((of_body & among)[owner])
-    if rest.any():
+    candidates = np.flatnonzero((of_body & among)[facet_of_point])
+    if others.any():
         at = point[candidates]
         candidates = candidates[
-            ((at >= low[rest].min(axis=0) - reach) & (at <= high[rest].max(axis=0) + reach)).all(axis=1)
+            ((at >= low[others].min(axis=0) - reach) & (at <= high[others].max(axis=0) + reach)).all(axis=1)
         ]
-    if not rest.any() or not len(candidates):
+    if not others.any() or not len(candidates):
         return np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0)
-    kinds = [block[rest[first : first + len(block)]] for block, first in zip(outside.blocks.values(), outside.first)]
+    kinds = [block[others[first : first + len(block)]] for block, first in zip(outside.blocks.values(), outside.first)]
     closest = closest_of_kinds(point[candidates], [outside.mesh.points[block] for block in kinds if len(block)])
-    facet, other = owner[candidates], np.flatnonzero(rest)[closest.facet]
+    facet, opposite = facet_of_point[candidates], np.flatnonzero(others)[closest.facet]
     difference = point[candidates] - closest.position
     gap = np.einsum("nd,nd->n", difference, closest.normal)
     offset = np.linalg.norm(difference - gap[:, None] * closest.normal, axis=1)
-    larger = np.maximum(size[facet], size[other])
+    larger = np.maximum(size[facet], size[opposite])
     opposed = np.einsum("nd,nd->n", normal[candidates], closest.normal) <= -np.cos(np.radians(angle))
     near = closest.distance <= (larger if distance is None else distance) + LENGTH_ROUND_OFF * larger
     ahead = offset <= np.abs(gap) * np.tan(np.radians(angle)) + LENGTH_ROUND_OFF * larger
     kept = opposed & near & ahead
-    return facet[kept], other[kept], gap[kept]
+    return facet[kept], opposite[kept], gap[kept]

@@ -1,10 +1,10 @@
-"""Pressure penetration: fluid between the sides of a contact pair, wherever they are open and connected with its source.
+"""Pressure penetration: fluid between the sides of a contact pair, where they are open and connected with its source.
 
-A node is open to the fluid if its contact pressure is at most the fluid pressure, and at first if its gap is open; such nodes
-of one facet are connected. There the fluid pressure replaces the contact pressure: it acts on the secondary side along its
-own normals, and on the primary side along the normal of the gap, over the area covered by the secondary side. In finite
-strain normals and areas are those of the deformed surface at which the bodies are linearised; their variation enters the
-tangent.
+A node is open to the fluid if its contact pressure is at most the fluid pressure or, in the first pairing, if its gap is
+open. Open nodes of one facet are connected. There the fluid pressure replaces the contact pressure: it acts on the secondary
+side along its own normals, and on the primary side along the normal of the gap, over the area covered by the secondary side.
+In finite strain normals and areas are those of the deformed surface at which the bodies are linearised; their variation
+enters the tangent.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import weighted_area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Mean gaps next to the edge of the contact, where some points between nodes are closed, may be negative by up to this
+# Mean gaps at open nodes beside the edge of the contact, where facets are partly closed, may be negative by up to this
 # fraction of the facet length.
 EDGE = 0.01
 
@@ -41,7 +41,7 @@ class Wetted:
     pressure : ndarray (n_nodes,)
         Fluid pressure at the secondary nodes [pressure].
     spread : csr_array (n_points, n_nodes)
-        Forces on points per area vector of the secondary nodes, in the opposite direction [force].
+        Matrix from the `areas` at the secondary nodes to forces on the points, in the opposite direction [force].
     areas : AreaVectors
     """
 
@@ -117,25 +117,25 @@ def wetted(constraints: Constraints, at: Configuration, areas: AreaVectors, sour
     if at.pressure is None:
         passable = nodal > LENGTH_ROUND_OFF * size
     else:
-        # A node under contact pressure is impermeable, even if its closed points lie beside it.
-        # Contact pressures are forces per reference area.
+        # A node under contact pressure is impermeable, even if only points beside it are closed. Contact pressures are forces
+        # per reference area.
         nominal = at.fluid_pressure * (1.0 if at.linearised is None else np.linalg.norm(vectors, axis=1))
-        facet = size / side.n_facets ** (1.0 / (points.shape[1] - 1))
-        passable = (nodal > -EDGE * facet) & (at.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
+        facet_size = size / side.n_facets ** (1.0 / (points.shape[1] - 1))
+        passable = (nodal > -EDGE * facet_size) & (at.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
     nodes = reached(side, source, passable)
     rows = nodes[node] & constraints.usable
     # A force independent of the gap is represented by a linear law of small slope, whose zero lies far beyond the side.
-    far = size / SINGLE_PRECISION
+    distance_to_zero = size / SINGLE_PRECISION
     B, weights = _along(constraints.B, rows, side, vectors[node])
-    strength = np.where(rows, at.fluid_pressure * constraints.areas, 0.0)
-    at_nodes = csr_array((strength, (np.arange(len(node)), node)), shape=(len(node), len(nodes)))
+    force = np.where(rows, at.fluid_pressure * constraints.areas, 0.0)
+    at_nodes = csr_array((force, (np.arange(len(node)), node)), shape=(len(node), len(nodes)))
     return replace(
         constraints,
         B=B,
-        gap0=np.where(rows, -far - B @ at.displacement.ravel(), constraints.gap0),
+        gap0=np.where(rows, -distance_to_zero - B @ at.displacement.ravel(), constraints.gap0),
         softness=np.where(
             rows,
-            far / (at.fluid_pressure * constraints.areas),
+            distance_to_zero / (at.fluid_pressure * constraints.areas),
             constraints.softness,
         ),
         equality=constraints.equality | rows,
@@ -169,7 +169,7 @@ def _along(B: csr_array, rows: Mask, side: Surface, vectors: Array) -> tuple[csr
 
 
 def reached(side: Surface, source: Mask, passable: Mask) -> Mask:
-    """Return which of the `passable` nodes (n_nodes,) are connected with those of the source by facets of a side."""
+    """Return which `passable` nodes (n_nodes,) are connected with passable nodes of the `source` by facets of a side."""
     count, n = side.n_facets, len(passable)
     nodes = np.concatenate([block.local.ravel() for block in side.blocks])
     facet = np.repeat(np.arange(count), np.concatenate([np.full(len(b.local), b.local.shape[1]) for b in side.blocks]))

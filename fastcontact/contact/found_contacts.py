@@ -1,4 +1,4 @@
-"""Automatic contact detection: bodies whose surfaces face each other, with facet groups for both sides."""
+"""Automatic contact detection: pairs of bodies whose surfaces face each other, with facet groups for both sides."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from fastcontact.mesh.topology import bodies
 if TYPE_CHECKING:
     import pandas
 
-# Relative differences of node distances and of moduli below which two sides count as equal.
+# Relative difference of node distances, moduli or areas below which two sides count as equal.
 ALIKE = 0.1
 _COLUMNS = (
     "contact", "secondary", "primary", "facets secondary", "facets primary", "spacing secondary", "spacing primary",
@@ -50,7 +50,7 @@ class FoundContact:
     gap : (float, float)
         Smallest and largest gap, negative if bodies overlap [length].
     reason : str
-        Why this side is the secondary one.
+        Why this side is the secondary one: ``"finer"``, ``"softer"``, ``"smaller"``, or ``"alike"`` for an arbitrary choice.
     """
 
     name: str
@@ -144,8 +144,8 @@ def find_contacts(
     ----------
     mesh : Mesh
     distance : float, optional
-        Largest gap or overlap [length]. By default smooth faces of two bodies form a pair if their distance is somewhere
-        at most the size of the larger of two facets; the pair extends as far as their normals are opposed.
+        Largest gap or overlap [length]. By default smooth faces of two bodies form a pair if somewhere their distance is
+        at most the size of the larger of the two facets. The pair extends as far as their normals are opposed.
     angle : float
         Largest deviation of the normals from opposite directions, more than 0 and less than 90 [degrees].
     groups : sequence of str, optional
@@ -157,7 +157,7 @@ def find_contacts(
     Returns
     -------
     FoundContacts
-        Their mesh has groups for both sides of every pair.
+        The pairs, and a mesh with groups for both sides of every pair.
 
     Raises
     ------
@@ -182,20 +182,20 @@ def find_contacts(
         return FoundContacts(mesh)
     outside = OuterFacets.of(mesh, body)
     search = facing(outside, distance, angle)
-    stiff = np.ones(mesh.n_cells)
+    modulus = np.ones(mesh.n_cells)
     for name, values in (moduli or {}).items():
-        stiff[mesh.offsets[name] : mesh.offsets[name] + len(mesh.cells[name])] = values
+        modulus[mesh.offsets[name] : mesh.offsets[name] + len(mesh.cells[name])] = values
     names = list(groups) if groups is not None else _names(mesh, body)
     pairs: list[FoundContact] = []
     sides: dict[str, Mapping[str, ArrayLike]] = {}
-    for pair, facets in _pairs(outside, search, stiff, names):
+    for pair, facets in _pairs(outside, search, modulus, names):
         sides.update(zip((pair.secondary, pair.primary), map(outside.facets, facets)))
         pairs.append(pair)
     return FoundContacts(mesh.with_facets(sides), tuple(pairs))
 
 
 def nothing_found(mesh: Mesh, distance: float | None, angle: float, groups: Sequence[str] | None) -> str:
-    """Return a message with the reason why `find_contacts` finds nothing, and the remedy."""
+    """Return a message that says why `find_contacts` finds no pairs, and what to change."""
     if groups is None and _whole_bodies(mesh).max() < 1:
         return (
             "the mesh is one body, since nodes connect all of its cells: name groups of cells as bodies, or duplicate the "
@@ -229,14 +229,14 @@ def _bodies_of_cells(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
         rows = mesh.split(mesh.cell_groups[group])
         cells = np.concatenate([mesh.offsets[name] + rows[name] for name in rows if name in mesh.solids])
         if (body_of_cell[cells] >= 0).any():
-            other = groups[body_of_cell[cells].max()]
-            raise ContactError(f"groups '{other}' and '{group}' share solid cells: bodies must be apart")
+            earlier = groups[body_of_cell[cells].max()]
+            raise ContactError(f"groups '{earlier}' and '{group}' share solid cells: bodies must be apart")
         body_of_cell[cells] = number
     return body_of_cell
 
 
 def _whole_bodies(mesh: Mesh) -> Numbers:
-    """Return the body (n_points,) of each point, -1 without any; both sides of a cut are one body."""
+    """Return the body (n_points,) of each point, -1 for points of no cell; both sides of a cut belong to one body."""
     count, body = bodies(mesh)
     cuts = [name for name in mesh.group_names if name + OPPOSITE in mesh.group_names]
     sides = [body[[mesh.points_of(name)[0], mesh.points_of(name + OPPOSITE)[0]]] for name in cuts]
@@ -246,45 +246,45 @@ def _whole_bodies(mesh: Mesh) -> Numbers:
 
 
 def _names(mesh: Mesh, body: Indices) -> list[str]:
-    """Return the names of bodies: a cell group that is a body, or up to four groups that form it, or its number from 1."""
+    """Return names of the bodies: the cell group of a body, up to four groups that form it, or its number from 1."""
     count = np.bincount(body[body >= 0])
-    inside: list[dict[str, Indices]] = [{} for _ in count]
+    groups_of_body: list[dict[str, Indices]] = [{} for _ in count]
     for group, cells in mesh.cell_groups.items():
         solids = cells[body[cells] >= 0]
         if len(solids) and np.ptp(body[solids]) == 0:
-            inside[body[solids[0]]][group] = solids
+            groups_of_body[body[solids[0]]][group] = solids
     names = []
-    for number, (groups, size) in enumerate(zip(inside, count), start=1):
-        whole = [group for group, solids in groups.items() if len(solids) == size]
-        if not whole and 1 < len(groups) <= 4:
+    for number, (groups, size) in enumerate(zip(groups_of_body, count), start=1):
+        complete = [group for group, solids in groups.items() if len(solids) == size]
+        if not complete and 1 < len(groups) <= 4:
             solids = np.concatenate([*groups.values()])
-            whole = ["+".join(groups)] if len(solids) == len(np.unique(solids)) == size else []
-        names.append(whole[0] if whole else f"body {number}")
+            complete = ["+".join(groups)] if len(solids) == len(np.unique(solids)) == size else []
+        names.append(complete[0] if complete else f"body {number}")
     return names
 
 
 def _pairs(
-    outside: OuterFacets, search: Facing, stiff: Array, names: Sequence[str]
+    outside: OuterFacets, search: Facing, modulus: Array, names: Sequence[str]
 ) -> Iterator[tuple[FoundContact, tuple[Indices, Indices]]]:
     """Yield the pairs of smooth faces of two bodies each with the facets of both sides.
 
-    `stiff` (n_cells,) is each cell's modulus [pressure], `names` are those of the bodies.
+    `modulus` (n_cells,) are the moduli of the cells [pressure], and `names` those of the bodies.
     """
-    of = np.sort(np.column_stack([outside.body[search.facet], outside.body[search.other]]), axis=1)
-    for pair in np.unique(of, axis=0):
-        rows = np.flatnonzero((of == pair).all(axis=1))
-        ends = np.column_stack([search.facet[rows], search.other[rows]])
+    bodies_of_points = np.sort(np.column_stack([outside.body[search.facet], outside.body[search.opposite]]), axis=1)
+    for pair in np.unique(bodies_of_points, axis=0):
+        rows = np.flatnonzero((bodies_of_points == pair).all(axis=1))
+        ends = np.column_stack([search.facet[rows], search.opposite[rows]])
         swapped = outside.body[ends[:, 0]] != pair[0]
         ends[swapped] = ends[swapped][:, ::-1]
-        second, reason = _secondary(outside, ends, stiff)
-        ends, numbers = (ends, pair) if second == 0 else (ends[:, ::-1], pair[::-1])
+        secondary, reason = _secondary(outside, ends, modulus)
+        ends, numbers = (ends, pair) if secondary == 0 else (ends[:, ::-1], pair[::-1])
         face = outside.smooth_face[ends[:, 0]]
-        for number, surface in enumerate(order := np.unique(face), start=1):
+        for number, surface in enumerate(faces := np.unique(face), start=1):
             of_surface = face == surface
             gap, spacing = search.gap[rows[of_surface]], _spacing(outside, ends[of_surface])
             sides = np.unique(ends[of_surface, 0]), np.unique(ends[of_surface, 1])
             both = names[numbers[0]], names[numbers[1]]
-            title = " on ".join(both) + (f" {number}" if len(order) > 1 else "")
+            title = " on ".join(both) + (f" {number}" if len(faces) > 1 else "")
             yield FoundContact(
                 title, both, f"{title} (secondary)", f"{title} (primary)", (len(sides[0]), len(sides[1])),
                 (float(spacing[0]), float(spacing[1])), (float(gap.min()), float(gap.max())), reason,
@@ -296,14 +296,14 @@ def _spacing(outside: OuterFacets, ends: Indices) -> Array:
     return np.asarray(np.exp(np.log(outside.spacing[ends]).mean(axis=0)))
 
 
-def _secondary(outside: OuterFacets, ends: Indices, stiff: Array) -> tuple[int, str]:
+def _secondary(outside: OuterFacets, ends: Indices, modulus: Array) -> tuple[int, str]:
     """Return which side of facets (n, 2) should be the secondary one, and the reason."""
     measures = (
         ("finer", _spacing(outside, ends)),
-        ("softer", stiff[outside.cell[ends]].mean(axis=0)),
+        ("softer", modulus[outside.cell[ends]].mean(axis=0)),
         ("smaller", np.array([outside.area[np.unique(side)].sum() for side in ends.T])),
     )
-    for word, values in measures:
+    for reason, values in measures:
         if values.min() < (1.0 - ALIKE) * values.max():
-            return int(np.argmin(values)), word
+            return int(np.argmin(values)), reason
     return 0, "alike"

@@ -17,8 +17,7 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.projection import CORNER
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION, TINY
 
-# Cosine of the largest angle between directions at different nodes that are treated as one direction, such as along a
-# curved rim.
+# Cosine of the largest angle between directions at two nodes that are joined into one field, such as along a curved rim.
 TOGETHER = float(np.cos(np.radians(0.5 * CORNER)))
 # Power of the inverse distance in the weights by which directions are interpolated to other nodes.
 NEAREST = 4
@@ -40,26 +39,26 @@ class HeldMotions:
     projectors: Array
 
     @classmethod
-    def of(cls, supported: Mask, relations: csr_array) -> HeldMotions:
+    def of(cls, supported: Mask, mpc_rows: csr_array) -> HeldMotions:
         """Return the prescribed components.
 
         Parameters
         ----------
         supported : ndarray of bool (n_points, dim)
             Components that supports hold.
-        relations : csr_array (m, n_dofs)
-            Rows of multi-point constraints, of which those count that involve only one node.
+        mpc_rows : csr_array (m, n_dofs)
+            Rows of multi-point constraints; only those that involve a single node count.
         """
         dim = supported.shape[1]
-        owners, normals = _rows_of_single_nodes(relations, dim)
-        nodes = np.union1d(np.flatnonzero(supported.any(axis=1)), owners)
+        single_nodes, normals = _rows_of_single_nodes(mpc_rows, dim)
+        nodes = np.union1d(np.flatnonzero(supported.any(axis=1)), single_nodes)
         projectors = np.zeros((len(nodes), dim, dim))
         projectors[:, np.arange(dim), np.arange(dim)] = supported[nodes]
-        if len(owners):
-            index = np.searchsorted(nodes, owners)
+        if len(single_nodes):
+            index = np.searchsorted(nodes, single_nodes)
             np.add.at(projectors, index, np.einsum("md,me->mde", normals, normals))
-            turned = np.unique(index)
-            projectors[turned] = spanned(projectors[turned], SINGLE_PRECISION)
+            constrained = np.unique(index)
+            projectors[constrained] = spanned(projectors[constrained], SINGLE_PRECISION)
         return cls(nodes, projectors)
 
     def at(self, nodes: NDArray[np.integer]) -> Array:
@@ -70,20 +69,20 @@ class HeldMotions:
         return np.asarray(np.where((self.nodes[index] == nodes)[..., None, None], self.projectors[index], 0.0))
 
 
-def _rows_of_single_nodes(relations: csr_array, dim: int) -> tuple[Indices, Array]:
-    """Return the nodes (k,) of those rows that involve only one node, and the unit vectors (k, dim) of these rows."""
-    counts = np.diff(relations.indptr)
+def _rows_of_single_nodes(mpc_rows: csr_array, dim: int) -> tuple[Indices, Array]:
+    """Return the nodes (k,) of the rows that involve only one node, and the unit vectors (k, dim) of these rows."""
+    counts = np.diff(mpc_rows.indptr)
     rows = np.flatnonzero(counts > 0)
     if not len(rows):
         return np.empty(0, np.intp), np.empty((0, dim))
-    owner = (relations.indices // dim).astype(np.intp)
-    first = relations.indptr[rows]
-    single_node = np.minimum.reduceat(owner, first) == np.maximum.reduceat(owner, first)
-    normals = np.zeros((relations.shape[0], dim))
-    np.add.at(normals, (np.repeat(np.arange(len(counts)), counts), relations.indices % dim), relations.data)
+    node = (mpc_rows.indices // dim).astype(np.intp)
+    first = mpc_rows.indptr[rows]
+    single_node = np.minimum.reduceat(node, first) == np.maximum.reduceat(node, first)
+    normals = np.zeros((mpc_rows.shape[0], dim))
+    np.add.at(normals, (np.repeat(np.arange(len(counts)), counts), mpc_rows.indices % dim), mpc_rows.data)
     length = np.linalg.norm(normals[rows], axis=1)
     single_node &= length > 0.0
-    return owner[first[single_node]], normals[rows[single_node]] / length[single_node, None]
+    return node[first[single_node]], normals[rows[single_node]] / length[single_node, None]
 
 
 def spanned(tensors: Array, least: float) -> Array:
@@ -104,7 +103,7 @@ def without(projectors: Array, vectors: Array, least: Array | float) -> Array:
     return projectors - inside[:, :, None] * inside[:, None, :]
 
 
-def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
+def alike(projectors: Array, positions: Array) -> list[tuple[Array, Mask]]:
     """Return fields of directions in which nodes are held, such as the normals of a plane of symmetry or of a curved rim.
 
     Nodes that are held in one direction form a field if their directions are nearly equal, or if directions of other nodes
@@ -115,7 +114,7 @@ def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
     ----------
     projectors : ndarray (n, dim, dim)
         Projectors onto the directions in which each node is held.
-    places : ndarray (n, dim)
+    positions : ndarray (n, dim)
         Positions of the nodes [length].
 
     Returns
@@ -123,34 +122,34 @@ def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
     list of (ndarray (n, dim), ndarray of bool (n,))
         Unit vectors of each field at all nodes, and the nodes that are held in its direction.
     """
-    rest, directions = projectors.copy(), []
-    while len(seeds := np.flatnonzero(rank := np.trace(rest, axis1=1, axis2=2).round())):
+    remaining, directions = projectors.copy(), []
+    while len(seeds := np.flatnonzero(rank := np.trace(remaining, axis1=1, axis2=2).round())):
         least = rank[seeds].min()
         seeds = seeds[rank[seeds] == least]
         seeds = seeds if least == 1 else seeds[:1]  # several directions: an arbitrary choice
-        axis = np.linalg.eigh(rest[seeds])[1][:, :, -1]
-        away = np.where(np.abs(axis @ axis.T) >= TOGETHER, _distances(places[seeds], places[seeds]), 0.0)
-        order, before = breadth_first_order(minimum_spanning_tree(csr_array(away)), 0, directed=False)
-        for child in order[1:]:  # the sign of each vector is that for which it agrees with its nearest neighbour
-            axis[child] *= np.sign(axis[child] @ axis[before[child]])
-        # Between these, directions are interpolated with weights of the inverse distances to the power NEAREST.
-        along = np.tile(axis[order][0], (len(places), 1))
+        axis = np.linalg.eigh(remaining[seeds])[1][:, :, -1]
+        away = np.where(np.abs(axis @ axis.T) >= TOGETHER, _distances(positions[seeds], positions[seeds]), 0.0)
+        order, predecessor = breadth_first_order(minimum_spanning_tree(csr_array(away)), 0, directed=False)
+        for child in order[1:]:  # orient each vector like its predecessor in the tree of nearest neighbours
+            axis[child] *= np.sign(axis[child] @ axis[predecessor[child]])
+        # Elsewhere, directions are interpolated with the inverse distances to the power NEAREST as weights.
+        along = np.tile(axis[order][0], (len(positions), 1))
         if not (axis[order] @ axis[order][0] > 1.0 - ROUND_OFF).all():
-            away = _distances(places, places[seeds[order]])
+            away = _distances(positions, positions[seeds[order]])
             along = _unit((away.min(axis=1, keepdims=True) / away) ** NEAREST @ axis[order])
         along[seeds[order]] = axis[order]
-        held = np.einsum("nd,nde,ne->n", along, rest, along) >= TOGETHER**2
-        along[held] = _unit(np.einsum("nde,ne->nd", rest[held], along[held]))
+        held = np.einsum("nd,nde,ne->n", along, remaining, along) >= TOGETHER**2
+        along[held] = _unit(np.einsum("nde,ne->nd", remaining[held], along[held]))
         directions.append((along, held))
-        rest[held] = without(rest[held], along[held], 0.0)
+        remaining[held] = without(remaining[held], along[held], 0.0)
     return directions
 
 
-def _distances(one: Array, other: Array) -> Array:
-    """Return the distances (n, m) between points (n, dim) and other points (m, dim), replaced by TINY if zero [length]."""
+def _distances(points: Array, others: Array) -> Array:
+    """Return the distances (n, m) between points (n, dim) and others (m, dim), replaced by TINY if zero [length]."""
     from scipy.spatial.distance import cdist
 
-    return np.maximum(cdist(one, other), TINY)
+    return np.maximum(cdist(points, others), TINY)
 
 
 def _unit(vectors: Array) -> Array:

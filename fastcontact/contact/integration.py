@@ -14,7 +14,7 @@ from fastcontact.round_off import SINGLE_PRECISION
 
 
 def facet_measure(facets: Numbers, element: str, points: Array, xi: Array, axisymmetric: bool) -> Array:
-    """Return the ratio (n_facets, n_q) of length or area to the reference coordinates [length] or [area].
+    """Return the length or area (n_facets, n_q) per unit of the reference coordinates [length] or [area].
 
     `xi` (n_q, dim - 1) are the reference coordinates of points in each facet, and `points` (n_points, dim) the coordinates
     of all points of the mesh [length]. In axisymmetric models the circumference is included.
@@ -28,7 +28,7 @@ def facet_measure(facets: Numbers, element: str, points: Array, xi: Array, axisy
 
 
 def gauss_rule(element: str, n: int) -> quadrature.Rule:
-    """Return the Gauss rule of a facet with `n` points in each direction, which is exact for polynomials of degree 2n - 1.
+    """Return the Gauss rule of a facet with `n` points in each direction, which is exact for degree 2n - 1.
 
     On triangles it is a symmetric rule of degree 2n - 2.
 
@@ -88,13 +88,14 @@ def nodal_areas(surface: Surface, points: Array, axisymmetric: bool) -> Array:
 
 
 def even_at_axis(surface: Surface, points: Array) -> csr_array:
-    """Return the map (m, m) from the values of a field at other nodes to those at all nodes, including ends on the axis.
+    """Return the map (m, m) from the values of a field at nodes off the axis to those at all nodes.
 
-    The integral of the shape function of the end of a quadratic line on the axis vanishes, and the force of the node, divided
-    by the area of the facet, hardly depends on its value: a 60th of its difference to the value at the other end. Errors of
-    forces would be amplified accordingly. Since a smooth field is an even function of the radius r, its value follows from
-    those at radii r1 and r2 of the two other nodes, (r2^2 p1 - r1^2 p2) / (r2^2 - r1^2). `points` (n_points, dim) are the
-    coordinates of all points [length]; the column of an end is empty, and all other nodes keep their values.
+    If the end of a quadratic line lies on the axis, the integral of its shape function vanishes. The force of this node
+    hardly depends on its value: divided by the area of the facet, it is a 60th of the difference to the value at the other
+    end. Errors of forces would be amplified accordingly. Since a smooth field is an even function of the radius r, the value
+    follows from those at the radii r1 and r2 of the two other nodes as (r2^2 p1 - r1^2 p2) / (r2^2 - r1^2). `points`
+    (n_points, dim) are the coordinates of all points [length]; the column of an end is empty, and all other nodes keep their
+    values.
     """
     values = eye_array(len(surface.points), format="lil")
     for block in surface.blocks:

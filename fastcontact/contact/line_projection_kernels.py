@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Projection of points on a curve in the plane along normals interpolated between its nodes."""
+"""Projection of points onto a curve in 2D along normals interpolated between its nodes."""
 
 from fastcontact._jit.decorators import interpretable_kernel, kernel
 from fastcontact.contact.search.limits import BEYOND, MAX_ITERATIONS, STEP
@@ -53,12 +53,13 @@ def along_normals(points, corners, normals, counts, neighbour, facet, xi, overha
     Parameters
     ----------
     points : ndarray (n, 2)
+        [length].
     corners, normals : ndarray (n_facets, 3, 2)
         Nodes of the facets and unit normals there, ends first.
     counts : ndarray of int (n_facets,)
         Nodes of each facet, 2 or 3.
     neighbour : ndarray of int (n_facets, 2)
-        The facet beyond each end, -1 for none. It shares its opposite end, 1 beyond end 0 and 0 beyond end 1.
+        The facet beyond each end, or -1. Its end 1 is shared beyond end 0, and its end 0 beyond end 1.
     facet, xi, overhang : ndarray (n,)
         Closest points, changed in place where the projection succeeds.
     values, slopes : ndarray (3,)
@@ -78,7 +79,7 @@ def along_normals(points, corners, normals, counts, neighbour, facet, xi, overha
             if beyond < 0:
                 facet[i], xi[i], overhang[i] = f, 2.0 * end - 1.0, 0.5 * (abs(s) - 1.0)
                 break
-            if beyond == before:  # at the node between the two
+            if beyond == before:  # at the node between both facets
                 facet[i], xi[i], overhang[i] = f, 2.0 * end - 1.0, 0.0
                 break
             before, f, s = f, beyond, 1.0 - 2.0 * end

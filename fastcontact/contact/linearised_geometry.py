@@ -1,9 +1,9 @@
 r"""Linearised contact geometry: variation of contact forces, gaps and slips with the displacements.
 
 The constraint rows depend on the displacements, because points slide over the opposite facets and normals rotate. A
-secondary point :math:`x`, with shape functions :math:`N_s` and contact force :math:`p = \lambda n + \tau`, faces the
-primary point :math:`y(\xi) = \sum_k N_k(\xi) y_k`, with the normal n. A variation of the displacements
-changes its nodal forces f and its gap g, in addition to their change at fixed rows, by
+secondary point :math:`x` with the shape functions :math:`N_s` and the contact force :math:`p = \lambda n + \tau`, faces the
+primary point :math:`y(\xi) = \sum_k N_k(\xi) y_k` with the normal n. A variation of the displacements
+changes the nodal forces f and the gap g of the point, in addition to their changes with constant rows, by
 
 .. math:: \delta f = N_s^T \delta p - N^T \delta p - N_{,\alpha}^T p \, \delta \xi^\alpha, \qquad
           \delta p = \lambda \, \delta n - (\tau \cdot \delta n) n, \qquad
@@ -44,13 +44,13 @@ from fastcontact.round_off import DIFFERENCES, TINY
 
 
 class NodalNormals:
-    """Nodal normals of a side, equal to those of `nodal_normals`, and their variation.
+    """Nodal normals of a side, which are those of `nodal_normals`, and their variation.
 
     Parameters
     ----------
     side : Surface
     coordinates : ndarray (n_points, dim)
-        Coordinates of all points at which the normals are computed [length].
+        Coordinates of all points, at which the normals are computed [length].
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class NodalNormals:
     """
 
     def __init__(self, side: Surface, coordinates: Array) -> None:
-        self._side, self._parts = side, []
+        self._side, self._blocks = side, []
         total = np.zeros((len(side.points), coordinates.shape[1]))
         for block in side.blocks:
             element, corners = elements.get(block.element), coordinates[block.facets]
@@ -68,7 +68,7 @@ class NodalNormals:
             normal, angle = facet_normals(block, coordinates), facet_angles(element, corners)
             dual_axes = np.linalg.solve(np.einsum("fqad,fqbd->fqab", axes, axes), axes)
             np.add.at(total, block.local, angle[:, :, None] * normal)
-            self._parts.append(
+            self._blocks.append(
                 (block, slope, normal, angle[:, :, None, None] * dual_axes, _angle_gradient(element, corners))
             )
         side.add_across_ends(total)
@@ -78,7 +78,7 @@ class NodalNormals:
     def along(self, du: Array) -> Array:
         """Return the variation (m, dim) [-] of the normals for a variation `du` (n_points, dim) of displacements [length]."""
         total = np.zeros_like(self.normal)
-        for block, slope, normal, dual_axes, angle_gradient in self._parts:
+        for block, slope, normal, dual_axes, angle_gradient in self._blocks:
             moved = du[block.facets]
             tilt = np.einsum("fqk,qka->fqa", normal @ np.swapaxes(moved, 1, 2), slope)
             np.add.at(total, block.local, -np.einsum("fqad,fqa->fqd", dual_axes, tilt))
@@ -105,8 +105,8 @@ def _angle_gradient(element: elements.Element, nodes: Array) -> Array | None:
         length = [np.linalg.norm(edge, axis=1, keepdims=True) for edge in edges]
         unit = [edge / size for edge, size in zip(edges, length, strict=True)]
         for end, a, b, size in zip(ends, unit, unit[::-1], length, strict=True):
-            other = across(a, b)
-            slope = -other / (size * np.linalg.norm(other, axis=1, keepdims=True))
+            perpendicular = across(a, b)
+            slope = -perpendicular / (size * np.linalg.norm(perpendicular, axis=1, keepdims=True))
             gradient[:, corner, end] += slope
             gradient[:, corner, corner] -= slope
     return gradient
@@ -183,8 +183,8 @@ class PolygonNormals:
 
     def along(self, du: Array) -> Array:
         """See `NodalNormals.along`."""
-        moved, spokes = du[self._corners], self._spokes
-        varied = moved[:, 1:] - moved[:, :1]
+        displaced, spokes = du[self._corners], self._spokes
+        varied = displaced[:, 1:] - displaced[:, :1]
         vector = 0.5 * (np.cross(varied[:, :-1], spokes[:, 1:]) + np.cross(spokes[:, :-1], varied[:, 1:])).sum(axis=1)
         return across(self.normal, vector) / self._area
 
@@ -229,15 +229,16 @@ class _SurfacePoints:
     normals : str or tuple of float
         Normals of the primary side: ``"facet"``, ``"averaged"``, or a fixed vector.
     direction : PolygonNormals or bool
-        Direction of the projection: False for the normals, True for the closest points on the primary side, which coincide
-        for facet normals, or other directions.
+        Direction of the projection: False for the normals, True for the closest points on the primary side, or other
+        directions. The first two coincide for facet normals.
     rise : ndarray (n, dim - 1), optional
-        Derivatives along facets of the heights of a smooth primary surface above them, see `surface_smoothing` [length].
+        Derivatives of the heights of a smooth primary surface above its facets with respect to reference coordinates, see
+        `surface_smoothing` [length].
 
     Attributes
     ----------
     motion : csr_array (n, n_points)
-        Map from nodal vectors to their values at the points minus those at the facing points [-].
+        Map from nodal vectors to the differences of their values at the points and at the facing points [-].
     apart : ndarray (n, dim)
         Vectors from the facing points to the points [length].
     axes : ndarray (n, dim - 1, dim)
@@ -245,7 +246,7 @@ class _SurfacePoints:
     normal : ndarray (n, dim)
         Normals of the primary side at the facing points [-].
     averaged : InterpolatedNormals or None
-        Source of averaged normals.
+        Averaged normals; None with other normals.
     """
 
     def __init__(
@@ -284,7 +285,7 @@ class _SurfacePoints:
         self._inverse = inverse @ frame
         self._foot = self.axes if rise is None else self.axes + rise[:, :, None] * self.normal[:, None]
         self._smooth = rise is not None and isinstance(direction, PolygonNormals)
-        if self._smooth:  # the smooth surfaces touch, so that only the facets are apart
+        if self._smooth:  # the smooth surfaces touch, and only their facets are apart
             self.apart = np.zeros_like(self.apart)
 
     def _facet_bend(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, at: Places) -> Array:
@@ -323,7 +324,7 @@ class _SurfacePoints:
     def spread(self, force: Array, varied: Array, xi: Array) -> Array:
         """Return the variation (n_points, dim) of nodal forces [force].
 
-        The points carry `force` (n, dim) [force] with the variation `varied` (n, dim) [force], and `xi` is that of
+        The forces `force` (n, dim) of the points have the variation `varied` (n, dim) [force], and `xi` is that of
         `Variation`.
         """
         motion, *slopes = self._spreading
@@ -334,7 +335,7 @@ class _SurfacePoints:
 
 
 class _ObstaclePoints:
-    """Points that face a rigid obstacle, which has no nodes. Its normals depend on the positions of the points.
+    """Points that face a rigid obstacle, which has no nodes. The normals depend on the positions of the points.
 
     Parameters
     ----------
@@ -439,7 +440,7 @@ class Closing:
 class Slips:
     r"""Slips in a step at n points or weighted gaps along k tangents t, and the tangential forces.
 
-    Slips are the components along t of s,
+    Slips are the components along t of the vector s,
 
     .. math:: s = r + q m, \qquad q = \frac{a \cdot o}{a \cdot m}, \qquad
               \delta (t \cdot s) = t \cdot \delta s - (t \cdot \delta n) (n \cdot s)
@@ -529,7 +530,7 @@ def _turned(multiplier: Array, tangential: Array | None, normal: Array, varied: 
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """Contact forces, gaps and slips of one pair, linearised about a pairing and the multipliers found with it.
+    """Contact forces, gaps and slips of one pair, linearised about a pairing and its solution.
 
     Attributes
     ----------
@@ -549,12 +550,12 @@ class Linearised:
     slips : Slips, optional
         Slips of the constraints; None without tangential constraints.
     place : (ndarray of int (m,), int), optional
-        Rows of the m constraints among all constraints of the pair, and the number of the latter.
+        Rows of the m constraints among all constraints of the pair, and the number of all constraints.
     smooth : (InterpolatedNormals, ndarray (n, dim - 1, dim)), optional
-        Primary normals of the slips, and their derivatives along facets, where they are not those of the points.
+        Primary normals of the slips and their derivatives along facets, if they differ from the normals of the points.
     compliance : Callable, optional
-        Elastic displacements (m, dim) [length] of the constraints under forces (m, dim) [force], if the compliance couples
-        vectors: its components along normals and tangents rotate with these.
+        Function from forces (m, dim) [force] to elastic displacements (m, dim) of the constraints [length], if the compliance
+        couples vectors. Their components along normals and tangents change as these rotate.
     """
 
     side: Surface
@@ -588,9 +589,9 @@ class Linearised:
             gaps += self._elastic(normal, force)
         force = force if self.functions is None else self.functions.T @ force
         if self.place is not None:
-            rows, of_place = self.place[0], gaps
+            rows, of_rows = self.place[0], gaps
             gaps = np.zeros((len(gaps), self.place[1]))
-            gaps[:, rows] = of_place
+            gaps[:, rows] = of_rows
         return self.points.spread(self._force, force, varied.xi), gaps
 
     def _elastic(self, normal: Array, force: Array) -> Array:

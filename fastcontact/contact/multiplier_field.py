@@ -24,9 +24,9 @@ class Projection:
     Attributes
     ----------
     P : csr_array (m, k)
-        Values, at the m integration points, of the functions that belong to the k independent values of the field [-].
+        Values at the m integration points of the functions that belong to the k independent values of the field [-].
     areas : ndarray (m,)
-        Areas W of the points [area]. A point without area, on the axis, has no compliance; it may carry a single force.
+        Areas W of the points [area]. Points on the axis have no area and no compliance, and may carry concentrated forces.
     rho : float
         The constant of the augmented Lagrangian [pressure / length].
     mass : SuperLU, optional
@@ -69,9 +69,9 @@ class Projection:
         """Return the compliance of the points `rows` (q,) in a form for linear solvers; see `Compliance.among`."""
         if not self.eliminable or self.mass is None or not (self.areas[rows] > 0).all():
             return self.block(rows)
-        others = np.where(self.areas > 0, self.areas, 0.0) / self.rho
-        others[rows] = 0.0
-        mass, areas = csr_array(self.P.T @ diags_array(others) @ self.P), self.areas[rows]
+        remaining = np.where(self.areas > 0, self.areas, 0.0) / self.rho
+        remaining[rows] = 0.0
+        mass, areas = csr_array(self.P.T @ diags_array(remaining) @ self.P), self.areas[rows]
         mass.eliminate_zeros()
         P, stiffness = csr_array(self.P[rows]), self.rho * areas
         return FieldCompliance(P, areas, stiffness, mass, lambda: self.block(rows), self.quadratic)

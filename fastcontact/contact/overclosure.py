@@ -1,4 +1,4 @@
-"""Pressure-overclosure relations: tables, and exponential laws."""
+"""Pressure-overclosure laws, given by tables or by an exponential function."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
 
-# Overclosure, in units of the clearance, beyond which the exponential law is linear.
+# Overclosure, in multiples of the clearance c0, beyond which the exponential law is linear.
 FARTHEST = 3.0
 
 
@@ -20,11 +20,11 @@ class OverclosureLaw(ABC):
 
     @abstractmethod
     def line(self, overclosure: Array) -> tuple[Array, Array]:
-        """Return the tangents at overclosures (m,) [length]: slopes (m,) [pressure / length] and zeros (m,) [length]."""
+        """Return slopes (m,) [pressure / length] and zeros (m,) [length] of the tangents at overclosures (m,) [length]."""
 
     @abstractmethod
     def energy(self, pressure: Array) -> Array:
-        """Return the energy by area (m,) [pressure length] at pressures (m,) [pressure]."""
+        """Return the energy per area (m,) [pressure length] at pressures (m,) [pressure]."""
 
 
 class TabularLaw(OverclosureLaw):
@@ -61,23 +61,23 @@ class TabularLaw(OverclosureLaw):
     def energy(self, pressure: Array) -> Array:
         """See `OverclosureLaw.energy`."""
         p = np.maximum(pressure, 0.0)
-        before = np.concatenate(
+        energies = np.concatenate(
             [[0.0], np.cumsum(0.5 * (self.table[1:, 1] + self.table[:-1, 1]) * np.diff(self.table[:, 0]))]
         )
         interval = np.clip(np.searchsorted(self.table[:, 1], p, side="right") - 1, 0, len(self._slopes) - 1)
         start = self.table[interval, 1]
-        return np.asarray(before[interval] + 0.5 * (p**2 - start**2) / self._slopes[interval])
+        return np.asarray(energies[interval] + 0.5 * (p**2 - start**2) / self._slopes[interval])
 
 
 class ExponentialLaw(OverclosureLaw):
-    """The pressure ``p0 exp(h ln(100) / c0)``, as in CalculiX; linear below the overclosure -c0 and beyond 3 c0.
+    """The pressure ``p0 exp(h ln(100) / c0)`` of overclosures h, as in CalculiX; linear for h < -c0 and for h > 3 c0.
 
     Parameters
     ----------
     clearance : float
         Gap c0 at which the pressure is a hundredth of p0 [length].
     pressure : float
-        p0, at a gap of zero [pressure].
+        Pressure p0 at a gap of zero [pressure].
     """
 
     def __init__(self, clearance: float, pressure: float) -> None:
@@ -85,13 +85,13 @@ class ExponentialLaw(OverclosureLaw):
 
     def line(self, overclosure: Array) -> tuple[Array, Array]:
         """See `OverclosureLaw.line`."""
-        at = np.clip(overclosure, -self._clearance, FARTHEST * self._clearance)
-        return self._rate * self._pressure * np.exp(self._rate * at), at - 1.0 / self._rate
+        clipped = np.clip(overclosure, -self._clearance, FARTHEST * self._clearance)
+        return self._rate * self._pressure * np.exp(self._rate * clipped), clipped - 1.0 / self._rate
 
     def energy(self, pressure: Array) -> Array:
         """See `OverclosureLaw.energy`."""
         ends = self._pressure * np.exp(self._rate * self._clearance * np.array([-1.0, FARTHEST]))
-        p, along = np.maximum(pressure, 0.0), np.clip(pressure, *ends)
+        p, clipped = np.maximum(pressure, 0.0), np.clip(pressure, *ends)
         below, beyond = np.minimum(p, ends[0]), np.maximum(p, ends[1])
         straight = 0.5 * below**2 / ends[0] + 0.5 * (beyond**2 - ends[1] ** 2) / ends[1]
-        return np.asarray((straight + along - ends[0]) / self._rate)
+        return np.asarray((straight + clipped - ends[0]) / self._rate)

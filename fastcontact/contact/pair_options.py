@@ -46,7 +46,7 @@ class PairOptions:
     wear : float, optional
         Archard's wear coefficient divided by the hardness, for wear of the secondary side [1 / pressure]; None means no wear.
     search_distance : float, optional
-        Points are only paired if the gap or penetration is at most this distance, now or at the beginning of the load step
+        Points are only paired if their gap or penetration, now or at the beginning of the load step, is at most this distance
         [length]; None means any distance.
     conductance : Conductance, optional
         Thermal contact conductance; None means no heat flow.
@@ -57,9 +57,9 @@ class PairOptions:
     cohesion : CohesiveLaw, optional
         Traction-separation law; None means that the pair has no tension.
     source : ndarray of bool (n_points,), optional
-        Nodes from which fluid penetrates; None without fluid.
+        Nodes at the source of a penetrating fluid; None without fluid.
     same_place : ndarray of int (n_points,), optional
-        In periodic models, for each node the node with which it has a common multiplier.
+        In periodic models, the node with which each node shares its multiplier.
     turning : Rotation, optional
         Rotation about the axis of a cyclic sector. Fields of tractions are then interpolated in cylindrical components,
         because tractions rotate from one end of the pair to the other.
@@ -99,19 +99,19 @@ class PairOptions:
         return self.kind in ("tied", "bilateral")
 
     def out(self, candidates: Candidates) -> Mask:
-        """Return the candidates (n,) without contact: those whose node with the largest weight is excluded."""
+        """Return the candidates (n,) whose node with the largest weight is excluded from contact."""
         return (
             np.zeros(len(candidates.nodes), bool) if self.excluded is None else candidates.belonging_to(self.excluded)
         )
 
     def borders(self, side: Surface) -> tuple[Indices, Array]:
-        """Return the boundaries of the excluded part of a line: facets (n,) and reference coordinates xi (n,)."""
+        """Return the boundaries of the excluded part of a line, as facets (n,) and reference coordinates xi (n,)."""
         mask = self.excluded
         if mask is None:
             return np.empty(0, np.intp), np.empty(0)
         order = np.argsort(elements.get(side.element).nodes[:, 0])
         inside = mask[side.facets[:, order]]
-        # The shape functions of neighbouring nodes are equal at 0 on linear lines, and at -2/3 and 2/3 on quadratic ones.
+        # The shape functions of adjacent nodes are equal at 0 on linear lines, and at -2/3 and 2/3 on quadratic lines.
         equal = np.linspace(-2 / 3, 2 / 3, 2) if len(order) == 3 else np.zeros(1)
         facet, edge = np.nonzero(inside[:, 1:] != inside[:, :-1])
         return facet, equal[edge]
@@ -142,18 +142,21 @@ class PairOptions:
         rubbing : tuple of k ndarray (n, dim)
             The same tangents, set to zero in the direction without friction.
         """
-        along, slippery = self.frictionless_along, np.full(len(candidates.nodes), self.frictionless_along is not None)
+        along, is_frictionless = (
+            self.frictionless_along,
+            np.full(len(candidates.nodes), self.frictionless_along is not None),
+        )
         if self.frictionless is not None:
-            slippery = candidates.belonging_to(self.frictionless)
+            is_frictionless = candidates.belonging_to(self.frictionless)
         if along is None:
-            return np.where(slippery, 0.0, friction), tuple(directions), tuple(directions)
+            return np.where(is_frictionless, 0.0, friction), tuple(directions), tuple(directions)
         normal = normals(directions)
         free = along - (normal @ along)[:, None] * normal
         length = np.linalg.norm(free, axis=1, keepdims=True)
-        across = slippery[:, None] & (length > SINGLE_PRECISION * np.linalg.norm(along))
+        across = is_frictionless[:, None] & (length > SINGLE_PRECISION * np.linalg.norm(along))
         first = np.where(across, free / np.where(across, length, 1.0), directions[0])
-        turned = (first, *(np.where(across, np.cross(normal, first), other) for other in directions[1:]))
-        return np.full(len(slippery), friction), turned, (np.where(across, 0.0, first), *turned[1:])
+        rotated = (first, *(np.where(across, np.cross(normal, first), tangent) for tangent in directions[1:]))
+        return np.full(len(is_frictionless), friction), rotated, (np.where(across, 0.0, first), *rotated[1:])
 
     def added_gap(
         self, candidates: Candidates, pairing: Pairing, primary: object, reference: Array, factor: float

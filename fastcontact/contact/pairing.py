@@ -36,9 +36,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 # and with any edge in 3D by default. When a body slides beyond an edge or a plane of symmetry, its nodes lose contact one
 # after the other. With a smaller tolerance, nodes near the edge alternate between paired and unpaired.
 OVERHANG = 0.5
-# Newton iterations of projections onto facets that points are known to face; one is exact on flat triangles.
+# Number of Newton iterations of a projection onto a given facet; one iteration is exact on flat triangles.
 PROJECTIONS = 4
-# Fraction of each of the two facets at an edge over which the normals vary if edges are rounded.
+# Fraction of each facet over which its normals vary towards an edge if edges are rounded.
 ROUNDED = 0.1
 
 
@@ -118,8 +118,8 @@ class Pairing:
     offset : ndarray (n,), optional
         Gap minus ``normal . x``, where x is the position of the candidate, for a rigid obstacle [length]; None for facets.
     beyond : ndarray (n, dim - 1), optional
-        Overhang of the candidate beyond the end of the primary surface, in reference coordinates of the facet, whose straight
-        extension it faces [-]; None if no candidate overhangs.
+        Overhang of the candidate beyond the end of the primary surface, in reference coordinates of the facet whose straight
+        extension the candidate faces [-]; None if no candidate overhangs.
     """
 
     facet: Indices
@@ -160,12 +160,12 @@ def pair(
         Current coordinates of all points of the mesh [length].
     projection_tolerance : float
         Largest overhang beyond the end of the primary surface at which a candidate is paired, in facet lengths [-]
-        (TOLE_PROJ_EXT of code_aster). It then faces the straight extension of the facet, so that the forces on both sides
-        have the same line of action, and their moments are in equilibrium.
+        (TOLE_PROJ_EXT of code_aster). It then faces the straight extension of the facet, so that the forces on both
+        sides have the same line of action, and their moments are in equilibrium.
     normals : str or sequence of float
-        ``"facet"``: normal of the facet. A unit vector (dim,): this normal everywhere. Any other string: normal interpolated
-        between averaged nodal normals, which is continuous except at corners. In the latter two cases the candidates are
-        projected along the normal.
+        ``"facet"`` for the normals of facets, a unit vector (dim,) for this normal everywhere, or any other string for
+        normals interpolated between averaged nodal normals, which are continuous except at corners. In the latter two cases
+        candidates are projected along the normals.
     obstacle : Pose, optional
         Position and rotation of a rigid obstacle.
     rounded : bool
@@ -181,16 +181,16 @@ def pair(
         If a projection does not converge; see `search.closest`.
     """
     if isinstance(primary, RigidSide):
-        at = Pose(np.zeros(candidates.shape[1])) if obstacle is None else obstacle
-        _, normal, paired, offset = primary.facing(candidates, at)
+        pose = Pose(np.zeros(candidates.shape[1])) if obstacle is None else obstacle
+        _, normal, paired, offset = primary.facing(candidates, pose)
         nowhere = np.zeros(len(candidates), np.intp)
         return Pairing(nowhere, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
     closest = closest_of_kinds(candidates, primary.corners(coordinates))
     if normals == "facet" and not rounded:
-        inner = _at_smooth_ends(primary, coordinates, closest)
-        paired = closest.overhang <= np.where(inner, max(projection_tolerance, OVERHANG), projection_tolerance)
-        outside = paired & ~inner & (closest.overhang > LENGTH_ROUND_OFF)
-        return _straight_on(
+        continued = _at_smooth_ends(primary, coordinates, closest)
+        paired = closest.overhang <= np.where(continued, max(projection_tolerance, OVERHANG), projection_tolerance)
+        outside = paired & ~continued & (closest.overhang > LENGTH_ROUND_OFF)
+        return _with_overhang(
             Pairing(closest.facet, closest.xi, closest.normal, paired), candidates, primary, coordinates, outside
         )
     at_nodes = at_nodes_of_facets(smooth_normals(primary, coordinates))
@@ -201,7 +201,7 @@ def pair(
     if normals == "facet":
         normal = _round_edges(primary, coordinates, facet, xi, normal)
     paired = overhang <= projection_tolerance
-    return _straight_on(
+    return _with_overhang(
         Pairing(facet, xi, normal, paired), candidates, primary, coordinates, paired & (overhang > LENGTH_ROUND_OFF)
     )
 
@@ -217,8 +217,8 @@ def onto(points: Array, primary: Surface, facet: Indices, coordinates: Array, al
         at = places(primary, facet, xi)
         nodes = coordinates[at.nodes]
         axes = np.einsum("nki,nkd->ndi", at.gradient, nodes)
-        apart = points - np.einsum("nk,nkd->nd", at.shape, nodes)
-        xi += np.linalg.solve(np.concatenate([axes, along[:, :, None]], axis=2), apart[:, :, None])[:, :2, 0]
+        offset = points - np.einsum("nk,nkd->nd", at.shape, nodes)
+        xi += np.linalg.solve(np.concatenate([axes, along[:, :, None]], axis=2), offset[:, :, None])[:, :2, 0]
     normal = np.cross(axes[:, :, 0], axes[:, :, 1])
     return Pairing(facet, xi, normal / np.linalg.norm(normal, axis=1, keepdims=True), np.ones(len(points), bool))
 
@@ -240,7 +240,7 @@ def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array
     xi : ndarray (n, dim - 1)
         Reference coordinates in the facet [-].
     mean : ndarray (n, dim)
-        Averaged normals at the points [-]. They are the result at edges. Over the fraction ROUNDED of the facet, the result
+        Averaged normals at the points, which are the result at edges [-]. Over the fraction ROUNDED of the facet, the result
         changes to the normal of the facet.
     """
     normals = at_nodes_of_facets([facet_normals(block, coordinates) for block in primary.blocks])[facet]
@@ -252,7 +252,7 @@ def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
-def _straight_on(pairing: Pairing, candidates: Array, primary: Surface, coordinates: Array, outside: Mask) -> Pairing:
+def _with_overhang(pairing: Pairing, candidates: Array, primary: Surface, coordinates: Array, outside: Mask) -> Pairing:
     """Return the pairing with the overhang `Pairing.beyond` of the candidates marked in `outside` (n,)."""
     rows = np.flatnonzero(outside)
     if not len(rows):
@@ -269,8 +269,8 @@ def _straight_on(pairing: Pairing, candidates: Array, primary: Surface, coordina
 def _at_smooth_ends(primary: Surface, coordinates: Array, closest: Closest) -> Mask:
     """Return which candidates (n,) overhang the end of a line facet where an adjacent facet continues it smoothly.
 
-    Opposite a node between two facets of a concave line, points at a distance lie beyond the ends of both facets, but not
-    beyond the end of the surface. In 3D the result is False for all candidates.
+    Near a node between two facets, points outside a convex or inside a concave line lie beyond the ends of both facets, but
+    not beyond the end of the surface. In 3D the result is False for all candidates.
     """
     out = closest.overhang > 0.0
     if closest.position.shape[1] == 3 or not out.any():
@@ -337,11 +337,11 @@ def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     mean = mean / length if length > LENGTH_ROUND_OFF * len(normal) else np.array([0.0, 0.0, 1.0])
     axis = np.cross(np.eye(3)[np.argmin(np.abs(mean))], mean)
     axis /= np.linalg.norm(axis)
-    # Apply the rotation from the mean normal to the normal to the axis; if they are opposite, rotate by 180 degrees about it.
-    both = 1.0 + normal @ mean
-    slope = np.divide(normal @ axis, both, out=np.zeros(len(normal)), where=both > LENGTH_ROUND_OFF)
+    # Rotate the axis by the rotation from the mean normal to the normal. If these are opposite, the axis stays unchanged.
+    scale = 1.0 + normal @ mean
+    slope = np.divide(normal @ axis, scale, out=np.zeros(len(normal)), where=scale > LENGTH_ROUND_OFF)
     first = axis - slope[:, None] * (mean + normal)
-    # Normals that are opposite but for round-off also get perpendicular tangents.
+    # Make tangents perpendicular also where the normals are opposite except for round-off.
     first -= np.einsum("nd,nd->n", first, normal)[:, None] * normal
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(normal, first)
@@ -386,8 +386,8 @@ def rows_along(
 
 Normals: TypeAlias = str | Sequence[float]
 KINDS = ("facet", "averaged", "secondary")
-# Cosine of the angle, about 85 degrees, beyond which two sides do not face each other, and mean cosine below which a surface
-# has no mean direction, since it closes on itself.
+# Cosine of the angle of about 84 degrees beyond which two sides do not face each other, and length of the mean unit normal
+# below which a surface has no mean direction because it closes on itself.
 FACING = 0.1
 
 
@@ -404,23 +404,23 @@ def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSid
     if isinstance(normals, str):
         if normals not in KINDS:
             raise ContactError(unknown("kind of normals", normals, [*KINDS, "a vector"]))
-        checked: str | tuple[float, ...] = normals
+        result: str | tuple[float, ...] = normals
     else:
         vector = np.asarray(normals, float)
         length = np.linalg.norm(vector)
         if vector.shape != (dim,) or not (np.isfinite(length) and length > 0):
             raise ContactError(f"normals = {normals!r} must be one of {', '.join(KINDS)}, or a vector of {dim} numbers")
-        checked = tuple((vector / length).tolist())
+        result = tuple((vector / length).tolist())
         if isinstance(primary, Surface) and (nodal_normals(primary, points) @ vector).mean() <= FACING * length:
             raise ContactError(
                 f"normals = {normals!r} must point out of the body of '{primary.group}', the primary side: reverse the vector"
             )
-    if isinstance(primary, RigidSide) and checked not in ("facet", "averaged"):
+    if isinstance(primary, RigidSide) and result not in ("facet", "averaged"):
         raise ContactError(f"normals = {normals!r} are for contact between bodies: a rigid obstacle has its own")
-    return checked
+    return result
 
 
 def opposed(pairing: Pairing, normals: Array) -> Pairing:
-    """Return a pairing whose normals are opposite to those of the secondary side (n, dim), and face the primary's."""
+    """Return the pairing with normals opposite to those (n, dim) of the secondary side, unpaired if these do not face it."""
     facing = np.einsum("nd,nd->n", pairing.normal, normals) < -FACING
     return replace(pairing, normal=np.where(facing[:, None], -normals, pairing.normal), paired=pairing.paired & facing)

@@ -24,8 +24,8 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Facets whose normals enclose a smaller angle than this approximate a smooth surface; others form a corner [degrees]. The
-# value lies between the angles of octagons and of heptagons, so that round-off does not decide about regular polygons.
+# Adjacent facets whose normals enclose a smaller angle approximate a smooth surface; others form a corner [degrees]. The
+# value lies between the exterior angles of octagons and heptagons, so that regular polygons do not depend on round-off.
 CORNER = 48.0
 
 
@@ -65,10 +65,10 @@ def places(side: Surface, facet: Indices, xi: Array) -> Places:
     first = 0
     for block in side.blocks:
         in_block = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
-        shape, k = _of_block(block, facet[in_block] - first, xi[in_block]), block.facets.shape[1]
+        of_block, k = _of_block(block, facet[in_block] - first, xi[in_block]), block.facets.shape[1]
         columns = np.minimum(np.arange(width), k - 1)
-        projected.nodes[in_block], projected.local[in_block] = shape.nodes[:, columns], shape.local[:, columns]
-        projected.shape[in_block, :k], projected.gradient[in_block, :k] = shape.shape, shape.gradient
+        projected.nodes[in_block], projected.local[in_block] = of_block.nodes[:, columns], of_block.local[:, columns]
+        projected.shape[in_block, :k], projected.gradient[in_block, :k] = of_block.shape, of_block.gradient
         first += len(block.facets)
     return projected
 
@@ -80,9 +80,9 @@ def _of_block(block: FacetBlock, rows: Indices, xi: Array) -> Places:
 
 
 def at_common_edges(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, Indices, Array]:
-    """Return all facets on which points of a side lie: those that meet in a point on an edge or at a corner.
+    """Return all facets on which points of a side lie, which are several for points on an edge or at a corner.
 
-    Which of them a projection finds depends on round-off.
+    A projection finds one of them, depending on round-off.
 
     Parameters
     ----------
@@ -90,14 +90,14 @@ def at_common_edges(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, 
     facet : ndarray of int (n,)
         One facet of each point.
     xi : ndarray (n, dim - 1)
-        Its reference coordinates there.
+        Reference coordinates of each point in this facet [-].
 
     Returns
     -------
     point, facet : ndarray of int (p,)
-        Numbers of the points and of the facets; points are in ascending order, and each is there at least once.
+        Numbers of the points and of the facets. Points are in ascending order, and each occurs at least once.
     xi : ndarray (p, dim - 1)
-        Reference coordinates of the point in the facet.
+        Reference coordinates of the point in the facet [-].
     """
     at = places(side, facet, xi)
     row, k = np.nonzero(np.abs(at.shape) > LENGTH_ROUND_OFF)
@@ -108,15 +108,15 @@ def at_common_edges(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, 
     common = coo_array(
         around @ csr_array((np.ones(len(nodes)), nodes, ends), shape=(len(ends) - 1, len(side.points))).T
     )
-    whole = common.data == np.diff(around.indptr)[common.row]
-    point, other = common.row[whole].astype(np.intp), common.col[whole].astype(np.intp)
+    contains_all = common.data == np.diff(around.indptr)[common.row]
+    point, common_facet = common.row[contains_all].astype(np.intp), common.col[contains_all].astype(np.intp)
     coordinates, first = np.empty((len(point), xi.shape[1])), 0
     for block in side.blocks:
-        rows = np.flatnonzero((other >= first) & (other < first + len(block.local)))
-        same = block.local[other[rows] - first][:, :, None] == at.local[point[rows]][:, None]
+        rows = np.flatnonzero((common_facet >= first) & (common_facet < first + len(block.local)))
+        same = block.local[common_facet[rows] - first][:, :, None] == at.local[point[rows]][:, None]
         coordinates[rows] = np.einsum("pkj,pj->pk", same, at.shape[point[rows]]) @ elements.get(block.element).nodes
         first += len(block.local)
-    return point, other, coordinates
+    return point, common_facet, coordinates
 
 
 def nodal_normals(side: Surface, coordinates: Array) -> Array:
@@ -170,12 +170,12 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
     weight = np.concatenate([angle.ravel() for angle in angles])
     normal = np.concatenate([normals.reshape(-1, coordinates.shape[1]) for normals in facet_normals_of_blocks])
     joined = np.concatenate([normals.reshape(-1, coordinates.shape[1]) for normals in smooth])
-    places_of, start = np.argsort(node, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(node))])
+    by_node, start = np.argsort(node, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(node))])
     for at in np.flatnonzero(corner):
-        here = places_of[start[at] : start[at + 1]]
-        similar = normal[here] @ normal[here].T > np.cos(np.radians(CORNER))
-        total = (similar * weight[here]) @ normal[here]
-        joined[here] = total / np.linalg.norm(total, axis=1, keepdims=True)
+        entries = by_node[start[at] : start[at + 1]]
+        similar = normal[entries] @ normal[entries].T > np.cos(np.radians(CORNER))
+        total = (similar * weight[entries]) @ normal[entries]
+        joined[entries] = total / np.linalg.norm(total, axis=1, keepdims=True)
     ends = np.cumsum([normals.shape[0] * normals.shape[1] for normals in facet_normals_of_blocks])[:-1]
     return [
         means.reshape(like.shape) for means, like in zip(np.split(joined, ends), facet_normals_of_blocks, strict=True)
@@ -241,7 +241,7 @@ def along_normals(
     normals : ndarray (n_facets, k, 3)
         Unit normals at the nodes of the facets of all blocks, see `smooth_normals` and `at_nodes_of_facets`.
     start : Closest
-        Closest points, from which the iteration starts. They are the result if it fails.
+        Closest points, from which the iteration starts, and which are the result if it fails.
 
     Returns
     -------
@@ -256,38 +256,38 @@ def along_normals(
     """
     from fastcontact.contact import projection_kernels
 
-    facet = start.facet.copy(), start.xi.copy(), start.overhang.copy(), np.empty(points.shape)
+    projection = start.facet.copy(), start.xi.copy(), start.overhang.copy(), np.empty(points.shape)
     # Coordinates are relative to the centre of the surface. Far from the origin, their round-off would exceed the tolerance.
     x = coordinates[side.points]
-    midst = 0.5 * (x.min(axis=0) + x.max(axis=0))
+    centre = 0.5 * (x.min(axis=0) + x.max(axis=0))
     heights = np.einsum("nd,nd->n", points - start.position, start.normal)
-    seen, kinds = points - midst, [coordinates[block.facets] - midst for block in side.blocks]
-    sizes = np.cumsum([0] + [len(kind) for kind in kinds])
+    relative_points, nodes_of_blocks = points - centre, [coordinates[block.facets] - centre for block in side.blocks]
+    sizes = np.cumsum([0] + [len(kind) for kind in nodes_of_blocks])
     at_nodes = [
         np.ascontiguousarray(normals[low:high, : kind.shape[1]])
-        for kind, low, high in zip(kinds, sizes[:-1], sizes[1:], strict=True)
+        for kind, low, high in zip(nodes_of_blocks, sizes[:-1], sizes[1:], strict=True)
     ]
-    terms, directions = _polynomials(kinds), _polynomials(at_nodes)
+    terms, directions = _polynomials(nodes_of_blocks), _polynomials(at_nodes)
     shared(
         lambda portion: projection_kernels.along_normals(
-            *portion, seen, heights, terms, directions, side.triangular, side.neighbours, facet
+            *portion, relative_points, heights, terms, directions, side.triangular, side.neighbours, projection
         ),
         portions(len(points)),
     )
-    return facet
+    return projection
 
 
-def _polynomials(kinds: Sequence[Array]) -> Array:
+def _polynomials(blocks: Sequence[Array]) -> Array:
     """Return the polynomial coefficients (n_facets, width, 3) of vectors that are interpolated on facets.
 
-    `kinds` are the vectors (n, m, 3) at the nodes of the facets of each block.
+    `blocks` are the vectors (n, m, 3) at the nodes of the facets of each block.
     """
     from fastcontact.contact import projection_kernels
 
-    out, first = np.empty((sum(map(len, kinds)), max(kind.shape[1] for kind in kinds), 3)), 0
-    for kind in kinds:
-        projection_kernels.coefficients(kind, tables(kind.shape[1]).to_terms, first, 0, len(kind), out)
-        first += len(kind)
+    out, first = np.empty((sum(map(len, blocks)), max(vectors.shape[1] for vectors in blocks), 3)), 0
+    for vectors in blocks:
+        projection_kernels.coefficients(vectors, tables(vectors.shape[1]).to_terms, first, 0, len(vectors), out)
+        first += len(vectors)
     return out
 
 

@@ -1,8 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Facets in 3D: their normals and angles, and projection along normals interpolated between their nodes.
+"""Kernels for facets in 3D: normals, angles, and projection along normals that are interpolated between nodes.
 
 Positions and normals of a facet are polynomials of its reference coordinates, with coefficients (n_facets, m, 3) of the terms
-in `search.facet_tables`; facets with fewer nodes than the widest kind have zeros at the end.
+in `search.facet_tables`; facets with fewer than m nodes have zeros at the end.
 """
 
 import numpy as np
@@ -42,10 +42,10 @@ def angles(nodes, beside, begin, end, out):
         for a in range(nodes.shape[1]):
             out[f, a] = 1.0
         for a in range(beside.shape[0]):
-            row = vector(nodes, f, a)
-            p, q = minus(vector(nodes, f, beside[a, 0]), row), minus(vector(nodes, f, beside[a, 1]), row)
-            sine = cross(p, q)
-            out[f, a] = np.arctan2(np.sqrt(dot(sine, sine)), dot(p, q))
+            corner = vector(nodes, f, a)
+            p, q = minus(vector(nodes, f, beside[a, 0]), corner), minus(vector(nodes, f, beside[a, 1]), corner)
+            product = cross(p, q)
+            out[f, a] = np.arctan2(np.sqrt(dot(product, product)), dot(p, q))
 
 
 @interpretable_kernel
@@ -65,7 +65,7 @@ def coefficients(values, to_terms, first, begin, end, out):
 
 
 @innermost_kernel
-def _place(terms, f, s, t):
+def _interpolated(terms, f, s, t):
     """Return the value of the polynomials of facet `f` at (s, t), and their derivatives."""
     x, xs, xt, _, _, _ = component(terms, f, 0, s, t)
     y, ys, yt, _, _, _ = component(terms, f, 1, s, t)
@@ -77,21 +77,21 @@ def _place(terms, f, s, t):
 def _newton(point, terms, directions, f, s, t, height):
     """Solve ``X(s, t) + height n(s, t) = point`` on the extended facet `f`; return (s, t) and whether it converged."""
     for _ in range(MAX_ITERATIONS):
-        foot, along_s, along_t = _place(terms, f, s, t)
-        normal, turn_s, turn_t = _place(directions, f, s, t)
+        foot, along_s, along_t = _interpolated(terms, f, s, t)
+        normal, turn_s, turn_t = _interpolated(directions, f, s, t)
         residual = minus(point, along(foot, normal, height))
         p, q = along(along_s, turn_s, height), along(along_t, turn_t, height)
-        across = cross(q, normal)
-        volume = dot(p, across)
+        product = cross(q, normal)
+        volume = dot(p, product)
         # The columns of the Jacobian are linearly dependent if the volume they span is negligible.
         if not abs(volume) > LENGTH_ROUND_OFF * np.sqrt(dot(p, p) * dot(q, q) * dot(normal, normal)):
             return s, t, False
-        ds, dt = dot(residual, across) / volume, dot(residual, cross(normal, p)) / volume
+        ds, dt = dot(residual, product) / volume, dot(residual, cross(normal, p)) / volume
         dh, size = dot(residual, cross(p, q)) / volume, max(abs(ds), abs(dt))
-        # Far off, a full step may leave the region where the interpolated normals are meaningful.
-        share = 1.0 if size <= 1.0 else 1.0 / size
-        s, t, height = s + share * ds, t + share * dt, height + share * dh
-        if share * size <= STEP * (1.0 + max(abs(s), abs(t))):
+        # Far from the solution, a full step may leave the region where the interpolated normals are meaningful.
+        damping = 1.0 if size <= 1.0 else 1.0 / size
+        s, t, height = s + damping * ds, t + damping * dt, height + damping * dh
+        if damping * size <= STEP * (1.0 + max(abs(s), abs(t))):
             return s, t, True
     return s, t, False
 
@@ -104,7 +104,7 @@ def beyond(triangle, s, t):
 
 
 @innermost_kernel
-def _ranked(triangle, s, t):
+def _rank(triangle, s, t):
     """Return `beyond` plus a small fraction of the sum of all overhangs, by which neighbouring facets are compared.
 
     Beyond the end of a surface, a facet and the next one along it have the same largest overhang; the sum breaks the tie.
@@ -118,7 +118,7 @@ def _ranked(triangle, s, t):
 
 @innermost_kernel
 def inside(triangle, s, t):
-    """Return reference coordinates moved into a facet, whichever its first corner is."""
+    """Return reference coordinates moved into a facet, independently of the choice of its first corner."""
     if triangle:
         a, b, c = max(s, 0.0), max(t, 0.0), max(1.0 - s - t, 0.0)
         whole = a + b + c if min(s, t, 1.0 - s - t) < 0.0 else 1.0
@@ -128,22 +128,22 @@ def inside(triangle, s, t):
 
 @innermost_kernel
 def _beside(point, terms, directions, triangular, neighbours, f, height):
-    """Return the facet next to `f` with the smallest `_ranked` of the projection, (s, t), and this value or infinity."""
+    """Return the facet next to `f` with the smallest `_rank` of the projection, (s, t), and this value or infinity."""
     start, numbers = neighbours
     best, best_s, best_t, least = f, 0.0, 0.0, np.inf
     for k in range(start[f], start[f + 1]):
         g = numbers[k]
         middle = 1.0 / 3.0 if triangular[g] else 0.0
         s, t, converged = _newton(point, terms, directions, g, middle, middle, height)
-        out = _ranked(triangular[g], s, t) if converged else np.inf
-        # Of several equivalent facets, the first one is taken.
-        if converged and max(out, LENGTH_ROUND_OFF) < max(least, LENGTH_ROUND_OFF) - ROUND_OFF:
-            best, best_s, best_t, least = g, s, t, out
+        rank = _rank(triangular[g], s, t) if converged else np.inf
+        # Of equivalent facets, the first one is taken.
+        if converged and max(rank, LENGTH_ROUND_OFF) < max(least, LENGTH_ROUND_OFF) - ROUND_OFF:
+            best, best_s, best_t, least = g, s, t, rank
     return best, best_s, best_t, least
 
 
 @interpretable_kernel
-def along_normals(begin, end, points, heights, terms, directions, triangular, neighbours, found):
+def along_normals(begin, end, points, heights, terms, directions, triangular, neighbours, projection):
     """Project points `begin` to ``end - 1`` along interpolated normals; see `projection.along_normals`.
 
     Parameters
@@ -158,21 +158,21 @@ def along_normals(begin, end, points, heights, terms, directions, triangular, ne
     triangular : ndarray of bool (n_facets,)
     neighbours : (ndarray of int (n_facets + 1,), ndarray of int)
         The facets that share a node with facet f, ascending, are numbers ``start[f]`` to ``start[f + 1] - 1``.
-    found : tuple of ndarray
+    projection : tuple of ndarray
         facet (n,), xi (n, 2) [-], overhang (n,) [-]: closest points, changed in place; and unit normals (n, 3), filled.
     """
-    facet, xi, overhang, normal = found
+    facet, xi, overhang, normal = projection
     for i in range(begin, end):
         point, f = (points[i, 0], points[i, 1], points[i, 2]), facet[i]
         s, t, over = xi[i, 0], xi[i, 1], overhang[i]
-        a, b, good = _newton(point, terms, directions, f, s, t, heights[i])
-        out = beyond(triangular[f], a, b)
-        if good and out <= BEYOND:
-            s, t, over = a, b, out
-            if out > LENGTH_ROUND_OFF:
-                other, a, b, off = _beside(point, terms, directions, triangular, neighbours, f, heights[i])
-                if off < _ranked(triangular[f], s, t):
-                    f, s, t, over = other, a, b, beyond(triangular[other], a, b)
+        a, b, converged = _newton(point, terms, directions, f, s, t, heights[i])
+        excess = beyond(triangular[f], a, b)
+        if converged and excess <= BEYOND:
+            s, t, over = a, b, excess
+            if excess > LENGTH_ROUND_OFF:
+                next_facet, a, b, rank = _beside(point, terms, directions, triangular, neighbours, f, heights[i])
+                if rank < _rank(triangular[f], s, t):
+                    f, s, t, over = next_facet, a, b, beyond(triangular[next_facet], a, b)
         s, t = inside(triangular[f], s, t)
         facet[i], xi[i, 0], xi[i, 1], overhang[i] = f, s, t, over if over > LENGTH_ROUND_OFF else 0.0
-        normal[i, 0], normal[i, 1], normal[i, 2] = unit(_place(directions, f, s, t)[0])
+        normal[i, 0], normal[i, 1], normal[i, 2] = unit(_interpolated(directions, f, s, t)[0])

@@ -13,14 +13,14 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.mesh.mesh import Mesh
 
-# Number of sampled facets of each kind.
+# Approximate number of sampled facets of each kind.
 SAMPLE = 200
 
 
 def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, excluded: Mask | None = None) -> None:
     """Raise ContactError for sides of contact `name` that share nodes or cannot face each other.
 
-    They may share nodes that are excluded from contact, `excluded` (n_points,).
+    Nodes that `excluded` (n_points,) marks, without contact, may be shared.
     """
     if secondary.group == primary.group:
         raise ContactError(
@@ -38,14 +38,14 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
         )
     for side in (secondary, primary):
         _check_normals(mesh, name, side)
-    frames, opposite = _facet_frames(mesh, secondary), _facet_frames(mesh, primary)
-    difference = opposite[0][None] - frames[0][:, None]
-    facing = np.einsum("id,jd->ij", frames[1], opposite[1]) < 0
-    ahead = (np.einsum("ijd,id->ij", difference, frames[1]) > -0.1 * np.linalg.norm(difference, axis=2)) | (
-        np.linalg.norm(difference, axis=2) < np.minimum.outer(frames[2], opposite[2])
+    secondary_frames, primary_frames = _facet_frames(mesh, secondary), _facet_frames(mesh, primary)
+    difference = primary_frames[0][None] - secondary_frames[0][:, None]
+    facing = np.einsum("id,jd->ij", secondary_frames[1], primary_frames[1]) < 0
+    ahead = (np.einsum("ijd,id->ij", difference, secondary_frames[1]) > -0.1 * np.linalg.norm(difference, axis=2)) | (
+        np.linalg.norm(difference, axis=2) < np.minimum.outer(secondary_frames[2], primary_frames[2])
     )
     if not (facing & ahead).any():
-        behind = -np.einsum("ijd,id->ij", difference, frames[1])[facing]
+        behind = -np.einsum("ijd,id->ij", difference, secondary_frames[1])[facing]
         inside = f", or do the bodies lie inside each other, by {behind.min():.4g} or more" if len(behind) else ""
         raise ContactError(
             f"no facet of '{secondary.group}' faces '{primary.group}': the outer sides of the two groups look away from "
@@ -67,11 +67,11 @@ def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSid
 
 
 def _check_normals(mesh: Mesh, name: str, side: Surface) -> None:
-    """Raise ContactError for a side of contact `name` with a node where it has no normal."""
+    """Raise ContactError for a side of contact `name` that has no normal at one of its nodes."""
     with np.errstate(invalid="ignore"):
-        without = np.flatnonzero(~np.isfinite(nodal_normals(side, mesh.points)).all(axis=1))
-    if len(without):
-        point = side.points[without[0]]
+        undefined = np.flatnonzero(~np.isfinite(nodal_normals(side, mesh.points)).all(axis=1))
+    if len(undefined):
+        point = side.points[undefined[0]]
         raise ContactError(
             f"the facets of '{side.group}' in contact '{name}' meet back to back at point {point}, {mesh.points[point]}: "
             "they have no normal there; bodies that touch at a point need separate points, which merge_points may have merged"
@@ -92,11 +92,11 @@ def shared_facets(mesh: Mesh, group: str, other: str) -> Numbers:
 
 
 def _facet_frames(mesh: Mesh, side: Surface) -> tuple[Array, Array, Array]:
-    """Return centres, unit normals and sizes of about SAMPLE facets of each kind of a surface, as if flat."""
+    """Return centres, unit normals and sizes of about SAMPLE facets of each kind, given by their corners."""
     centres, normals, sizes = [], [], []
     for block in side.blocks:
-        some = block.facets[:: max(1, len(block.facets) // SAMPLE), : elements.get(block.element).n_corners]
-        corners = mesh.points[some]
+        sample = block.facets[:: max(1, len(block.facets) // SAMPLE), : elements.get(block.element).n_corners]
+        corners = mesh.points[sample]
         normal = flat_area_vectors(corners)
         centres.append(corners.mean(axis=1))
         normals.append(normal / np.linalg.norm(normal, axis=1, keepdims=True))

@@ -1,4 +1,4 @@
-"""One side of a contact pair: the facets of a group, with normals that point out of the body."""
+"""A side of a contact pair: the facets of a group, with normals that point out of the body."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Surface:
     def add_across_ends(self, vectors: Array) -> None:
         """Add up the vectors (m, dim) of corresponding nodes at both ends of each periodic interface, in place.
 
-        The vectors are sums over the facets of a node, which at a periodic end include the facets of the other end.
+        The vectors are sums over the facets of a node. At a periodic end these include the facets at the other end.
         """
         for first, second, turn in self.periodic_ends:
             vectors[first] += (vectors[second][:, None] @ turn)[:, 0]
@@ -223,7 +223,7 @@ def _ordered(mesh: Mesh, group: str, facets: Mapping[str, Numbers]) -> tuple[Num
         try:
             line = ordered_line(mesh, group)
             return line.points, line.abscissa
-        except MeshError:  # closed, or in several pieces: no order along it
+        except MeshError:  # a closed line, or several pieces, have no order
             pass
     points = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
     return points, np.zeros(len(points))

@@ -1,13 +1,13 @@
 r"""Geometric correction of contact surfaces: gaps between the smooth surfaces that straight facets approximate.
 
-Non-matching facets of curved sides leave gaps and overlaps of the size of their sag :math:`h`, and thus pressure errors
-of the order of :math:`E h / L` for facets of length L, whatever the interference. A surface of constant curvature and a
-polynomial of twice the order of the facet are fitted to the nodes of the facet and of those around it (local surface fitting:
-Jiao and Zha, 2008). The height of this smooth surface P above the facet is its interpolation error on the facet,
+Non-matching facets of curved sides leave gaps and overlaps of the size of their sag :math:`h`, and thus pressure errors of
+the order of :math:`E h / L` for facets of length L, independently of the interference. A surface of constant curvature and a
+polynomial of twice the order of the facet are fitted to the nodes of the facet and of those around it (local surface
+fitting: Jiao and Zha, 2008). The height of this smooth surface P above the facet is its interpolation error on the facet,
 :math:`h = P - \sum_a N_a P(x_a)`. It vanishes at nodes, on flat sides, and where facets follow the surface.
 
-Only the curvature that both sides share is corrected for: a sphere pressed on a plane is flat within the contact, as its
-facets are. With the curvature tensors :math:`K_s` and :math:`K_p` of facets that face each other, heights of one side are
+Only the curvature that both sides share is corrected, since a sphere pressed on a plane is flat within the contact, like its
+facets. With the curvature tensors :math:`K_s` and :math:`K_p` of facets that face each other, heights of one side are
 multiplied by :math:`\min(\max(-K_s : K_p / K : K, 0), 1)`, with the tensor K of that side. Fits do not extend across
 corners. Where the curvature changes from one facet to the next, heights are multiplied by the limiter of van Albada, van
 Leer and Roberts (1982), :math:`2 K : K' / (K : K + K' : K')`, so that a plane beside a fillet stays plane.
@@ -30,16 +30,16 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Factor on the columns of a fit for each degree of the polynomial, whose least squares are damped: where nodes
-# leave terms undetermined, as on a strip one facet wide, those of low degree are preferred.
-LOWER = 0.1
-# Circles, spheres and cylinders are matched to (L / R)^(2 PASSES).
+# Factor by which the columns of a least-squares fit decrease with each degree of the polynomial. Because the fit is damped,
+# terms of low degree are preferred where nodes leave terms undetermined, as on a strip one facet wide.
+DEGREE_FACTOR = 0.1
+# Number of passes of a fit. The relative error for circles, spheres and cylinders is of the order (L / R)^(2 PASSES).
 PASSES = 3
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothSide:
-    """Heights and curvatures of the smooth surface above the facets of one side, counted through its blocks.
+    """Heights and curvatures of the smooth surface above the facets of one side, numbered through its blocks.
 
     Attributes
     ----------
@@ -86,14 +86,14 @@ class Smoothing:
         smooth_secondary = None if smooth_primary is None else smooth_side(secondary, points)
         if smooth_secondary is None or smooth_primary is None:
             return None
-        made = cls(smooth_secondary, smooth_primary)
+        smoothing = cls(smooth_secondary, smooth_primary)
         axes = [frames(side, points, points) for side in (secondary, primary)]
         middles = [points[b.facets[:, : elements.get(b.element).n_corners]].mean(axis=1) for b in secondary.blocks]
         opposite = closest_of_kinds(np.concatenate(middles), primary.corners(points)).facet
-        factor = made.shared(np.arange(len(opposite)), opposite, axes)
-        counts = factor[:, 0] * np.abs(smooth_secondary.heights).max(axis=(1, 2)) > 0.0
-        counts |= factor[:, 1] * np.abs(smooth_primary.heights[opposite]).max(axis=(1, 2)) > 0.0
-        return made if counts.any() else None
+        factor = smoothing.shared(np.arange(len(opposite)), opposite, axes)
+        is_corrected = factor[:, 0] * np.abs(smooth_secondary.heights).max(axis=(1, 2)) > 0.0
+        is_corrected |= factor[:, 1] * np.abs(smooth_primary.heights[opposite]).max(axis=(1, 2)) > 0.0
+        return smoothing if is_corrected.any() else None
 
     def shared(self, secondary: Indices, primary: Indices, frames: Sequence[Array]) -> Array:
         """Return the factors (n, 2) of the heights of secondary and primary facets, both (n,), that face each other.
@@ -118,17 +118,17 @@ class Smoothing:
 
 
 def frames(side: Surface, points: Array, coordinates: Array) -> Array:
-    """Return convected tangents (n_facets, dim - 1, dim) in the middle of facets, of unit length in the reference.
+    """Return convected tangents (n_facets, dim - 1, dim) at the centres of facets, of unit length in the reference.
 
-    In the reference, at `points` (n_points, dim), the first one points to the first corner; they follow the mean
-    deformation of a facet to `coordinates` (n_points, dim), so that no corner has more influence than others.
+    In the reference, at `points` (n_points, dim), the first tangent points to the first corner. Tangents follow the mean
+    deformation of a facet to `coordinates` (n_points, dim), so that all corners have the same influence.
     """
     frames_of_blocks = []
     for block in side.blocks:
-        rest, now = (x[block.facets[:, : elements.get(block.element).n_corners]] for x in (points, coordinates))
+        initial, current = (x[block.facets[:, : elements.get(block.element).n_corners]] for x in (points, coordinates))
         axes = _axes(block, points, _normals(block, points))[:, :-1]
-        local = (rest - rest.mean(axis=1, keepdims=True)) @ axes.transpose(0, 2, 1)
-        centred = now - now.mean(axis=1, keepdims=True)
+        local = (initial - initial.mean(axis=1, keepdims=True)) @ axes.transpose(0, 2, 1)
+        centred = current - current.mean(axis=1, keepdims=True)
         frames_of_blocks.append(np.linalg.solve(local.transpose(0, 2, 1) @ local, local.transpose(0, 2, 1) @ centred))
     return np.concatenate(frames_of_blocks)
 
@@ -150,7 +150,7 @@ def _axes(block: FacetBlock, coordinates: Array, normal: Array) -> Array:
 
 
 def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
-    """Return the smooth surface of a side at `points` (n_points, dim); None where its facets have no sag."""
+    """Return the smooth surface of a side at `points` (n_points, dim); None if its facets have no sag."""
     away = points[side.points] - points[side.points].mean(axis=0)
     if np.linalg.svd(away, compute_uv=False)[-1] <= LENGTH_ROUND_OFF * np.linalg.norm(away):  # in one plane
         return None
@@ -175,7 +175,7 @@ def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
 
 
 def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]:
-    """Return which facets share a node without a corner between them, and the nodes of all these facets for each facet.
+    """Return which facets share a node without a corner between them, and for each facet the nodes of all these facets.
 
     The results are a matrix (n_facets, n_facets), including the diagonal, positions (n_facets, most) in the points of the
     side, and a mask of the entries of the latter that are filled.
@@ -196,10 +196,10 @@ def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Surfaces over planes of facets (n,): of a constant `curvature` (n, d, d), and polynomials (n, n_terms) beside it.
+    """Surfaces over the planes of facets (n,), with a constant `curvature` (n, d, d) plus polynomials (n, n_terms).
 
-    The planes have the `axes` (n, dim, dim), the last one normal, through the middle of the corners; lengths are counted in
-    the `size` (n,) of the facets.
+    The planes contain the mean of the corners, `origin`, and have the `axes` (n, dim, dim), the last of which are normals.
+    Lengths are relative to the `size` (n,) of the facets.
     """
 
     axes: Array
@@ -210,7 +210,7 @@ class _Fit:
     polynomial: Array
 
     def in_planes(self, points: Array) -> tuple[Array, Array]:
-        """Return places (n, m, d) in the planes of `points` (n, m, dim), and their heights (n, m) above."""
+        """Return the coordinates (n, m, d) of `points` (n, m, dim) in the planes, and their heights (n, m) above them."""
         local = np.einsum("nkd,ned->nke", points - self.origin[:, None], self.axes) / self.size[:, None, None]
         return local[..., :-1], local[..., -1]
 
@@ -218,15 +218,15 @@ class _Fit:
         """Return the surfaces with polynomials fitted to those `points` (n, m, dim) that are `valid` (n, m)."""
         (plane, height), (i, j) = self.in_planes(points), self.powers
         powers = [math.comb(*pair) for pair in zip(i + j, i)]
-        lower = LOWER ** (i + j) * np.sqrt(powers)  # Bombieri's norm is invariant under rotation
-        columns = np.where(valid[..., None], lower * _terms(plane, i, j), 0.0)
-        rest = np.where(valid, height - _conic(self.curvature, plane), 0.0)
-        size = LOWER ** (i + j).max() * np.sqrt(SINGLE_PRECISION * (columns**2).sum(axis=(1, 2)))
+        scale = DEGREE_FACTOR ** (i + j) * np.sqrt(powers)  # Bombieri's norm is invariant under rotation
+        columns = np.where(valid[..., None], scale * _terms(plane, i, j), 0.0)
+        residual = np.where(valid, height - _conic(self.curvature, plane), 0.0)
+        size = DEGREE_FACTOR ** (i + j).max() * np.sqrt(SINGLE_PRECISION * (columns**2).sum(axis=(1, 2)))
         damping = size[:, None, None] * np.eye(len(i), len(i) + 1)
         # With normal equations instead of QR, terms determined by the damping would be accurate to only 1e-3.
-        rows = np.concatenate([np.concatenate([columns, rest[..., None]], axis=2), damping], axis=1)
+        rows = np.concatenate([np.concatenate([columns, residual[..., None]], axis=2), damping], axis=1)
         R: Array = np.asarray(np.linalg.qr(rows, mode="r"))
-        return replace(self, polynomial=lower * np.linalg.solve(R[:, : len(i), :-1], R[:, : len(i), -1:])[..., 0])
+        return replace(self, polynomial=scale * np.linalg.solve(R[:, : len(i), :-1], R[:, : len(i), -1:])[..., 0])
 
     def at(self, plane: Array) -> Array:
         """Return the heights (n, m) over points (n, m, d) of the planes."""
@@ -235,25 +235,26 @@ class _Fit:
     def reaching(self, points: Array, valid: Mask) -> Mask:
         """Return which surfaces (n,) of constant curvature extend to all `points` (n, m, dim) that are `valid` (n, m).
 
-        The others are not determined by their nodes, e.g. of three coarse facets in a row, and amplify round-off.
+        Other surfaces, e.g. of three coarse facets in a row, are not determined by their nodes and amplify round-off.
         """
         bent = np.einsum("nqd,nde->nqe", self.in_planes(points)[0], self.curvature)
         return np.asarray((((bent**2).sum(axis=2) < 1.0) | ~valid).all(axis=1))
 
     def in_the_middle(self) -> tuple[Array, Array]:
         """Return slopes (n, d) and curvatures (n, d, d) in the middle of the facets."""
-        at = {(int(a), int(b)): n for n, (a, b) in enumerate(zip(*self.powers, strict=True))}
+        term = {(int(a), int(b)): n for n, (a, b) in enumerate(zip(*self.powers, strict=True))}
         if self.curvature.shape[1] == 1:
-            slope, second = [at[1, 0]], np.array([[at[2, 0]]])
+            slope, second = [term[1, 0]], np.array([[term[2, 0]]])
         else:
-            slope, second = [at[1, 0], at[0, 1]], np.array([[at[2, 0], at[1, 1]], [at[1, 1], at[0, 2]]])
+            slope, second = [term[1, 0], term[0, 1]], np.array([[term[2, 0], term[1, 1]], [term[1, 1], term[0, 2]]])
         return self.polynomial[:, slope], self.curvature - self.polynomial[:, second] * (1.0 + np.eye(len(second)))
 
 
 def _fit(block: FacetBlock, points: Array, around: Array, valid: Mask, degree: int) -> _Fit:
     """Fit surfaces to those of the points `around` (n, m, dim) the facets of a block that are `valid` (n, m).
 
-    In each pass, planes are rotated towards the tangent, and constant curvature is moved from the polynomials to `curvature`.
+    In each pass, planes are rotated to the tangents of the surfaces, and the curvatures of the polynomials are moved to
+    `curvature`.
     """
     corners = points[block.facets[:, : elements.get(block.element).n_corners]]
     origin, normal = corners.mean(axis=1), _normals(block, points)
@@ -271,9 +272,9 @@ def _tilted(axes: Array, slope: Array) -> Array:
     """Return axes (n, dim, dim) after the smallest rotation to the normals of surfaces of `slope` (n, dim - 1) over them."""
     normal = axes[:, -1] - np.einsum("nj,njd->nd", slope, axes[:, :-1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    both = axes[:, -1] + normal
-    along = np.einsum("njd,nd->nj", axes[:, :-1], normal) / np.einsum("nd,nd->n", both, normal)[:, None]
-    return np.concatenate([axes[:, :-1] - along[:, :, None] * both[:, None], normal[:, None]], axis=1)
+    twice_mean = axes[:, -1] + normal
+    along = np.einsum("njd,nd->nj", axes[:, :-1], normal) / np.einsum("nd,nd->n", twice_mean, normal)[:, None]
+    return np.concatenate([axes[:, :-1] - along[:, :, None] * twice_mean[:, None], normal[:, None]], axis=1)
 
 
 def _heights(block: FacetBlock, points: Array, smooth: _Fit) -> tuple[Array, Array, Array]:
@@ -293,7 +294,7 @@ def _heights(block: FacetBlock, points: Array, smooth: _Fit) -> tuple[Array, Arr
 def _conic(curvature: Array, plane: Array) -> Array:
     r"""Return the heights (n, m) of surfaces of constant `curvature` K (n, d, d) over points x (n, m, d) of their planes.
 
-    :math:`-x^T K x / (1 + \sqrt{1 - x^T K^2 x})`, spheres and cylinders without error.
+    :math:`-x^T K x / (1 + \sqrt{1 - x^T K^2 x})`, which is exact for spheres and cylinders.
     """
     bent = np.einsum("nqd,nde->nqe", plane, curvature)
     root = np.sqrt(np.maximum(1.0 - (bent**2).sum(axis=2), 0.0))
@@ -302,7 +303,7 @@ def _conic(curvature: Array, plane: Array) -> Array:
 
 def _powers(dim: int, degree: int) -> tuple[Indices, Indices]:
     """Return the exponents of the terms of a polynomial in one or two variables."""
-    i, j = (part.ravel() for part in np.indices((degree + 1, degree + 1 if dim == 2 else 1)))
+    i, j = (exponents.ravel() for exponents in np.indices((degree + 1, degree + 1 if dim == 2 else 1)))
     kept = i + j <= degree
     return i[kept], j[kept]
 
@@ -317,28 +318,28 @@ def _terms(x: Array, i: Indices, j: Indices) -> Array:
 
 
 def _lattice(element: elements.Element, k: int) -> tuple[Array, tuple[Indices, Indices]]:
-    """Return points of a reference facet, and exponents of as many terms that they determine."""
+    """Return points of a reference facet, and the exponents of as many terms, which these points determine."""
     if element.n_corners == 3:
         i, j = _powers(2, k - 1)
         return np.column_stack([i, j]) / (k - 1.0), (i, j)
-    i, j = (part.ravel() for part in np.indices((k, k if element.dim == 2 else 1)))
-    at = np.linspace(-1.0, 1.0, k)
-    return (at[i][:, None] if element.dim == 1 else np.column_stack([at[i], at[j]])), (i, j)
+    i, j = (exponents.ravel() for exponents in np.indices((k, k if element.dim == 2 else 1)))
+    abscissa = np.linspace(-1.0, 1.0, k)
+    return (abscissa[i][:, None] if element.dim == 1 else np.column_stack([abscissa[i], abscissa[j]])), (i, j)
 
 
 def _limiter(near: csr_array, curvature: Array, axes: Array) -> Array:
-    """Return the factors (n_facets,) by which changes of the curvature to facets `near` reduce heights."""
+    """Return the factors (n_facets,) that reduce heights where the curvature changes towards `near` facets."""
     i, j = near.tocoo().coords
-    other, square = _in_plane_of(axes[i], axes[j], curvature[j]), np.einsum("nij,nij->n", curvature, curvature)
-    common, both = 2.0 * np.einsum("nij,nij->n", curvature[i], other), square[i] + square[j]
+    neighbour, square = _in_plane_of(axes[i], axes[j], curvature[j]), np.einsum("nij,nij->n", curvature, curvature)
+    common, squares = 2.0 * np.einsum("nij,nij->n", curvature[i], neighbour), square[i] + square[j]
     factor = np.ones(len(curvature))
-    np.minimum.at(factor, i, np.divide(common, both, out=np.ones_like(both), where=both > 0.0))
+    np.minimum.at(factor, i, np.divide(common, squares, out=np.ones_like(squares), where=squares > 0.0))
     return np.maximum(factor, 0.0)
 
 
-def _in_plane_of(axes: Array, other: Array, tensor: Array) -> Array:
-    """Return tensors (n, d, d), given along the `other` axes (n, d, dim), along `axes`, after rotating plane into plane."""
-    turn = np.einsum("nid,njd->nij", axes, other)
+def _in_plane_of(axes: Array, other_axes: Array, tensor: Array) -> Array:
+    """Return tensors (n, d, d) given along `other_axes` (n, d, dim) along `axes`, after a rotation between both planes."""
+    turn = np.einsum("nid,njd->nij", axes, other_axes)
     if turn.shape[1] == 2:  # the closest rotation or reflection
         cofactors = turn[:, ::-1, ::-1] * [[1.0, -1.0], [-1.0, 1.0]]
         turn = turn + np.sign(np.linalg.det(turn))[:, None, None] * cofactors

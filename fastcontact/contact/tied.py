@@ -1,12 +1,12 @@
-"""Tied contact: no opening and no slip, as linear equations that hold from the beginning.
+"""Tied contact: linear equations for zero opening and zero slip from the beginning.
 
-The sides are paired once, in the undeformed configuration; the relative displacement of points that face each other stays
-zero in every direction. The test functions are the formulation's multipliers. If forces are nodal, there is one set of
+The sides are paired once, in the undeformed configuration. The relative displacement of points that face each other remains
+zero in every direction. The test functions are the multipliers of the formulation. If forces are nodal, there is one set of
 equations per node. If forces act at integration points, the equations are moments with the functions of the multiplier
 field, which is the mortar method (Bernardi, Maday and Patera, 1994), so that complementarity parameters have no influence.
 
-At nodes that supports hold on both sides, the secondary side has one displacement less than the multipliers, which then are
-not determined: multipliers that alternate from node to node and decay along the surface do no work. They are reduced as at
+Where supports hold both sides at a node, the secondary side has fewer free displacements than multipliers, which are then not
+determined: multipliers that alternate from node to node and decay along the surface do no work. They are reduced as at
 the ends of mortar lines (Bernardi et al., section 3): in a direction that is held on both sides, the multiplier of a node is
 the mean of those of its neighbours, so that uniform tractions remain possible (`reduction`).
 
@@ -40,9 +40,9 @@ class TiedPair:
     Attributes
     ----------
     moments : csr_array (q, m)
-        From the gaps at the m constraint points of the formulation to the q gaps that vanish.
+        Matrix from the gaps at the m constraint points of the formulation to the q gaps that vanish.
     rows : tuple of csr_array (q, n_dofs)
-        Relative displacement along the normal and each tangent.
+        Relative displacements along the normal and each tangent.
     directions : tuple of ndarray (m, dim)
         Tangents [-].
     positions : ndarray (q, dim)
@@ -89,8 +89,8 @@ def tied(constraints: Constraints, moments: csr_array, areas: Array | None, redu
     positions = abs(moments) @ constraints.positions / size[:, None]
     rows = [csr_array(moments @ along) for along in (constraints.B, *constraints.tangents)]
     if reduction is not None:
-        whole, q = csr_array(reduction.T @ vstack(rows, format="csr")), len(size)
-        rows = [csr_array(whole[first : first + q]) for first in range(0, whole.shape[0], q)]
+        reduced, q = csr_array(reduction.T @ vstack(rows, format="csr")), len(size)
+        rows = [csr_array(reduced[first : first + q]) for first in range(0, reduced.shape[0], q)]
     assert constraints.nodal is not None
     return TiedPair(
         moments, tuple(map(_cleaned, rows)), constraints.directions, positions, constraints.nodal, constraints.nodes, areas,
@@ -105,7 +105,7 @@ def moments_of(constraints: Constraints) -> tuple[csr_array, Array | None]:
     P, areas = constraints.compliance.P, constraints.compliance.areas
     weighted = csr_array(P.T @ diags_array(areas))
     scale = np.asarray(abs(weighted).sum(axis=1)).ravel()
-    on_axis = np.flatnonzero((areas == 0.0) & constraints.usable)  # at the axis
+    on_axis = np.flatnonzero((areas == 0.0) & constraints.usable)
     single = csr_array((np.ones(len(on_axis)), (np.arange(len(on_axis)), on_axis)), shape=(len(on_axis), len(areas)))
     scales = np.concatenate([scale, np.zeros(len(on_axis))])
     return csr_array(vstack([diags_array(1.0 / np.maximum(scale, TINY)) @ weighted, single])), scales
@@ -133,23 +133,23 @@ def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: 
     areas : ndarray (q,)
         Integrals of their test functions, zero for empty equations [area].
     beside : csr_array (n_nodes, n_nodes)
-        Incidence of nodes with a common facet.
+        Adjacency of nodes with a common facet.
     """
     q, dim = held.shape[:2]
-    taken = np.trace(held, axis1=1, axis2=2).round().astype(np.intp)
-    takers, free = np.flatnonzero(taken), np.eye(dim) - held
+    n_held = np.trace(held, axis1=1, axis2=2).round().astype(np.intp)
+    held_nodes, free = np.flatnonzero(n_held), np.eye(dim) - held
     along = np.linalg.norm(np.einsum("qde,qke->qkd", held, frames), axis=2)
-    left = np.argsort(np.argsort(-along, axis=1, kind="stable"), axis=1) >= taken[:, None]
-    freed = np.where(left[:, None], np.einsum("qde,qke->qdk", free, frames), 0.0)
-    around = coo_array(csr_array(beside[nodes])[:, nodes][takers])
-    gives = (areas[around.col] > 0.0) & (areas[takers[around.row]] > 0.0) & (takers[around.row] != around.col)
-    taker, giver = around.row[gives], around.col[gives]
-    whole = np.zeros((len(takers), dim, dim))
-    np.add.at(whole, taker, free[giver])
-    share = held[takers] @ np.linalg.pinv(whole, hermitian=True)
-    rows, columns = np.append(np.arange(q), takers[taker]), np.append(np.arange(q), giver)
+    is_free = np.argsort(np.argsort(-along, axis=1, kind="stable"), axis=1) >= n_held[:, None]
+    freed = np.where(is_free[:, None], np.einsum("qde,qke->qdk", free, frames), 0.0)
+    around = coo_array(csr_array(beside[nodes])[:, nodes][held_nodes])
+    is_pair = (areas[around.col] > 0.0) & (areas[held_nodes[around.row]] > 0.0) & (held_nodes[around.row] != around.col)
+    receiver, giver = around.row[is_pair], around.col[is_pair]
+    total = np.zeros((len(held_nodes), dim, dim))
+    np.add.at(total, receiver, free[giver])
+    share = held[held_nodes] @ np.linalg.pinv(total, hermitian=True)
+    rows, columns = np.append(np.arange(q), held_nodes[receiver]), np.append(np.arange(q), giver)
     size = np.where(areas > 0.0, areas, 1.0)
-    tractions = np.concatenate([freed, share[taker] @ freed[giver]]) * (size[rows] / size[columns])[:, None, None]
+    tractions = np.concatenate([freed, share[receiver] @ freed[giver]]) * (size[rows] / size[columns])[:, None, None]
     blocks = frames[rows] @ tractions
     blocks[np.abs(blocks) < ROUND_OFF] = 0.0
     row, column = (np.arange(dim) * q + nodes_of[:, None] for nodes_of in (rows, columns))
@@ -173,7 +173,7 @@ def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, poin
         Reference coordinates [length].
     """
     size = float(np.ptp(constraints.positions, axis=0).max(initial=0.0))
-    # At an edge the derivative is the mean of those on the facets that meet there: round-off decides which one is found.
+    # At an edge the derivative is the mean over the facets that meet there, as the facet of the pairing depends on round-off.
     point, facet, xi = at_common_edges(primary, pairing.facet, pairing.xi)
     normal, facing = normals(constraints.directions)[point], places(primary, facet, xi)
     axes = np.einsum("pkj,pkd->pdj", facing.gradient, points[facing.nodes])
@@ -184,10 +184,10 @@ def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, poin
     levers = [mean @ nodal_rows(facing.nodes, slope[:, :, None] * normal[:, None, :], points.size) for slope in slopes]
     rotations, translations = _rotations(points), np.tile(np.eye(points.shape[1]), (len(points), 1))
     arms = np.stack([lever @ rotations for lever in levers], axis=1)
-    left = np.stack([tangent @ rotations for tangent in constraints.tangents], axis=1)
+    spurious = np.stack([tangent @ rotations for tangent in constraints.tangents], axis=1)
     moved = np.stack([np.abs(tangent @ translations).max(axis=1) for tangent in constraints.tangents], axis=1)
-    # The length is a tensor: one length per tangent would depend on the choice of tangents if the gap is not normal.
-    lengths = left @ np.linalg.pinv(arms)
+    # Lengths of arms form a tensor. One length per tangent would depend on the choice of tangents if the gap is not normal.
+    lengths = spurious @ np.linalg.pinv(arms)
     lengths[(np.abs(lengths) <= LENGTH_ROUND_OFF * size) | (moved > LENGTH_ROUND_OFF)[:, :, None]] = 0.0
     tangents = [
         csr_array(tangent - sum(diags_array(lengths[:, k, j]) @ lever for j, lever in enumerate(levers)))

@@ -1,7 +1,7 @@
 """Segmentation of secondary faces by clipping with the primary faces, and integration over the segments (Puso, 2004).
 
 Both sides are projected along the normal of the secondary facet. Each segment then belongs to one facet on each side. Curved
-facets are clipped as the polygons of their corners; the error is of second order in the ratio of facet length to radius.
+facets are clipped as the polygons of their corners, with an error of second order in the ratio of facet length to radius.
 """
 
 from __future__ import annotations
@@ -56,26 +56,26 @@ def face_overlap(
     secondary_polygons = [_Polygons.of(block, deformed) for block in secondary.blocks]
     primary_polygons = [_Polygons.of(block, deformed) for block in primary.blocks]
     centres = np.concatenate([polygons.origin for polygons in secondary_polygons])
-    away = closest_of_kinds(centres, primary.corners(deformed)).distance
+    distance = closest_of_kinds(centres, primary.corners(deformed)).distance
     axes = None if smoothing is None else [frames(side, reference, deformed) for side in (secondary, primary)]
-    masses, couplings, closer, first = [], [], [], 0
+    masses, couplings, depths, first = [], [], [], 0
     for of_secondary in secondary_polygons:
         size, nodes = of_secondary.block.facets.shape
-        reach = REACH * (away[first : first + size] + of_secondary.radius)
+        reach = REACH * (distance[first : first + size] + of_secondary.radius)
         mass, depth, first_other = np.zeros((size, nodes, nodes)), np.zeros((size, nodes)), 0
         for of_primary in primary_polygons:
             pairs = _facing(of_secondary, of_primary, reach)
             rows = slice(first, first + size), slice(first_other, first_other + len(of_primary.nodes))
             heights = _heights(smoothing, pairs, rows, axes)
-            coupling, area, deep = _integrated(of_secondary, of_primary, pairs, reference, heights)
+            coupling, area, pair_depth = _integrated(of_secondary, of_primary, pairs, reference, heights)
             couplings.append(coupling)
             mass += area
-            depth += deep
+            depth += pair_depth
             first_other += len(of_primary.nodes)
         masses.append(mass)
-        closer.append(depth[:, :, None] * -of_secondary.axes[:, None, 2])
+        depths.append(depth[:, :, None] * -of_secondary.axes[:, None, 2])
         first += size
-    return Overlap(masses, couplings, closer)
+    return Overlap(masses, couplings, depths)
 
 
 def _heights(
@@ -155,20 +155,20 @@ class _Polygons:
 def _facing(secondary: _Polygons, primary: _Polygons, reach: Array) -> Indices:
     """Return pairs (n, 2) of a secondary and a primary facet that may overlap, in ascending order.
 
-    `reach` is the largest distance (n_secondary,) at which facets are paired [length].
+    `reach` (n_secondary,) are the largest distances at which facets are paired [length].
     """
     numbers = tree_order(primary.origin, 1)
     tree = build(primary.low[numbers], primary.high[numbers])
-    room = 8 * (len(secondary.nodes) + len(primary.nodes))
+    capacity = 8 * (len(secondary.nodes) + len(primary.nodes))
     while True:
-        pairs = np.empty((room, 2), np.intp)
+        pairs = np.empty((capacity, 2), np.intp)
         count = _cut_faces_kernels.facing_pairs(
             secondary.nodes, secondary.count, secondary.origin, secondary.axes, secondary.radius, reach,
             primary.nodes, primary.count, np.ascontiguousarray(primary.axes[:, 2]), numbers, tree, -FACING, pairs,
         )  # fmt: skip
-        if count <= room:
+        if count <= capacity:
             return pairs[np.lexsort((pairs[:count, 1], pairs[:count, 0]))]
-        room = count
+        capacity = count
 
 
 def _integrated(
@@ -199,29 +199,30 @@ def _integrated(
     ContactError
         If a facet is too distorted to be projected.
     """
-    one, other = elements.get(secondary.block.element), elements.get(primary.block.element)
-    to_terms, other_to_terms = tables(one.n_nodes).to_terms, tables(other.n_nodes).to_terms
+    element, opposite = elements.get(secondary.block.element), elements.get(primary.block.element)
+    to_terms, primary_to_terms = tables(element.n_nodes).to_terms, tables(opposite.n_nodes).to_terms
     n, k = secondary.block.facets.shape
-    mass, integrals = np.empty((len(pairs), k, k)), np.empty((len(pairs), k, other.n_nodes))
+    mass, integrals = np.empty((len(pairs), k, k)), np.empty((len(pairs), k, opposite.n_nodes))
     closer, start = np.empty((n, k)), np.searchsorted(pairs[:, 0], np.arange(n + 1))
-    degree = DEGREE[one.n_nodes] + max(DEGREE[one.n_nodes], DEGREE[other.n_nodes])
-    if one.n_nodes == other.n_nodes == 3:  # exact quadrature, so that the result does not depend on the first corner
+    degree = DEGREE[element.n_nodes] + max(DEGREE[element.n_nodes], DEGREE[opposite.n_nodes])
+    # Between triangles the quadrature is exact, so that the result does not depend on the choice of a first corner.
+    if element.n_nodes == opposite.n_nodes == 3:
         degree = max(degree, heights[0].shape[1])
-    given = (
+    arguments = (
         start, secondary.nodes, secondary.count, secondary.origin, secondary.axes,
-        to_terms @ secondary.nodes, to_terms @ reference[secondary.block.facets], to_terms, _middle(one),
-        primary.nodes, primary.count, other_to_terms @ primary.nodes, other_to_terms, _middle(other),
+        to_terms @ secondary.nodes, to_terms @ reference[secondary.block.facets], to_terms, _middle(element),
+        primary.nodes, primary.count, primary_to_terms @ primary.nodes, primary_to_terms, _middle(opposite),
         pairs, *quadrature.triangle(min(degree + degree % 2, 8)), *heights, mass, integrals, closer,
     )  # fmt: skip
     failed = parallel.shared(
-        lambda portion: _cut_faces_kernels.integrate(*portion, *given), parallel.portions(n, EFFORT)
+        lambda portion: _cut_faces_kernels.integrate(*portion, *arguments), parallel.portions(n, EFFORT)
     )
     if max(failed) >= 0:
         first, second = (side.origin[row] for side, row in zip((secondary, primary), pairs[max(failed)], strict=True))
         raise ContactError(f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there")
     of_facets = csr_array((np.ones(len(pairs)), np.arange(len(pairs)), start), shape=(n, len(pairs)))
-    whole = (of_facets @ mass.reshape(-1, k * k)).reshape(-1, k, k)
-    return Coupling(secondary.block, primary.block, pairs, integrals, mass), whole, closer
+    total = (of_facets @ mass.reshape(-1, k * k)).reshape(-1, k, k)
+    return Coupling(secondary.block, primary.block, pairs, integrals, mass), total, closer
 
 
 def _middle(element: elements.Element) -> Array:

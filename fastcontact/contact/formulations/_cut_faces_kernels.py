@@ -2,7 +2,7 @@
 """Polygon clipping of facets in 3D, in the plane of the secondary facet, and integration over the clipped polygon.
 
 A facet is a polynomial with coefficients ``terms`` (n_terms, 3) of the terms in `contact.search.facet_tables`. Its corners
-make the polygon that is cut, in the ``axes`` (3, 3) of its plane: two tangents and the unit normal.
+form the polygon that is clipped, in the ``axes`` (3, 3) of its plane, which are two tangents and the unit normal.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 @interpretable_kernel
 def planes(corners, n_corners, origin, axes):
-    """Fill `origin` (n, 3) with the centres of polygons (n, most, 3) and `axes` (n, 3, 3); see above."""
+    """Fill `origin` (n, 3) with the centres of polygons (n, k, 3) and `axes` (n, 3, 3) with their axes."""
     for i in range(corners.shape[0]):
         _plane(corners[i], n_corners, origin[i], axes[i])
 
@@ -94,13 +94,13 @@ def _clip(subject, count, window, n_window, spare):
         kept = 0
         for k in range(count):
             m = (k + 1) % count
-            here = (bx - ax) * (subject[k, 1] - ay) - (by - ay) * (subject[k, 0] - ax)
+            this_side = (bx - ax) * (subject[k, 1] - ay) - (by - ay) * (subject[k, 0] - ax)
             next_side = (bx - ax) * (subject[m, 1] - ay) - (by - ay) * (subject[m, 0] - ax)
-            if here >= 0.0:
+            if this_side >= 0.0:
                 spare[kept, 0], spare[kept, 1] = subject[k, 0], subject[k, 1]
                 kept += 1
-            if (here > 0.0 and next_side < 0.0) or (here < 0.0 and next_side > 0.0):
-                t = here / (here - next_side)
+            if (this_side > 0.0 and next_side < 0.0) or (this_side < 0.0 and next_side > 0.0):
+                t = this_side / (this_side - next_side)
                 spare[kept, 0] = subject[k, 0] + t * (subject[m, 0] - subject[k, 0])
                 spare[kept, 1] = subject[k, 1] + t * (subject[m, 1] - subject[k, 1])
                 kept += 1
@@ -116,12 +116,12 @@ def _clip(subject, count, window, n_window, spare):
 def _common(corners, count, others, n_others, origin, axes, subject, window, spare):
     """Fill `subject` with the overlap of two polygons; return its number of corners, 0 for none."""
     _flatten(corners, count, count, origin, axes, subject)
-    whole = _area(subject, count)
+    full_area = _area(subject, count)
     _flatten(others, n_others, n_others, origin, axes, spare)
-    for k in range(n_others):  # facets that face each other turn opposite ways
+    for k in range(n_others):  # facets that face each other have opposite orientations
         window[k, 0], window[k, 1] = spare[n_others - 1 - k, 0], spare[n_others - 1 - k, 1]
     count = _clip(subject, count, window, n_others, spare)
-    if count < 3 or _area(subject, count) <= ROUND_OFF * whole:
+    if count < 3 or _area(subject, count) <= ROUND_OFF * full_area:
         return 0
     return count
 
@@ -131,14 +131,14 @@ def _meets(low, high, origin, normal, radius, reach):
     """Return whether a box may meet the cylinder of a `radius` and length 2 `reach` around a normal; False if it is empty."""
     if low[0] > high[0]:
         return False
-    far, along, size = 0.0, 0.0, 0.0
+    square, along, size = 0.0, 0.0, 0.0
     for d in range(3):
         apart = 0.5 * (low[d] + high[d]) - origin[d]
         along += apart * normal[d]
-        far += apart * apart
+        square += apart * apart
         size += 0.25 * ((high[d] - low[d]) * (high[d] - low[d]))
     size = np.sqrt(size)
-    return abs(along) <= reach + size and far - along * along <= (radius + size) * (radius + size)
+    return abs(along) <= reach + size and square - along * along <= (radius + size) * (radius + size)
 
 
 @interpretable_kernel
@@ -149,30 +149,30 @@ def facing_pairs(
 
     Parameters
     ----------
-    secondary, primary : (n_facets, most, 3)
-        Corners.
+    secondary, primary : (n_facets, k, 3)
+        Corners [length].
     n_secondary, n_primary : int
         Number of corners.
     origin, axes : (n_facets, 3), (n_facets, 3, 3)
         Planes of the secondary facets.
     radius, reach : (n_facets,)
-        Radii around the centres of the secondary facets; largest distance of the other side along the normal.
+        Radii of the secondary facets around their centres, and largest distances of primary facets along normals [length].
     other_normal : (n_facets, 3)
         Unit normals of the primary facets.
     numbers, tree : (n_facets,), Tree
         The primary facets in the order of their tree.
     facing : float
         Largest cosine between the normals of facets that face each other, e.g. -0.1.
-    pairs : (room, 2)
-        Filled in place: secondary and primary facet; ascending in the first.
+    pairs : (capacity, 2)
+        Filled with the numbers of the secondary and the primary facet, ascending in the former.
 
     Returns
     -------
     int
         Number of pairs; if it exceeds the capacity of `pairs`, only the first ones are filled.
     """
-    room = n_secondary + 2 * n_primary  # each side of the window adds at most two corners
-    subject, window, spare = np.empty((room, 2)), np.empty((room, 2)), np.empty((room, 2))
+    capacity = n_secondary + 2 * n_primary  # each side of the window adds at most two corners
+    subject, window, spare = np.empty((capacity, 2)), np.empty((capacity, 2)), np.empty((capacity, 2))
     stack, leaves, count = np.empty(DEPTH, np.int64), len(tree.low) // 2, 0
     for s in range(secondary.shape[0]):
         normal = axes[s, 2]
@@ -311,9 +311,9 @@ def integrate(
     """Integrate products of shape functions over the segments of the secondary facets `low` to ``high - 1``.
 
     Both facets are projected along the normal of the secondary polygon; areas are those of the reference surface. Segments
-    are divided into triangles around their centres. The rule is exact between flat triangles. On mapped facets it is not
-    exact, but thanks to the centre its error does not depend on the choice of a first corner, and it does not jump where
-    corners appear or vanish.
+    are divided into triangles around their centres. The rule is exact between flat triangles. On other facets it has
+    an error, which does not depend on the choice of a first corner because of the centre, and does not jump where corners
+    appear or vanish.
 
     Planes and polygons are those of `facing_pairs`, `pairs` (n_pairs, 2) its result, ascending in the secondary facet;
     those of facet s begin at ``start[s]``.
@@ -325,10 +325,10 @@ def integrate(
     functions over the segment, `coupling` (n_pairs, n_nodes, n_other_nodes), secondary times primary shape
     functions, and `closer` (n_facets, n_nodes), the former times the sum of both heights.
 
-    Returns -1, or the number of a pair with a facet too distorted to be projected.
+    Return -1, or the number of a pair with a facet that is too distorted to be projected.
     """
-    room = n_secondary + 2 * n_primary  # each side of the window adds at most two corners
-    subject, window, spare = np.empty((room, 2)), np.empty((room, 2)), np.empty((room, 2))
+    capacity = n_secondary + 2 * n_primary  # each side of the window adds at most two corners
+    subject, window, spare = np.empty((capacity, 2)), np.empty((capacity, 2)), np.empty((capacity, 2))
     n, m = to_terms.shape[0], other_to_terms.shape[0]
     terms, other_terms, shape, other_shape = np.empty((n, 3)), np.empty((m, 3)), np.empty(n), np.empty(m)
     flat, other_flat, xi, other_xi = np.empty((n, 2)), np.empty((m, 2)), np.empty(2), np.empty(2)
@@ -352,17 +352,17 @@ def integrate(
             for q in range(points.shape[0]):
                 x = ox + points[q, 0] * ux + points[q, 1] * vx
                 y = oy + points[q, 0] * uy + points[q, 1] * vy
-                seen = _locate(flat, x, y, xi, terms)
-                if seen == 0.0 or _locate(other_flat, x, y, other_xi, other_terms) == 0.0:
+                projected_area = _locate(flat, x, y, xi, terms)
+                if projected_area == 0.0 or _locate(other_flat, x, y, other_xi, other_terms) == 0.0:
                     return i
                 _fill_shape(to_terms, terms, shape)
                 _fill_shape(other_to_terms, other_terms, other_shape)
-                area = weights[q] * twice * _stretch(reference[s], terms) / seen
+                area = weights[q] * twice * _stretch(reference[s], terms) / projected_area
                 _add_products(area, shape, other_shape, mass, coupling, i)
                 if heights.shape[1] > 0:
-                    above = factor[i, 0] * _height(heights[s], xi)
-                    above += factor[i, 1] * _height(other_heights[p], other_xi)
+                    rise = factor[i, 0] * _height(heights[s], xi)
+                    rise += factor[i, 1] * _height(other_heights[p], other_xi)
                     for a in range(n):
-                        closer[s, a] += area * above * shape[a]
+                        closer[s, a] += area * rise * shape[a]
     _symmetrise(mass[start[low] : start[high]])
     return -1

@@ -1,8 +1,8 @@
 """Segmentation of secondary lines at the projected primary nodes, and integration over the segments.
 
-The gap between non-matching facets has a kink opposite every primary node; between two kinks it is smooth (Popp, Gee and
-Wall, 2009). At an end of the primary side the cut lies along the normal there. Points beyond the cut do not face the side,
-and the projections that decide this must agree with the cut.
+The gap between non-matching facets has a kink opposite every primary node and is smooth between two kinks (Popp, Gee and
+Wall, 2009). At an end of the primary side, secondary facets are cut along the normal there. Points beyond the cut do not face
+the side, and the projections of points must agree with this cut.
 """
 
 from __future__ import annotations
@@ -69,14 +69,14 @@ def _cuts(
     """Return (facet, begin, end) of the segments of the facets of a block, in their reference coordinate."""
     n = len(block.facets)
     normals = nodal_normals(primary, deformed)
-    between, along = _opposite_nodes(block, primary, deformed, normals)
-    ending, xi_of_end = _opposite_ends(block, primary, deformed, normals, tolerance)
-    facet = np.concatenate([np.arange(n), np.arange(n), between, borders[0], ending])
-    xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), along, borders[1], xi_of_end])
+    facet_of_node, xi_of_node = _opposite_nodes(block, primary, deformed, normals)
+    facet_of_end, xi_of_end = _opposite_ends(block, primary, deformed, normals, tolerance)
+    facet = np.concatenate([np.arange(n), np.arange(n), facet_of_node, borders[0], facet_of_end])
+    xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), xi_of_node, borders[1], xi_of_end])
     order = np.lexsort((xi, facet))
     facet, xi = facet[order], xi[order]
-    piece = (facet[1:] == facet[:-1]) & (np.diff(xi) > LENGTH_ROUND_OFF)
-    return facet[:-1][piece], xi[:-1][piece], xi[1:][piece]
+    is_segment = (facet[1:] == facet[:-1]) & (np.diff(xi) > LENGTH_ROUND_OFF)
+    return facet[:-1][is_segment], xi[:-1][is_segment], xi[1:][is_segment]
 
 
 def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Array:
@@ -90,11 +90,11 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     """Return (facet, xi) of the points of a block that lie opposite the ends of primary facets.
 
     Where two primary facets meet, the opposite point lies on the bisector of the angle between them, at which the closest
-    facet changes. The closest point of the block is used only where the primary side ends, and at its corners, beside
+    facet changes. The closest point of the block is used only where the primary side ends, and at its corners, near
     which points do not face the flank. It is unsuitable elsewhere, since opposite a concave corner of sides with a gap or an
-    interference it jumps from one facet to the next as the bodies move.
+    interference, the closest point jumps from one facet to the next as the bodies move.
     """
-    ends, first = np.unique(np.concatenate([other.local[:, :2].ravel() for other in primary.blocks]), return_index=True)
+    ends, first = np.unique(np.concatenate([lines.local[:, :2].ravel() for lines in primary.blocks]), return_index=True)
     foot, normal = deformed[primary.points[ends]], normals[ends]
     opposite = closest(foot, deformed[block.facets])
     along = opposite.xi[:, 0]
@@ -103,9 +103,9 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     inside = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(along) < 1.0 - LENGTH_ROUND_OFF) & ~smooth)
     rows = np.flatnonzero(inner)
     facets = np.column_stack([opposite.facet[rows], line_neighbours(block.local)[opposite.facet[rows]]])
-    crossed = _across(deformed[block.facets[facets]], foot[rows][:, None], normal[rows][:, None])
-    crossed[facets < 0] = 1.0
-    row, xi = _zeros(crossed.reshape(-1, block.facets.shape[1]))
+    distance = _across(deformed[block.facets[facets]], foot[rows][:, None], normal[rows][:, None])
+    distance[facets < 0] = 1.0
+    row, xi = _zeros(distance.reshape(-1, block.facets.shape[1]))
     return np.concatenate([opposite.facet[inside], facets.ravel()[row]]), np.concatenate([along[inside], xi])
 
 
@@ -128,22 +128,22 @@ def _opposite_ends(
     block: FacetBlock, primary: Surface, deformed: Array, normals: Array, tolerance: float
 ) -> tuple[Indices, Array]:
     """Return (facet, xi) of the points of a block that lie on the normals at the ends of the primary side."""
-    # A tolerance for round-off only does not extend the side: a cut there would leave a sliver of the tolerance's width.
+    # A tolerance that is only for round-off does not extend the side: a cut there would leave a sliver of that width.
     ends = (1.0, 1.0 + 2.0 * tolerance) if tolerance > SINGLE_PRECISION else (1.0,)
-    first, facets, places = 0, [], []
-    for other in primary.blocks:
-        shape = elements.get(other.element).shape
+    first, facets, coordinates = 0, [], []
+    for primary_block in primary.blocks:
+        shape = elements.get(primary_block.element).shape
         for end, s in [(end, sign * beyond) for end, sign in ((0, -1.0), (1, 1.0)) for beyond in ends]:
-            free = np.flatnonzero(~primary.inner_ends[first : first + len(other.facets), end])
+            free = np.flatnonzero(~primary.inner_ends[first : first + len(primary_block.facets), end])
             weights = shape(np.array([[s]]))[0]
-            foot = np.einsum("k,fkd->fd", weights, deformed[other.facets[free]])
-            normal = np.einsum("k,fkd->fd", weights, normals[other.local[free]])
-            crossed = _across(deformed[block.facets][None], foot[:, None], normal[:, None])
-            facet, xi = _zeros(crossed.reshape(-1, block.facets.shape[1]))
+            foot = np.einsum("k,fkd->fd", weights, deformed[primary_block.facets[free]])
+            normal = np.einsum("k,fkd->fd", weights, normals[primary_block.local[free]])
+            distance = _across(deformed[block.facets][None], foot[:, None], normal[:, None])
+            facet, xi = _zeros(distance.reshape(-1, block.facets.shape[1]))
             facets.append(facet % len(block.facets))
-            places.append(xi)
-        first += len(other.facets)
-    return np.concatenate(facets), np.concatenate(places)
+            coordinates.append(xi)
+        first += len(primary_block.facets)
+    return np.concatenate(facets), np.concatenate(coordinates)
 
 
 def _zeros(values: Array) -> tuple[Indices, Array]:
@@ -152,12 +152,12 @@ def _zeros(values: Array) -> tuple[Indices, Array]:
     slope, middle = 0.5 * (b - a), 0.5 * (a + b) if values.shape[1] == 2 else values[:, 2]
     bend = 0.5 * (a + b) - middle
     root = np.sqrt(np.maximum(slope**2 - 4.0 * bend * middle, 0.0))
-    half = -0.5 * (slope + np.where(slope < 0.0, -root, root))
+    stable = -0.5 * (slope + np.where(slope < 0.0, -root, root))
     with np.errstate(divide="ignore", invalid="ignore"):
-        both = np.stack([half / bend, middle / half], axis=1)
-    both[slope**2 < 4.0 * bend * middle] = np.nan
-    row, which = np.nonzero(np.abs(both) < 1.0 - LENGTH_ROUND_OFF)
-    return row, both[row, which]
+        roots = np.stack([stable / bend, middle / stable], axis=1)
+    roots[slope**2 < 4.0 * bend * middle] = np.nan
+    row, number = np.nonzero(np.abs(roots) < 1.0 - LENGTH_ROUND_OFF)
+    return row, roots[row, number]
 
 
 def line_overlap(
@@ -172,7 +172,7 @@ def line_overlap(
     reference, deformed : ndarray (n_points, 2)
         Coordinates of all points [length].
     axisymmetric : bool
-        Integrals run over the full circle.
+        Whether integrals run over the full circle.
     tolerance : float
         Largest distance of a point beyond the end of the primary side at which it still faces the side, in facet lengths.
     smoothing : Smoothing or None
@@ -184,13 +184,14 @@ def line_overlap(
     for block in secondary.blocks:
         n, k = block.facets.shape
         points = line_points(block, primary, reference, deformed, axisymmetric, k + 2, tolerance)
-        at = Candidates(block.facets[points.facet], points.shape).positions(deformed)
-        facing = pair(at, primary, deformed, tolerance)
-        # Beside a corner, the flank is closest but does not face the point.
+        positions = Candidates(block.facets[points.facet], points.shape).positions(deformed)
+        facing = pair(positions, primary, deformed, tolerance)
+        # Near a corner, the flank may be closest without facing the point.
         opposite = np.einsum("nd,nd->n", normals_at(block, deformed, points), facing.normal) < -FACING
-        # A segment faces the other side with all its points or none: too few points would not determine a field.
-        mostly = (facing.paired & opposite).reshape(-1, k + 2).mean(axis=1) > 0.5
-        area = np.where(np.repeat(mostly, k + 2), points.area, 0.0)
+        # A segment faces the other side with all of its points or with none, since too few points would not determine a
+        # field.
+        is_facing = (facing.paired & opposite).reshape(-1, k + 2).mean(axis=1) > 0.5
+        area = np.where(np.repeat(is_facing, k + 2), points.area, 0.0)
         mass = np.zeros((n, k, k))
         np.add.at(mass, points.facet, area[:, None, None] * points.shape[:, :, None] * points.shape[:, None, :])
         masses.append(mass)
@@ -202,13 +203,13 @@ def line_overlap(
             np.add.at(heights, points.facet, points.shape[:, :, None] * (depth[:, None] * facing.normal)[:, None])
         closer.append(heights)
         number_of_first += n
-        for number, other in enumerate(primary.blocks):
+        for number, primary_block in enumerate(primary.blocks):
             rows = np.flatnonzero((area > 0) & (facing.facet >= first[number]) & (facing.facet < first[number + 1]))
-            shape = elements.get(other.element).shape(facing.xi[rows])
+            shape = elements.get(primary_block.element).shape(facing.xi[rows])
             products = area[rows, None, None] * points.shape[rows, :, None] * shape[:, None, :]
             ends = np.column_stack([points.facet[rows], facing.facet[rows] - first[number]])
             pairs, pair_of_end = np.unique(ends, axis=0, return_inverse=True)
             integrals = np.zeros((len(pairs), *products.shape[1:]))
             np.add.at(integrals, pair_of_end.ravel(), products)
-            couplings.append(Coupling(block, other, pairs, integrals))
+            couplings.append(Coupling(block, primary_block, pairs, integrals))
     return Overlap(masses, couplings, closer, inside)

@@ -27,12 +27,12 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
-# Smallest covered fraction, that is the fraction of the weight of a function that faces the other side. Below it, a node
-# has no gap, because its weighted gap would be extrapolated from a small part. On facets whose dual functions are ill
-# conditioned, a function below it has no dual function.
+# Smallest covered fraction, that is, the fraction of the weight of a function that faces the other side. A node with a
+# smaller fraction has no gap, because its weighted gap would be extrapolated from a small part. On facets with
+# ill-conditioned dual functions, a function with a smaller fraction has no dual function.
 COVERED = 0.02
-# Covered fractions above this multiple of the largest one count as equal to it, because on curved facets fractions of covered
-# functions differ by a few percent.
+# Covered fractions above this multiple of the largest one count as equal to it, because on curved facets the fractions of
+# fully covered functions differ by a few percent.
 EQUAL = 0.9
 # Dual functions count as ill conditioned if the root mean square of one of them exceeds MOST, or if the integral of one of
 # them is less than LEAST times its weight. Dual functions of complete facets have root mean squares up to 2.4 (nine nodes).
@@ -53,11 +53,11 @@ def positive(name: str) -> Array:
     # Fraction of the function of a mid-side node that is moved to the function of each end of its edge. With 1/4 the
     # functions become Bernstein polynomials. For quadrangles without a centre node, 3/8 is the smallest fraction for which
     # all functions are positive.
-    share = 0.375 if element.n_nodes == 8 else 0.25
+    fraction = 0.375 if element.n_nodes == 8 else 0.25
     for k, ends in enumerate(_edges(element)):
         middle = element.n_corners + k
-        T[list(ends), middle] = share
-        T[middle, middle] = 1.0 - 2.0 * share
+        T[list(ends), middle] = fraction
+        T[middle, middle] = 1.0 - 2.0 * fraction
     return T
 
 

@@ -1,4 +1,4 @@
-"""The base class of contact formulations, which computes the constraints of a contact pair from its configuration."""
+"""Base class of contact formulations, which compute the constraints of a contact pair from its configuration."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 SLIPS = ("symmetric", "primary")
 # Sine of the angle between the normal of a surface and a plane of symmetry above which the surface has a corner at the plane.
-# Octagons have corners there; their 22.5 degrees would otherwise be a matter of round-off.
+# Octagons, with an angle of 22.5 degrees, have corners there irrespective of round-off.
 LEANING = float(np.sin(np.radians(21.0)))
 
 
@@ -210,20 +210,18 @@ class Formulation(ABC):
         if self.options.cohesion is None:
             constraints = self._softened(constraints, at)
         if at.elastic_slip is not None and constraints.tangents:
-            before = _at_places(at.elastic_slip, constraints.positions)
-            given = np.stack([-np.einsum("md,md->m", t, before) for t in constraints.directions])
-            constraints = replace(constraints, elastic_slip=given)
+            previous_slip = _values_at(at.elastic_slip, constraints.positions)
+            elastic_slip = np.stack([-np.einsum("md,md->m", t, previous_slip) for t in constraints.directions])
+            constraints = replace(constraints, elastic_slip=elastic_slip)
         if self.options.gap_only:
             return constraints.without(np.ones(len(constraints), bool))
         if self.options.search_distance is not None:
-            # A constraint is ignored only if it is far away at the beginning of the step, too. Otherwise a large penetration
-            # in an intermediate iterate would be ignored.
-            away = np.minimum(np.abs(constraints.gaps(at.displacement)), np.abs(constraints.gaps(at.start)))
-            constraints = constraints.without(away > self.options.search_distance)
+            # A constraint is ignored only if the sides are also far apart at the beginning of the step. Otherwise a large
+            # penetration in an intermediate iterate would be ignored.
+            distance = np.minimum(np.abs(constraints.gaps(at.displacement)), np.abs(constraints.gaps(at.start)))
+            constraints = constraints.without(distance > self.options.search_distance)
         if self.options.cohesion is not None:
-            return bonded(
-                self.options.cohesion, constraints, at, _at_places(self._gaps_as_they_lie, constraints.positions)
-            )
+            return bonded(self.options.cohesion, constraints, at, _values_at(self._initial_gaps, constraints.positions))
         equality = self.never_opening(constraints.positions, at)
         constraints = replace(constraints, equality=equality, friction=at.friction_factor * constraints.friction)
         if self.options.source is None:
@@ -241,10 +239,8 @@ class Formulation(ABC):
         if areas is None:
             raise ContactError(f"formulation '{self.name}' supports no penalty: leave out the option")
         if isinstance(normal, OverclosureLaw):
-            slope, without = normal.line(-constraints.gaps(at.displacement))
-            constraints = replace(
-                constraints, gap0=constraints.gap0 + without, softness=1.0 / (slope * areas), law=normal
-            )
+            slope, zero = normal.line(-constraints.gaps(at.displacement))
+            constraints = replace(constraints, gap0=constraints.gap0 + zero, softness=1.0 / (slope * areas), law=normal)
         elif normal is not None:
             constraints = replace(constraints, softness=np.asarray(1.0 / (normal * areas)))
         if tangential is None or not constraints.tangents:
@@ -252,8 +248,8 @@ class Formulation(ABC):
         return replace(constraints, tangential_softness=1.0 / (tangential(constraints.positions) * areas))
 
     @cached_property
-    def _gaps_as_they_lie(self) -> tuple[Array, Array]:
-        """Positions (m, dim) of constraints on the undeformed bodies, and their gaps (m,) [length]."""
+    def _initial_gaps(self) -> tuple[Array, Array]:
+        """Positions (m, dim) and gaps (m,) of the constraints between the undeformed bodies [length]."""
         constraints = self.unilateral(Configuration.undeformed(self.points))
         return constraints.positions, constraints.gap0
 
@@ -264,7 +260,7 @@ class Formulation(ABC):
             return None
         constraints = self.unilateral(Configuration.undeformed(self.points))
         if isinstance(self.primary, Surface) and constraints.tangents:
-            # Beside a concave edge two facets may be equally close; along averaged normals the projection is unique.
+            # Near a concave edge two facets may be equally close. The projection along averaged normals is unique.
             pairing = pair(constraints.positions, self.primary, self.points, np.inf, "averaged")
             constraints = with_arms(constraints, pairing, self.primary, self.points)
         moments, areas = moments_of(constraints)
@@ -272,7 +268,7 @@ class Formulation(ABC):
 
     def _tied_at_supports(self, constraints: Constraints, moments: csr_array, areas: Array | None) -> csr_array | None:
         """Return the `reduction` of the multipliers of a tied pair; None if no node is held by supports on both sides."""
-        # Directions in which all nodes of a facet are held do not count.
+        # Directions in which all nodes of a facet are held are ignored.
         held = _without_whole_facets(self._both_held(Configuration.undeformed(self.points)), self.secondary)
         if not (held.any() and constraints.tangents):
             return None
@@ -298,7 +294,7 @@ class Formulation(ABC):
         """Return which constraints (m,) cannot open, given their reference positions (m, dim) [length]."""
         if self.options.always_closed or at.never_opening is None:
             return np.full(len(positions), self.options.always_closed)
-        return np.asarray(_at_places(at.never_opening, positions))
+        return np.asarray(_values_at(at.never_opening, positions))
 
     def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
         """Return the pairing of candidates on the deformed configuration, with the options of the formulation.
@@ -402,10 +398,10 @@ class Formulation(ABC):
         moved, turning = at.displacement - at.start, None
         total = mean @ moved
         if isinstance(self.primary, RigidSide):
-            now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-            total -= self.primary.carried(now, before, at.pose, at.pose_start)
+            current, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
+            total -= self.primary.carried(current, before, at.pose, at.pose_start)
             if at.pose.angle != at.pose_start.angle:  # The motion is an affine function of the positions.
-                ends = np.vstack([np.zeros(now.shape[1]), np.eye(now.shape[1])])
+                ends = np.vstack([np.zeros(current.shape[1]), np.eye(current.shape[1])])
                 varied = self.primary.carried(ends, ends[:1], at.pose, at.pose_start)
                 turning = varied[1:] - varied[0]
         return Slips(directions, tangential, total, moved, self.points + at.start, turning=turning)
@@ -476,10 +472,10 @@ class Formulation(ABC):
         return slope if pairing.beyond is None else np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
 
     def carried(self, candidates: Candidates, at: Configuration) -> Array:
-        """Return the displacements (n, dim) in the step of the points of an obstacle opposite to candidates [length]."""
+        """Return the displacements (n, dim) of the points of an obstacle opposite to candidates in the step [length]."""
         assert isinstance(self.primary, RigidSide)
-        now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
-        return self.primary.carried(now, before, at.pose, at.pose_start)
+        current, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
+        return self.primary.carried(current, before, at.pose, at.pose_start)
 
     @cached_property
     def _held_nodes(self) -> Indices:
@@ -494,26 +490,26 @@ class Formulation(ABC):
         assert self.held is not None
         candidates = Candidates(self.secondary.points[nodes][:, None], np.ones((len(nodes), 1)))
         pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, BESIDE))
-        theirs = np.zeros((len(nodes), *2 * self.points.shape[1:]))
+        held_primary = np.zeros((len(nodes), *2 * self.points.shape[1:]))
         if isinstance(self.primary, Surface):
             rows = np.flatnonzero(pairing.paired)
             facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
-            theirs[rows] = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
-        return pairing, theirs
+            held_primary[rows] = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
+        return pairing, held_primary
 
     def _both_held(self, at: Configuration) -> Array:
         """Return projectors (n_nodes, dim, dim) onto directions in which both sides are held."""
         held, nodes = np.zeros((len(self.secondary.points), *2 * self.points.shape[1:])), self._held_nodes
         if len(nodes) and self.held is not None:
-            ours, (_, theirs) = self.held.at(self.secondary.points[nodes]), self._opposite_held(nodes, at)
-            held[nodes] = spanned(ours @ theirs @ ours, 0.5)
+            P, (_, Q) = self.held.at(self.secondary.points[nodes]), self._opposite_held(nodes, at)
+            held[nodes] = spanned(P @ Q @ P, 0.5)
         return held
 
     def undetermined(self, at: Configuration) -> Mask:
         """Return which nodes (n_nodes,) belong to facets whose traction is undetermined.
 
-        Supports hold all their nodes, and the other side, in one direction. Where they hold the whole side along the
-        contact, as in a slice in plane strain, the traction in this direction vanishes.
+        Supports hold all nodes of such a facet and the other side in one direction. If supports hold the whole side along the
+        contact, as in a slice in plane strain, the traction in this direction vanishes and is not undetermined.
         """
         both = self._both_held(at)
         if not both.any():
@@ -532,7 +528,7 @@ class Formulation(ABC):
 
         In a plane of symmetry or on an axis, slip in these directions is zero for every traction, so that the traction is
         undetermined. If one side is free, or is moved relative to the other, friction acts and determines it. Directions in
-        which all nodes of a facet are held do not count.
+        which all nodes of a facet are held are ignored.
 
         Returns
         -------
@@ -555,11 +551,11 @@ class Formulation(ABC):
         else:
             rows = np.flatnonzero(pairing.paired)
             facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
-            theirs, motion = self.held.at(facing.nodes), (at.displacement - at.start)[facing.nodes]
+            held_primary, motion = self.held.at(facing.nodes), (at.displacement - at.start)[facing.nodes]
             mean = np.einsum("nk,nkd->nd", facing.shape, motion)
             # If an inclined normal meets the primary side slightly beside a held node, the motion of the other nodes of that
             # facet is ignored.
-            excess = np.einsum("nk,nkde,nkd->ne", facing.shape, theirs, motion - mean[:, None])
+            excess = np.einsum("nk,nkde,nkd->ne", facing.shape, held_primary, motion - mean[:, None])
             moved[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(held_opposite[rows], hermitian=True), excess)
             both = spanned(both @ held_opposite @ both, 0.5)
         along = np.einsum("nde,ne->nd", both, pairing.normal)
@@ -591,12 +587,11 @@ class Formulation(ABC):
     def _closing_slip(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
     ) -> Array:
-        """Return the correction (k, n) of slips by which closing a gap causes no slip [length].
+        """Return the correction (k, n) of slips by the motion that closes gaps [length].
 
         On curved surfaces, in particular at the edge of the contact, the normal of the primary side is inclined to the
         direction in which the gap closes. A component of this motion would then count as slip. The correction assumes that
-        the gap closes along the mean of the normals of both sides; this is exact for two bodies that are mirror images of
-        each other.
+        the gap closes along the mean of the normals of both sides, which is exact for two bodies that are mirror images.
         """
         assert isinstance(self.primary, Surface)
         deformed, start = self.points + at.displacement, self.points + at.start
@@ -624,8 +619,8 @@ class Formulation(ABC):
         """
         positions = self.points[self.secondary.points]
         gap, normal = self.nodal_gap(replace(at, displacement=np.zeros_like(self.points)))
-        close = np.flatnonzero(gap <= gap.min() + LENGTH_ROUND_OFF * np.ptp(positions, axis=0).max())
-        first = close[np.argmin(np.linalg.norm(positions[close], axis=1))]
+        nearest_nodes = np.flatnonzero(gap <= gap.min() + LENGTH_ROUND_OFF * np.ptp(positions, axis=0).max())
+        first = nearest_nodes[np.argmin(np.linalg.norm(positions[nearest_nodes], axis=1))]
         return positions[first], normal[first]
 
     def nodal_gap(
@@ -661,7 +656,7 @@ class Formulation(ABC):
     def nodal_slip(self, at: Configuration) -> Array:
         """Return the slip increment (m, dim) of the secondary nodes [length].
 
-        Nodes beyond the other side may still carry pressure, by parts of their facets.
+        Nodes beyond the end of the other side may also carry pressure, through parts of their facets.
         """
         nodes = Candidates.nodes_of(self.secondary)
         pairing = self.facing(nodes, at, np.inf)
@@ -682,16 +677,16 @@ def _without_whole_facets(held: Array, side: Surface) -> Array:
     for block in side.blocks:
         around = held[block.local]
         vectors = np.linalg.eigh(around.mean(axis=1))[1]
-        least = np.einsum("fdk,fnde,fek->fnk", vectors, around, vectors).min(axis=1) >= TOGETHER**2
-        vectors = np.where(least[:, None], vectors, 0.0)
+        is_common = np.einsum("fdk,fnde,fek->fnk", vectors, around, vectors).min(axis=1) >= TOGETHER**2
+        vectors = np.where(is_common[:, None], vectors, 0.0)
         np.add.at(span, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
     return spanned(held - held @ spanned(span, 0.5) @ held, 0.5)
 
 
-def _at_places(known: tuple[Array, AnyArray], positions: Array) -> AnyArray:
-    """Return, for each of `positions` (m, dim), the value at the nearest known point.
+def _values_at(points_and_values: tuple[Array, AnyArray], positions: Array) -> AnyArray:
+    """Return, for each of `positions` (m, dim), the value at the nearest point with a known value.
 
-    `known` are k points (k, dim) [length] and values (k, ...).
+    `points_and_values` are the k points (k, dim) with known values [length], and the values (k, ...).
     """
-    places_before, values = known
-    return np.asarray(values[nearest(places_before, positions)[1]])
+    points, values = points_and_values
+    return np.asarray(values[nearest(points, positions)[1]])

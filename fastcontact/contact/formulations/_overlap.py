@@ -51,7 +51,7 @@ class OverlapPoints(NamedTuple):
     area : ndarray (n,)
         Undeformed area of the point, zero outside of the overlap [area].
     opposite : ndarray of int (n,), optional
-        Number of the opposite facet, counted through the blocks of the primary side.
+        Number of the opposite facet; facets are numbered through the blocks of the primary side.
     """
 
     facet: Indices
@@ -72,10 +72,10 @@ class Overlap:
     couplings : list of Coupling
     closer : list of ndarray (n_facets, n_nodes, dim)
         For each block, integrals of its shape functions times the distance by which the smooth surfaces are closer to each
-        other than the facets, see `surface_smoothing`, along the normals that the secondary side faces [volume]. Against an
-        obstacle, which has no points in the mesh, times the positions faced on it.
+        other than the facets, see `surface_smoothing`, along the normals of the primary side [volume]. Against an obstacle,
+        which has no points in the mesh, the integrals are those of the shape functions times the opposite positions.
     points : list of OverlapPoints, optional
-        For each block, the integration points, where they are known.
+        For each block, the integration points, if the method has them.
     """
 
     mass: list[Array]
@@ -87,7 +87,7 @@ class Overlap:
 def obstacle_overlap(
     secondary: Surface, obstacle: RigidSide, points: tuple[Array, Array], axisymmetric: bool, pose: Pose
 ) -> Overlap:
-    """Integrate the secondary facets over what faces a rigid obstacle; areas are those of the reference.
+    """Integrate over the parts of the secondary facets that face a rigid obstacle; areas are those of the reference.
 
     Parameters
     ----------
@@ -99,13 +99,13 @@ def obstacle_overlap(
     pose : Pose
         Position and rotation of the obstacle.
     """
-    mass, faced = [], []
+    mass, positions_faced = [], []
     for block in secondary.blocks:
-        N, whole = areas_of_rule(block, points[0], axisymmetric)
+        N, full_area = areas_of_rule(block, points[0], axisymmetric)
         positions = np.einsum("qk,fkd->fqd", N, points[1][block.facets])
         gap, normal, paired, _ = obstacle.facing(positions.reshape(-1, positions.shape[2]), pose)
         foot = positions - (np.where(paired, gap, 0.0)[:, None] * normal).reshape(positions.shape)
-        area = np.where(paired.reshape(whole.shape), whole, 0.0)
+        area = np.where(paired.reshape(full_area.shape), full_area, 0.0)
         mass.append(np.einsum("fq,qa,qb->fab", area, N, N))
-        faced.append(np.einsum("fq,qa,fqd->fad", area, N, foot))
-    return Overlap(mass, [], faced)
+        positions_faced.append(np.einsum("fq,qa,fqd->fad", area, N, foot))
+    return Overlap(mass, [], positions_faced)

@@ -18,8 +18,8 @@ It vanishes for point forces of a pressure field that the shape functions can re
 regularised. C acts only on the remaining components of the point forces.
 
 The primal-dual active set method, a semismooth Newton method, solves this problem exactly for every :math:`\rho > 0`. The
-surfaces are paired again in each iteration. The field is determined if :math:`P^T W P` is regular: a facet needs at least
-as many points with an area as it has nodes. Integrals are taken over the undeformed surface.
+surfaces are paired again in each iteration. The field is determined if :math:`P^T W P` is regular: a facet must have
+at least as many points with an area as nodes. Integrals are taken over the undeformed surface.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ from fastcontact.errors import ContactError
 from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Part of the friction cone that the component of a pressure along a support may take; see `_undetermined`. With all of the
-# cone, facets at 22 degrees to a plane of symmetry penetrate by 0.5 % of the displacement with a coefficient of 0.3.
+# Largest ratio of the component of a pressure along a support to the limit of friction; see `_undetermined`. With a ratio of
+# one, facets at 22 degrees to a plane of symmetry penetrate by 0.5 % of the displacement for a coefficient of 0.3.
 PART_OF_CONE = 0.5
 
 
@@ -104,12 +104,12 @@ class PressureField(NodalField):
             `nodes` and `independent`.
         renewed : bool
         """
-        (around, shape), (nodes, independent), (taking_part, full_areas) = points, field, areas
+        (around, shape), (nodes, independent), (usable_areas, full_areas) = points, field, areas
         P = shapes_at(shape, around, nodes.shape[0])
-        covered, total = P.T @ taking_part, P.T @ full_areas
+        covered, total = P.T @ usable_areas, P.T @ full_areas
         P = csr_array(P @ nodes)
-        mass = splu((P.T @ diags_array(taking_part) @ P).tocsc()) if len(independent) else None
-        projection = Projection(P, taking_part, rho, mass)
+        mass = splu((P.T @ diags_array(usable_areas) @ P).tocsc()) if len(independent) else None
+        projection = Projection(P, usable_areas, rho, mass)
         return cls(projection, nodes, independent, around, shape, renewed, total, covered)
 
     @property
@@ -166,14 +166,14 @@ class PressureField(NodalField):
 
         Nodal gaps are not used: between facets of different curvature, nodes of facets in contact have open gaps.
         """
-        usual = self.nodal_areas > NO_AREA * self.nodal_areas.max(initial=0.0)
+        with_area = self.nodal_areas > NO_AREA * self.nodal_areas.max(initial=0.0)
         near = _nearest(self.around[active], self.shape[active], len(gap))
         near |= _nearest(
-            self.around[active], np.where(usual[self.around[active]], self.shape[active], -np.inf), len(gap)
+            self.around[active], np.where(with_area[self.around[active]], self.shape[active], -np.inf), len(gap)
         )
-        seen, touched = self.projection.areas > 0, np.zeros(len(gap), bool)
+        usable, touched = self.projection.areas > 0, np.zeros(len(gap), bool)
         touched[self.around[active]] = True
-        near |= touched & ~_nearest(self.around[seen], self.shape[seen], len(gap))
+        near |= touched & ~_nearest(self.around[usable], self.shape[usable], len(gap))
         near &= pressure > 0
         # Forces at one end of a facet, opposite an edge, may cause a negative pressure at the nearest node.
         isolated = self.around[active][~near[self.around[active]].any(axis=1)]
@@ -216,7 +216,7 @@ class PressureFieldFormulation(Formulation):
     def eliminable(self) -> bool:
         """Whether iterative solvers can eliminate closed constraints; see `Formulation`.
 
-        They can eliminate the values of the field in 3D without friction; friction would couple them in all directions.
+        In 3D without friction they can eliminate the values of the field, which friction would couple in all directions.
         """
         return self.points.shape[1] == 3 and not self.friction
 
@@ -247,8 +247,8 @@ class PressureFieldFormulation(Formulation):
         """
         field = constraints.nodal
         assert isinstance(field, PressureField)
-        alone = moments.indices[moments.indptr[len(field.independent) : -1]]
-        return np.concatenate([field.independent, field.around[alone, field.shape[alone].argmax(axis=1)]])
+        single = moments.indices[moments.indptr[len(field.independent) : -1]]
+        return np.concatenate([field.independent, field.around[single, field.shape[single].argmax(axis=1)]])
 
     def of_points(
         self, candidates: Candidates, pairing: Pairing, field: PressureField, at: Configuration
@@ -273,12 +273,12 @@ class PressureFieldFormulation(Formulation):
     ) -> Array:
         """Return the factor of a compliance that determines tangential tractions at nodes where both sides are held.
 
-        Supports prevent slip there, so that these tractions do no work, and no equation determines them. The compliance makes
-        them vanish, together with the components of pressures that are slightly inclined to the support. Where a pressure is
-        inclined so much that its component takes a large part of the friction cone, as on facets that meet a plane of
-        symmetry at an angle, the support carries it, and the compliance must not act on the pressure: the bodies would
-        penetrate. `directions` are the tangents (m, dim) in the axes of the field. See
-        `Constraints.low_rank_compliance`; empty if no such node exists.
+        Supports prevent slip there, so that these tractions do no work, and no equation determines them. The compliance
+        makes them vanish, together with the components of pressures that are slightly inclined to the support. If the
+        component of an inclined pressure is a large part of the limit of friction, as on facets that meet a plane of
+        symmetry at an angle, the support carries it. The compliance must then not act on the pressure, because bodies would
+        penetrate. `directions` are the tangents (m, dim) in the axes of the field. See `Constraints.low_rank_compliance`;
+        empty if no such node exists.
         """
         factors = []
         for held, nodes in self.without_slip(at):
@@ -291,7 +291,9 @@ class PressureFieldFormulation(Formulation):
                     [np.einsum("nd,nd->n", along, at_points) for along in (normals(directions), *directions)]
                 )
                 factor = components[:, :, None] * Z
-                pressure, shear = (np.linalg.norm(part, axis=(0, 1)) for part in (factor[:1], factor[1:]))
+                pressure, shear = (
+                    np.linalg.norm(components_of_force, axis=(0, 1)) for components_of_force in (factor[:1], factor[1:])
+                )
                 factor[0, :, pressure > PART_OF_CONE * constraints.friction.max() * shear] = 0.0
                 factors.append(factor)
         return np.concatenate(factors, axis=2) if factors else np.empty(0)
@@ -303,7 +305,7 @@ def _coupled(
 ) -> Linearised:  # fmt: skip
     """Return the linearised geometry of constraints whose forces a multiplier field couples as vectors.
 
-    The first three arguments are the geometry at fixed compliance, the multiplier field, and its `PressureField.axes`.
+    The first three arguments are the geometry without compliance, the multiplier field, and its `PressureField.axes`.
     """
     linearised = geometry(multiplier, tangential, displacement)
     assert linearised.place is not None

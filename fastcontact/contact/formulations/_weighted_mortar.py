@@ -70,13 +70,13 @@ class Coverage(NamedTuple):
 
 @dataclass(eq=False)
 class WeightedMortar(Formulation):
-    """Mortar contact with weighted gaps at nodes; further parameters as in `Formulation`.
+    """Mortar contact with weighted gaps at nodes. The parameters of `Formulation` apply as well.
 
     Parameters
     ----------
     normals : str or sequence of float
-        Normals whose mean is the normal of a node: ``"facet"``, those of the opposite primary facets; ``"averaged"``,
-        their nodal averages. ``"secondary"`` and vectors as in `Formulation`.
+        Normals whose mean is the normal of a node: ``"facet"`` for those of the opposite primary facets, or ``"averaged"``
+        for interpolated nodal averages. ``"secondary"`` and vectors are those of `Formulation`.
     multipliers : str
         ``"dual"``, or in 3D ``"standard"``.
     """
@@ -132,9 +132,9 @@ class WeightedMortar(Formulation):
         deformed = self.points + at.displacement
         overlap = self._overlap(deformed, at.pose)
         weights = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
-        coverage = self._coverage(overlap, weights, self._taking_part(weights))
+        coverage = self._coverage(overlap, weights, self._nodes_with_gaps(weights))
         rows, across, closer = self._weighted(coverage)
-        # An excluded node only loses its gap: the functions of its neighbours are not extended over its area.
+        # Only the gap of an excluded node is omitted. The functions of its neighbours are not extended over its area.
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         mean = scaled(csr_array(rows - across), 1.0 / weight)
@@ -154,22 +154,22 @@ class WeightedMortar(Formulation):
         candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
         held = [] if self.options.tied else self.without_slip(at)  # ties have separate equations there
         projectors = np.zeros((*normal.shape, normal.shape[1]))
-        for along, where in held:
-            projectors[where] += along[where, :, None] * along[where, None, :]
+        for along, nodes_held in held:
+            projectors[nodes_held] += along[nodes_held, :, None] * along[nodes_held, None, :]
         friction, directions, rubbing = self.options.rubbing(self.friction, tangents(normal, projectors), candidates)
         slips, additional = self._slips(rubbing, held, coverage, mean, rows, weight)
-        length, between = self._closing(constraints, normal, at)
-        closing = length[:, None] * between
-        # The slip that is not due to displacements is that of a rigid obstacle, or minus that of closing.
+        length, closing_direction = self._closing(constraints, normal, at)
+        closing = length[:, None] * closing_direction
+        # Slip is also due to the motion of a rigid obstacle, and is corrected for motions that close gaps.
         if not isinstance(self.primary, RigidSide):
             moved = -closing if self.slip == "symmetric" else np.zeros_like(closing)
         else:
-            now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-            moved = self.primary.carried(now, before, at.pose, at.pose_start)
+            current, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
+            moved = self.primary.carried(current, before, at.pose, at.pose_start)
         slip0 = -np.stack([np.einsum("nd,nd->n", t, moved) for t in rubbing])
-        for along, still, more in additional:
-            remaining = closing - np.where(still, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
-            apparent_slip = np.einsum("md,md->m", more @ remaining, along)
+        for along, is_held, motion in additional:
+            remaining = closing - np.where(is_held, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
+            apparent_slip = np.einsum("md,md->m", motion @ remaining, along)
             slip0 += np.stack([np.einsum("md,md->m", t, along) * apparent_slip for t in rubbing])
         return replace(
             constraints,
@@ -186,17 +186,17 @@ class WeightedMortar(Formulation):
     ) -> Linearised:  # fmt: skip
         """Return the linearisation of contact forces, mean gaps and slips; see `linearised_geometry`.
 
-        `slipping` are tangents (k, m, dim), mean relative motions (m, n_points), and lengths by which gaps close (m,). The
-        segments are fixed: the integrand is continuous across the cuts.
+        `slipping` are tangents (k, m, dim), mean relative motions (m, n_points), and lengths (m,) by which gaps close.
+        Segments are constant, because the variation of the cuts has no effect if the integrand is continuous across them.
         """
-        at, acts, overlap = replace(at, displacement=displacement), multiplier != 0.0, coverage.overlap
+        at, is_loaded, overlap = replace(at, displacement=displacement), multiplier != 0.0, coverage.overlap
         deformed = self.points + displacement
         functions, tests, first, first_facet = Entries(), Entries(), 0, 0
         nodes, shapes, facets, opposite, corners = [], [], [], [], []
         of_blocks = zip(self.secondary.blocks, self._test, coverage.functions, strict=True)
         for number, (block, T, (psi, _)) in enumerate(of_blocks):
             inside = self._points_of(number, overlap) if overlap.points is None else overlap.points[number]
-            kept = acts[block.local].any(axis=1)[inside.facet]
+            kept = is_loaded[block.local].any(axis=1)[inside.facet]
             facet, shape, area = (values[kept] for values in inside[:3])
             if inside.opposite is not None:
                 opposite.append(inside.opposite[kept])
@@ -222,13 +222,13 @@ class WeightedMortar(Formulation):
         points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, direction, rise)
         weighted = scaled(csr_array(functions.matrix(size)[:, rows]), 1.0 / weight)
         mean = csr_array(tests.matrix(size)[:, rows])
-        own_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
+        separate_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
-            own = self.secondary.points[:, None]
-            here, all_nodes = Candidates(own, np.ones(own.shape)), np.arange(len(own))
-            own_normals = faced(here, pairing, all_nodes, self.primary, deformed, self.normals, at.pose)
+            column = self.secondary.points[:, None]
+            at_nodes, all_nodes = Candidates(column, np.ones(column.shape)), np.arange(len(column))
+            separate_normals = faced(at_nodes, pairing, all_nodes, self.primary, deformed, self.normals, at.pose)
         elif self.normals == "secondary":
-            own_normals = NodalNormals(self.secondary, deformed)
+            separate_normals = NodalNormals(self.secondary, deformed)
         slips = None
         if slipping is not None:
             directions, motion, length = slipping
@@ -236,27 +236,26 @@ class WeightedMortar(Formulation):
             if not isinstance(self.primary, RigidSide) and self.slip == "symmetric":
                 closing = Closing.of(normal, NodalNormals(self.secondary, deformed), motion @ slips.start, length)
                 slips = replace(slips, total=slips.total + closing.vector, closing=closing)
-        return Linearised(self.secondary, points, weighted, normal, multiplier, mean, own_normals, slips)
+        return Linearised(self.secondary, points, weighted, normal, multiplier, mean, separate_normals, slips)
 
     def _points_of(self, number: int, overlap: Overlap) -> OverlapPoints:
         """Return integration points of the facets of a block, on the parts that face the other side.
 
-        Against obstacles they are Gauss points of whole facets. In 3D they are those of the rectangle that has the second
-        moments of area of a segment in the reference facet: exact on flat triangles, whose integrand is quadratic.
+        Against obstacles they are Gauss points of whole facets. In 3D they are those of the rectangle with the same second
+        moments of area as a segment in the reference facet. They are exact on flat triangles, where the integrand is
+        quadratic.
         """
         block = self.secondary.blocks[number]
-        segments = [
-            (part, part.mass) for part in overlap.couplings if part.secondary is block and part.mass is not None
-        ]
+        segments = [(c, c.mass) for c in overlap.couplings if c.secondary is block and c.mass is not None]
         if not segments:
             N, area = areas_of_rule(block, self.points, self.axisymmetric)
             facet = np.repeat(np.arange(len(area)), len(N))
             return OverlapPoints(facet, np.tile(N, (len(area), 1)), area.ravel())
         assert isinstance(self.primary, Surface)
         starts, first = {}, 0
-        for other in self.primary.blocks:
-            starts[other.element], first = first, first + len(other.facets)
-        pairs = np.concatenate([np.add(part.pairs, (0, starts[part.primary.element])) for part, _ in segments])
+        for primary_block in self.primary.blocks:
+            starts[primary_block.element], first = first, first + len(primary_block.facets)
+        pairs = np.concatenate([np.add(c.pairs, (0, starts[c.primary.element])) for c, _ in segments])
         mass = np.concatenate([products for _, products in segments])
         size = mass.sum(axis=(1, 2))
         pairs, mass, size = pairs[size > 0.0], mass[size > 0.0], size[size > 0.0]
@@ -264,11 +263,11 @@ class WeightedMortar(Formulation):
         mean = mass.sum(axis=2) @ element.nodes / size[:, None]
         moments = element.nodes.T @ (mass / size[:, None, None]) @ element.nodes - mean[:, :, None] * mean[:, None]
         variance, axes = np.linalg.eigh(moments)
-        square, share = quadrature.square(quadrature.gauss_line(2 if element.n_nodes == 3 else 3))
+        square, weights = quadrature.square(quadrature.gauss_line(2 if element.n_nodes == 3 else 3))
         stretched = axes * np.sqrt(3.0 * np.maximum(variance, 0.0))[:, None]
         xi = mean[:, None] + square @ stretched.transpose(0, 2, 1)
-        facet, opposite = np.repeat(pairs, len(share), axis=0).T
-        area = 0.25 * size[:, None] * share
+        facet, opposite = np.repeat(pairs, len(weights), axis=0).T
+        area = 0.25 * size[:, None] * weights
         return OverlapPoints(facet, element.shape(xi.reshape(-1, 2)), area.ravel(), opposite)
 
     def _nodal(self, weight: Array) -> WeightedPressures:
@@ -294,56 +293,56 @@ class WeightedMortar(Formulation):
             np.add.at(tested, block.local, full)
         return tested, full_area
 
-    def _closing(self, part: Constraints, normal: Array, at: Configuration) -> tuple[Array, Array]:
-        """Return the lengths (m,) by which the step closes gaps [length], and the directions (m, dim) in which it does so.
+    def _closing(self, constraints: Constraints, normal: Array, at: Configuration) -> tuple[Array, Array]:
+        """Return the lengths (m,) by which gaps close in the step [length], and the directions (m, dim) of this motion.
 
-        Closing in these directions is not slip. As in `Formulation`, they are along the mean of both sides' normals, or along
-        the normal of an obstacle.
+        This motion is not slip. As in `Formulation`, the directions are those of the means of the normals of both sides, or
+        the normals of an obstacle.
         """
-        between = normal
+        direction = normal
         if not isinstance(self.primary, RigidSide):
-            between = normal - nodal_normals(self.secondary, self.points + at.displacement)
-            between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), TINY)  # zero at unpaired nodes
-        lean = np.einsum("nd,nd->n", normal, between)
-        gap = np.where(part.usable & (lean > 0.0), part.gaps(at.start), 0.0)
-        return gap / np.where(lean > 0.0, lean, 1.0), between
+            direction = normal - nodal_normals(self.secondary, self.points + at.displacement)
+            direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), TINY)  # zero at unpaired nodes
+        lean = np.einsum("nd,nd->n", normal, direction)
+        gap = np.where(constraints.usable & (lean > 0.0), constraints.gaps(at.start), 0.0)
+        return gap / np.where(lean > 0.0, lean, 1.0), direction
 
     def _slips(
         self, directions: Sequence[Array], without_slip: list[tuple[Array, Mask]], coverage: Coverage, mean: csr_array,
-        own: csr_array, weight: Array,
+        base: csr_array, weight: Array,
     ) -> tuple[tuple[csr_array, ...], list[tuple[Array, Mask, csr_array]]]:  # fmt: skip
         """Return rows (m, n_dofs) of the slips along tangents (m, dim).
 
-        Usually these are the rows of the `mean` relative motion. In a direction in which both sides are held at a node, as in
-        a plane of symmetry, the mean would contain only the motion of the other side beside the plane: there the functions of
-        neighbouring nodes replace the node's own (`Formulation.without_slip`). For each such direction (m, dim) the matrix
-        (m, m) of the additional motion of secondary nodes in these functions is also returned, because on curved sides these
-        nodes close their gaps along other normals.
+        Usually these are the rows of the `mean` relative motion. In a direction in which both sides are held at a node, as
+        in a plane of symmetry, the mean would contain only the motion of the other side near the plane. The functions of
+        neighbouring nodes then replace that of the node (`Formulation.without_slip`). For each such direction (m, dim) the
+        matrix (m, m) of the additional motion of secondary nodes in these functions is also returned, because on curved
+        sides these nodes close their gaps along other normals.
         """
         rows, additional = [rows_of(mean, direction) for direction in directions], []
         held = np.zeros((len(weight), *2 * self.points.shape[1:]))
         for along, nodes in without_slip:
             if not (nodes & coverage.kept).any():
                 continue
-            on_secondary, across, _ = self._weighted(self._coverage(*coverage[:2], coverage.kept & ~nodes))
-            other = csr_array(scaled(csr_array(on_secondary - across), 1.0 / weight) - mean)
-            other.eliminate_zeros()
+            replaced, across, _ = self._weighted(self._coverage(*coverage[:2], coverage.kept & ~nodes))
+            difference = csr_array(scaled(csr_array(replaced - across), 1.0 / weight) - mean)
+            difference.eliminate_zeros()
             for k, direction in enumerate(directions):
                 slip = np.einsum("md,md->m", direction, along)
-                rows[k] = csr_array(rows[k] + rows_of(other, slip[:, None] * along))
+                rows[k] = csr_array(rows[k] + rows_of(difference, slip[:, None] * along))
             additional.append(
-                (along, nodes, csr_array(scaled(csr_array(on_secondary - own), 1.0 / weight)[:, self.secondary.points]))
+                (along, nodes, csr_array(scaled(csr_array(replaced - base), 1.0 / weight)[:, self.secondary.points]))
             )
             held[nodes] += np.einsum("md,me->mde", along[nodes], along[nodes])
-        # Slip is computed along tangents whose part that supports do not hold is longer than FACING.
+        # Slip is computed along tangents whose component that supports do not hold is longer than FACING.
         free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FACING**2 for t in directions]
         return tuple(scaled(row, np.where(slips, 1.0, 0.0)) for row, slips in zip(rows, free, strict=True)), additional
 
     def _weighted(self, coverage: Coverage) -> tuple[csr_array, csr_array, Array]:
         """Return the integrals of psi with secondary and with primary shape functions, both (m, n_points) [area].
 
-        The third result contains the integrals of psi with the distance by which smooth surfaces are closer than facets (m,)
-        [volume].
+        The third result contains the integrals (m, dim) of psi with the vectors by which smooth surfaces are closer than
+        facets [volume].
         """
         overlap = coverage.overlap
         size = (len(self.secondary.points), len(self.points))
@@ -362,35 +361,36 @@ class WeightedMortar(Formulation):
 
     def _coverage(self, overlap: Overlap, weights: list[Array], kept: Mask) -> Coverage:
         """Return the coverage with the functions psi of the nodes `kept` (m,)."""
-        functions, given = [], zip(self._test, overlap.mass, weights, self._whole, strict=True)
-        for block, (T, mass, covered, whole) in zip(self.secondary.blocks, given, strict=True):
+        functions, of_blocks = [], zip(self._test, overlap.mass, weights, self._whole, strict=True)
+        for block, (T, mass, covered, full) in zip(self.secondary.blocks, of_blocks, strict=True):
             of_facets = kept[block.local]
             if self.multipliers == "standard":
                 psi = np.where(of_facets[:, :, None], T, 0.0)
                 functions.append((psi, psi @ mass))
-            else:  # by the fraction of the weights of a block's functions that faces the other side
-                fraction = np.divide(covered, whole, out=np.zeros_like(covered), where=whole > 0.0)
+            else:  # depending on the fractions of the weights that face the other side
+                fraction = np.divide(covered, full, out=np.zeros_like(covered), where=full > 0.0)
                 psi, D = dual_functions(T @ mass @ T.T, of_facets, fraction)
                 functions.append((psi @ T, D @ np.linalg.inv(T).T))
         return Coverage(overlap, weights, kept, functions)
 
-    def _taking_part(self, covered: list[Array]) -> Mask:
+    def _nodes_with_gaps(self, covered: list[Array]) -> Mask:
         """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions."""
         m = len(self.secondary.points)
-        total, complete, rescued = np.zeros(m), np.zeros(m), np.zeros(m, bool)
+        total, full_total, added = np.zeros(m), np.zeros(m), np.zeros(m, bool)
         for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
             np.add.at(total, block.local, weights)
-            np.add.at(complete, block.local, full)
-        enough = total > (COVERED if self.multipliers == "dual" else NO_AREA) * complete
+            np.add.at(full_total, block.local, full)
+        sufficient = total > (COVERED if self.multipliers == "dual" else NO_AREA) * full_total
         for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
-            # If no node of a facet has sufficient weight, the one with the largest has a gap, so that no overlap is lost.
-            lost = ~enough[block.local].any(axis=1) & (weights.sum(axis=1) > NO_AREA * full.sum(axis=1))
-            most = np.argmax(total[block.local[lost]], axis=1)
-            rescued[block.local[lost][np.arange(len(most)), most]] = True
-        return (enough | rescued) & (complete > 0.0)
+            # If no node of a facet has sufficient weight, that with the largest weight has a gap, so that no overlap is
+            # omitted.
+            without_gap = ~sufficient[block.local].any(axis=1) & (weights.sum(axis=1) > NO_AREA * full.sum(axis=1))
+            largest = np.argmax(total[block.local[without_gap]], axis=1)
+            added[block.local[without_gap][np.arange(len(largest)), largest]] = True
+        return (sufficient | added) & (full_total > 0.0)
 
     def _mean_normals(self, overlap: Overlap, deformed: Array, pose: Pose) -> Array:
-        """Return unit means (m, dim) of the opposite primary normals; at unpaired nodes, the mean of all nodes.
+        """Return unit means (m, dim) of the opposite primary normals; at unpaired nodes, the mean over all nodes.
 
         Against an obstacle these are the normals at the nodes themselves, which lie in planes of symmetry.
         """
@@ -446,7 +446,7 @@ class WeightedPressures(NodalField):
     quadratic : list of (int, ndarray (n_nodes, n_nodes), ndarray of int (n_facets, n_nodes))
         Kinds of quadratic facets: number of corners, coefficients of positive functions in shape functions, nodes.
     held : ndarray of bool (m,)
-        Nodes prescribed in all directions, whose forces act between supports and are unrelated to those of their neighbours.
+        Nodes prescribed in all directions, whose forces act between supports, independently of their neighbours.
     """
 
     weight: Array
@@ -456,7 +456,7 @@ class WeightedPressures(NodalField):
     held: Mask
 
     def pressure(self, force: Array) -> Array:
-        """Return forces over the areas of their gaps; at mid nodes without a gap, the mean of their corners."""
+        """Return the forces divided by the areas of their gaps or, at mid nodes without a gap, the mean of their corners."""
         return self._at_nodes(force / self.weight, only_without_gap=True)
 
     @property
@@ -469,10 +469,10 @@ class WeightedPressures(NodalField):
         return self._at_nodes(fraction, only_without_gap=True)
 
     def over_whole_side(self, force: Array) -> Array:
-        """Return forces over the whole areas of the positive functions; see `_at_nodes`.
+        """Return the forces divided by the complete areas of the positive functions; see `_at_nodes`.
 
-        The part of a node's area that faces the other side may be arbitrarily small, and its force vanishes with this part.
-        The ratio of both is sensitive to round-off; the force divided by the whole area is not.
+        The part of the area of a node that faces the other side may be arbitrarily small, and the force vanishes with it. The
+        ratio of both is sensitive to round-off, unlike the force divided by the complete area.
         """
         return self._at_nodes(np.divide(force, self.tested, out=np.zeros_like(force), where=self.tested > 0.0))
 

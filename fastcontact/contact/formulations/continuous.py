@@ -51,7 +51,7 @@ class Continuous(PressureFieldFormulation):
 
     n_gauss : int, optional
         Number of Gauss points in each direction of a facet; by default 3 on linear and 4 on quadratic facets. On triangles
-        the numbers 2 to 5 select rules with 3, 6, 12 and 16 points in total. Too few points to determine the pressure field
+        the numbers 2 to 5 select rules with 3, 6, 12 and 16 points in total. Fewer points than determine the pressure field
         are rejected.
     normals : str or sequence of float
         See `Formulation`. The default is ``"averaged"``, because with discontinuous normals the pairing of a point opposite a
@@ -130,18 +130,18 @@ class Continuous(PressureFieldFormulation):
         """Return the matrix (n_nodes, k) from the independent values of the field to all nodal values, and their nodes (k,).
 
         All nodal values are independent, except at nodes without area, at excluded nodes, and with friction at ends of
-        quadratic lines on the axis, see `integration.even_at_axis`. Without friction the field there is that of code_aster,
-        a few percent from its even continuation.
+        quadratic lines on the axis, see `integration.even_at_axis`. Without friction, the field there is independent
+        as in code_aster, and deviates by a few percent from its even continuation.
         """
         size = P.shape[1]
-        seen = np.asarray((P.T @ diags_array(areas) @ P).diagonal())
+        weight = np.asarray((P.T @ diags_array(areas) @ P).diagonal())
         excluded = self.options.excluded_nodes(self.secondary)
         even = even_at_axis(self.secondary, self.points) if self.axisymmetric else csr_array(eye_array(size))
         if not self.friction:
-            alone = (seen != 0.0).astype(float)
-            even = csr_array(diags_array(alone) + diags_array(1.0 - alone) @ even)
+            has_weight = (weight != 0.0).astype(float)
+            even = csr_array(diags_array(has_weight) + diags_array(1.0 - has_weight) @ even)
         values = csr_array(diags_array((~excluded).astype(float)) @ even + diags_array(excluded.astype(float)))
-        kept = np.flatnonzero((seen != 0.0) & ~excluded & (even.diagonal() != 0.0))
+        kept = np.flatnonzero((weight != 0.0) & ~excluded & (even.diagonal() != 0.0))
         return csr_array((values @ spread(self.secondary, excluded, kept))[:, kept]), kept
 
     def unilateral(self, at: Configuration) -> Constraints:
@@ -159,8 +159,8 @@ class Continuous(PressureFieldFormulation):
     def _at_axis(self) -> Mask:
         """The integration points (m,) that are nodes on the axis.
 
-        They have no area, but only their own constraint prevents their penetration. With a penalty, which is proportional to
-        areas, the result is False for all points.
+        They have no area, but only their own constraints prevent their penetration. With a penalty, which is proportional
+        to areas, the result is False for all points.
         """
         areas = self._field.projection.areas
         if self.integration != "node" or not self.axisymmetric or self.options.penalty is not None:

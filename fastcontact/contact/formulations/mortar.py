@@ -4,7 +4,7 @@ There are two methods of this name. In 3D, or with dual multipliers, each second
 `_weighted_mortar`. In 2D with standard multipliers, the contact status is determined at integration points.
 
 This file contains the latter. In each pairing the secondary facets are divided into segments, see `_cut_lines`, and each
-segment gets Gauss points (Puso and Laursen, 2004). The integrals are thus exact, and a uniform pressure is transmitted
+segment has Gauss points (Puso and Laursen, 2004). The integrals are thus exact, and a uniform pressure is transmitted
 exactly between non-matching meshes. Neither node-to-segment contact nor quadrature over complete facets achieves this.
 
 Segments without an opposite facet carry no pressure, and the pressure field is projected over the other segments. If the
@@ -13,10 +13,10 @@ complementarity conditions are those of `_pressure_field`.
 
 If only a strip of a facet faces the other side, the integration points in this strip hardly determine a field over the
 complete facet: on a strip of the fraction :math:`\theta` at one end of a line, the value of a polynomial of degree k at the
-other end has a weight proportional to :math:`\theta^{2k+1}`. The measure is the smallest generalised eigenvalue of two mass
-matrices of the facet, with integrals over the covered part and over the complete facet. If it is too small, the field is
-simplified. It becomes linear between the corners of a quadratic facet, or the mean of the values at nodes that other facets
-determine. Constant fields remain representable, so that a uniform pressure is transmitted.
+other end has a weight proportional to :math:`\theta^{2k+1}`. This is measured by the smallest generalised eigenvalue of two
+mass matrices of the facet, with integrals over the covered part and over the complete facet. If it is too small, the field
+is simplified. It becomes linear between the corners of a quadratic facet, or the mean of the values at nodes that other
+facets determine. Constant fields remain representable, so that a uniform pressure is transmitted.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def determined(
         kept[field.block.local[degree == 1][:, : len(field.to_corners)]] = True
     kept &= ~excluded
     for field, degree, mass in zip(fields, degrees, masses, strict=True):
-        # A facet without an independent node gets one: that with the largest covered area.
+        # In a facet without an independent node, the node with the largest covered area becomes independent.
         for facet in np.flatnonzero((degree >= 0) & ~kept[field.block.local].any(axis=1)):
             nodes = field.block.local[facet]
             if not (kept[nodes].any() or excluded[nodes].all()):
@@ -169,7 +169,7 @@ def _between_corners(fields: list[WholeFacets], degrees: list[Indices], done: Ma
         corners = len(field.to_corners)
         facet, k = np.nonzero(~done[field.block.local[:, corners:]] & (degree >= 0)[:, None])
         for nodes, node in zip(field.block.local[facet], k + corners, strict=True):
-            # The facets on both sides of an edge give the same row.
+            # The facets on both sides of an edge have the same row.
             between[nodes[node], nodes[:corners]] = field.to_corners[:, node]
     return csr_array(between)
 

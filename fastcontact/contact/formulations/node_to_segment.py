@@ -1,7 +1,7 @@
 """Node-to-segment contact: no secondary node penetrates the primary facet onto which it projects.
 
 There is one constraint per secondary node. It is enforced exactly, and its multiplier is the nodal contact force. The
-pairing, the projections and the normals are constant while the active set is solved for (code_aster, R5.03.50, formulation
+pairing, the projections and the normals are constant during the active set iteration (code_aster, R5.03.50, formulation
 DISCRETE with ALGO_CONT='CONTRAINTE').
 
 The formulation does not pass the patch test on non-matching meshes, and its pressures oscillate on quadratic facets. Under
@@ -41,8 +41,8 @@ class NodeToSegment(Formulation):
     Parameters
     ----------
     opposite : str
-        ``"facet"``: the gap is measured to the opposite primary facet. ``"node"``: it is measured to the nearest primary
-        node, for matching meshes with little sliding (APPARIEMENT='NODAL' of code_aster).
+        ``"facet"`` to measure the gap to the opposite primary facet, ``"node"`` to measure it to the nearest primary node,
+        for matching meshes with little sliding (APPARIEMENT='NODAL' of code_aster).
     """
 
     opposite: str = "facet"
@@ -116,8 +116,8 @@ class NodalForces(NodalField):
     independent : ndarray of int (k,), optional
         Nodes of these values.
     mass : SuperLU, optional
-        Factors of the mass matrix (k, k) of these values [area]. They are used for quadratic facets, for which
-        forces divided by nodal areas are not nodal values of a field.
+        Factors of the mass matrix (k, k) of these values [area]. They are used for quadratic facets, where forces
+        divided by nodal areas are not the nodal values of a field.
     """
 
     nodal_areas: Array
@@ -141,9 +141,9 @@ class NodalForces(NodalField):
         """
         if self.values is None:
             return active
-        others = self.values.indptr[1:] - self.values.indptr[:-1] > 1
-        apart = abs(self.values) @ (~active[self.independent]).astype(float)
-        return active | (others & (apart == 0.0))
+        depends_on_others = self.values.indptr[1:] - self.values.indptr[:-1] > 1
+        inactive_weight = abs(self.values) @ (~active[self.independent]).astype(float)
+        return active | (depends_on_others & (inactive_weight == 0.0))
 
 
 FORMULATION = NodeToSegment

@@ -1,12 +1,12 @@
 """Rigid obstacles.
 
 An obstacle returns signed distances, positive outside, and outward normals in its own frame. For shapes given by a
-height (paraboloid, cone, a function of position), the distance is the vertical one times the cosine of the slope: its
-sign is exact, and it is accurate to first order near the surface. This suffices, since the pairing is repeated until
-the points lie on the surface.
+height (paraboloid, cone, a function of position), the distance is approximated by the vertical distance times the cosine of
+the slope, whose sign is exact, and which is accurate to first order near the surface. This suffices, since the pairing is
+repeated until the points lie on the surface.
 
-Coordinates are (x, y) in two dimensions (x the radius in axisymmetry) and (x, y, z) in three; the axis of a shape is
-the last coordinate.
+Coordinates are (x, y) in 2D, where x is the radius in axisymmetry, and (x, y, z) in 3D. The axis of a shape is along the last
+coordinate.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Facets of a rigid surface: orientation, adjacency, averaged normals.
+"""Facets of a rigid surface: orientation, adjacency and averaged normals.
 
-Facets are numbered through blocks of one kind each. Ridges are shared by two facets: the ends of a line in two dimensions,
-the edges of a face in three.
+Facets are numbered through blocks of one element type each. Ridges are shared by two facets. They are the ends of lines in
+2D, and the edges of faces in 3D.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Facets of one kind."""
+    """Facets of one element type."""
 
     element: elements.Element
     numbers: Indices  # (n,): cell numbers in the mesh
@@ -33,7 +33,7 @@ class Block:
     corners: Array  # (n, k, dim): positions of the nodes [length]
 
     def ridges(self) -> tuple[Indices, Indices]:
-        """Return the nodes at the beginning and at the end (n, r) of each ridge; for the ends of lines, twice the node."""
+        """Return the nodes at the beginning and at the end (n, r) of each ridge, which are equal for the ends of lines."""
         if self.element.dim == 1:
             return self.nodes[:, :2], self.nodes[:, :2]
         edges = np.array(self.element.edges)
@@ -50,9 +50,10 @@ class Block:
 class SurfaceFacets(NamedTuple):
     """The facets of a rigid surface, their neighbours and their normals.
 
-    The smooth normal of a facet at a node is the mean over the facets there whose angle to it is at most the crease. The
-    normal of a point is the mean over all facets there, not normalised; it distinguishes inside from outside next to the
-    point (Baerentzen and Aanaes, 2005). Both are weighted by the angles of the facets (Thuermer and Wuethrich, 1998).
+    The smooth normal of a facet at a node is the mean over the facets there whose angle to this facet is at most the crease
+    angle. The normal of a point is the mean over all facets there, not normalised. It determines on which side of the
+    surface positions near the point lie (Baerentzen and Aanaes, 2005). Both are weighted by the angles of the facets
+    (Thuermer and Wuethrich, 1998).
     """
 
     blocks: list[Block]
@@ -64,7 +65,7 @@ class SurfaceFacets(NamedTuple):
 
 
 def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> SurfaceFacets:
-    """Return the facets of a group, which count as a smooth surface where they meet at the angle `crease` [degrees] or less.
+    """Return the facets of a group, which form a smooth surface where they meet at the angle `crease` [degrees] or less.
 
     Raises ContactError if they do not form an orientable surface.
     """
@@ -85,9 +86,9 @@ def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> Surface
 
 
 def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
-    """Return the facets of a group as the mesh orients them, or the other way round with `flip`.
+    """Return the facets of a group with the orientation of the mesh or, with `flip`, the opposite one.
 
-    Facets on the outside of solid cells point out of these, whatever their own order of nodes.
+    Facets on the outside of solid cells point out of these cells, independently of the order of their nodes in the group.
     """
     rows = mesh.split(mesh.cell_groups[group]) if mesh.cells_of(group, dim=mesh.dim - 1) else {}
     rows = {name: block for name, block in rows.items() if elements.get(name).dim == mesh.dim - 1}
@@ -102,23 +103,23 @@ def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
         element = elements.get(name)
         nodes = mesh.cells[name][block]
         if name in outer:  # facets of solids are oriented outwards
-            same = same_facets(outer[name], nodes)
-            nodes = np.where((same >= 0)[:, None], outer[name][same], nodes)
+            outer_rows = same_facets(outer[name], nodes)
+            nodes = np.where((outer_rows >= 0)[:, None], outer[name][outer_rows], nodes)
         if flip:
             nodes = nodes[:, list(element.reversed)]
         blocks.append(Block(element, block + mesh.offsets[name], nodes.astype(np.intp), mesh.points[nodes]))
         lengths = np.linalg.norm(blocks[-1].normals()[0], axis=2)
-        flat = np.flatnonzero(lengths.min(axis=1) == 0.0)
-        if len(flat):
+        degenerate = np.flatnonzero(lengths.min(axis=1) == 0.0)
+        if len(degenerate):
             raise ContactError(
-                f"{_described(blocks[-1:], int(flat[0]))} of the rigid surface '{group}' has no area, or none at "
+                f"{_described(blocks[-1:], int(degenerate[0]))} of the rigid surface '{group}' has no area, or none at "
                 "one of its nodes: remove it or repair the mesh there"
             )
     return blocks
 
 
 def _described(blocks: list[Block], facet: int) -> str:
-    """Return number, kind and position of a facet, in words."""
+    """Return a description of a facet with its number, element type and position."""
     for block in blocks:
         if facet < len(block.nodes):
             break
@@ -139,9 +140,9 @@ def _neighbours(blocks: list[Block], group: str) -> Indices:
     first = np.flatnonzero(np.r_[True, key[1:] != key[:-1]])
     count = np.diff(np.r_[first, len(key)])
     if (count > 2).any():
-        at = facet[first[np.argmax(count > 2)]]
+        branch = facet[first[np.argmax(count > 2)]]
         raise ContactError(
-            f"{_described(blocks, at)} of the rigid surface '{group}' shares an edge with more than one other facet: a "
+            f"{_described(blocks, branch)} of the rigid surface '{group}' shares an edge with more than one other facet: a "
             "surface must not branch, so split it into several groups"
         )
     shared = first[count == 2]
@@ -153,7 +154,7 @@ def _neighbours(blocks: list[Block], group: str) -> Indices:
 
 
 def _ridge_table(blocks: list[Block]) -> tuple[Indices, Indices, Indices, Indices]:
-    """Return facet, ridge, a key of its nodes, and the sense in which the facet goes round it, for all ridges."""
+    """Return the facet, the number, a key of the nodes and the orientation in the facet, for all ridges."""
     facets, ridges, keys, signs, start = [], [], [], [], 0
     size = 1 + max(int(block.nodes.max()) for block in blocks)
     for block in blocks:
@@ -166,16 +167,16 @@ def _ridge_table(blocks: list[Block]) -> tuple[Indices, Indices, Indices, Indice
     return np.concatenate(facets), np.concatenate(ridges), np.concatenate(keys), np.concatenate(signs)
 
 
-def _check_orientation(blocks: list[Block], group: str, one: Indices, other: Indices, consistent: Mask) -> None:
-    """Raise ContactError for neighbours of opposite orientation, naming a facet of the smaller part."""
+def _check_orientation(blocks: list[Block], group: str, first: Indices, second: Indices, consistent: Mask) -> None:
+    """Raise ContactError for neighbours of opposite orientation, which names a facet of the smaller part."""
     if consistent.all():
         return
     n = sum(len(block.nodes) for block in blocks)
-    good = coo_array((np.ones(consistent.sum()), (one[consistent], other[consistent])), shape=(n, n))
-    _, component = connected_components(good, directed=False)
+    graph = coo_array((np.ones(consistent.sum()), (first[consistent], second[consistent])), shape=(n, n))
+    _, component = connected_components(graph, directed=False)
     size = np.bincount(component)
-    bad = int(np.flatnonzero(~consistent)[0])
-    pair = sorted((int(one[bad]), int(other[bad])), key=lambda facet: (size[component[facet]], facet))
+    wrong = int(np.flatnonzero(~consistent)[0])
+    pair = sorted((int(first[wrong]), int(second[wrong])), key=lambda facet: (size[component[facet]], facet))
     numbers = np.concatenate([block.numbers for block in blocks])
     raise ContactError(
         f"{_described(blocks, pair[0])} of the rigid surface '{group}' has the opposite orientation to its neighbour facet "
@@ -193,14 +194,14 @@ def _smooth_normals(
     weight = np.concatenate([angle.ravel() for _, angle in by_block])
     at_points = np.zeros((node.max() + 1, dim))
     np.add.at(at_points, node, weight[:, None] * normal)
-    at = csr_array((np.ones(len(node)), node, np.arange(len(node) + 1)))
-    pairs = at @ at.T  # of facets at a common node
+    incidence = csr_array((np.ones(len(node)), node, np.arange(len(node) + 1)))
+    pairs = incidence @ incidence.T  # pairs of facets at a common node
     pairs.sort_indices()
     i, j = pairs.nonzero()
-    alike = np.einsum("nd,nd->n", normal[i], normal[j]) >= np.cos(np.radians(crease)) - LENGTH_ROUND_OFF
-    alike |= i == j
+    is_smooth = np.einsum("nd,nd->n", normal[i], normal[j]) >= np.cos(np.radians(crease)) - LENGTH_ROUND_OFF
+    is_smooth |= i == j
     mean = np.zeros_like(normal)
-    np.add.at(mean, i[alike], weight[j[alike], None] * normal[j[alike]])
+    np.add.at(mean, i[is_smooth], weight[j[is_smooth], None] * normal[j[is_smooth]])
     mean /= np.linalg.norm(mean, axis=1, keepdims=True)
     ends = np.cumsum([block.nodes.size for block in blocks])[:-1]
     means = np.split(mean, ends)

@@ -1,4 +1,4 @@
-"""A rigid surface made of facets: lines in two dimensions, triangles and quadrangles in three, straight or curved."""
+"""Rigid surfaces of facets: lines in 2D, triangles and quadrangles in 3D, straight or curved."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 class MeshedSurface:
     """A rigid surface given by a group of facets of a mesh.
 
-    Normals point out of the obstacle, towards the body. In two dimensions they point to the right of a line's direction,
-    in three dimensions to the side from which the nodes of a face run counter-clockwise. Normals of facets on the outside
+    Normals point out of the obstacle, towards the body. In 2D they point to the right of the direction of a line, in 3D
+    to the side from which the nodes of a face run counter-clockwise. Normals of facets on the outside
     of solid cells of their mesh point out of these cells. Distances to the closest point of the curved facets are exact.
     Beyond the border of an open surface there is no contact.
 
@@ -96,7 +96,7 @@ class MeshedSurface:
         offset = points - closest.position
         extents = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._facets.blocks]
         size = np.concatenate(extents)[closest.facet]
-        # At touching points the direction between both points is dominated by round-off; the facet's normal replaces it.
+        # At touching points the direction between both points is dominated by round-off; the normal of the facet is used.
         touching = closest.distance <= SINGLE_PRECISION * size
         outside = np.einsum("nd,nd->n", offset, pseudonormal) >= 0
         distance = np.where(outside, closest.distance, -closest.distance)
@@ -108,7 +108,8 @@ class MeshedSurface:
         normal[corrected] = offset[corrected] / distance[corrected, None]
         height = np.abs(np.einsum("nd,nd->n", offset, pseudonormal))
         overhang = np.sqrt(np.maximum(closest.distance**2 - height**2, 0.0))
-        # Borders on a plane of symmetry, to which facets of a smooth surface lean by up to half of a crease, stay in contact.
+        # At a plane of symmetry, facets of a smooth surface are inclined by up to half the crease angle; their borders stay
+        # in contact.
         leaning = np.tan(np.radians(0.5 * MeshedSurface.crease))
         beyond_border = on_border & (overhang > BESIDE * size) & (overhang > leaning * height)
         return np.where(beyond_border, np.inf, distance), normal
@@ -146,14 +147,14 @@ class MeshedSurface:
         beyond = self._facets.beyond[first + rows, edge]
         directions = np.zeros((len(rows), self.mesh.dim))
         start = 0
-        for other, normals in zip(self._facets.blocks, self._facets.normals, strict=True):
-            in_block = np.flatnonzero((beyond >= start) & (beyond < start + len(other.nodes)))
+        for block_beyond, normals in zip(self._facets.blocks, self._facets.normals, strict=True):
+            in_block = np.flatnonzero((beyond >= start) & (beyond < start + len(block_beyond.nodes)))
             facet = beyond[in_block] - start
             for weight, end in ((1.0 - along, ends[:, 0]), (along, ends[:, 1])):
                 node = block.nodes[rows[in_block], end[in_block]]
-                local = np.argmax(other.nodes[facet] == node[:, None], axis=1)
+                local = np.argmax(block_beyond.nodes[facet] == node[:, None], axis=1)
                 directions[in_block] += weight[in_block, None] * normals[facet, local]
-            start += len(other.nodes)
+            start += len(block_beyond.nodes)
         return directions
 
 
@@ -167,9 +168,9 @@ def _corners_and_edges(block: Block, xi: Array) -> tuple[Indices, Indices]:
     edges = np.array(element.edges)
     a, b = element.nodes[edges[:, 0]], element.nodes[edges[:, 1]]
     across = np.column_stack([a[:, 1] - b[:, 1], b[:, 0] - a[:, 0]])
-    on = np.einsum("nej,ej->ne", xi[:, None] - a[None], across) <= ROUND_OFF * np.einsum("ej,ej->e", across, across)
+    is_on = np.einsum("nej,ej->ne", xi[:, None] - a[None], across) <= ROUND_OFF * np.einsum("ej,ej->e", across, across)
     corner = none.copy()
     for k in range(element.n_corners):
-        at = np.flatnonzero((edges == k).any(axis=1))
-        corner[on[:, at].all(axis=1)] = k
-    return corner, np.where((corner < 0) & on.any(axis=1), np.argmax(on, axis=1), -1)
+        edges_of_corner = np.flatnonzero((edges == k).any(axis=1))
+        corner[is_on[:, edges_of_corner].all(axis=1)] = k
+    return corner, np.where((corner < 0) & is_on.any(axis=1), np.argmax(is_on, axis=1), -1)

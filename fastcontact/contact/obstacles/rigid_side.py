@@ -35,26 +35,26 @@ class RigidSide:
     """A rigid obstacle that may translate and rotate; its position is part of the configuration."""
 
     obstacle: Obstacle  # in its initial position
-    motion: Array  # (dim,): its displacement at multiplier 1 of its ramp [length]
+    motion: Array  # (dim,): displacement at multiplier 1 of the ramp [length]
     rotation: Rotation | None = None
 
     @property
     def points(self) -> Numbers:
-        """The nodes of the side (0,): none."""
+        """The nodes of the side, an empty array."""
         return np.empty(0, np.int32)
 
     def facing(self, positions: Array, at: Pose) -> tuple[Array, Array, Mask, Array]:
         """Return (gap, normal, paired, offset) of points at `positions` (n, dim) [length].
 
-        Near a position x the gap is ``offset + normal . x``.
+        To first order, the gap at a position x nearby is ``offset + normal . x``.
         """
         local = positions - at.displacement
         if self.rotation is None or at.angle == 0.0:
             gap, normal = self._distance(local)
         else:
-            turned, centre = self.rotation.matrix(at.angle), np.array(self.rotation.centre)
-            gap, normal = self._distance((local - centre) @ turned + centre)
-            normal = normal @ turned.T
+            rotation, centre = self.rotation.matrix(at.angle), np.array(self.rotation.centre)
+            gap, normal = self._distance((local - centre) @ rotation + centre)
+            normal = normal @ rotation.T
         paired = np.isfinite(gap)
         offset = np.where(paired, gap, 0.0) - np.einsum("nd,nd->n", normal, positions)
         return gap, normal, paired, offset
@@ -68,18 +68,19 @@ class RigidSide:
             raise ContactError("the distance from a rigid obstacle must be real numbers, not complex ones")
         return distance_and_normal
 
-    def carried(self, positions: Array, before: Array, now: Pose, then: Pose) -> Array:
-        """Return the displacement of points of the obstacle's surface by its motion (n, dim) [length].
+    def carried(self, positions: Array, before: Array, pose: Pose, pose0: Pose) -> Array:
+        """Return the displacements (n, dim) of points on the surface of the obstacle due to its motion [length].
 
         The slip of a point that moves from `before` to `positions` (n, dim) [length] is its displacement minus this result.
-        It equals the change of the position relative to the obstacle, in the frame rotated by half the angle and scaled from
-        the chord to the arc. It vanishes where a point sticks, and lies along the circle where a point is at rest in 3D.
+        The slip equals the change of the position relative to the obstacle, in the frame rotated by half the angle, and
+        scaled from the chord to the arc. It vanishes where a point sticks, and is tangential to the circle for a point at
+        rest.
         """
-        angle, moved = now.angle - then.angle, np.tile(now.displacement - then.displacement, (len(positions), 1))
+        angle, moved = pose.angle - pose0.angle, np.tile(pose.displacement - pose0.displacement, (len(positions), 1))
         if self.rotation is None or angle == 0.0:
             return moved
         half, centre = self.rotation.matrix(0.5 * angle), np.array(self.rotation.centre)
-        end, start = positions - centre - now.displacement, before - centre - then.displacement
+        end, start = positions - centre - pose.displacement, before - centre - pose0.displacement
         slip = (end @ half - start @ half.T) * (0.5 * angle / math.sin(0.5 * angle))
         return np.asarray(moved + ((end - start) - slip))
 
@@ -99,7 +100,7 @@ class Rotation:
     centre : tuple of float (dim,)
         A point of the axis before any motion [length].
     axis : tuple of float (3,)
-        Direction of the axis, of any length [-]; (0, 0, 1) in the plane.
+        Direction of the axis, of any length [-]; (0, 0, 1) in 2D.
     angle : float
         Angle at multiplier 1, by the right-hand rule [radian].
     """
@@ -114,7 +115,7 @@ class Rotation:
         return np.asarray(np.array(self.axis) / np.linalg.norm(self.axis))
 
     def matrix(self, angle: float) -> Array:
-        """Return the matrix (dim, dim) that turns vectors by `angle` [radian] (Rodrigues' formula)."""
+        """Return the matrix (dim, dim) that rotates vectors by `angle` [radian] (Rodrigues' formula)."""
         first, second = self.generators
         return np.asarray(np.eye(len(first)) + math.sin(angle) * first + (1.0 - math.cos(angle)) * second)
 
@@ -135,9 +136,9 @@ class Rotation:
         arm[:, :dim] = positions - self.centre
         radial = arm - (arm @ along)[:, None] * along
         length = np.linalg.norm(radial, axis=1, keepdims=True)
-        some = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+        arbitrary = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
         on_axis = length <= LENGTH_ROUND_OFF * length.max(initial=0.0)
-        radial = np.where(on_axis, some / np.linalg.norm(some), radial / np.where(on_axis, 1.0, length))
+        radial = np.where(on_axis, arbitrary / np.linalg.norm(arbitrary), radial / np.where(on_axis, 1.0, length))
         axes = np.stack([radial, np.cross(along, radial), np.broadcast_to(along, radial.shape)], axis=2)
         return axes[:, :dim, :dim]
 

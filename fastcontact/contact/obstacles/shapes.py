@@ -82,7 +82,7 @@ class Sphere:
     R : float
         Radius [length].
     hollow : bool
-        Whether the body lies inside.
+        Whether the deformable body lies inside.
 
     Examples
     --------
@@ -167,7 +167,7 @@ class Height:
 
     Examples
     --------
-    A wavy floor in the plane:
+    A wavy floor in 2D:
 
     >>> import numpy as np
     >>> from fastcontact import obstacles
@@ -267,7 +267,7 @@ def cone(slope: float, tip: float = 0.0, side: str = "above") -> Height:
 
     def height(x: Array) -> tuple[Array, Array]:
         r = np.linalg.norm(x, axis=1)
-        beyond_tip = r > ROUND_OFF * r.max(initial=0.0)  # a point at the tip of a rotated model is off it by round-off
+        beyond_tip = r > ROUND_OFF * r.max(initial=0.0)  # in a rotated model, round-off moves a point off the tip
         away = np.divide(x, r[:, None], out=np.zeros_like(x), where=beyond_tip[:, None])
         return tip + sign * slope * r, sign * slope * away
 

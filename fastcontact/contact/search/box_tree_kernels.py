@@ -13,7 +13,7 @@ import numpy as np
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.arrays import Array
 
-# Capacity of the stack of boxes still to open: a tree has at most as many levels as a number of a box has bits.
+# Capacity of the stack of boxes to be opened. A tree has at most as many levels as the number of a box has bits.
 DEPTH = np.iinfo(np.int64).bits
 # A squared distance that no facet exceeds.
 FAR = float(np.finfo(np.float64).max)

@@ -14,17 +14,18 @@ from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import flat_triangles, tables
 from fastcontact.errors import ContactError
 
-# Number of consecutive points in the order of the search that need not be sorted.
+# Number of consecutive points that need not be sorted for the search.
 TOGETHER = 16
-# Overhang up to which a point still faces a side that ends there: nodes on an axis or plane of symmetry lie slightly beyond
-# inclined facets, and nodes at the end of one side beyond that of the other if the two strain differently.
+# Overhang up to which a point faces the end of a side. Nodes on an axis or in a plane of symmetry lie slightly beyond
+# inclined facets, and nodes at the end of one side beyond that of the other if both sides strain differently.
 BESIDE = 0.05
 
 
 class Closest(NamedTuple):
     """Projections of n points on their closest facets.
 
-    Normals point to the right of a line's direction, and to the side from which a face's nodes run counter-clockwise.
+    Normals point to the right of the direction of a line, and to the side from which the nodes of a face run
+    counter-clockwise.
     """
 
     facet: Indices  # (n,): row of the facet, the first one of several at equal distance
@@ -57,7 +58,7 @@ def closest(points: Array, corners: Array) -> Closest:
 
 
 def closest_of_kinds(points: Array, kinds: Sequence[Array]) -> Closest:
-    """Project points on the closest facet of several arrays of corners, one per kind; rows count through all arrays."""
+    """Project points on the closest facet of several arrays of corners, one per kind; facets are numbered through all."""
     if len(kinds) == 1:
         return closest(points, kinds[0])
     first = np.cumsum([0] + [len(corners) for corners in kinds])
@@ -85,15 +86,16 @@ def _on_faces(points: Array, corners: Array, closest: Closest) -> None:
     from fastcontact.contact.search import facets_3d_kernels, search_3d_kernels
     from fastcontact.contact.search.projection_3d_kernels import Domain, Facets
 
-    n, kind = len(corners), tables(corners.shape[1])
+    n, table = len(corners), tables(corners.shape[1])
     numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, TOGETHER)
-    midst = 0.5 * (corners.min(axis=0).min(axis=0) + corners.max(axis=0).max(axis=0))
-    facets = Facets(corners[numbers], midst, np.empty(corners.shape), np.empty(n), np.empty(n))
+    centre = 0.5 * (corners.min(axis=0).min(axis=0) + corners.max(axis=0).max(axis=0))
+    facets = Facets(corners[numbers], centre, np.empty(corners.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))
     shared(
-        lambda portion: facets_3d_kernels.prepare(facets, *portion, kind.to_terms, kind.weights, low, high), portions(n)
+        lambda portion: facets_3d_kernels.prepare(facets, *portion, table.to_terms, table.weights, low, high),
+        portions(n),
     )
-    tree, domain = build(low, high), Domain(kind.nodes, flat_triangles(len(kind.nodes)), kind.sides)
+    tree, domain = build(low, high), Domain(table.nodes, flat_triangles(len(table.nodes)), table.sides)
     shared(
         lambda portion: search_3d_kernels.closest_facets(
             points, order, *portion, facets, domain, numbers, tree, closest

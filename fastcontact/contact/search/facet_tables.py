@@ -1,4 +1,4 @@
-"""Constants of each kind of facet in 3D: sides, polynomial, flat triangles, bounds on the curvature.
+"""Constants of each kind of facet in 3D: sides, polynomials, flat triangles, and bounds on the curvature.
 
 A facet of m nodes is a polynomial of the first m terms 1, s, t, st, s^2, t^2, s^2 t, s t^2, s^2 t^2 of its reference
 coordinates.
@@ -48,7 +48,7 @@ class Tables(NamedTuple):
 
 @cache
 def tables(n_nodes: int) -> Tables:
-    """Return the constants of facets of `n_nodes` nodes, or raise ContactError if there are no such facets."""
+    """Return the constants of facets with `n_nodes` nodes; ContactError if there are no such facets."""
     if n_nodes not in _NAMES:
         raise ContactError(
             f"there are no facets of {n_nodes} nodes in three dimensions: expected one of {sorted(_NAMES)}"

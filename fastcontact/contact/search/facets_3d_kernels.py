@@ -5,7 +5,7 @@ import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.contact.search.projection_3d_kernels import vector
-from fastcontact.contact.search.straight_3d_kernels import dot, room
+from fastcontact.contact.search.straight_3d_kernels import dot, uniqueness_bound
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
@@ -16,14 +16,14 @@ def prepare(facets, begin, end, to_terms, weights, low, high):
     The boxes contain the nodes, extended at curved sides by the bound on the deviation of the facet from flat triangles.
     `to_terms` and `weights` are those of `facet_tables.Tables`.
     """
-    nodes, midst, terms, bend, convex = facets
+    nodes, centre, terms, bend, convex = facets
     m = nodes.shape[1]
     for i in range(begin, end):
         for d in range(3):
             if m <= 4:
-                _fill_straight(nodes, midst, i, d, terms, low, high)
+                _fill_straight(nodes, centre, i, d, terms, low, high)
             else:
-                _fill_curved(nodes, midst, i, d, to_terms, terms, low, high)
+                _fill_curved(nodes, centre, i, d, to_terms, terms, low, high)
         bend[i], convex[i] = 0.0, np.inf
         if m == 3:
             continue
@@ -35,33 +35,33 @@ def prepare(facets, begin, end, to_terms, weights, low, high):
             bend[i] = stray
         p, q = vector(terms, i, 1), vector(terms, i, 2)
         diagonal = np.sqrt(dot(extent, extent))
-        convex[i] = room(p, q, vector(terms, i, 3)) if m == 4 else _convex(p, q, turn, second, diagonal)
+        convex[i] = uniqueness_bound(p, q, vector(terms, i, 3)) if m == 4 else _convex(p, q, turn, second, diagonal)
 
 
 @inlined_kernel
-def _fill_straight(nodes, midst, i, d, terms, low, high):
+def _fill_straight(nodes, centre, i, d, terms, low, high):
     """Fill the terms and the box of a facet of 3 or 4 nodes, in one coordinate."""
-    p, q, r = nodes[i, 0, d] - midst[d], nodes[i, 1, d] - midst[d], nodes[i, 2, d] - midst[d]
+    p, q, r = nodes[i, 0, d] - centre[d], nodes[i, 1, d] - centre[d], nodes[i, 2, d] - centre[d]
     low[i, d], high[i, d] = min(p, q, r), max(p, q, r)
     if nodes.shape[1] == 3:
         terms[i, 0, d], terms[i, 1, d], terms[i, 2, d] = p, q - p, r - p
     else:
-        s = nodes[i, 3, d] - midst[d]
+        s = nodes[i, 3, d] - centre[d]
         terms[i, 0, d], terms[i, 1, d] = 0.25 * ((p + r) + (q + s)), 0.25 * ((q - p) + (r - s))
         terms[i, 2, d], terms[i, 3, d] = 0.25 * ((r - q) + (s - p)), 0.25 * ((p - q) + (r - s))
         low[i, d], high[i, d] = min(low[i, d], s), max(high[i, d], s)
 
 
 @inlined_kernel
-def _fill_curved(nodes, midst, i, d, to_terms, terms, low, high):
+def _fill_curved(nodes, centre, i, d, to_terms, terms, low, high):
     """Fill the terms of a facet with curved sides and the box of its nodes, in one coordinate."""
     low[i, d], high[i, d] = np.inf, -np.inf
     for k in range(to_terms.shape[0]):
         value = 0.0
         for a in range(nodes.shape[1]):
-            value += to_terms[k, a] * (nodes[i, a, d] - midst[d])
-        terms[i, k, d], place = value, nodes[i, k, d] - midst[d]
-        low[i, d], high[i, d] = min(low[i, d], place), max(high[i, d], place)
+            value += to_terms[k, a] * (nodes[i, a, d] - centre[d])
+        terms[i, k, d], x = value, nodes[i, k, d] - centre[d]
+        low[i, d], high[i, d] = min(low[i, d], x), max(high[i, d], x)
 
 
 @inlined_kernel

@@ -12,19 +12,20 @@ import numpy as np
 from fastcontact._jit.decorators import inlined_kernel, kernel
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.search.limits import MAX_ITERATIONS, STEP
-from fastcontact.contact.search.straight_3d_kernels import cross, dot, minus, on_flat, rest, unit
+from fastcontact.contact.search.straight_3d_kernels import cross, dot, minus, on_flat, residual, unit
 from fastcontact.round_off import ROUND_OFF
 
 
 class Facets(NamedTuple):
     """Facets of one kind, relative to their centre, since round-off far from the origin would exceed STEP.
 
-    `convex` bounds the distance up to which a local minimum is unique: with four nodes by `straight_3d_kernels.room`,
-    with more nodes by the square of a distance below which half the squared distance is convex.
+    `convex` bounds the distance up to which a local minimum is unique: with four nodes by
+    `straight_3d_kernels.uniqueness_bound`, with more nodes by the square of a distance below which half the squared distance
+    is convex.
     """
 
     nodes: Array  # (n_facets, m, 3), relative to the origin [length]
-    midst: Array  # (3,): their centre [length]
+    centre: Array  # (3,): centre of all nodes [length]
     terms: Array  # (n_facets, m, 3): coefficients of the polynomials [length]
     bend: Array  # (n_facets,): bound on a facet's deviation from the flat triangles between its nodes [length]
     convex: Array  # (n_facets,) [length^2]
@@ -47,7 +48,7 @@ def vector(vectors, f, k):
 @inlined_kernel
 def node(facets, f, k):
     """Return node `k` of facet `f`, relative to the centre."""
-    return minus(vector(facets.nodes, f, k), (facets.midst[0], facets.midst[1], facets.midst[2]))
+    return minus(vector(facets.nodes, f, k), (facets.centre[0], facets.centre[1], facets.centre[2]))
 
 
 @kernel
@@ -107,8 +108,8 @@ def _expansion(terms, f, s, t, point):
 def _allowed(sides, s, t, ps, pt, size):
     """Return whether a step (ps, pt) from (s, t) leaves the domain through none of the sides that (s, t) lies on."""
     for k in range(sides.shape[0]):
-        on = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t <= ROUND_OFF
-        if on and sides[k, 0] * ps + sides[k, 1] * pt > 1e-14 * size:
+        on_side = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t <= ROUND_OFF
+        if on_side and sides[k, 0] * ps + sides[k, 1] * pt > 1e-14 * size:
             return False
     return True
 
@@ -204,8 +205,8 @@ def descend(terms, f, s, t, sides, point):
         for k in range(sides.shape[0]):
             rate = sides[k, 0] * ps + sides[k, 1] * pt
             if rate > ROUND_OFF * size:  # along a side, it is round-off
-                room = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t
-                length = min(length, max(room, 0.0) / rate)
+                distance = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t
+                length = min(length, max(distance, 0.0) / rate)
         if length * size > 1e-6:  # in smaller steps round-off exceeds the decrease
             for _ in range(40):
                 if half_square(terms, f, s + length * ps, t + length * pt, point) <= value * (1.0 + 1e-14):
@@ -240,20 +241,20 @@ def project(facets, f, domain, point, reach):
         return s, t, best, True
     for k in range(triangles.shape[0] if bend > 0.0 else 0):
         a, b, square = _on_triangle(facets, f, nodes, triangles, k, point)
-        most = np.sqrt(2.0 * best) + bend
-        if square > most * most or abs(a - tried_s) + abs(b - tried_t) < 1e-3:
+        largest = np.sqrt(2.0 * best) + bend
+        if square > largest * largest or abs(a - tried_s) + abs(b - tried_t) < 1e-3:
             continue
-        a, b, good = descend(terms, f, a, b, sides, point)
+        a, b, success = descend(terms, f, a, b, sides, point)
         value = half_square(terms, f, a, b, point)
         if value < best:
-            s, t, best, converged = a, b, value, good
+            s, t, best, converged = a, b, value, success
     side = minus(node(facets, f, 1), node(facets, f, 0))
     # Near the centres of curvature the distance has several minima on one triangle, so that the descent starts at every node.
     for k in range(nodes.shape[0] if np.sqrt(2.0 * best) * 16.0 * bend > dot(side, side) else 0):
-        a, b, good = descend(terms, f, nodes[k, 0], nodes[k, 1], sides, point)
+        a, b, success = descend(terms, f, nodes[k, 0], nodes[k, 1], sides, point)
         value = half_square(terms, f, a, b, point)
         if value < best:
-            s, t, best, converged = a, b, value, good
+            s, t, best, converged = a, b, value, success
     return s, t, best, converged
 
 
@@ -264,7 +265,7 @@ def _on_triangle(facets, f, nodes, triangles, k, point):
     origin = node(facets, f, a)
     p, q, r = minus(node(facets, f, b), origin), minus(node(facets, f, c), origin), minus(point, origin)
     v, w = on_flat(r, p, q)
-    u, away = 1.0 - v - w, rest(r, p, q, (0.0, 0.0, 0.0), v, w)
+    u, away = 1.0 - v - w, residual(r, p, q, (0.0, 0.0, 0.0), v, w)
     s = u * nodes[a, 0] + v * nodes[b, 0] + w * nodes[c, 0]
     t = u * nodes[a, 1] + v * nodes[b, 1] + w * nodes[c, 1]
     return s, t, dot(away, away)
@@ -274,8 +275,8 @@ def _on_triangle(facets, f, nodes, triangles, k, point):
 def onto_sides(sides, s, t):
     """Return (s, t) moved exactly onto the sides that it lies on up to round-off."""
     for k in range(sides.shape[0]):
-        room = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t
-        if room <= ROUND_OFF:
+        distance = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t
+        if distance <= ROUND_OFF:
             # The equation a s + b t = c is solved for s unless a = 0; s is then as accurate as t.
             if sides[k, 0] != 0.0:
                 s = (sides[k, 2] - sides[k, 1] * t) / sides[k, 0]

@@ -65,8 +65,8 @@ def _project(nodes, f, x, y):
 def _precedes(nodes, f, s, g, r, numbers):
     """Return whether of two equally close facets, `f` at s and `g` at r, `f` is taken.
 
-    Where a line continues smoothly beyond a common node, it is the one that ends there, whatever the numbers of facets are.
-    At corners of more than 45 degrees, and otherwise, it is the one with the lowest number.
+    If a line continues smoothly beyond a common node, the facet that ends there is taken, independently of the numbering. At
+    corners of more than 45 degrees and in all other cases, it is the facet with the lowest number.
     """
     _, _, px, py, _, _ = _curve(nodes, f, s)
     _, _, qx, qy, _, _ = _curve(nodes, g, r)
@@ -80,9 +80,9 @@ def _precedes(nodes, f, s, g, r, numbers):
 def closest_facets(points, order, begin, end, nodes, numbers, tree, result):
     """Project points (n, 2) on their closest facets; see `_precedes` for equally close ones.
 
-    Points are taken from `begin` to `end` of an `order` (n,) in which neighbours in space
-    follow each other. Facets are in the order of the tree; `numbers` (n_facets,) are those before they were sorted. `result`
-    is filled in place, with facet -1 and distance NaN where a point is not finite.
+    Points are those from `begin` to ``end - 1`` in an `order` (n,) in which neighbours in space follow each other. Facets are
+    in the order of the tree, and `numbers` (n_facets,) are their numbers before sorting. `result` is filled in place, with
+    facet -1 and distance NaN if a point is not finite.
     """
     stack, squares, leaves = np.empty(DEPTH, np.int64), np.empty(DEPTH), len(tree.low) // 2
     for k in range(begin, end):

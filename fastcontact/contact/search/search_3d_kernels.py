@@ -19,12 +19,12 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, clo
     is also -1.
     """
     stack, squares, leaves = np.empty(DEPTH, np.int64), np.empty(DEPTH), len(tree.low) // 2
-    midst = facets.midst[0], facets.midst[1], facets.midst[2]
+    centre = facets.centre[0], facets.centre[1], facets.centre[2]
     for k in range(begin, end):
         i = order[k]
-        point = minus((points[i, 0], points[i, 1], points[i, 2]), midst)
+        point = minus((points[i, 0], points[i, 1], points[i, 2]), centre)
         closest, best, same, certain, converged = -1, np.inf, 0.0, False, True
-        best_s, best_t, place, reach, top = 0.0, 0.0, point, FAR, 0
+        best_s, best_t, foot, reach, top = 0.0, 0.0, point, FAR, 0
         if np.isfinite(point[0] + point[1] + point[2]):
             stack[0], squares[0], top = 1, square_to_box(tree, 1, point), 1
         while top > 0:
@@ -36,14 +36,14 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, clo
                 top = open_box(tree, box, point, stack, squares, top)
                 continue
             f = box - leaves
-            s, t, trial, square, good, inside = _projected(facets, f, domain, point, reach)
+            s, t, trial, square, success, inside = _projected(facets, f, domain, point, reach)
             if square == np.inf:
                 continue
-            gap = minus(trial, place)
+            gap = minus(trial, foot)
             # Facets whose closest points coincide meet there and are equally close.
             tied = closest >= 0 and (dot(gap, gap) <= same * same or square == best)
             if (numbers[f] < numbers[closest]) if tied else (square < best):
-                closest, best_s, best_t, place, certain, converged = f, s, t, trial, inside, good
+                closest, best_s, best_t, foot, certain, converged = f, s, t, trial, inside, success
                 same = LENGTH_ROUND_OFF * _size(tree.low, tree.high, box)
             if square < best:
                 best = square
@@ -52,11 +52,11 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, clo
         closest_facet.facet[i], closest_facet.distance[i] = -1, np.nan
         if closest >= 0:
             closest_facet.facet[i] = numbers[closest]
-            _write(closest_facet, i, facets, closest, domain, best_s, best_t, point, place, certain, converged)
+            _write(closest_facet, i, facets, closest, domain, best_s, best_t, point, foot, certain, converged)
 
 
 @inlined_kernel
-def _write(closest, i, facets, f, domain, s, t, point, place, inside, converged):
+def _write(closest, i, facets, f, domain, s, t, point, foot, inside, converged):
     """Fill the results for point `i`, except the number of the facet `f`."""
     if inside:
         a, b, c = vector(facets.terms, f, 1), vector(facets.terms, f, 2), _twist(facets.terms, f)
@@ -64,12 +64,12 @@ def _write(closest, i, facets, f, domain, s, t, point, place, inside, converged)
     else:
         s, t = onto_sides(domain.sides, s, t)
         normal, overhang = frame(facets.terms, f, s, t, point, domain.sides, domain.nodes)
-    gap = minus(point, place)
+    gap = minus(point, foot)
     closest.xi[i, 0], closest.xi[i, 1], closest.overhang[i] = s, t, overhang
     if converged and np.isfinite(normal[0]):
         closest.distance[i] = np.sqrt(dot(gap, gap))
     for d in range(3):
-        closest.normal[i, d], closest.position[i, d] = normal[d], place[d] + facets.midst[d]
+        closest.normal[i, d], closest.position[i, d] = normal[d], foot[d] + facets.centre[d]
 
 
 @inlined_kernel
@@ -94,16 +94,16 @@ def _projected(facets, f, domain, point, reach):
         else:
             s, t, d = on_bilinear(r, a, b, c, np.sqrt(reach))
             inside = abs(s) < 1.0 and abs(t) < 1.0
-        place = along(along(along(o, a, s), b, t), c, s * t)
-        gap = minus(point, place)
+        foot = along(along(along(o, a, s), b, t), c, s * t)
+        gap = minus(point, foot)
         if d == np.inf:
-            return s, t, place, np.inf, True, False
+            return s, t, foot, np.inf, True, False
         if terms.shape[1] == 3 or (abs(dot(gap, c)) < facets.convex[f] and d >= 0.0):
-            return s, t, place, dot(gap, gap), True, inside
-    s, t, d, good = project(facets, f, domain, point, reach)
-    place = component(terms, f, 0, s, t)[0], component(terms, f, 1, s, t)[0], component(terms, f, 2, s, t)[0]
-    gap = minus(point, place)
-    return s, t, place, np.inf if d == np.inf else dot(gap, gap), good, False
+            return s, t, foot, dot(gap, gap), True, inside
+    s, t, d, converged = project(facets, f, domain, point, reach)
+    foot = component(terms, f, 0, s, t)[0], component(terms, f, 1, s, t)[0], component(terms, f, 2, s, t)[0]
+    gap = minus(point, foot)
+    return s, t, foot, np.inf if d == np.inf else dot(gap, gap), converged, False
 
 
 @inlined_kernel

@@ -43,7 +43,7 @@ def along(o, a, s):
 
 
 @kernel
-def rest(r, a, b, c, s, t):
+def residual(r, a, b, c, s, t):
     """Return the vector from the point (s, t) of the facet ``a s + b t + c s t`` to `r`."""
     return (
         r[0] - s * a[0] - t * b[0] - s * t * c[0],
@@ -81,7 +81,7 @@ def on_flat(r, a, b):
     area = va + vb + vc
     s, t = vb / area, vc / area
     if square < LENGTH_ROUND_OFF * aa * bb:  # one step of iterative refinement, since rounding errors are large here
-        v = rest(r, a, b, (0.0, 0.0, 0.0), s, t)
+        v = residual(r, a, b, (0.0, 0.0, 0.0), s, t)
         s, t = s + (bb * dot(a, v) - ab * dot(b, v)) / square, t + (aa * dot(b, v) - ab * dot(a, v)) / square
     if s >= -ROUND_OFF and t >= -ROUND_OFF and s + t <= 1.0 + ROUND_OFF:
         return s, t
@@ -105,10 +105,10 @@ def _on_longest_side(r, a, b):
 def on_bilinear(r, a, b, c, reach):
     """Return (s, t) of the point ``a s + b t + c s t`` of a bilinear facet closest to `r`, and the squared distance.
 
-    The result is exact where the squared distance has only one minimum on the facet (see `room`); elsewhere it is NaN or a
-    stationary point. The distance is infinite where it clearly exceeds `reach`. Newton's method starts from the closest point
-    on the plane of a and b, and uses precomputed products of vectors. If it leaves the facet, the result is the closest point
-    of the straight sides.
+    The result is exact where the squared distance has only one minimum on the facet (see `uniqueness_bound`); elsewhere it
+    is NaN or a stationary point. The distance is infinite where it clearly exceeds `reach`. Newton's method starts from the
+    closest point on the plane of a and b, and uses precomputed products of vectors. If it leaves the facet, the result is
+    the closest point of the straight sides.
     """
     aa, ab, bb, ac, bc, cc = dot(a, a), dot(a, b), dot(b, b), dot(a, c), dot(b, c), dot(c, c)
     ar, br, cr = dot(a, r), dot(b, r), dot(c, r)
@@ -125,11 +125,11 @@ def on_bilinear(r, a, b, c, reach):
     for _ in range(2):
         s, t, stationary = _stationary(aa, ab, bb, ac, bc, cc, ar, br, cr, s, t)
         if stationary:
-            v = rest(r, a, b, c, s, t)
+            v = residual(r, a, b, c, s, t)
             return s, t, dot(v, v)
         s, t, square = _on_sides(r, a, b, c, aa, ab, bb, ac, bc, cc, ar, br, cr)
         # The minimum over the sides is the global one if the distance does not decrease into the facet.
-        v = rest(r, a, b, c, s, t)
+        v = residual(r, a, b, c, s, t)
         inward = (abs(s) == 1.0 and s * dot(v, along(a, c, t)) < 0.0) or (
             abs(t) == 1.0 and t * dot(v, along(b, c, s)) < 0.0
         )
@@ -141,7 +141,7 @@ def on_bilinear(r, a, b, c, reach):
 
 @kernel
 def _stationary(aa, ab, bb, ac, bc, cc, ar, br, cr, s, t):
-    """Return where Newton's method gets from (s, t), and whether that is a stationary point inside the facet."""
+    """Return the point that Newton's method reaches from (s, t), and whether it is a stationary point inside the facet."""
     for _ in range(8):
         if not (abs(s) < 1.0 - ROUND_OFF and abs(t) < 1.0 - ROUND_OFF):
             return s, t, False
@@ -170,7 +170,7 @@ def _on_sides(r, a, b, c, aa, ab, bb, ac, bc, cc, ar, br, cr):
         else:
             s, t = (ar - sign * (ab - cr) - bc) / (aa + sign * 2.0 * ac + cc), sign
             s = min(max(s, -1.0), 1.0)
-        v = rest(r, a, b, c, s, t)
+        v = residual(r, a, b, c, s, t)
         square = dot(v, v)
         if square < best:
             best, best_s, best_t = square, s, t
@@ -178,7 +178,7 @@ def _on_sides(r, a, b, c, aa, ab, bb, ac, bc, cc, ar, br, cr):
 
 
 @kernel
-def room(a, b, c):
+def uniqueness_bound(a, b, c):
     """Return the bound on |(r - X) . c| below which a local minimum X of the distance to r is the only one on the facet.
 
     Let r - X = v, and let another point be X + ds p + dt q, with p the tangent along s at the t of that point and q the

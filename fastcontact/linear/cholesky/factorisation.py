@@ -19,7 +19,7 @@ from fastcontact.linear.cholesky import elimination_tree_kernels, factorisation_
 from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Largest fraction of explicit zeros in merged supernodes: SHARES for widths up to each of WIDTHS, and beyond.
+# Largest fraction of explicit zeros in merged supernodes, by SHARES for widths up to each of WIDTHS and for larger widths.
 WIDTHS, SHARES = np.array([4, 16, 48]), np.array([0.8, 0.5, 0.1, 0.05])
 
 
@@ -31,10 +31,10 @@ def singular() -> ModelError:
 def fill_reducing(K: bsr_array, last: Indices, connected: bool = False) -> Indices:
     """Return the unknowns (n,) of K in a fill-reducing elimination order, with the unknowns `last` (m,) at the end.
 
-    If `connected`, the order takes into account that these are connected with each other when all others are eliminated.
-    Nodes are ordered by the minimum degree algorithm for the pattern of K (Liu, 1985). SciPy only provides this order as a
-    part of the factorisations of SuperLU. An incomplete factorisation that drops all entries costs little more than the
-    ordering.
+    With `connected`, the order takes into account that the unknowns `last` are coupled with each other after the elimination
+    of all others. Nodes are ordered by the minimum degree algorithm for the pattern of K (Liu, 1985). SciPy only provides
+    this order as a part of the factorisations of SuperLU. An incomplete factorisation that drops all entries costs little
+    more than the ordering.
     """
     size = K.blocksize[0]
     n = K.shape[0] // size
@@ -49,26 +49,26 @@ def fill_reducing(K: bsr_array, last: Indices, connected: bool = False) -> Indic
         options={"SymmetricMode": True},
     )  # fmt: skip
     order = (np.argsort(incomplete.perm_c)[:, None] * size + np.arange(size)).ravel()
-    late = np.zeros(len(order), bool)
-    late[last] = True
-    return np.concatenate([order[~late[order]], order[late[order]]])
+    is_last = np.zeros(len(order), bool)
+    is_last[last] = True
+    return np.concatenate([order[~is_last[order]], order[is_last[order]]])
 
 
 def reordered(K: bsr_array, order: Indices) -> csc_array:
-    """Return the symmetric matrix K (n, n) with its unknowns in the given order (n,)."""
+    """Return the symmetric matrix K (n, n) with its unknowns in the order `order` (n,)."""
     rows = K.tocsr()[order][:, order]
     return csc_array((rows.data, rows.indices, rows.indptr), shape=K.shape)  # symmetric: rows are columns
 
 
-class Kept(NamedTuple):
-    """Data of the last factorisation that the next one may reuse.
+class Previous(NamedTuple):
+    """Results of the previous factorisation that the next one may reuse.
 
     Attributes
     ----------
     entries : ndarray (nnz,)
         Entries of the matrix.
     offsets : ndarray of int (n_supernodes,)
-        Offset of the update matrix of each supernode, if it is stored.
+        Offset of the update matrix of each supernode, or -1 if it is not stored.
     factors : tuple of three ndarray
         Entries of L, of D, and of the stored update matrices; see `factorisation_kernels`.
     """
@@ -91,31 +91,31 @@ class SymbolicFactors:
     Parameters
     ----------
     K : bsr_array (n, n)
-        One of these matrices.
+        A matrix with this pattern.
     last : ndarray of int (m,)
         Unknowns that are eliminated last.
     many : bool, optional
-        Whether there are many matrices, so that the better of two orders is worth its time.
+        Whether many matrices will be factorised, so that it pays off to compute two orders and choose the better one.
     """
 
     def __init__(self, K: bsr_array, last: Indices, many: bool = False) -> None:
-        n, late = K.shape[0], np.zeros(K.shape[0], bool)
+        n, is_last = K.shape[0], np.zeros(K.shape[0], bool)
         self._pattern, self._last = (K.indptr, K.indices), last
-        self._kept = Kept(np.empty(0), np.empty(0, np.int64), NO_FACTORS)
+        self._previous = Previous(np.empty(0), np.empty(0, np.int64), NO_FACTORS)
         self._numbers: csc_array | None = None
         self._first: csc_array | None
         orders = [fill_reducing(K, last, connected) for connected in (False, True)[: 1 + many]]
         analysed = [(order, A := reordered(K, order), elimination_tree(A)) for order in orders]
-        order, self._first, self._tree = min(analysed, key=lambda one: np.square(one[2].entries, dtype=float).sum())
+        order, self._first, self._tree = min(analysed, key=lambda entry: np.square(entry[2].entries, dtype=float).sum())
         self._unknowns, self._position = order[self._tree.order], np.empty(n, np.intp)
         self._position[self._unknowns] = np.arange(n)
-        late[self._position[last]] = True
-        self._nodes = supernodes(self._first, self._tree, late)
-        above = self._tree.parent[self._nodes.first[1:] - 1].astype(np.int64)
-        self._above = np.where(above < 0, -1, np.searchsorted(self._nodes.first, above, side="right") - 1)
+        is_last[self._position[last]] = True
+        self._supernodes = supernodes(self._first, self._tree, is_last)
+        parent = self._tree.parent[self._supernodes.first[1:] - 1].astype(np.int64)
+        self._parent = np.where(parent < 0, -1, np.searchsorted(self._supernodes.first, parent, side="right") - 1)
 
-    def serves(self, K: bsr_array, last: Indices) -> bool:
-        """Return whether the matrix K has the pattern of this factorisation, and the same unknowns are eliminated last."""
+    def matches(self, K: bsr_array, last: Indices) -> bool:
+        """Return whether K has the pattern of this factorisation, and `last` are the unknowns that are eliminated last."""
         return all(map(np.array_equal, (*self._pattern, self._last), (K.indptr, K.indices, last)))
 
     @on_one_blas_thread
@@ -127,49 +127,50 @@ class SymbolicFactors:
         ModelError
             If K is singular or not positive definite.
         """
-        (A, *place), nodes, n = self._numbered(K), self._nodes, K.shape[0]
+        (A, *permutation), nodes, n = self._numbered(K), self._supernodes, K.shape[0]
         width, below = np.diff(nodes.first), np.diff(nodes.begin)
         start = np.concatenate([[0], np.cumsum(np.repeat(nodes.first[1:] + below, width) - np.arange(n))])
         values, d = np.empty(start[-1]), np.empty(n)
-        sizes = factorisation_kernels.room(self._tree.parent, nodes.first, nodes.begin)
-        source, target, updates = self._planned(A, place[0])
-        bad = factorisation_kernels.factorise(
-            A.indptr, A.indices, A.data, *place, self._tree.parent, *nodes, sizes, start,
-            source, self._kept.factors, target, updates, values, d,
+        sizes = factorisation_kernels.work_sizes(self._tree.parent, nodes.first, nodes.begin)
+        source, target, updates = self._planned(A, permutation[0])
+        failed = factorisation_kernels.factorise(
+            A.indptr, A.indices, A.data, *permutation, self._tree.parent, *nodes, sizes, start,
+            source, self._previous.factors, target, updates, values, d,
         )  # fmt: skip
-        if bad >= 0:
-            if abs(d[bad]) <= LENGTH_ROUND_OFF * A.diagonal()[place[0][bad]]:
+        if failed >= 0:
+            if abs(d[failed]) <= LENGTH_ROUND_OFF * A.diagonal()[permutation[0][failed]]:
                 raise singular()
             raise ModelError("the stiffness matrix is not positive definite: check the material and the cells")
         if self._numbers is not None:
-            self._kept = Kept(A.data, target, (values, d, updates) if (target >= 0).any() else NO_FACTORS)
+            self._previous = Previous(A.data, target, (values, d, updates) if (target >= 0).any() else NO_FACTORS)
         return SymmetricFactors(LowerTriangle(start, values, *nodes), d, self._position, self._last)
 
     def _planned(self, A: csc_array, order: Numbers) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """Return `source` and `target` (n_supernodes,) of `factorisation_kernels.plan`, and an array for update matrices."""
-        nodes, kept, size = self._nodes, self._kept, 0
-        source, target = np.full((2, len(self._above)), -1)
-        if len(kept.entries):
+        nodes, previous, size = self._supernodes, self._previous, 0
+        source, target = np.full((2, len(self._parent)), -1)
+        if len(previous.entries):
             size = factorisation_kernels.plan(
-                A.indptr, A.data, kept.entries, order, self._above, nodes.first, nodes.begin, kept.offsets, source, target,
+                A.indptr, A.data, previous.entries, order, self._parent, nodes.first, nodes.begin, previous.offsets,
+                source, target,
             )  # fmt: skip
         return source, target, np.empty(size)
 
     def _numbered(self, K: bsr_array) -> tuple[csc_array, Numbers, Numbers]:
-        """Return K, and its columns in the order of elimination with the inverse; see `factorisation_kernels.factorise`.
+        """Return K, its columns in the order of elimination, and the inverse; see `factorisation_kernels.factorise`.
 
-        From the second matrix on, K is its lower triangle in this order, taken by cached numbers of its entries.
+        From the second matrix on, only the lower triangle in this order is returned, by the cached positions of its entries.
         """
         if self._first is not None:
             A, self._first = self._first, None
-            return A, self._tree.order, self._tree.place
+            return A, self._tree.order, self._tree.position
         if self._numbers is None:
             numbers = np.arange(K.data.size, dtype=np.int64).reshape(K.data.shape)
             A = reordered(bsr_array((numbers, K.indices, K.indptr), shape=K.shape), self._unknowns).tocoo()
             lower = A.row >= A.col
             self._numbers = csc_array((A.data[lower], (A.row[lower], A.col[lower])), shape=K.shape)
-        A, same = self._numbers, np.arange(K.shape[0], dtype=np.intc)
-        return csc_array((K.data.ravel()[A.data], A.indices, A.indptr), shape=K.shape), same, same
+        A, identity = self._numbers, np.arange(K.shape[0], dtype=np.intc)
+        return csc_array((K.data.ravel()[A.data], A.indices, A.indptr), shape=K.shape), identity, identity
 
 
 class Tree(NamedTuple):
@@ -177,7 +178,7 @@ class Tree(NamedTuple):
 
     Attributes
     ----------
-    order, place : ndarray of int (n,)
+    order, position : ndarray of int (n,)
         Postorder of the columns, and its inverse.
     parent : ndarray of int (n,)
         Parent of each column in postorder, -1 for roots.
@@ -186,7 +187,7 @@ class Tree(NamedTuple):
     """
 
     order: Numbers
-    place: Numbers
+    position: Numbers
     parent: Numbers
     entries: Numbers
 
@@ -217,16 +218,16 @@ def elimination_tree(A: csc_array) -> Tree:
     elimination_tree_kernels.postordered(parent, order)
     elimination_tree_kernels.counts(A.indptr, A.indices, parent, order, count)
     position[order] = np.arange(n, dtype=np.intc)
-    above = parent[order]
-    return Tree(order, position, np.where(above < 0, np.intc(-1), position[above]), count[order])
+    ordered_parent = parent[order]
+    return Tree(order, position, np.where(ordered_parent < 0, np.intc(-1), position[ordered_parent]), count[order])
 
 
-def supernodes(A: csc_array, tree: Tree, late: Mask) -> Supernodes:
-    """Return the supernodes of A (n, n), none of which mixes `late` columns (n,) and others."""
+def supernodes(A: csc_array, tree: Tree, is_last: Mask) -> Supernodes:
+    """Return the supernodes of A (n, n), none of which mixes columns that `is_last` (n,) marks with others."""
     n = A.shape[0]
     first, below = np.empty(n + 1, np.int64), np.empty(n + 1, np.int64)
-    count = elimination_tree_kernels.supernodes(tree.parent, tree.entries, late, WIDTHS, SHARES, first, below)
+    count = elimination_tree_kernels.supernodes(tree.parent, tree.entries, is_last, WIDTHS, SHARES, first, below)
     first, begin = first[: count + 1].copy(), np.concatenate([[0], np.cumsum(below[:count])])
     rows = np.empty(begin[-1], np.intc)
-    elimination_tree_kernels.rows_below(A.indptr, A.indices, tree.order, tree.place, tree.parent, first, begin, rows)
+    elimination_tree_kernels.rows_below(A.indptr, A.indices, tree.order, tree.position, tree.parent, first, begin, rows)
     return Supernodes(first, begin, rows)

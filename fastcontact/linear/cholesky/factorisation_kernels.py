@@ -2,9 +2,10 @@
 """Multifrontal factorisation ``L D L.T`` of a sparse symmetric positive definite matrix (Duff and Reid, 1983).
 
 Every supernode assembles a dense frontal matrix from its own columns of the matrix and the update matrices of its children in
-the elimination tree. Its columns are eliminated there, and the update matrix is passed to the parent.
-Fronts are symmetric, and only their upper triangles count: row j of a front is column j of L. Subtrees in which the matrix
-has not changed since the last factorisation keep their columns of L, and the update matrix that their root passes on.
+the elimination tree. The columns of the supernode are eliminated in this front, and the remaining update matrix is passed to
+the parent. Fronts are symmetric, and only their upper triangles are used, so that row j of a front becomes column j of L.
+Subtrees in which the matrix has not changed since the last factorisation keep their columns of L and the update matrix of
+their root.
 """
 
 from __future__ import annotations
@@ -15,71 +16,72 @@ from fastcontact._jit.decorators import innermost_kernel, interpretable_kernel, 
 from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.cholesky.triangular_kernels import PANEL, Offsets
 
-# Number of columns that are subtracted in one pass.
+# Number of columns of L whose contributions are subtracted in one pass.
 TOGETHER = 4
-# Smallest number of multiplications for which a product is passed to BLAS.
+# Smallest number of multiplications for which a matrix product is computed by BLAS.
 SMALL = 20_000
 
 
 @interpretable_kernel
-def room(parent: Numbers, first: Offsets, begin: Offsets) -> tuple[int, int]:
-    """Return the size of the largest front, and the peak size of the stack of update matrices."""
+def work_sizes(parent: Numbers, first: Offsets, begin: Offsets) -> tuple[int, int]:
+    """Return the numbers of entries of the largest front, and of the stack of update matrices at its peak."""
     count = len(first) - 1
-    front = most = used = top = 0
-    left = np.empty(count, np.int64)  # supernodes whose update matrix is on the stack
+    largest_front = peak = used = top = 0
+    stacked = np.empty(count, np.int64)  # supernodes whose update matrix is on the stack
     for s in range(count):
         below = begin[s + 1] - begin[s]
-        front = max(front, (first[s + 1] - first[s] + below) ** 2)
-        while top > 0 and first[s] <= parent[first[left[top - 1] + 1] - 1] < first[s + 1]:
+        largest_front = max(largest_front, (first[s + 1] - first[s] + below) ** 2)
+        while top > 0 and first[s] <= parent[first[stacked[top - 1] + 1] - 1] < first[s + 1]:
             top -= 1
-            used -= (begin[left[top] + 1] - begin[left[top]]) ** 2
+            used -= (begin[stacked[top] + 1] - begin[stacked[top]]) ** 2
         if below:
-            left[top] = s
+            stacked[top] = s
             top += 1
             used += below**2
-            most = max(most, used)
-    return front, most
+            peak = max(peak, used)
+    return largest_front, peak
 
 
 @kernel
 def plan(
-    start: Numbers, values: Array, before: Array, order: Numbers, above: Offsets, first: Offsets, begin: Offsets,
-    kept: Offsets, source: Offsets, target: Offsets,
+    start: Numbers, values: Array, previous: Array, order: Numbers, supernode_parent: Offsets, first: Offsets, begin: Offsets,
+    kept_offsets: Offsets, source: Offsets, target: Offsets,
 ) -> int:  # fmt: skip
-    """Plan the factorisation of a matrix after that of a matrix with the same pattern; return the size of updates to keep.
+    """Plan the factorisation of a matrix whose pattern is that of the previous one; return the size of the updates to keep.
 
     Parameters
     ----------
     start, order, first, begin
         See `factorise`.
-    values, before : ndarray
-        Entries of this matrix and of the previous one.
-    above : ndarray of int (n_supernodes,)
+    values, previous : ndarray
+        Entries of the new and of the previous matrix.
+    supernode_parent : ndarray of int (n_supernodes,)
         Parents of supernodes, or -1.
-    kept : ndarray of int (n_supernodes,)
-        Offsets of the update matrices that are kept from the last factorisation, or -1.
+    kept_offsets : ndarray of int (n_supernodes,)
+        Offsets of the update matrices that were kept from the previous factorisation, or -1.
     source : ndarray of int (n_supernodes,)
-        Filled with -1 for supernodes that are factorised, -2 for those below the root of a subtree that keeps its columns,
-        and for the root itself with the offset of its update matrix.
+        Filled with -1 for supernodes that are factorised. In subtrees that keep their columns, the root is assigned the
+        offset of its update matrix, and the other supernodes -2.
     target : ndarray of int (n_supernodes,)
-        Filled with the offsets of the update matrices to keep, those of the largest subtrees without a change, or -1.
+        Filled with the offsets of the update matrices to keep, which are those of the roots of the largest subtrees without
+        a change, or -1.
     """
-    count, size = len(above), 0
+    count, size = len(supernode_parent), 0
     changed = np.zeros(count, np.bool_)
     for s in range(count):
         for j in range(first[s], first[s + 1]):
             for k in range(start[order[j]], start[order[j] + 1]):
-                changed[s] |= values[k] != before[k]
-        if changed[s] and above[s] >= 0:
-            changed[above[s]] = True
+                changed[s] |= values[k] != previous[k]
+        if changed[s] and supernode_parent[s] >= 0:
+            changed[supernode_parent[s]] = True
     for s in range(count - 1, -1, -1):
-        root = above[s] < 0
+        root = supernode_parent[s] < 0
         source[s], target[s] = -1, -1
-        if not root and source[above[s]] != -1:
+        if not root and source[supernode_parent[s]] != -1:
             source[s] = -2
         elif not changed[s]:
-            source[s] = kept[s]
-        if not changed[s] and (root or changed[above[s]]):
+            source[s] = kept_offsets[s]
+        if not changed[s] and (root or changed[supernode_parent[s]]):
             target[s] = size
             size += (begin[s + 1] - begin[s]) ** 2
     return size
@@ -89,15 +91,15 @@ def plan(
 def factorise(
     start: Numbers, rows: Numbers, values: Array, order: Numbers, position: Numbers, parent: Numbers, first: Offsets,
     begin: Offsets, below: Numbers, sizes: tuple[int, int], begins: Offsets,
-    source: Offsets, last: tuple[Array, Array, Array], target: Offsets, updates: Array, L: Array, d: Array,
+    source: Offsets, previous: tuple[Array, Array, Array], target: Offsets, updates: Array, L: Array, d: Array,
 ) -> int:  # fmt: skip
-    """Fill L and `d` (n,); return the first column whose pivot, then in `d`, is not positive, or -1.
+    """Fill L and `d` (n,); return -1, or the first column whose pivot, which `d` contains, is not positive.
 
     Parameters
     ----------
     start, rows, values
-        The matrix by columns, at least the lower triangle in the order of elimination; everything else is numbered as in
-        `elimination_tree_kernels.postordered`.
+        The matrix by columns, at least its lower triangle in the order of elimination. All other arguments are numbered
+        in the postorder of `elimination_tree_kernels.postordered`.
     order, position : ndarray of int (n,)
         Columns of the matrix in the order of elimination, and the inverse.
     parent : ndarray of int (n,)
@@ -105,13 +107,13 @@ def factorise(
     first, begin, below
         Supernodes and the rows below them, as in `triangular_kernels`.
     sizes : (int, int)
-        See `room`.
+        See `work_sizes`.
     begins : ndarray of int (n + 1,)
         Offsets of the columns of L.
     source, target : ndarray of int (n_supernodes,)
         See `plan`.
-    last : (ndarray, ndarray, ndarray)
-        L, `d` and `updates` of the last factorisation.
+    previous : (ndarray, ndarray, ndarray)
+        L, `d` and `updates` of the previous factorisation.
     updates : ndarray
         Filled with the update matrices to keep.
     L : ndarray
@@ -120,57 +122,57 @@ def factorise(
         Filled with the diagonal of D.
     """
     count = len(first) - 1
-    front, waiting = np.empty(sizes[0]), np.empty(sizes[1])
-    local, left = np.empty(len(order), np.int64), np.empty(count, np.int64)
-    # Work space for a panel, its transpose and product.
+    front, stack = np.empty(sizes[0]), np.empty(sizes[1])
+    local, stacked = np.empty(len(order), np.int64), np.empty(count, np.int64)
+    # Work space for a panel, the panel multiplied by its pivots, and the product of both.
     widest = 0
     for s in range(count):
         widest = max(widest, first[s + 1] - first[s] + begin[s + 1] - begin[s])
-    one, other, product = np.empty(PANEL * widest), np.empty(PANEL * widest), np.empty(2 * PANEL * widest)
+    panel, scaled_panel, product = np.empty(PANEL * widest), np.empty(PANEL * widest), np.empty(2 * PANEL * widest)
     top = used = 0
     for s in range(count):
-        low, high, rest = first[s], first[s + 1], below[begin[s] : begin[s + 1]]
-        m = len(rest)
+        low, high, rows_below = first[s], first[s + 1], below[begin[s] : begin[s + 1]]
+        m = len(rows_below)
         if source[s] == -1:
             size = high - low + m
             F = front[: size * size].reshape(size, size)
-            _gather(start, rows, values, order, position, low, high, rest, local, F)
-            while top > 0 and low <= parent[first[left[top - 1] + 1] - 1] < high:
+            _gather(start, rows, values, order, position, low, high, rows_below, local, F)
+            while top > 0 and low <= parent[first[stacked[top - 1] + 1] - 1] < high:
                 top -= 1
-                child = below[begin[left[top]] : begin[left[top] + 1]]
+                child = below[begin[stacked[top]] : begin[stacked[top] + 1]]
                 n = len(child)
                 used -= n * n
-                _add(waiting[used : used + n * n].reshape(n, n), child, local, F)
-            bad = _eliminated(F, high - low, one, other, product)
-            if bad >= 0:
-                d[low + bad] = F[bad, bad]
-                return low + bad
-            _store(F, low, high - low, begins, L, d, waiting[used : used + m * m].reshape(m, m))
+                _add(stack[used : used + n * n].reshape(n, n), child, local, F)
+            failed = _eliminated(F, high - low, panel, scaled_panel, product)
+            if failed >= 0:
+                d[low + failed] = F[failed, failed]
+                return low + failed
+            _store(F, low, high - low, begins, L, d, stack[used : used + m * m].reshape(m, m))
         else:
-            _copy(last[0], begins[low], L, begins[low], begins[high] - begins[low])
-            _copy(last[1], low, d, low, high - low)
+            _copy(previous[0], begins[low], L, begins[low], begins[high] - begins[low])
+            _copy(previous[1], low, d, low, high - low)
             if source[s] == -2:
                 continue
-            _copy(last[2], source[s], waiting, used, m * m)
+            _copy(previous[2], source[s], stack, used, m * m)
         if target[s] >= 0:
-            _copy(waiting, used, updates, target[s], m * m)
+            _copy(stack, used, updates, target[s], m * m)
         if m:
-            left[top] = s
+            stacked[top] = s
             top += 1
             used += m * m
     return -1
 
 
 @kernel
-def _copy(source: Array, at: int, target: Array, to: int, count: int) -> None:
-    """Copy entries; assigning a slice would compile its error message as well, which takes seconds."""
+def _copy(source: Array, source_start: int, target: Array, target_start: int, count: int) -> None:
+    """Copy `count` entries; assigning a slice would compile its error message as well, which takes seconds."""
     for k in range(count):
-        target[to + k] = source[at + k]
+        target[target_start + k] = source[source_start + k]
 
 
 @kernel
 def _gather(
-    start: Numbers, rows: Numbers, values: Array, order: Numbers, position: Numbers, low: int, high: int, rest: Numbers,
+    start: Numbers, rows: Numbers, values: Array, order: Numbers, position: Numbers, low: int, high: int, rows_below: Numbers,
     local: Offsets, F: Array,
 ) -> None:  # fmt: skip
     """Fill a front with the columns `low` to ``high - 1`` of the matrix, and `local` with the positions of its rows."""
@@ -179,8 +181,8 @@ def _gather(
         F[i, i:] = 0.0
     for k in range(width):
         local[low + k] = k
-    for k in range(len(rest)):
-        local[rest[k]] = width + k
+    for k in range(len(rows_below)):
+        local[rows_below[k]] = width + k
     for j in range(low, high):
         for k in range(start[order[j]], start[order[j] + 1]):
             i = position[rows[k]]
@@ -189,8 +191,8 @@ def _gather(
 
 
 @kernel
-def _store(F: Array, low: int, width: int, begins: Offsets, L: Array, d: Array, rest: Array) -> None:
-    """Move the eliminated columns of a front to L and `d`, and the update matrix to `rest` (m, m)."""
+def _store(F: Array, low: int, width: int, begins: Offsets, L: Array, d: Array, update: Array) -> None:
+    """Move the eliminated columns of a front to L and `d`, and the update matrix to `update` (m, m)."""
     size = len(F)
     for j in range(width):
         d[low + j] = F[j, j]
@@ -200,24 +202,24 @@ def _store(F: Array, low: int, width: int, begins: Offsets, L: Array, d: Array, 
             L[at + k - j] = F[j, k]
     for i in range(size - width):
         for k in range(i, size - width):
-            rest[i, k] = F[width + i, width + k]
+            update[i, k] = F[width + i, width + k]
 
 
 @kernel
-def _add(rest: Array, rows: Numbers, local: Offsets, F: Array) -> None:
-    """Add the update matrix `rest` of a front, with `rows` (m,), to the parent's front (extend-add)."""
+def _add(update: Array, rows: Numbers, local: Offsets, F: Array) -> None:
+    """Add the update matrix `update` of a front, with `rows` (m,), to the parent's front (extend-add)."""
     m = len(rows)
     for i in range(m):
-        target, source = F[local[rows[i]]], rest[i]
+        target, source = F[local[rows[i]]], update[i]
         for k in range(i, m):
             target[local[rows[k]]] += source[k]
 
 
 @kernel
-def _eliminated(F: Array, width: int, one: Array, other: Array, product: Array) -> int:
-    """Eliminate the first `width` columns of a front; return the first without a positive pivot, or -1.
+def _eliminated(F: Array, width: int, panel: Array, scaled_panel: Array, product: Array) -> int:
+    """Eliminate the first `width` columns of a front; return -1, or the first without a positive pivot.
 
-    The pivots remain on the diagonal, the columns of L to the right of it.
+    The pivots remain on the diagonal, and the columns of L are stored to the right of it.
     """
     size = len(F)
     for begin in range(0, width, PANEL):
@@ -235,7 +237,7 @@ def _eliminated(F: Array, width: int, one: Array, other: Array, product: Array) 
                     F[j, k] /= pivot
         m = size - end
         if (end - begin) * m * m >= SMALL:
-            _reduced_by_blocks(F, begin, end, one, other, product)
+            _reduced_by_blocks(F, begin, end, panel, scaled_panel, product)
         else:
             for low in range(begin, end, TOGETHER):
                 _subtract(F, low, min(low + TOGETHER, end), end, size, True)
@@ -246,7 +248,7 @@ def _eliminated(F: Array, width: int, one: Array, other: Array, product: Array) 
 def _subtract(F: Array, low: int, high: int, begin: int, end: int, scaled: bool) -> None:
     """Subtract the contribution of the columns `low` to ``high - 1`` of L from the rows `begin` to ``end - 1`` of a front.
 
-    `scaled` tells whether these columns have been divided by their pivots. `TOGETHER` columns are subtracted in one pass.
+    `scaled` is true if these columns have been divided by their pivots. `TOGETHER` columns are subtracted in one pass.
     """
     size = len(F)
     for i in range(begin, end):
@@ -269,11 +271,11 @@ def _factor(F: Array, j: int, i: int, scaled: bool) -> float:
 
 
 @kernel
-def _reduced_by_blocks(F: Array, begin: int, end: int, one: Array, other: Array, product: Array) -> None:
-    """Subtract the contribution of the columns `begin` to ``end - 1`` of L from the rest of a front by matrix products."""
+def _reduced_by_blocks(F: Array, begin: int, end: int, panel: Array, scaled_panel: Array, product: Array) -> None:
+    """Subtract the contribution of the columns `begin` to ``end - 1`` of L from the rows below by matrix products."""
     size, width = len(F), end - begin
     m = size - end
-    plain, scaled = one[: m * width].reshape(m, width), other[: m * width].reshape(m, width)
+    plain, scaled = panel[: m * width].reshape(m, width), scaled_panel[: m * width].reshape(m, width)
     for j in range(width):
         row, pivot = F[begin + j], F[begin + j, begin + j]
         for i in range(m):

@@ -1,13 +1,12 @@
-"""Inverse of the matrix P of the pivot columns: by small independent blocks, or by a factorisation if many nodes are coupled.
+"""Inverse of the matrix P of the pivot columns, by small independent blocks or, if many nodes are coupled, by LU factors.
 
 Weighted gaps with standard multipliers are coupled by a mass matrix of the secondary surface, whose inverse is a full
-matrix. Its factors, however, are sparse, so that a solution costs little compared with a product with the stiffness matrix.
-Preconditioners need sparse weights. They use a sparse approximation of the inverse, with one block per node, that is exact
-for translations in the directions of the pivots of the node.
+matrix. Its factors, however, are sparse, so that a solution with them costs little compared with a product with the
+stiffness matrix. Preconditioners need sparse weights. They use a sparse approximation of the inverse, with one block per
+node, that is exact for translations in the directions of the pivots of the node.
 
-Near singularity of a factorised matrix is detected by an estimate of its condition number, which takes a few solutions
-(`condition`). The diagonal of the triangular factors is not sufficient: if two rows of many are equal, all its entries may be
-large.
+A nearly singular matrix is detected by an estimate of its condition number, which takes a few solutions (`condition`). The
+diagonal of the triangular factors is not sufficient: if two of many rows are equal, all its entries may be large.
 """
 
 from __future__ import annotations
@@ -65,7 +64,7 @@ class SparseInverse:
 
     @property
     def sparse(self) -> SparseInverse:
-        """The inverse itself; that of `CoupledPivots` is an approximation."""
+        """The inverse itself; `CoupledPivots.sparse` is an approximation."""
         return self
 
     def solve(self, b: Array) -> Array:
@@ -128,7 +127,7 @@ Inverse: TypeAlias = SparseInverse | CoupledPivots
 
 
 def lumped(P: csr_array, pivots: Indices, size: int) -> csr_array:
-    """Return P (m, m) with the entries of each row added up in the diagonal block of its node, separately by direction.
+    """Return P (m, m) with the entries of each row summed into the diagonal block of its node, separately by direction.
 
     Entries in directions in which the node of the row has no pivot are left out. In the other directions, the product with a
     translation of all pivots is unchanged. `pivots` (m,) are the unknowns of the columns, and `size` is the number of
@@ -160,14 +159,14 @@ def block_inverse(A: csr_array) -> csr_array:
     entries = coo_array(A)
     rows, cols, values = [], [], []
     for k in np.unique(size):
-        alike = np.flatnonzero(size == k)
-        number = np.full(len(size), -1, np.intp)
-        number[alike] = np.arange(len(alike))
-        selected = number[label[entries.row]] >= 0
+        of_size = np.flatnonzero(size == k)
+        block_number = np.full(len(size), -1, np.intp)
+        block_number[of_size] = np.arange(len(of_size))
+        selected = block_number[label[entries.row]] >= 0
         row, col = entries.row[selected], entries.col[selected]
-        blocks = np.zeros((len(alike), k, k))
-        np.add.at(blocks, (number[label[row]], position[row], position[col]), entries.data[selected])
-        members = order[first[alike][:, None] + np.arange(k)]
+        blocks = np.zeros((len(of_size), k, k))
+        np.add.at(blocks, (block_number[label[row]], position[row], position[col]), entries.data[selected])
+        members = order[first[of_size][:, None] + np.arange(k)]
         rows.append(np.repeat(members, k, axis=1).ravel())
         cols.append(np.tile(members, k).ravel())
         values.append(_inverses(blocks).ravel())
@@ -189,8 +188,8 @@ def _inverses(blocks: Array) -> Array:
 def condition(P: csr_array, solve: Apply, solve_transposed: Apply) -> float:
     """Return an estimate of the componentwise condition number of P (m, m) (Skeel, 1979).
 
-    It is the largest component of ``abs(P^-1) @ abs(P) @ ones`` and does not depend on the scaling of the rows. The
-    estimate is a lower bound, which is seldom less than a third of the number (Hager, 1984; Higham, 1988). It is NaN if
+    The condition number is the largest component of ``abs(P^-1) @ abs(P) @ ones`` and does not depend on the scaling of the
+    rows. The estimate is a lower bound, which is seldom less than a third of it (Hager, 1984; Higham, 1988), or NaN if
     products overflow.
 
     Parameters
@@ -199,9 +198,9 @@ def condition(P: csr_array, solve: Apply, solve_transposed: Apply) -> float:
     solve, solve_transposed : callable
         Functions that return ``P^-1 b`` and ``P^-T b`` (m,) for b (m,).
     """
-    rows = np.asarray(abs(P).sum(axis=1), np.float64).ravel()
+    row_sums = np.asarray(abs(P).sum(axis=1), np.float64).ravel()
     product = LinearOperator(
-        P.shape, lambda x: rows * solve_transposed(x.ravel()), lambda x: solve(rows * x.ravel()), dtype=float
+        P.shape, lambda x: row_sums * solve_transposed(x.ravel()), lambda x: solve(row_sums * x.ravel()), dtype=float
     )
     with np.errstate(all="ignore"):
         return float(onenormest(product, t=1))

@@ -1,4 +1,4 @@
-"""Choice of the unknown to eliminate from each linear equation, its pivot, and inverse of the pivot columns.
+"""Choice of the pivot of each linear equation, the unknown to be eliminated, and inverse of the pivot columns.
 
 Equations are grouped by nodes, or each equation is a group. Pivots are chosen by the first of these rules that succeeds:
 
@@ -7,8 +7,8 @@ Equations are grouped by nodes, or each equation is a group. Pivots are chosen b
 3. the unknowns of rule 1 as far as they suffice, and a matching for the remaining equations (`of_most_groups`);
 4. a matching of all equations with unknowns (`assigned`).
 
-The pivot columns are inverted by small blocks, which are independent or coupled in one direction. If equations of many
-nodes are coupled in another way, they are factorised (`coupled_pivots`).
+The matrix of the pivot columns is inverted block by block if it is block diagonal or block triangular with small blocks.
+Otherwise, it is factorised (`coupled_pivots`).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SMALLEST = 0.25
 # factorised (`test_many_coupled_equations_are_assigned_unknowns`). The latter is also the largest number of equations whose
 # pivots are chosen by a dense QR factorisation.
 LARGEST_BLOCK, FULL_UP_TO = 64, 500
-# Largest number of layers of equations: the inverse is a sum of that many products of sparse matrices.
+# Largest number of layers of equations. The inverse is a sum of as many products of sparse matrices.
 MOST_LAYERS = 4
 
 
@@ -125,10 +125,11 @@ def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInvers
 def of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indices | None:
     """Return the pivots (m,), chosen among the exclusive unknowns of groups; None if a group has too few of them.
 
-    An unknown is exclusive to a group if no other group of the same and of later layers involves it. The first layer are
-    the groups with enough exclusive unknowns among all groups, the second layer those with enough among the remaining ones,
-    and so on, up to `layers` layers. An example are weighted gaps of quadratic facets with dual multipliers: no other mid
-    node involves the unknowns of a mid node, and without the mid nodes the same holds for the corners.
+    An unknown is exclusive to a group if no other group of the same and of later layers involves it. The first layer
+    contains the groups with enough exclusive unknowns among all groups, the second layer those with enough among the
+    remaining ones, and so on, up to `layers` layers. An example is the set of weighted gaps of quadratic facets with dual
+    multipliers: no other midside node involves the unknowns of a midside node, and without the midside nodes the same holds
+    for the corners.
 
     Parameters
     ----------
@@ -144,23 +145,22 @@ def of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indic
 
 
 def of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
-    """Return the pivots (m,), chosen as by `of_groups` as far as possible, and by `assigned` for the remaining equations.
+    """Return the pivots (m,), chosen as by `of_groups` where possible, and by `assigned` for the remaining equations.
 
-    An example of the latter are slips at supported nodes that stick to a moving side, which have no exclusive unknowns.
-    None if no group has enough exclusive unknowns, or if more than FULL_UP_TO equations remain. Parameters as in
-    `of_groups`.
+    For example, slips at supported nodes that stick to a moving side have no exclusive unknowns. The result is None if no
+    group has enough exclusive unknowns, or if more than FULL_UP_TO equations remain. For the parameters see `of_groups`.
     """
     pivots = _in_layers(B, groups, MOST_LAYERS)
-    left = np.flatnonzero(pivots < 0)
-    if len(left) == len(pivots):
+    remaining = np.flatnonzero(pivots < 0)
+    if len(remaining) == len(pivots):
         return None
     # A single equation may have an exclusive unknown although its group has too few of them.
-    pivots[left] = _in_layers(csr_array(B[left]), np.arange(len(left)), layers=1)
-    left = left[pivots[left] < 0]
-    if len(left) > FULL_UP_TO:
+    pivots[remaining] = _in_layers(csr_array(B[remaining]), np.arange(len(remaining)), layers=1)
+    remaining = remaining[pivots[remaining] < 0]
+    if len(remaining) > FULL_UP_TO:
         return None
-    if len(left):
-        pivots[left] = assigned(csr_array(B[left]))
+    if len(remaining):
+        pivots[remaining] = assigned(csr_array(B[remaining]))
     return pivots
 
 
@@ -170,11 +170,11 @@ def _in_layers(B: csr_array, groups: Indices, layers: int) -> Indices:
     group, row = np.unique(groups, return_inverse=True)[1], np.repeat(np.arange(m), np.diff(B.indptr))
     pivots = np.full(m, -1, np.intp)
     for _ in range(layers):
-        among = pivots[row] < 0
+        unassigned = pivots[row] < 0
         lowest, highest = np.full(n, m), np.full(n, -1)
-        np.minimum.at(lowest, B.indices[among], group[row[among]])
-        np.maximum.at(highest, B.indices[among], group[row[among]])
-        pivots_of_group = _pivots_in_groups(B, group, among & (lowest[B.indices] == highest[B.indices]))
+        np.minimum.at(lowest, B.indices[unassigned], group[row[unassigned]])
+        np.maximum.at(highest, B.indices[unassigned], group[row[unassigned]])
+        pivots_of_group = _pivots_in_groups(B, group, unassigned & (lowest[B.indices] == highest[B.indices]))
         pivots = np.where(pivots < 0, pivots_of_group, pivots)
         if (pivots >= 0).all() or not (pivots_of_group >= 0).any():
             break
@@ -182,13 +182,13 @@ def _in_layers(B: csr_array, groups: Indices, layers: int) -> Indices:
 
 
 def of_nodes(B: csr_array, nodes: Indices, size: int) -> Indices | None:
-    """Return the pivots (m,), chosen among the unknowns of the node of each equation; None if entries are too small."""
+    """Return the pivots (m,), chosen among the unknowns of the node of each equation; None if a pivot is too small."""
     row = np.repeat(np.arange(B.shape[0]), np.diff(B.indptr))
     pivots = _pivots_in_groups(B, np.unique(nodes, return_inverse=True)[1], B.indices // size == nodes[row])
     return pivots if (pivots >= 0).all() else None
 
 
-def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices:
+def _pivots_in_groups(B: csr_array, group: Indices, eligible: Mask) -> Indices:
     """Return the pivots (m,) by complete pivoting within each group, in all groups simultaneously.
 
     A pivot must be at least SMALLEST times the largest entry of its row. If a group has fewer pivots than rows, all its
@@ -200,42 +200,42 @@ def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices:
         Equations.
     group : ndarray of int (m,)
         Number of the group of each equation.
-    is_own : ndarray of bool (nnz,)
-        Entries of B that may be pivots: no other group may have entries in their columns.
+    eligible : ndarray of bool (nnz,)
+        Entries of B that may be pivots. Each of their columns must have such entries in one group only.
     """
     m, n = B.shape
-    row, entries = np.repeat(np.arange(m), np.diff(B.indptr)), np.flatnonzero(is_own)
+    row, entries = np.repeat(np.arange(m), np.diff(B.indptr)), np.flatnonzero(eligible)
     pivots = np.full(m, -1, np.intp)
     if not len(entries):
         return pivots
     pivot_columns = B.indices[np.sort(entries[np.unique(B.indices[entries], return_index=True)[1]])]
-    line, column, owner = _place_in_group(group), np.zeros(n, np.intp), np.zeros(n, np.intp)
-    owner[B.indices[entries]] = group[row[entries]]
-    column[pivot_columns] = _place_in_group(owner[pivot_columns])
-    table = np.zeros((group.max() + 1, line.max() + 1, column.max() + 1))
-    table[group[row[entries]], line[row[entries]], column[B.indices[entries]]] = B.data[entries]
-    equation, unknown = np.zeros(table.shape[:2], np.intp), np.zeros((len(table), table.shape[2]), np.intp)
-    equation[group, line], unknown[owner[pivot_columns], column[pivot_columns]] = np.arange(m), pivot_columns
+    row_rank, col_rank, group_of = _rank_in_group(group), np.zeros(n, np.intp), np.zeros(n, np.intp)
+    group_of[B.indices[entries]] = group[row[entries]]
+    col_rank[pivot_columns] = _rank_in_group(group_of[pivot_columns])
+    blocks = np.zeros((group.max() + 1, row_rank.max() + 1, col_rank.max() + 1))
+    blocks[group[row[entries]], row_rank[row[entries]], col_rank[B.indices[entries]]] = B.data[entries]
+    equation, unknown = np.zeros(blocks.shape[:2], np.intp), np.zeros((len(blocks), blocks.shape[2]), np.intp)
+    equation[group, row_rank], unknown[group_of[pivot_columns], col_rank[pivot_columns]] = np.arange(m), pivot_columns
     count, largest = np.bincount(group), abs(B).max(axis=1).toarray().ravel()
     failed = np.zeros(len(count), bool)
-    for made in range(table.shape[1]):
-        left = np.flatnonzero((count > made) & ~failed)
-        if not len(left):
+    for n_chosen in range(blocks.shape[1]):
+        unfinished = np.flatnonzero((count > n_chosen) & ~failed)
+        if not len(unfinished):
             break
-        r, c = np.divmod(np.abs(table[left]).reshape(len(left), -1).argmax(axis=1), table.shape[2])
-        i, pivot = equation[left, r], table[left, r, c]
-        good = (np.abs(pivot) >= SMALLEST * largest[i]) & (pivot != 0.0)
-        failed[left[~good]] = True
-        left, r, c, i, pivot = (array[good] for array in (left, r, c, i, pivot))
-        pivots[i] = unknown[left, c]
+        r, c = np.divmod(np.abs(blocks[unfinished]).reshape(len(unfinished), -1).argmax(axis=1), blocks.shape[2])
+        chosen_row, pivot = equation[unfinished, r], blocks[unfinished, r, c]
+        accepted = (np.abs(pivot) >= SMALLEST * largest[chosen_row]) & (pivot != 0.0)
+        failed[unfinished[~accepted]] = True
+        unfinished, r, c, chosen_row, pivot = (array[accepted] for array in (unfinished, r, c, chosen_row, pivot))
+        pivots[chosen_row] = unknown[unfinished, c]
         # The row of the pivot is eliminated as well, so that it is not selected again.
-        factor = table[left, :, c] / pivot[:, None]
-        table[left] -= factor[:, :, None] * table[left, r][:, None]
+        factor = blocks[unfinished, :, c] / pivot[:, None]
+        blocks[unfinished] -= factor[:, :, None] * blocks[unfinished, r][:, None]
     pivots[failed[group]] = -1
     return pivots
 
 
-def _place_in_group(group: Indices) -> Indices:
+def _rank_in_group(group: Indices) -> Indices:
     """Return, for each entry of `group` (m,), the number (m,) of earlier entries with the same value."""
     order = np.argsort(group, kind="stable")
     position = np.empty(len(group), np.intp)

@@ -1,7 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Vector operations of conjugate gradients: sums in fixed chunks, equal for any number of threads.
+"""Vector operations of the conjugate gradient method, with sums that do not depend on the number of threads.
 
-Kernels work on chunks, or numbers, `low` to ``high - 1``: see `_jit.parallel.spread`.
+Sums are taken over chunks of fixed length. Kernels process the chunks, or the entries, `low` to ``high - 1``; see
+`_jit.parallel.spread`.
 """
 
 import numpy as np
@@ -10,9 +11,9 @@ from fastcontact._jit.decorators import kernel
 
 # Length of the chunks.
 CHUNK = 4096
-# Work of kernels for a number, see `_jit.parallel.portions`.
+# Work of kernels per entry, see `_jit.parallel.portions`.
 WORK_OF_NUMBER = 0.5
-# First index of a whole range; with a literal 0 or an unsigned number, Numba would compile another copy of `stretch_dot`.
+# First index of a whole range. With a literal 0 or an unsigned integer, Numba would compile another copy of `stretch_dot`.
 FIRST = np.int64(0)
 
 
@@ -33,7 +34,7 @@ def stretch_dot(a, b, low, high):
 
 @kernel
 def total(sums):
-    """Return the sum of the `sums` of chunks, in their order."""
+    """Return the sum of the `sums` of the chunks, added in ascending order."""
     total = 0.0
     for k in range(sums.shape[0]):
         total += sums[k]
@@ -50,7 +51,7 @@ def dot(low, high, a, b, sums):
 
 @kernel
 def advance(low, high, alpha, p, q, x, r, sums):
-    """Step ``x += alpha p``, ``r -= alpha q``, and fill `sums` with the squared norms of the chunks of r."""
+    """Update ``x += alpha p`` and ``r -= alpha q``, and fill `sums` with the squared norms of the chunks of r."""
     n = x.shape[0]
     for c in range(low, high):
         begin, end = c * CHUNK, min(n, (c + 1) * CHUNK)
@@ -62,13 +63,13 @@ def advance(low, high, alpha, p, q, x, r, sums):
 
 @kernel
 def turn(low, high, beta, z, p):
-    """Update the search direction: ``p = z + beta p``."""
+    """Update the search direction, ``p = z + beta p``."""
     for i in range(low, high):
         p[i] = z[i] + beta * p[i]
 
 
 @kernel
 def scaled(low, high, factor, a, b):
-    """Fill `b` with ``factor a``, in the precision of b."""
+    """Fill `b` with ``factor * a``, in the precision of b."""
     for i in range(low, high):
         b[i] = factor * a[i]

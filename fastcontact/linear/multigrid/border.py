@@ -1,8 +1,8 @@
-"""Saddle-point system of equations ``B u + C multiplier = c`` that are not eliminated.
+"""Saddle-point system with equations ``B u + C multiplier = c`` that are not eliminated.
 
 The matrix of the system for displacements and multipliers, ``[A, -B.T; B, C]``, is not symmetric positive definite. It is
-solved by the conjugate residual method. The preconditioner is block lower triangular, with multigrid for A and the factors
-of ``C + B D^-1 B.T`` for the multipliers, where D is the diagonal of A.
+solved by the generalised conjugate residual method. The preconditioner is block lower triangular, with multigrid for A and
+the factors of ``C + B D^-1 B.T`` for the multipliers, where D is the diagonal of A.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fastcontact.round_off import ROUND_OFF
 
 
 class Border:
-    """Equations that are not eliminated.
+    """Equations ``B u + C multiplier = c`` that are not eliminated.
 
     Parameters
     ----------
@@ -39,12 +39,12 @@ class Border:
 
     def prepare(self, diagonal: Array) -> None:
         """Factorise the preconditioner of the multipliers, given the diagonal (n,) of A [force / length]."""
-        yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
-        S = self.compliance + self.rows @ diags_array(yielding) @ self.rows.T
+        inverse_diagonal = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
+        S = self.compliance + self.rows @ diags_array(inverse_diagonal) @ self.rows.T
         diagonal_of_S = S.diagonal()
-        # Factor that converts the residuals of the equations to forces.
+        # Factors that convert the residuals of the equations to forces.
         self.stiffness = 1.0 / diagonal_of_S
-        # The equations may be linearly dependent; a small shift keeps the matrix regular.
+        # A small shift keeps the matrix regular if equations are linearly dependent.
         self._factors = splu(csc_array(S + diags_array(ROUND_OFF * diagonal_of_S)))
 
     def multiply(self, multiply: Multiply, move_forces: Callable[[Array], None]) -> Multiply:

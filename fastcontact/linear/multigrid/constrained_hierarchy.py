@@ -1,12 +1,12 @@
 """Multigrid hierarchy under eliminated equations, by local changes of its levels that can be undone.
 
 The prolongators are those without equations, except for the rows of the eliminated unknowns, the pivots. Therefore, only
-the blocks of the Galerkin products that are near pivots change. The changes are stored separately, and the matrices of the
-levels are not modified. On the finest level only the changes of diagonal blocks are computed, for the smoother; products
+the blocks of the Galerkin products near pivots change. These changes are stored separately, and the matrices of the levels
+are not modified. On the finest level only the changes of diagonal blocks are computed, for the smoother; products
 with the matrix move displacements and forces between the pivots and the other unknowns instead.
 
-Springs between unknowns, such as penalties and the springs of sliding contact, are added on all levels: for the smooth
-displacements that coarser levels correct, they are much stiffer than the bodies.
+Springs between unknowns, such as penalties and the springs of sliding contact, are added on all levels, because they
+are much stiffer than the bodies for the smooth displacements that coarser levels correct.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from fastcontact.linear.springs import Springs
 
 # Largest eigenvalue of ``D^-1 A`` on the finest level above which its spectrum counts as wide. It is 3 to 4 for well-shaped
 # hexahedra.
-WIDE = 6.0
-# Factor by which equations stiffen a node above which the smoother and the coarser levels are corrected, see
+WIDE_SPECTRUM = 6.0
+# Factor of the stiffening of a node by equations above which the smoother and the coarser levels are corrected, see
 # `stiffened_nodes`.
-MUCH = 4.0
+STIFFENED = 4.0
 
 
 class ConstrainedHierarchy:
@@ -52,54 +52,54 @@ class ConstrainedHierarchy:
     def __init__(self, hierarchy: Hierarchy, A: BlockMatrix) -> None:
         self.hierarchy, self.A = hierarchy, A
         self.stiffening = 0.0
-        self._kept: list[tuple[Level, Indices, AnyArray]] = []
+        self._saved: list[tuple[Level, Indices, AnyArray]] = []
 
     def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
         """Change the hierarchy to that of the matrix with `springs` added and the equations eliminated.
 
-        None means no equations, or no springs. Earlier changes are undone.
+        None means no equations, or no springs. Earlier changes are reverted.
         """
-        self._undo()
+        self._restore()
         self.stiffening = 0.0
         if elimination is not None and not len(elimination.pivots):
             elimination = None
         added = springs
         if springs is not None and elimination is not None:
             added = springs.reduced(elimination.pivots, elimination.weights)
-        if added is not None and not added.rows.nnz:  # The springs act on supported unknowns or on pivots only.
+        if added is not None and not added.rows.nnz:  # The springs act only on supported unknowns or on pivots.
             added = None
         if elimination is None and added is None:
             self.hierarchy.coarse.set(None)
             self.hierarchy.set_bounds()
             return
         self._change_levels(elimination, added)
-        # Equations widen the spectrum of the coarser levels. They also widen that of the finest level if it is wide
-        # already, as for flat or nearly incompressible cells, or if nodes are stiffened by equations or springs.
+        # Equations widen the spectrum of the coarser levels. They also widen that of the finest level if it was already
+        # wide, as for flat or nearly incompressible cells, or if equations or springs stiffen nodes.
         self.hierarchy.set_bounds()
-        finest = added is not None or self.stiffening > MUCH or self.hierarchy.bounds[0] > WIDE
-        self.hierarchy.set_bounds(range(0 if finest else 1, len(self.hierarchy.levels) - 1))
+        with_finest = added is not None or self.stiffening > STIFFENED or self.hierarchy.bounds[0] > WIDE_SPECTRUM
+        self.hierarchy.set_bounds(range(0 if with_finest else 1, len(self.hierarchy.levels) - 1))
 
     def _change_levels(self, elimination: Elimination | None, springs: Springs | None) -> None:
         """Change all levels for the equations, and for springs after the elimination."""
-        top = self.hierarchy.levels[0]
-        kind = top.b.dtype
+        finest = self.hierarchy.levels[0]
+        kind = finest.b.dtype
         changes = []
         if elimination is not None:
             rounded = elimination.weights.astype(kind)
-            top.eliminated = replace(elimination, weights=rounded, force_weights=rounded)
+            finest.eliminated = replace(elimination, weights=rounded, force_weights=rounded)
             changes.append(SymmetricChange.of_equations(self.A, elimination.pivots, elimination.weights))
         if springs is not None:
-            top.springs = springs.scaled(1.0, kind)
+            finest.springs = springs.scaled(1.0, kind)
             changes.append(SymmetricChange.of_springs(springs, len(self.A.rows)))
-        if top.P is None:
+        if finest.P is None:
             self.hierarchy.coarse.set(csc_array(sum(change.on_finest() for change in changes)))
             return
         diagonals = [change.diagonal() for change in changes]
         stiffened = None if elimination is None else self._stiffened(diagonals[0], elimination)
-        self._change_diagonal(top, merged(*diagonals))
+        self._change_diagonal(finest, merged(*diagonals))
         if elimination is not None and stiffened is not None and len(stiffened):
             changes = self._exchange_roles(elimination, springs, stiffened, diagonals[1:])
-        change = merged(*(change.on_coarse(top.P) for change in changes))
+        change = merged(*(change.on_coarse(finest.P) for change in changes))
         for level in self.hierarchy.levels[1:]:
             if level.P is None:
                 self.hierarchy.coarse.set(change.scattered(level.n))
@@ -108,26 +108,26 @@ class ConstrainedHierarchy:
             level.change = change.rows(kind)
             change = change.coarser(level.P)
 
-    def _undo(self) -> None:
-        """Restore the levels of the hierarchy without equations and springs."""
-        for level, nodes, old in self._kept:
+    def _restore(self) -> None:
+        """Restore the levels to their state without equations and springs."""
+        for level, nodes, old in self._saved:
             level.inverse.reshape(-1, old.shape[1])[nodes] = old
-        self._kept.clear()
+        self._saved.clear()
         for level in self.hierarchy.levels:
             level.eliminated = level.change = level.springs = None
             level.followers = level.free_motions = None
 
     def _stiffened(self, change: LocalChange, elimination: Elimination) -> Indices:
-        """Return the nodes without pivots that equations stiffen by more than the factor MUCH, and set `stiffening`.
+        """Return the nodes without pivots that equations stiffen by more than the factor STIFFENED, and set `stiffening`.
 
         `change` is the change of the diagonal blocks by the equations.
         """
         size = change.size
         of_all = self.hierarchy.levels[0].diagonal.reshape(-1, size * size)[change.nodes]
-        trace, more = (np.einsum("kii->k", blocks.reshape(-1, size, size)) for blocks in (of_all, change.diagonal()))
-        by = np.divide(more, trace, out=np.zeros(len(more)), where=trace > 0.0)
-        self.stiffening = float(by.max(initial=0.0))
-        return change.nodes[(by > MUCH) & ~np.isin(change.nodes, elimination.pivots // size)]
+        trace, added = (np.einsum("kii->k", blocks.reshape(-1, size, size)) for blocks in (of_all, change.diagonal()))
+        factors = np.divide(added, trace, out=np.zeros(len(added)), where=trace > 0.0)
+        self.stiffening = float(factors.max(initial=0.0))
+        return change.nodes[(factors > STIFFENED) & ~np.isin(change.nodes, elimination.pivots // size)]
 
     def _exchange_roles(
         self, elimination: Elimination, springs: Springs | None, stiffened: Indices, of_springs: list[LocalChange]
@@ -137,11 +137,11 @@ class ConstrainedHierarchy:
         `stiffened` (k,) are the numbers of the nodes, and `of_springs` the changes of diagonal blocks by springs. See
         `stiffened_nodes`.
         """
-        top, size = self.hierarchy.levels[0], len(self.A.rows)
-        top.free_motions = FreeMotions(elimination.weights, stiffened, self._inverse_blocks(stiffened, of_springs))
+        finest, size = self.hierarchy.levels[0], len(self.A.rows)
+        finest.free_motions = FreeMotions(elimination.weights, stiffened, self._inverse_blocks(stiffened, of_springs))
         following = followers(elimination, stiffened, size)
-        rounded = following.weights.astype(top.b.dtype)
-        top.followers = replace(following, weights=rounded, force_weights=rounded)
+        rounded = following.weights.astype(finest.b.dtype)
+        finest.followers = replace(following, weights=rounded, force_weights=rounded)
         changes = [SymmetricChange.of_equations(self.A, *composed(elimination, following))]
         if springs is not None:
             changes.append(SymmetricChange.of_springs(springs.reduced(following.pivots, following.weights), size))
@@ -162,11 +162,11 @@ class ConstrainedHierarchy:
         return inverses.reshape(-1, size, size)
 
     def _change_diagonal(self, level: Level, change: LocalChange) -> None:
-        """Add the diagonal blocks of a change to those of a level in the inverses of the smoother; save the old inverses."""
+        """Add the diagonal blocks of a change to those that the smoother of a level inverts; save the old inverses."""
         size, nodes = len(level.A.rows), change.nodes
         blocks = level.diagonal.reshape(-1, size**2)[nodes].astype(float).ravel() + change.diagonal()
         inverse = np.empty(blocks.size, level.inverse.dtype)
         cycle_kernels.invert_blocks(blocks, size, inverse)
-        every = level.inverse.reshape(-1, size**2)
-        self._kept.append((level, nodes, every[nodes].copy()))
-        every[nodes] = inverse.reshape(-1, size**2)
+        inverses = level.inverse.reshape(-1, size**2)
+        self._saved.append((level, nodes, inverses[nodes].copy()))
+        inverses[nodes] = inverse.reshape(-1, size**2)

@@ -5,8 +5,8 @@ to its nodes. One step of the block Jacobi method smooths it (Vanek, Mandel and 
 Galerkin product. The levels are smoothed by a Chebyshev iteration (`level`).
 
 Two functions come from pyamg: `standard_aggregation` forms the aggregates, and `fit_candidates` computes an orthonormal
-basis of the rigid-body modes of each aggregate. `linear.solvers.pyamg` uses the complete multigrid method of pyamg, for
-comparison.
+basis of the rigid-body modes of each aggregate. For comparison, `linear.solvers.pyamg` uses the complete multigrid method of
+pyamg.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ class Hierarchy:
     def renewed(self, A: BlockMatrix) -> Hierarchy | None:
         """Return a hierarchy whose finest level is that of a matrix A of the same pattern, with the coarser levels kept.
 
-        It is a symmetric preconditioner of A, which costs a fifth of a new hierarchy. None is returned if there are no
-        coarser levels, or for another precision.
+        It is a symmetric preconditioner of A, and its set-up costs a fifth of that of a new hierarchy. The result is None if
+        there are no coarser levels, or if A has another precision.
         """
         if len(self.levels) == 1 or A.data.dtype != self.dtype:
             return None
@@ -155,13 +155,13 @@ class Hierarchy:
         """Multiply the bounds of the smoothers by `factor`, until the next call of `set_bounds`."""
         self.bounds = [factor * bound for bound in self.bounds]
 
-    def set_bounds(self, anew: Sequence[int] = ()) -> None:
+    def set_bounds(self, estimated: Sequence[int] = ()) -> None:
         """Set the bounds of the smoothers to those without equations and springs.
 
-        On the levels numbered `anew` the bounds are estimated for the current matrices, and used if they are larger.
+        On the levels with the numbers `estimated`, bounds are also estimated for the current matrices, and used if larger.
         """
         self.bounds = [
-            max(bound, SAFETY * largest_eigenvalue(level)) if number in anew else bound
+            max(bound, SAFETY * largest_eigenvalue(level)) if number in estimated else bound
             for number, (level, bound) in enumerate(zip(self.levels, self._free_bounds, strict=True))
         ]
 
@@ -180,21 +180,21 @@ class Hierarchy:
             level.residual()
             level.relax(level.r, *factor)
         level.residual()
-        below = self.levels[number + 1]
-        level.restrict(below.b)
+        coarser = self.levels[number + 1]
+        level.restrict(coarser.b)
         self.cycle(number + 1)
-        level.correct(below.x)
+        level.correct(coarser.x)
         for factor in factors:
             level.residual()
             level.relax(level.r, *factor)
 
 
 def graph(A: BlockMatrix) -> csr_matrix:
-    """Return the graph (n, n) of a symmetric A: positive numbers at the off-diagonal blocks that are not zero."""
+    """Return the graph (n, n) of a symmetric A, with positive numbers at the off-diagonal blocks that are not zero."""
     n, (start, columns) = len(A.indptr) - 1, (A.indptr, A.indices) if A.storage is ALL else A.storage[:3:2]
     rows = np.repeat(np.arange(n), np.diff(start))
-    near = A.data.reshape(-1, len(A.rows) ** 2).any(axis=1) & (columns != rows)
-    stored = csr_matrix((np.ones(int(near.sum()), np.int8), (rows[near], columns[near])), shape=(n, n))
+    coupled = A.data.reshape(-1, len(A.rows) ** 2).any(axis=1) & (columns != rows)
+    stored = csr_matrix((np.ones(int(coupled.sum()), np.int8), (rows[coupled], columns[coupled])), shape=(n, n))
     return stored + stored.T.tocsr()
 
 
@@ -224,15 +224,15 @@ def transposed(P: BlockMatrix, index: tuple[Numbers, Numbers, Numbers]) -> Block
 def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Numbers, Numbers, Numbers]) -> BlockMatrix:
     """Return the Galerkin product ``P.T A P`` for a symmetric matrix A; `index` is ``by_columns(P, n)``."""
     n_coarse = len(index[0]) - 1
-    count, near = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
+    count, near_count = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
     work = WORK_OF_ROW * len(A.indptr) // max(1, n_coarse)
     patterns = A.indptr, A.indices, P.indptr, P.indices, *index[:2]
-    spread(galerkin_kernels.count_galerkin, n_coarse, work, *patterns, count, near)
+    spread(galerkin_kernels.count_galerkin, n_coarse, work, *patterns, count, near_count)
     indptr = pointers(count)
     columns = np.empty(indptr[-1], np.int32)
     out = np.zeros(int(indptr[-1]) * len(P.cols) ** 2)
     spread(
         galerkin_kernels.galerkin, n_coarse, work, A.indptr, A.indices, A.storage, A.exact, P.indptr, P.indices, P.data,
-        *index, indptr, int(near.max(initial=0)), columns, out, P.rows, P.cols,
+        *index, indptr, int(near_count.max(initial=0)), columns, out, P.rows, P.cols,
     )  # fmt: skip
     return BlockMatrix(indptr, columns, out, P.cols, P.cols)

@@ -1,12 +1,12 @@
-"""A level of the multigrid hierarchy: matrix, smoother, and transfer to the next coarser level; solver of the coarsest level.
+"""Levels of the multigrid hierarchy, with matrix, smoother and transfer operators, and the solver of the coarsest level.
 
 Let A be the matrix of a level, D its diagonal blocks, and `bound` an upper bound of the eigenvalues of ``D^-1 A``. The
 smoother is a Chebyshev iteration, preconditioned by D, that reduces the components of the error that belong to eigenvalues
 between ``SMOOTHED * bound`` and `bound` (Adams, Brezina, Hu and Tuminaro, 2003). Unlike with the Gauss-Seidel method, results
 do not depend on the number of threads. `Level.relax` makes one step.
 
-The coarsest level has a dense Cholesky factor or, if aggregation stopped early so that it is large, sparse factors by
-SuperLU.
+The matrix of the coarsest level has a dense Cholesky factor or, if it is large because aggregation stopped early, sparse
+factors by SuperLU.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from fastcontact.round_off import ROUND_OFF
 # Number of Lanczos steps for the largest eigenvalue, and safety factor of its estimate.
 LANCZOS_STEPS = 8
 SAFETY = 1.08
-# Lower end of the interval of eigenvalues that is smoothed, relative to its upper end; number of Chebyshev steps.
+# Ratio of the lower to the upper end of the interval of eigenvalues that is smoothed, and number of Chebyshev steps.
 SMOOTHED = 1 / 24
 DEGREE = 3
-# Number of unknowns up to which a level is not coarsened. Its factors are then dense.
+# Number of unknowns up to which a level is not coarsened, and has dense factors.
 COARSEST = 200
 
 
@@ -95,15 +95,15 @@ class Level:
         return len(self.b)
 
     def without_equations(self) -> Level:
-        """Return a copy without the changes by equations and springs, which shares the matrix and the transfer."""
+        """Return a copy without equations and springs, which shares the matrix and the transfer operators."""
         inverse = np.empty_like(self.inverse)
         cycle_kernels.invert_blocks(self.diagonal, len(self.A.rows), inverse)
         return Level(self.A, self.diagonal, inverse, self.bound, self.P, self.R)
 
     def relax(self, r: AnyArray, first: float, second: float, begin: bool = False) -> None:
-        """Make one Chebyshev step for the residual r (n,), see `cycle_kernels.relax`; equations stay satisfied."""
-        kind = r.dtype.type
-        self.scale(r, kind(first), kind(second), self.d, self.x, begin)
+        """Make one Chebyshev step for the residual r (n,), see `cycle_kernels.relax`; `x` then satisfies the equations."""
+        real = r.dtype.type
+        self.scale(r, real(first), real(second), self.d, self.x, begin)
         if self.free_motions is not None:
             self.free_motions.correct(r, second, self.d, self.x)
         if self.eliminated is not None:
@@ -131,7 +131,7 @@ class Level:
             spread(cycle_kernels.subtract_rows, len(self.change[0]), WORK_OF_ROW, *self.change, x, r, self.A.rows)
 
     def restrict(self, coarse: AnyArray) -> None:
-        """Fill `coarse`, the right-hand side of the next coarser level, with the restricted residual; `r` is overwritten."""
+        """Fill `coarse`, the right-hand side of the next coarser level, with the restricted residual; `r` may be changed."""
         assert self.R is not None
         if self.followers is not None:
             self.followers.move_forces(self.r)
@@ -160,20 +160,20 @@ class Level:
 def chebyshev(bound: float, degree: int) -> list[tuple[float, float]]:
     """Return the coefficients of `degree` Chebyshev steps for eigenvalues between ``SMOOTHED * bound`` and `bound`.
 
-    The two coefficients of a step multiply the last step and the preconditioned residual, see `cycle_kernels.relax`.
+    The coefficients of a step multiply the last step and the preconditioned residual, see `cycle_kernels.relax`.
     """
-    centre, half = 0.5 * (1 + SMOOTHED) * bound, 0.5 * (1 - SMOOTHED) * bound
+    centre, half_width = 0.5 * (1 + SMOOTHED) * bound, 0.5 * (1 - SMOOTHED) * bound
     factors = [(0.0, 1.0 / centre)]
-    rho = half / centre
+    rho = half_width / centre
     for _ in range(1, degree):
-        new = 1.0 / (2.0 * centre / half - rho)
-        factors.append((new * rho, 2.0 * new / half))
-        rho = new
+        new_rho = 1.0 / (2.0 * centre / half_width - rho)
+        factors.append((new_rho * rho, 2.0 * new_rho / half_width))
+        rho = new_rho
     return factors
 
 
 def largest_eigenvalue(level: Level) -> float:
-    """Return a lower estimate of the largest eigenvalue of ``D^-1 A`` by the Lanczos method.
+    """Return an estimate of the largest eigenvalue of ``D^-1 A`` from below, by the Lanczos method.
 
     The tridiagonal matrix of the Lanczos method follows from the coefficients of the conjugate gradient method with the
     preconditioner D (Golub and Van Loan, Matrix Computations, 2013, section 11.3).
@@ -185,25 +185,25 @@ def largest_eigenvalue(level: Level) -> float:
         level.eliminated.move_forces(r)
     diagonal, off_diagonal = [], []
     old_alpha, beta, rz = 1.0, 0.0, 0.0
-    kind = r.dtype.type
+    real = r.dtype.type
     for step in range(min(LANCZOS_STEPS, level.n)):
-        level.scale(r, kind(0), kind(1), scratch, z, True)
+        level.scale(r, real(0), real(1), scratch, z, True)
         if level.free_motions is not None:
             level.free_motions.correct(r, 1.0, scratch, z)
         if level.eliminated is not None:
             level.eliminated.complete(z)
-        new = float(r @ z)
-        if not new > ROUND_OFF * abs(rz):
+        new_rz = float(r @ z)
+        if not new_rz > ROUND_OFF * abs(rz):
             break
-        beta = new / rz if step else 0.0
-        rz = new
-        p = z + kind(beta) * p
+        beta = new_rz / rz if step else 0.0
+        rz = new_rz
+        p = z + real(beta) * p
         level.subtract_product(p, zero, q)
         q *= -1
         alpha = rz / float(p @ q)
         diagonal.append(1 / alpha + beta / old_alpha)
         off_diagonal.append(np.sqrt(beta) / old_alpha)
-        r -= kind(alpha) * q
+        r -= real(alpha) * q
         old_alpha = alpha
     T = np.diag(diagonal) + np.diag(off_diagonal[1:], 1) + np.diag(off_diagonal[1:], -1)
     return float(np.linalg.eigvalsh(T).max()) if diagonal else 1.0
@@ -219,7 +219,7 @@ class Coarse:
     Attributes
     ----------
     matrix : csc_array (n, n)
-        The matrix A without the change by `set`.
+        The matrix A, without the change that `set` adds.
     """
 
     def __init__(self, A: csc_array) -> None:
@@ -246,9 +246,9 @@ class Coarse:
             cycle_kernels.factorise_dense(self._factor, self._reciprocal)
             return
         diagonal = A.diagonal()
-        self._idle = np.flatnonzero(diagonal <= ROUND_OFF * diagonal.max())
+        self._unstiffened = np.flatnonzero(diagonal <= ROUND_OFF * diagonal.max())
         active = np.ones(self.n)
-        active[self._idle] = 0.0
+        active[self._unstiffened] = 0.0
         K = diags_array(active) @ A @ diags_array(active) + diags_array(1.0 - active)
         self._lu = splu(csc_array(K), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
@@ -258,4 +258,4 @@ class Coarse:
             cycle_kernels.solve_dense(self._factor, self._reciprocal, b, self._work, x)
             return
         x[:] = self._lu.solve(b.astype(float))
-        x[self._idle] = 0.0
+        x[self._unstiffened] = 0.0

@@ -1,4 +1,4 @@
-"""Changes of a symmetric block matrix near some nodes, and their Galerkin products on coarser levels.
+"""Local changes of a symmetric block matrix, and their Galerkin products on coarser levels.
 
 The elimination of m equations sets ``u[pivots] = weights @ u``. Let the rows of E (m, n) be the unit vectors of the pivots,
 and ``D = weights - E``. The elimination is then the transformation ``T = I + E.T D``, and ``T.T A T`` differs from a
@@ -45,13 +45,13 @@ class LocalChange:
         """Return the diagonal blocks (k * size * size,) of the change."""
         return diagonal_blocks(self.blocks.indptr, self.blocks.indices, self.blocks.data, self.size)
 
-    def rows(self, kind: DTypeLike) -> tuple[Any, ...]:
+    def rows(self, dtype: DTypeLike) -> tuple[Any, ...]:
         """Return the change as block rows: `nodes`, `indptr`, `indices` and `data` as in `BlockMatrix`.
 
-        `indices` are numbers of nodes of the complete matrix. `kind` is the data type of `data`, which is a tuple of one.
+        `indices` are numbers of nodes of the complete matrix. `dtype` is the data type of `data`, which is a tuple of one.
         """
         columns = self.nodes[self.blocks.indices].astype(np.int32)
-        return self.nodes, self.blocks.indptr, columns, (self.blocks.data.astype(kind).ravel(),)
+        return self.nodes, self.blocks.indptr, columns, (self.blocks.data.astype(dtype).ravel(),)
 
     def coarser(self, P: BlockMatrix) -> LocalChange:
         """Return the Galerkin product ``P.T change P``, the change of the next coarser matrix with the prolongator P."""
@@ -129,7 +129,7 @@ class SymmetricChange:
     def diagonal(self) -> LocalChange:
         """Return the diagonal blocks of the change."""
         D, G = (rows.tobsr((1, self.size)) for rows in (self.D, self.G))
-        keys_of_D, keys_of_G = (self._numbers(rows) for rows in (D, G))
+        keys_of_D, keys_of_G = (self._keys(rows) for rows in (D, G))
         # A diagonal block is a sum over the rows in which both D and G have entries of the node.
         _, in_D, in_G = np.intersect1d(keys_of_D, keys_of_G, return_indices=True)
         half = np.einsum("ka,kb->kab", D.data[in_D, 0], G.data[in_G, 0])
@@ -140,7 +140,7 @@ class SymmetricChange:
         return LocalChange(nodes, bsr_array((blocks, each[:-1], each), shape=(n, n)))
 
     @staticmethod
-    def _numbers(rows: bsr_array) -> Indices:
+    def _keys(rows: bsr_array) -> Indices:
         """Return keys (k,) of the k stored blocks of `rows` (m, n), which identify their block row and block column."""
         row = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
         return np.asarray(row * rows.shape[1] + rows.indices, np.intp)

@@ -22,8 +22,8 @@ Storage = tuple[Numbers, Numbers, Numbers, int]
 
 # Every block is stored.
 ALL: Storage = (np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, np.int32), 0)
-# Number of parts of the rows of a symmetric matrix, and their smallest size: enough parts for many threads, and small
-# enough for their results to stay in the cache. More parts store more blocks twice.
+# Number of parts into which the rows of a symmetric matrix are divided, and their smallest number of rows. The parts suffice
+# for many threads, and their results stay in the cache. With more parts, more blocks would be stored twice.
 PARTS, SHORTEST = 32, 1024
 # Work of kernels for a row of blocks, see `_jit.parallel.portions`.
 WORK_OF_ROW = 20
@@ -42,7 +42,7 @@ class BlockMatrix:
     data : ndarray (n_blocks * len(rows) * len(cols),)
         The blocks, one after the other, in single or double precision.
     rows, cols : tuple of zeros
-        Their lengths are the size of a block: compiled kernels know the length of a tuple.
+        Their lengths are the size of a block, because compiled kernels know the length of a tuple at compile time.
     low : ndarray, optional
         Low parts, in single precision, where `data` are the high parts of a split matrix.
     storage : tuple
@@ -60,7 +60,7 @@ class BlockMatrix:
 
     @property
     def exact(self) -> tuple[AnyArray, ...]:
-        """The numbers in full precision, as arguments of kernels: (data,), or (high part, low part) of a split matrix."""
+        """Arrays of the entries in full precision, as arguments of kernels: (data,), or (high, low) for a split matrix."""
         return (self.data,) if self.low is None else (self.data, self.low)
 
     @property
@@ -76,18 +76,18 @@ class BlockMatrix:
 
     def combine(self, factor: float, x: AnyArray, share: float, z: AnyArray, y: AnyArray) -> None:
         """Fill `y` with ``share * z + factor * A @ x``, in the precision of x; x and y must be different arrays."""
-        kind = x.dtype.type
+        real = x.dtype.type
         numbers = (self.data,) if x.dtype == self.data.dtype else self.exact
         if self.storage is not ALL:
             length, n = self.storage[3], len(self.indptr) - 1
             spread(
                 symmetric_storage_kernels.multiply, -(-n // length), WORK_OF_ROW * length, self.storage, numbers, x,
-                kind(factor), kind(share), z, y, self.rows,
+                real(factor), real(share), z, y, self.rows,
             )  # fmt: skip
             return
         spread(
-            cycle_kernels.multiply, len(self.indptr) - 1, WORK_OF_ROW, self.indptr, self.indices, numbers, x, kind(factor),
-            kind(share), z, y, self.rows, self.cols,
+            cycle_kernels.multiply, len(self.indptr) - 1, WORK_OF_ROW, self.indptr, self.indices, numbers, x, real(factor),
+            real(share), z, y, self.rows, self.cols,
         )  # fmt: skip
 
     def diagonal_blocks(self) -> Array:
@@ -157,7 +157,7 @@ def block_matrix(K: bsr_array) -> BlockMatrix:
 
 
 class ScaledMatrix:
-    """A power of two times the stiffness K; its products are those of K, in double precision.
+    """The stiffness matrix K, stored times a power of two; products are those with K, in double precision.
 
     Parameters
     ----------
@@ -169,12 +169,14 @@ class ScaledMatrix:
         Whether the low parts may overwrite K's numbers, so that K and its parts are never in memory at the same time,
         which saves a tenth of the peak with a million unknowns. K is empty afterwards.
     near : ScaledMatrix, optional
-        Matrix whose unit and, for the same pattern, storage are used again. By default the largest stiffness is about one.
+        Matrix whose unit and, for the same pattern, storage are used again. By default, the unit is such that the largest
+        stiffness is about one.
 
     Attributes
     ----------
     scaled : BlockMatrix
-        ``unit K``. With a largest stiffness of about one, numbers of any unit system fit single precision.
+        ``unit K``. With a largest stiffness of about one, numbers in any system of units are within the range
+        of single precision.
     unit : float
         Scaling factor, a power of two, which is exact.
     shape, blocksize : (int, int)
@@ -202,7 +204,7 @@ class ScaledMatrix:
         self._store(self.restored(), precision, release=True)
 
     def restored(self) -> bsr_array:
-        """Return K as given, up to round-off."""
+        """Return K, up to round-off."""
         K = self.scaled.to_scipy()
         K.data /= self.unit
         return K
@@ -237,12 +239,12 @@ class ScaledMatrix:
 def _split(K: bsr_array, unit: float, release: bool, near: BlockMatrix | None) -> BlockMatrix:
     """Return ``unit K``, split into high and low parts; see `ScaledMatrix` for `release`.
 
-    The storage of a matrix that is `near` is used if it has the same pattern.
+    The storage of the matrix `near` is used if it has the same pattern.
     """
     indptr, indices = (array.astype(np.int32, copy=False) for array in (K.indptr, K.indices))
     size, numbers = K.blocksize[0], K.data if K.data.base is None else K.data.base
     if release and numbers.size == K.data.size and numbers.flags.owndata and numbers.flags.c_contiguous:
-        # Every number is read before it is overwritten. K's numbers are invalid then, and are removed.
+        # Every number is read before it is overwritten. K's numbers are then invalid, and are removed.
         K.indptr, K.indices, K.data = np.zeros_like(indptr), indices[:0], np.empty((0, *K.blocksize))
     else:
         numbers = K.data.copy()
@@ -267,11 +269,11 @@ def _store(
     """
     start, low = indptr if storage is ALL else storage[0], numbers.view(np.float32)
     end, n, widest = 0, len(indptr) - 1, int(np.diff(indptr).max(initial=0))
-    while end < n:  # rows whose low parts lie before unread numbers: in parallel; otherwise few rows
+    while end < n:  # up to `safe_end`, low parts overwrite only numbers that were read
         first = end
-        behind = int(np.searchsorted(start, 2 * int(indptr[first]), side="right")) - 1
-        end = max(min(n, behind), min(n, first + SHORTEST))
-        work = WORK_OF_ROW if end == behind else 0
+        safe_end = int(np.searchsorted(start, 2 * int(indptr[first]), side="right")) - 1
+        end = max(min(n, safe_end), min(n, first + SHORTEST))
+        work = WORK_OF_ROW if end == safe_end else 0
         spread(
             symmetric_storage_kernels.store_rows, end - first, work, first, widest, indptr, indices, storage, unit, numbers,
             square, high, low,
@@ -281,21 +283,21 @@ def _store(
 def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
     """Return the storage of a symmetric matrix.
 
-    It is `ALL` where the pattern is not sorted, lacks a diagonal block, or has a block without its transpose.
+    The storage is `ALL` if the pattern is not sorted, lacks a diagonal block, or is not symmetric within the parts.
     """
     n = len(indptr) - 1
     length = max(SHORTEST, -(-n // PARTS))
     row = np.repeat(np.arange(n, dtype=np.int32), np.diff(indptr))
-    inside = row // length == indices // length
-    below, above, diagonal = inside & (indices < row), inside & (indices > row), indices == row
+    same_part = row // length == indices // length
+    below, above, diagonal = same_part & (indices < row), same_part & (indices > row), indices == row
     ascending = (indices[1:] > indices[:-1]) | (row[1:] > row[:-1])
     transposed = np.sort(indices[below].astype(np.int64) * n + row[below])
     symmetric = np.array_equal(transposed, row[above].astype(np.int64) * n + indices[above])
     if not (symmetric and ascending.all() and diagonal.sum() == n):
         return ALL
     stored = ~below
-    rows, group = row[stored], (diagonal + np.int32(2) * above)[stored]
-    columns = indices[stored][np.argsort(np.int64(3) * rows + group, kind="stable")]
+    rows, rank = row[stored], (diagonal + np.int32(2) * above)[stored]
+    columns = indices[stored][np.argsort(np.int64(3) * rows + rank, kind="stable")]
     start = pointers(np.bincount(rows, minlength=n).astype(np.int32))
     upper = start[1:] - np.bincount(row[above], minlength=n).astype(np.int32)
     return start, upper, columns, length

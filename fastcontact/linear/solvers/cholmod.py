@@ -1,6 +1,6 @@
 """Direct solver by the supernodal Cholesky factorisation of CHOLMOD, from the optional package kvxopt.
 
-For 59 000 unknowns in 3D, with columns of K^-1, it is faster than ``"direct"`` by 10 to 25 %, and needs twice the memory.
+For 59 000 unknowns in 3D, including columns of K^-1, it is 10 to 25 % faster than ``"direct"`` and needs twice the memory.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ class Cholmod(FactorSolver):
         from kvxopt import cholmod, matrix
 
         factor = factorised(lower_triangle(K.tocsr()), matrix(fill_reducing(K, last)))  # K's rows are its columns
-        # CHOLMOD may reorder independent branches of the elimination tree, which does not change dependences.
+        # CHOLMOD may reorder independent branches of the elimination tree, which changes no dependencies.
         position = np.empty(self.n, np.intp)
-        position[_in_order(factor, self.n)] = np.arange(self.n)
+        position[_elimination_order(factor, self.n)] = np.arange(self.n)
         start, rows, values = (np.asarray(array).ravel() for array in cholmod.getfactor(factor).CCS)
         diagonal = values[start[:-1]]
         values /= np.repeat(diagonal, np.diff(start))
@@ -38,14 +38,15 @@ class Cholmod(FactorSolver):
 def by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Array) -> LowerTriangle:
     """Return a Cholesky factor, given by columns with ascending rows, with the rows once per supernode.
 
-    A column has the rows of the previous one without its first, if that row is the column itself and the numbers of rows
-    agree: below the diagonal, the structure of a column of a Cholesky factor is contained in that of its parent.
+    A column belongs to the supernode of the previous one if it is the first row below the diagonal of the latter and has one
+    entry fewer. It then has the same rows below, since the rows of a column without its diagonal are contained in those of
+    its parent.
     """
     entries = np.diff(start)
     continues = np.zeros(len(entries), bool)
     continues[1:] = entries[:-1] == entries[1:] + 1
-    before = np.flatnonzero(continues) - 1
-    continues[1 + before] = rows[start[before] + 1] == before + 1
+    previous = np.flatnonzero(continues) - 1
+    continues[1 + previous] = rows[start[previous] + 1] == previous + 1
     first = np.append(np.flatnonzero(~continues), len(entries))
     last = np.zeros(len(entries), bool)
     last[first[1:] - 1] = True
@@ -69,7 +70,7 @@ def factorised(A: Any, order: Any) -> Any:
     """Return the Cholesky factor of a `lower_triangle` A, with the unknowns eliminated in a given order."""
     from kvxopt import cholmod
 
-    before = dict(cholmod.options)
+    options = dict(cholmod.options)
     cholmod.options["nmethods"] = 1  # otherwise CHOLMOD may choose a different order
     try:
         factor = cholmod.symbolic(A, order)
@@ -78,11 +79,11 @@ def factorised(A: Any, order: Any) -> Any:
         raise singular() from error
     finally:
         cholmod.options.clear()
-        cholmod.options.update(before)
+        cholmod.options.update(options)
     return factor
 
 
-def _in_order(factor: Any, n: int) -> Indices:
+def _elimination_order(factor: Any, n: int) -> Indices:
     """Return the n unknowns in the order in which `factor` eliminates them."""
     from kvxopt import cholmod, matrix
 

@@ -20,7 +20,7 @@ class Direct(FactorSolver):
 
     def __init__(self, tolerance: float = ATTAINABLE) -> None:
         super().__init__(tolerance)
-        # Symbolic factorisations of tangents (True), which their solvers share, and of other matrices.
+        # Symbolic factorisations of tangents (True), which the solvers of all tangents share, and of other matrices (False).
         self._symbolic: dict[bool, SymbolicFactors] = {}
 
     def __repr__(self) -> str:
@@ -35,7 +35,7 @@ class Direct(FactorSolver):
 
     def _factorised(self, K: bsr_array, last: Indices) -> SymmetricFactors:
         symbolic = self._symbolic.get(self._of_tangents)
-        if symbolic is None or not symbolic.serves(K, last):
+        if symbolic is None or not symbolic.matches(K, last):
             symbolic = self._symbolic[self._of_tangents] = SymbolicFactors(K, last, self._of_tangents)
         return symbolic.factors(K)
 
