@@ -10,6 +10,7 @@ from scipy.sparse import bsr_array
 
 from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import typed
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.modal.cyclic import Sectors, Wave, pairs_of, without_ends
 from fastcontact.analysis.modal.eigenpairs import Reduced, lowest
 from fastcontact.analysis.modal.held_contact import Conditions, held_contact, joined
@@ -163,7 +164,9 @@ class _Vibration:
         contact = held_contact(model, step, held, hold_sliding)
         slides = step is not None and any((pair.active & ~pair.sticking).any() for pair in step.contact.values())
         sliding = held_contact(model, step, held, True) if slides and not hold_sliding else []
-        return cls(model, field, K, M, contact, supported, SINGLE_PRECISION * _uniform_quotient(model, K, M), sliding)
+        # The shift regularises free bodies, and loaded ones that turn freely, whose eigenvalues may be a little negative. Its
+        # frequency is the part NOTABLE of that of a uniform deformation: below the frequencies of all but thin bodies.
+        return cls(model, field, K, M, contact, supported, NOTABLE**2 * _uniform_quotient(model, K, M), sliding)
 
     def warn_of_slides(self, values: Array, vectors: Array) -> None:
         """Warn of eigenvalues (n,) close to zero whose shapes (n_dofs, n) slide where friction holds small motions."""

@@ -100,7 +100,7 @@ def even_at_axis(surface: Surface, points: Array) -> csr_array:
     values = eye_array(len(surface.points), format="lil")
     for block in surface.blocks:
         radii = np.abs(points[block.facets, 0])
-        on_axis = radii <= SINGLE_PRECISION * radii.max(axis=1, keepdims=True)
+        on_axis = radii <= SINGLE_PRECISION * np.abs(points).max()  # as in `symmetry_axis.axis_nodes`
         for facet, end in zip(*np.nonzero(on_axis[:, :2]), strict=True) if block.element == "line3" else ():
             nodes = block.local[facet]
             r1, r2 = radii[facet, [2, 1 - end]] ** 2

@@ -18,6 +18,7 @@ from scipy.sparse import csr_array
 from fastcontact.arrays import Array
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.elasticity.materials import LinearElastic, Material
+from fastcontact.elasticity.temperature import Temperature
 from fastcontact.elasticity.varying_constants import Varying
 from fastcontact.heat.loads import TemporaryHeat
 from fastcontact.mesh.mesh import Mesh
@@ -150,6 +151,8 @@ def _update_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points:
         fields = [field for field in fields if not field.name.startswith("rotation")]
     if isinstance(value, TemporaryHeat):
         fields = [field for field in fields if field.name not in ("begins", "ends", "reached") or value.temporary]
+    if isinstance(value, Temperature):  # the ramp of a history contains its instants
+        fields = [field for field in fields if field.name not in ("times", "instant")]
     if isinstance(value, ContactPair):
         fields = [f for f in fields if f.name != "found_gap" and (f.name != "fluid" or value.fluid is not None)]
     if isinstance(value, LinearElastic):  # the volumetric option that takes effect

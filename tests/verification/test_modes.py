@@ -210,6 +210,25 @@ def test_a_warning_counts_modes_that_friction_would_hold():
     assert abs(fc.modes(pressed({}), step, **own).frequencies[0]) < 1e-3 * held[0]
 
 
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+@pytest.mark.filterwarnings("ignore:contact .* has only")
+def test_a_loaded_disc_between_plates_turns_freely(solver):
+    """Its stresses make the turn a little unstable, since closed nodes stay in the planes of the plates."""
+    quarter = fc.generate.quarter_disc("tri6", R=2.5, size=0.8, contact_size=0.4, contact_radius=1.0)
+    quarter = fc.generate.transformed(quarter, translate=(0.0, 2.5))
+    half = union(quarter, fc.generate.mirrored(quarter, "x"))
+    mesh = fc.generate.merge_points(union(half, fc.generate.mirrored(half, "y")), 1e-6)
+    middle = int(np.linalg.norm(mesh.points, axis=1).argmin())
+    model = model_of(mesh.replace(point_groups={"MIDDLE": [middle]}), "plane_strain", nu=0.3)
+    model.fix("MIDDLE", "x")
+    for name, y, motion in (("floor", -2.5, None), ("lid", 2.5, {"y": -1e-3})):
+        plate = fc.obstacles.HalfSpace((0.0, y), (0.0, -np.sign(y)))
+        model.add_obstacle(name, secondary="CONT1", obstacle=plate, motion=motion)
+    step = fc.solve(model, 1)[-1]
+    turn, bounce = fc.modes(model, step, n=2, linear_solver=solver).frequencies
+    assert abs(turn) < 0.02 * bounce
+
+
 @pytest.mark.filterwarnings("ignore:contact 'joint' penetrates")
 def test_what_is_open_is_free_and_penalties_are_springs():
     """Two bars of length 1 joined by a spring k: ``w cos w sin w = k (cos^2 w - sin^2 w)`` with w the angular frequency."""

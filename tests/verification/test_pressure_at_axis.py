@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
+from fastcontact.contact.integration import even_at_axis
+from fastcontact.contact.surface import surface
 
 FORMULATIONS = ["node_to_segment", "continuous", "mortar"]
 
@@ -47,6 +49,16 @@ def test_ball_on_an_elastic_block(formulation, element, strain, friction):
     assert contact.pressure[0] == pytest.approx(stress[0], rel=0.01)
     assert not contact.shear[0].any()
     assert contact.active[0]
+
+
+def test_nodes_at_the_axis_of_a_mesh_in_single_precision():
+    """Their facets are small beside the model, to which the accuracy of coordinates is relative."""
+    block = fc.generate.graded_block("quad8", width=30.0, contact_radius=1.0, contact_size=0.2)
+    points = block.points + (block.points[:, :1] == 0.0) * [1e-5, 0.0]
+    side = surface(block.replace(points=points), "CONTACT")
+    moved, exact = (even_at_axis(side, at).toarray() for at in (points, block.points))
+    assert moved == pytest.approx(exact, abs=1e-6)
+    assert (moved.diagonal() == 0.0).sum() == 1  # the node at the axis
 
 
 @pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")

@@ -132,7 +132,7 @@ class _Problem:
         return forces, self.gaps(forces)
 
     def starts(self, closed: Mask, guess: Array | None) -> Iterator[tuple[Array, bool]]:
-        """Yield initial forces (1 + k, m) of Newton's method and whether to use a line search, in order of increasing cost.
+        """Yield initial forces (1 + k, m) of Newton's method, and whether to use a line search.
 
         The same initial forces are tried with and without a line search: at a kink of the residual, Newton's method may
         converge with full steps although no shortened step decreases the residual.

@@ -272,6 +272,13 @@ def test_what_changed_is_named(change, part):
     assert different(parts(), parts(**change)) == [part]
 
 
+@pytest.mark.parametrize(("values", "digest"), [(100.0, "3ac392ebd97a4d4c"), (np.ones((2, 9)), "6895e0e40b806985")])
+def test_digests_of_temperatures_are_those_in_files_of_earlier_versions(values, digest):
+    model = elastic_model(block((1.0, 1.0), (2, 2)), "plane_strain")
+    model.add_temperature(values, **({"times": [0.0, 1.0]} if np.ndim(values) else {}))
+    assert fingerprint(model)["the temperatures"] == digest
+
+
 def test_options_count():
     one, other = (fingerprint(model(), {"geometry_updates": updates}) for updates in (None, 2))
     assert different(one, other) == ["the option geometry_updates"]
