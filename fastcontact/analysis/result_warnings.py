@@ -131,7 +131,7 @@ def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
 def _unbalanced(state: State) -> Iterator[str]:
     """Yield a warning where the energy balance of all steps is violated by more than round-off."""
     work, round_off = state.work, LENGTH_ROUND_OFF * state.largest_force * float(np.abs(state.u).max(initial=0.0))
-    if work is not None and abs(work.imbalance) > NOTABLE * work.largest and work.largest > round_off:
+    if work is not None and abs(work.imbalance) > 2 * NOTABLE * work.largest and work.largest > round_off:
         yield (
             f"the energy of these load steps is out of balance: {work.imbalance:.3g} of the external work "
             f"{work.external:.4g} is neither strain energy ({work.strain_energy:.4g}), nor frictional work "

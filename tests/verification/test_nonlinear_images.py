@@ -142,4 +142,4 @@ def test_multigrid_finds_what_factors_do(name: str) -> None:
 
 def test_a_point_that_unloads_last_is_in_balance() -> None:
     """Plastic flow that ends in the last iteration changes a tangent that is otherwise still good enough."""
-    agrees("kinematic, quad8", solved("kinematic, quad8", Image(Q=TURN)), 1e-10)
+    agrees("kinematic, quad8", solved("kinematic, quad8", Image(Q=TURN)), 1e-9)

@@ -142,7 +142,8 @@ class Element:
 def quadratic(name: str, linear: Element, functions: Functions, **others: Any) -> Element:
     """Return a quadratic element, whose facets are those of the `linear` element with their mid-side and centre nodes.
 
-    `functions` are its nodes, its shape functions and their derivatives, and `others` are further arguments of `Element`.
+    `functions` (n_nodes, dim) [-] are its nodes, followed by its shape functions and their derivatives, and `others` are
+    further arguments of `Element`.
     """
     nodes, shape, gradient = functions
     facets = []
@@ -162,7 +163,7 @@ def with_middles(linear: Element) -> Array:
 
 
 def serendipity(box: Element) -> Functions:
-    """Return the nodes, shape functions and derivatives of the serendipity square or cube with mid-side nodes.
+    """Return the nodes (n_nodes, dim) [-], shape functions and derivatives of the serendipity square or cube with mid-side nodes.
 
     The function of a mid-side node with the coordinates X is the product of 1 - x^2 for the coordinate x along its edge,
     where X is 0, and of (1 + x X) / 2 for the others. The function of a corner is its linear function times the sum of all
@@ -190,9 +191,9 @@ def serendipity(box: Element) -> Functions:
 
 
 def product(nodes: Array, first: Element, second: Element) -> Functions:
-    """Return the `nodes` (n_nodes, dim), and the shape functions and derivatives of the product of two elements [-].
+    """Return nodes, shape functions (m, n_nodes) [-] and derivatives (m, n_nodes, dim) [-] of the product of two elements.
 
-    The function of a node is the product of two functions: that of the node of the first element with the first coordinates,
+    The function of each of the `nodes` (n_nodes, dim) [-] is the product of two functions: that of the node of the first element with the first coordinates,
     and that of the node of the second element with the other coordinates.
     """
     split = first.dim
@@ -212,7 +213,7 @@ def product(nodes: Array, first: Element, second: Element) -> Functions:
 
 
 def with_mid_nodes(simplex: Element) -> Functions:
-    """Return the nodes, shape functions and derivatives of the quadratic simplex with mid-side nodes."""
+    """Return the nodes (n_nodes, dim) [-], shape functions and derivatives of the quadratic simplex with mid-side nodes."""
     first, second = np.array(simplex.edges).T
 
     def shape(xi: Array) -> Array:

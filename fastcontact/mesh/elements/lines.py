@@ -7,24 +7,24 @@ from fastcontact.mesh.quadrature import gauss_line
 
 
 def shape(xi: Array) -> Array:
-    """Return the shape functions (m, 2) of the linear line at `xi` (m, 1) [-]."""
+    """Return the shape functions (m, 2) [-] of the linear line at `xi` (m, 1) [-]."""
     s = xi[:, 0]
     return np.stack([(1 - s) / 2, (1 + s) / 2], axis=1)
 
 
 def gradient(xi: Array) -> Array:
-    """Return the derivatives (m, 2, 1) of the linear line at `xi` (m, 1) [-]."""
+    """Return the derivatives (m, 2, 1) [-] of the linear line at `xi` (m, 1) [-]."""
     return np.broadcast_to(np.array([[-0.5], [0.5]]), (len(xi), 2, 1)).copy()
 
 
 def shape_3(xi: Array) -> Array:
-    """Return the shape functions (m, 3) of the quadratic line at `xi` (m, 1) [-]."""
+    """Return the shape functions (m, 3) [-] of the quadratic line at `xi` (m, 1) [-]."""
     s = xi[:, 0]
     return np.stack([s * (s - 1) / 2, s * (s + 1) / 2, 1 - s * s], axis=1)
 
 
 def gradient_3(xi: Array) -> Array:
-    """Return the derivatives (m, 3, 1) of the quadratic line at `xi` (m, 1) [-]."""
+    """Return the derivatives (m, 3, 1) [-] of the quadratic line at `xi` (m, 1) [-]."""
     s = xi[:, 0]
     return np.stack([s - 0.5, s + 0.5, -2 * s], axis=1)[:, :, None]
 

@@ -11,7 +11,7 @@ from fastcontact.mesh.quadrature import tetrahedron_1, tetrahedron_5
 
 
 def shape(xi: Array) -> Array:
-    """Return the shape functions (m, 4) at `xi` (m, 3), which are the barycentric coordinates [-]."""
+    """Return the shape functions (m, 4) [-] at `xi` (m, 3) [-], which are the barycentric coordinates."""
     return np.column_stack([1 - xi.sum(axis=1), xi])
 
 

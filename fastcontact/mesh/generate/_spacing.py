@@ -108,7 +108,7 @@ def growing(length: float, first: float, growth: float) -> Array:
 
 
 def straight(start: Sequence[float], end: Sequence[float], relative: Array) -> Array:
-    """Return points (n, 2) [length] of a straight side at relative abscissae (n,) from 0 to 1 [-]. The ends are exact."""
+    """Return points (n, 2) [length] of a straight side at the abscissae `relative` (n,) [-]. The ends are exact."""
     a, b, s = np.asarray(start, float), np.asarray(end, float), relative[:, None]
     return np.where(s < 1.0, a + s * (b - a), b)
 
@@ -128,8 +128,8 @@ def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, 
     """Return the grid (n + 1, m + 1, 2) [length] between four sides, whose nodes it contains.
 
     It is the bilinearly blended Coons patch (W. J. Gordon and C. A. Hall, Int. J. Numer. Meth. Engng 7, 1973, eq. 6). The
-    nodes of `bottom` and `top` (n + 1, 2) [length] have the relative abscissae `u` (n + 1,) from 0 to 1 [-], and those of
-    `right` and `left` (m + 1, 2) [length] have `v` (m + 1,) [-].
+    nodes of `bottom` (n + 1, 2) [length] and `top` (n + 1, 2) [length] have the relative abscissae `u` (n + 1,) [-], from 0
+    to 1, and those of `right` (m + 1, 2) [length] and `left` (m + 1, 2) [length] have `v` (m + 1,) [-].
     """
     affordable(len(u) * len(v))
     U, V = u[:, None, None], v[None, :, None]

@@ -29,7 +29,7 @@ _CLEARANCE = 0.6  # smallest distance of seeds from the outline, in edge lengths
 def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> Mesh:
     """Return a triangle mesh of a convex body, with all cells in the group `solid`.
 
-    Each of the `sides` consists of a name and nodes (n, 2) [length]. They are in counter-clockwise order, and each begins at
+    Each of the `sides` (n, 2) [length] consists of a name and nodes. They are in counter-clockwise order, and each begins at
     the end of the previous one. `spacing` defines the longest inner edges.
     """
     outline = np.vstack([nodes[:-1] for _, nodes in sides])
@@ -235,11 +235,11 @@ def stars_of(triangles: Indices, n_points: int) -> Indices:
 
 
 def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
-    """Return points (n, 2) after relaxation by repulsive bars along the edges [length].
+    """Return points (n, 2) [length] after relaxation by repulsive bars along the edges.
 
-    The bars of a truss push its nodes apart until their lengths follow the function `size` of positions (P.-O. Persson and
-    G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Only points with True in `movable` (n,)
-    move, in `steps` steps.
+    The bars of a truss push its nodes apart until their lengths follow the function `size` (n,) [length] of positions (P.-O.
+    Persson and G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Only those of the `points`
+    (n, 2) [length] with True in `movable` (n,) move, in `steps` steps.
     """
     points = points.copy()
     if not movable.any():
@@ -268,12 +268,12 @@ def _bar_forces(points: Array, edges: Indices, desired: Array) -> Array:
 
 
 def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
-    """Return points (n, 2) that are moved one by one to improve the worst triangle around each of them [length].
+    """Return points (n, 2) [length] that are moved one by one to improve the worst triangle around each of them.
 
     A trial move is accepted if it increases the smallest angle around the point, with a penalty on edges that are too long
     (smart smoothing after L. Freitag and C. Ollivier-Gooch, Int. J. Numer. Meth. Engng 40, 1997). Points that move
-    simultaneously share no edge. Only points with True in `movable` (n,) move, in at most `sweeps` sweeps. The function
-    `limit` of positions returns the longest admissible edge.
+    simultaneously share no edge. Only those of the `points` (n, 2) [length] with True in `movable` (n,) move, in at most
+    `sweeps` sweeps. The function `limit` (n,) [length] of positions returns the longest admissible edge.
     """
     points = points.copy()
     radius, moved = 0.1, True

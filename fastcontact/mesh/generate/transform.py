@@ -257,7 +257,7 @@ def with_points_at(mesh: Mesh, positions: Mapping[str, Sequence[float]]) -> Mesh
 def with_cells_inside(mesh: Mesh, name: str, group: str, inside: Callable[[Array], Mask]) -> Mesh:
     """Return the mesh with a cell group called `name`, which contains the cells of `group` with all nodes in a region.
 
-    The function `inside` returns for positions (n, dim) [length] whether they are in the region (n,).
+    The function `inside` (n,) of positions (n, dim) [length] returns whether they are in the region.
     """
     in_region = inside(mesh.points)
     rows_of = mesh.split(mesh.cell_groups[group])

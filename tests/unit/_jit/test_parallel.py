@@ -145,12 +145,12 @@ def test_every_node_belongs_to_one_part_of_a_nodal_average(threads):
     for count in (1, 2, 4):
         threads(count)
         average = recovery.NodalAverage(25**3, 6)
-        parts = average._parts(cells)
+        parts = average._node_ranges(cells)
         assert len(parts) == count
         assert [k for low, high in parts for k in range(low, high)] == list(range(25**3))
         work = [((cells >= low) & (cells < high)).sum() for low, high in parts]
         assert max(work) < 1.3 * min(work)
-        assert average._parts(cells[:0]) == [(0, 25**3)]
+        assert average._node_ranges(cells[:0]) == [(0, 25**3)]
 
 
 @pytest.mark.parametrize("batch", [0, 1000, 10**9])

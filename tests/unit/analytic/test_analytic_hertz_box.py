@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from models import reference
 
-from fastcontact.analytic import finite_half_spheres, finite_spheres, hertz_box
+from fastcontact.analytic import _finite_spheres, finite_half_spheres, hertz_box
 from fastcontact.errors import ModelError
 
 REFERENCE = reference("hertz_box")
@@ -154,10 +154,10 @@ def test_two_independent_computations_agree(row):
 
 
 def test_leaving_out_a_row_bounds_the_error_of_interpolation():
-    table = finite_spheres._table()
+    table = _finite_spheres._table()
     errors = {}
     for i in range(1, len(table) - 1):
-        found = finite_spheres._interpolated(np.delete(table, i, axis=0), table[i, 0])
+        found = _finite_spheres._interpolated(np.delete(table, i, axis=0), table[i, 0])
         errors[table[i, 0]] = np.abs(np.array(found) / table[i, 1:] - 1.0)
     worst = np.max(list(errors.values()), axis=0)
     large = np.max([error for x, error in errors.items() if x > 0.0079], axis=0)

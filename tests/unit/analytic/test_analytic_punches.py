@@ -15,6 +15,7 @@ from scipy.integrate import quad
 from scipy.special import ellipk, ellipkm1
 
 from fastcontact.analytic import (
+    _receding,
     bonded_stiffness_ratio,
     cone_punch,
     flat_punch,
@@ -22,7 +23,6 @@ from fastcontact.analytic import (
     hertz_point,
     paraboloid_punch,
     power_law_punch,
-    receding,
     receding_layer,
     spence_stick_ratio,
 )
@@ -221,7 +221,7 @@ def test_pressure_carries_the_force_and_vanishes_at_the_edge(ratio, load):
 @pytest.mark.parametrize(("ratio", "load"), first_of(1, [(0.0, 10.0), (100.0, 1.0)]))
 def test_series_is_long_enough(ratio, load, monkeypatch):
     found = layer(ratio, load)
-    monkeypatch.setattr(receding, "_TERMS", 160)
+    monkeypatch.setattr(_receding, "_TERMS", 160)
     longer = layer(ratio, load)
     assert found.series != longer.series
     assert found.half_width == pytest.approx(longer.half_width, rel=2e-6)
