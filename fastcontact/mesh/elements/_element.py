@@ -163,7 +163,7 @@ def with_middles(linear: Element) -> Array:
 
 
 def serendipity(box: Element) -> Functions:
-    """Return the nodes (n_nodes, dim) [-], shape functions and derivatives of the serendipity square or cube with mid-side nodes.
+    """Return the nodes (n_nodes, dim) [-], shape functions and derivatives of the serendipity square or cube.
 
     The function of a mid-side node with the coordinates X is the product of 1 - x^2 for the coordinate x along its edge,
     where X is 0, and of (1 + x X) / 2 for the others. The function of a corner is its linear function times the sum of all
@@ -193,8 +193,8 @@ def serendipity(box: Element) -> Functions:
 def product(nodes: Array, first: Element, second: Element) -> Functions:
     """Return nodes, shape functions (m, n_nodes) [-] and derivatives (m, n_nodes, dim) [-] of the product of two elements.
 
-    The function of each of the `nodes` (n_nodes, dim) [-] is the product of two functions: that of the node of the first element with the first coordinates,
-    and that of the node of the second element with the other coordinates.
+    The function of each of the `nodes` (n_nodes, dim) [-] is the product of two functions: that of the node of the first
+    element with the first coordinates, and that of the node of the second element with the other coordinates.
     """
     split = first.dim
     I = np.abs(nodes[:, None, :split] - first.nodes).sum(axis=2).argmin(axis=1)  # noqa: E741
