@@ -1,1 +1,1 @@
-"""The analysis of a model. Start reading in `load_step`: one load step from its loads to its result."""
+"""Analyses of a model: load steps with contact, modes and sensitivities. To read the code, begin with `load_step`."""

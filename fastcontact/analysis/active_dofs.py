@@ -18,10 +18,10 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.linear.sparse_rows import without_remnants
 
-# Where supports hold both sides of a constraint, no force there can close its gap or stop its slip: its row only has
-# entries of neighbours that move by strains, below this fraction of the row, of either sign. With such entries of 1e-16,
-# multipliers of a mortar joint between two flanges held at one edge reached 1e23; with entries of 1e-7 active sets of
-# held nodes never settled.
+# If supports hold both sides of a constraint, its force can neither close its gap nor stop its slip. After the supported
+# unknowns are eliminated, its row contains only small entries of neighbouring nodes. Rows whose entries are all below this
+# fraction of the largest entry before the elimination are set to zero. With remaining entries of 1e-16, multipliers of a
+# mortar joint between two flanges with a fixed edge reached 1e23; with entries of 1e-7, active sets did not converge.
 HELD = 1e-2
 
 
@@ -29,8 +29,8 @@ class ActiveDofs:
     """Degrees of freedom of the contact problem.
 
     In the methods, `u` (n,) are all displacement components, `lift` (n,) those that supports and multi-point constraints
-    prescribe if all unknowns are zero, `part` (k,) the active components, for which the contact problem is solved, and `v`
-    (l,) the unknowns that determine the active components [length].
+    prescribe if all unknowns are zero, `active` (k,) the active components, for which the contact problem is solved, and
+    `v` (l,) the unknowns that determine the active components [length].
 
     Parameters
     ----------
@@ -58,39 +58,39 @@ class ActiveDofs:
         self, system: System, contact_dofs: Indices, springs: Indices, unknowns: Indices | None = None
     ) -> None:
         self.condensed = unknowns is not None
-        involved, everything = np.union1d(contact_dofs, springs), np.arange(len(system.free))
-        self._dofs, self._unknowns = (everything, everything) if unknowns is None else (involved, unknowns)
+        involved, all_dofs = np.union1d(contact_dofs, springs), np.arange(len(system.free))
+        self._dofs, self._unknowns = (all_dofs, all_dofs) if unknowns is None else (involved, unknowns)
         self.compared, self.determined = (np.searchsorted(self._dofs, dofs) for dofs in (contact_dofs, involved))
         free = diags_array(system.free.astype(float), format="csr")
         T = free if system.T is None else system.T @ free
         self._system, self._T = system, csr_array(csr_array(T)[self._dofs][:, self._unknowns])
         self._transpose = csr_array(self._T.T)
 
-    # The largest condensed unknown; set by `for_step`.
-    _unknown_beyond: float
+    # The largest absolute value of the unknowns that are condensed; set by `for_step`.
+    _largest_condensed: float
 
     def for_step(self, u: Array, lift: Array) -> ActiveDofs:
         """Return the object for a load step that begins at displacements `u`."""
         step = copy.copy(self)
-        beyond = self._system.unknowns(u, lift)
-        beyond[self._unknowns] = 0.0
-        step._unknown_beyond = largest(beyond)
+        condensed = self._system.unknowns(u, lift)
+        condensed[self._unknowns] = 0.0
+        step._largest_condensed = largest(condensed)
         return step
 
     def of(self, u: Array) -> Array:
         """Return the active components (k,) of `u`."""
         return u[self._dofs]
 
-    def put(self, u: Array, part: Array) -> Array:
-        """Return all displacements `u`, in which the active ones are replaced in place by `part`."""
-        u[self._dofs] = part
+    def put(self, u: Array, active: Array) -> Array:
+        """Replace the active components of all displacements `u` by `active`, in place; return `u`."""
+        u[self._dofs] = active
         return u
 
     def constraints(self, constraints: Constraints, lift: Array, start: Array) -> Constraints:
         """Return constraints on all displacements as constraints on the active unknowns.
 
         Constraints whose two sides are held by supports get empty rows, see HELD. `start` (n,) are the displacements at the
-        beginning of the load step, from where slip is measured [length].
+        beginning of the load step, relative to which slips are measured [length].
         """
 
         def on_unknowns(rows: csr_array, offset: Array) -> tuple[csr_array, Array]:
@@ -120,9 +120,9 @@ class ActiveDofs:
         return np.asarray(self._transpose @ force[self._dofs])
 
     def numbers(self, unknowns: Indices) -> Indices:
-        """Return the numbers of unknowns of the system (k,) among the active unknowns."""
+        """Return the positions (k,) of `unknowns` (k,), numbers of unknowns of the system, among the active unknowns."""
         return np.searchsorted(self._unknowns, unknowns)
 
     def size(self, v: Array) -> float:
-        """Return the largest absolute value of all unknowns; condensed ones count with their values before the step."""
-        return max(self._unknown_beyond, largest(v))
+        """Return the largest absolute value of `v` and of the condensed unknowns at the beginning of the step."""
+        return max(self._largest_condensed, largest(v))

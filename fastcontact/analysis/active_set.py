@@ -5,16 +5,16 @@ With the stiffness matrix K, displacements u, external forces f, and the matrix 
 gap is ``gap0 + B u + C multiplier``. C is the compliance of the constraints themselves, symmetric and positive
 semidefinite; it is zero in most formulations.
 
-The primal-dual active set method (Hintermueller, Ito and Kunisch, 2003) changes all constraints whose signs are wrong at
-once. It usually converges after a few linear solutions, but it can cycle. If the constraints are linearly independent,
-``B K^-1 B.T + C`` is symmetric positive definite, so that the problem is a linear complementarity problem with a P-matrix.
+The primal-dual active set method (Hintermueller, Ito and Kunisch, 2003) changes the status of all constraints with wrong
+signs at once. It usually converges after a few linear solutions, but it can cycle. If the constraints are linearly
+independent, ``B K^-1 B.T + C`` is symmetric positive definite, and the linear complementarity problem has a P-matrix.
 When a set recurs, the solver therefore continues with the least-index rule: it only changes the wrong constraint with the
 lowest number. No set is then repeated, and the method terminates (Murty, 1974).
 
 An iterative linear solver need not converge for a set that will change anyway. It is therefore monitored, and stopped as
-soon as gaps or multipliers with wrong signs exceed the error that its residual allows. The method still terminates: each
-constraint changes in this way at most once, because a second change would contradict the first and shows that the error is
-larger than estimated. A set is accepted as final only if the linear solution has converged.
+soon as gaps or multipliers with wrong signs exceed the error that is estimated from its residual. The method still
+terminates, because each constraint changes in this way at most once: a second change would contradict the first and shows
+that the error is larger than estimated. A set is accepted as final only if the linear solution has converged.
 """
 
 from __future__ import annotations
@@ -53,13 +53,13 @@ def solve(
     Returns
     -------
     Solution
-        The solution. Its `settled` is False if the active set still changes after ``accuracy.max_iterations`` iterations.
+        The solution; not `settled` if the active set still changes after ``accuracy.max_iterations`` iterations.
     """
     equations = constraints.usable & constraints.equality
     active = (active & constraints.usable) | equations
-    seen: set[bytes] = set()
+    earlier_sets: set[bytes] = set()
     changed = np.zeros(len(active), bool)  # constraints that a monitored, unconverged solution has changed
-    one_by_one, iteration, wanted = False, 1, None
+    least_index, iteration, wanted = False, 1, None
 
     def monitor(u: Array, forces: Array, error: float) -> bool:
         """Return whether signs beyond the relative `error` of the unconverged solution require a different set.
@@ -68,16 +68,16 @@ def solve(
         """
         nonlocal wanted
         estimate = _with_next_set(constraints, accuracy, equations, u, forces, active, error)
-        again = (estimate.wanted != active) & changed
-        wanted = None if estimate.settled or again.any() else estimate.wanted
+        changes_again = (estimate.wanted != active) & changed
+        wanted = None if estimate.settled or changes_again.any() else estimate.wanted
         return wanted is not None
 
     while True:
         rows, compliance, wanted = np.flatnonzero(active), constraints.normal_compliance, None
         C = None if compliance is None else compliance.among(rows)
         nodes = None if constraints.nodes is None else constraints.nodes[rows]
-        B, right = constraints.B[rows], -constraints.gap0[rows]
-        u, forces = loaded.solve(B, right, C, guess, monitor, accuracy.residual, nodes)
+        B, values = constraints.B[rows], -constraints.gap0[rows]
+        u, forces = loaded.solve(B, values, C, guess, monitor, accuracy.residual, nodes)
         guess = u
         if wanted is not None:
             changed |= active != wanted
@@ -86,11 +86,11 @@ def solve(
         solution = _with_next_set(constraints, accuracy, equations, u, forces, active)
         if solution.settled or iteration == accuracy.max_iterations:
             return replace(solution, iterations=iteration, response=partial(_response, loaded, constraints, rows))
-        seen.add(active.tobytes())
-        one_by_one = one_by_one or solution.wanted.tobytes() in seen
-        if one_by_one:
-            first = np.flatnonzero(active != solution.wanted)[0]
-            solution.wanted[:first], solution.wanted[first + 1 :] = active[:first], active[first + 1 :]
+        earlier_sets.add(active.tobytes())
+        least_index = least_index or solution.wanted.tobytes() in earlier_sets
+        if least_index:
+            lowest = np.flatnonzero(active != solution.wanted)[0]
+            solution.wanted[:lowest], solution.wanted[lowest + 1 :] = active[:lowest], active[lowest + 1 :]
         active = solution.wanted
         iteration += 1
 

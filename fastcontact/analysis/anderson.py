@@ -7,7 +7,7 @@ import numpy as np
 from fastcontact.arrays import Array, Indices
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Number of earlier iterates that are mixed into the next one.
+# Number of earlier iterates that are combined with the last one.
 DEPTH = 5
 
 

@@ -35,7 +35,7 @@ def contact_results(
     ----------
     problem : Problem
     start : State
-        At the beginning of the step.
+        State at the beginning of the step.
     load : StepLoad
     settled : SettledContact
     end : State
@@ -50,14 +50,14 @@ def contact_results(
         )
         for name, rows in settled.constraints.rows.items()
     }  # fmt: skip
-    results = _joined(problem, results)
+    results = _with_periodic_nodes(problem, results)
     if problem.model.strain == "small":
         return results
     return {name: _on_deformed_surface(problem.pairs[name], result, displacement) for name, result in results.items()}
 
 
 def contact_result(
-    name: str, pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, at: Configuration,
+    name: str, pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, configuration: Configuration,
     axis: tuple[Array, Array] | None = None, displacement: Array | None = None,
 ) -> ContactResult:  # fmt: skip
     """Return the result of one pair at the end of a load step.
@@ -72,40 +72,40 @@ def contact_result(
         Solution of all pairs.
     rows : slice
         Rows of this pair in the solution.
-    at : Configuration
+    configuration : Configuration
         Configuration of the last pairing of the step.
     axis : (ndarray (dim,), ndarray (dim,)), optional
         In 3D, the point of first contact [length] and the normal there [-].
     displacement : ndarray (n_points, dim), optional
-        Displacement at which gaps are evaluated, by default that of `at` [length].
+        Displacement at which gaps are evaluated, by default that of `configuration` [length].
     """
     points = pair.secondary.points
     coordinates = pair.points[points]
     multiplier, active = solution.multiplier[rows], solution.active[rows]
     active = active if constraints.wetted is None else active & ~constraints.wetted.rows
-    gap, normal = pair.nodal_gap(at, displacement=displacement)
+    gap, normal = pair.nodal_gap(configuration, displacement=displacement)
     active_gaps = active[: len(constraints.normal_forces(multiplier))]
-    closed, pressure, nodal, kept = _closed(pair, constraints, multiplier, active_gaps, gap, at)
-    if pair.options.tied:  # in the undeformed configuration
-        normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[1]
-    shear, sticking, tangential = _along_the_surface(constraints, solution, rows, normal, closed, kept)
+    closed, pressure, nodal_multiplier, scale = _closed(pair, constraints, multiplier, active_gaps, gap, configuration)
+    if pair.options.tied:  # normals of the undeformed configuration
+        normal = pair.nodal_gap(replace(configuration, displacement=np.zeros_like(configuration.displacement)))[1]
+    shear, sticking, tangential = _tangential_results(constraints, solution, rows, normal, closed, scale)
     if pair.axisymmetric:  # The radial traction is an odd function of the radius.
         shear[coordinates[:, 0] <= LENGTH_ROUND_OFF * np.ptp(coordinates)] = 0.0
     forces, total, primary_points, primary_forces = _forces(pair, constraints, multiplier, tangential)
-    faced = np.where(np.isfinite(normal), normal, 0.0)
-    middle = contact_middle(pair, faced, np.einsum("nd,nd->n", forces, faced), closed, gap)
+    finite_normal = np.where(np.isfinite(normal), normal, 0.0)
+    middle = contact_middle(pair, finite_normal, np.einsum("nd,nd->n", forces, finite_normal), closed, gap)
     fluid = None if pair.options.source is None else np.zeros(len(points))
     if constraints.wetted is not None:
         fluid = constraints.wetted.pressure
-    abscissa, obstacle = pair.secondary.abscissa, dict[str, Any]()
-    if axis is not None:  # the distance from it
-        arm = coordinates - axis[0]
-        abscissa = np.linalg.norm(arm - (arm @ axis[1])[:, None] * axis[1], axis=1)
+    abscissa, obstacle_results = pair.secondary.abscissa, dict[str, Any]()
+    if axis is not None:  # distance from the axis
+        offset = coordinates - axis[0]
+        abscissa = np.linalg.norm(offset - (offset @ axis[1])[:, None] * axis[1], axis=1)
     if isinstance(side := pair.primary, RigidSide):
-        obstacle = {
-            "obstacle_displacement": at.pose.displacement.copy(),
-            "obstacle_angle": None if side.rotation is None else at.pose.angle,
-            "torque": side.torque(coordinates + at.displacement[points], forces, at.pose),
+        obstacle_results = {
+            "obstacle_displacement": configuration.pose.displacement.copy(),
+            "obstacle_angle": None if side.rotation is None else configuration.pose.angle,
+            "torque": side.torque(coordinates + configuration.displacement[points], forces, configuration.pose),
         }
     return ContactResult(
         name=name,
@@ -115,7 +115,7 @@ def contact_result(
         abscissa=abscissa,
         gap=gap,
         pressure=pressure,
-        multiplier=nodal,
+        multiplier=nodal_multiplier,
         force_vectors=forces,
         normal=normal,
         active=closed,
@@ -129,7 +129,7 @@ def contact_result(
         primary_points=primary_points,
         primary_force_vectors=primary_forces,
         fluid_pressure=fluid,
-        **obstacle,
+        **obstacle_results,
     )
 
 
@@ -146,10 +146,10 @@ def _forces(
     return forces, total, opposite, nodal_forces[opposite]
 
 
-def _along_the_surface(
-    constraints: Constraints, solution: Solution, rows: slice, normal: Array, closed: Mask, kept: Array
+def _tangential_results(
+    constraints: Constraints, solution: Solution, rows: slice, normal: Array, closed: Mask, scale: Array
 ) -> tuple[Array, Mask, Array | None]:
-    """Return nodal tractions (n_nodes, dim) [pressure], nodes that stick, and forces (m, k) of friction [force]."""
+    """Return nodal shear (n_nodes, dim) [pressure], sticking nodes, and tangential forces (m, k) [force] or None."""
     multiplier, all_nodes = solution.multiplier[rows], np.ones(len(normal), bool)
     if constraints.tied is not None and constraints.tied.directions:
         _, tangential = constraints.tied.forces(multiplier)
@@ -160,46 +160,53 @@ def _along_the_surface(
     tangential = solution.tangential[rows]
     shear = _nodal_shear(constraints, constraints.directions, tangential, normal, constraints.normal_forces(multiplier))
     sticking, pressure = solution.sticking[rows], constraints.pressure(multiplier)
-    if len(sticking) != len(pressure):  # more force comes to a node from sticking constraints than from sliding ones
+    if len(sticking) != len(pressure):  # a node sticks if most of its pressure is due to sticking constraints
         assert constraints.nodal is not None
         sticking = constraints.nodal.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * pressure
-    return shear * kept[:, None], sticking, tangential
+    return shear * scale[:, None], sticking, tangential
 
 
 def _closed(
-    pair: Formulation, constraints: Constraints, multiplier: Array, active: Mask, gap: Array, at: Configuration
+    pair: Formulation,
+    constraints: Constraints,
+    multiplier: Array,
+    active: Mask,
+    gap: Array,
+    configuration: Configuration,
 ) -> tuple[Mask, Array, Array, Array]:
     """Return the closed nodes of a pair, and pressures that integrate to the contact force.
 
     Returns
     -------
     closed : ndarray of bool (n_nodes,)
-        Secondary nodes in contact: by their pressure, or because they cannot separate.
+        Secondary nodes in contact, due to their pressure or because they cannot separate.
     pressure : ndarray (n_nodes,)
         Pressures at closed nodes [pressure].
     multiplier : ndarray (n_nodes,)
         The pressure field over the whole side [pressure].
-    kept : ndarray (n_nodes,)
-        Factor from the raw to the reported pressures of closed nodes, by which tractions are scaled, too. At most 1: where a
-        field undershoots, the raw pressure of a node may nearly vanish, and its shear is arbitrary.
+    scale : ndarray (n_nodes,)
+        Ratio of reported to raw pressures at closed nodes, by which tractions are scaled as well; zero at open nodes. If raw
+        pressures are negative anywhere, the ratio is at most 1, since the raw pressure of a node may then nearly vanish [-].
     """
     field, excluded = constraints.nodal, pair.options.excluded_nodes(pair.secondary)
     assert field is not None
     forces = constraints.normal_forces(constraints.contact_forces(multiplier))
-    over_side, covered = field.over_whole_side(forces), field.covered
+    side_pressure, covered = field.over_whole_side(forces), field.covered
     if pair.options.always_closed:
         # Nodes beyond the end of the other side are unpaired, but parts of their facets may face it.
         closed = np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
     else:
         # Nodes of a cohesive layer are closed under tension as well.
-        closed = field.closed_nodes(active, gap, over_side if pair.options.cohesion is None else np.abs(over_side))
-        for_good = pair.never_opening(pair.points[pair.secondary.points], at)
-        closed = closed | (for_good & np.isfinite(gap))
+        closed = field.closed_nodes(
+            active, gap, side_pressure if pair.options.cohesion is None else np.abs(side_pressure)
+        )
+        never_opening = pair.never_opening(pair.points[pair.secondary.points], configuration)
+        closed = closed | (never_opening & np.isfinite(gap))
     closed, pressure = carried(constraints, forces, closed & ~excluded, pair.secondary)
-    raw = field.pressure(forces) * covered  # averaged at each node like the frictional tractions
-    fraction = np.divide(pressure, raw, out=np.ones_like(pressure), where=raw > 0.0)
-    kept = np.where(closed, np.minimum(fraction, 1.0) if raw.min() < 0.0 else fraction, 0.0)
-    return closed, pressure, np.where(excluded, 0.0, over_side), kept
+    raw_pressure = field.pressure(forces) * covered  # averaged at each node like the frictional tractions
+    ratio = np.divide(pressure, raw_pressure, out=np.ones_like(pressure), where=raw_pressure > 0.0)
+    scale = np.where(closed, np.minimum(ratio, 1.0) if raw_pressure.min() < 0.0 else ratio, 0.0)
+    return closed, pressure, np.where(excluded, 0.0, side_pressure), scale
 
 
 def _nodal_shear(
@@ -211,8 +218,8 @@ def _nodal_shear(
 ) -> Array:
     """Return the tangential traction on the secondary nodes (n_nodes, dim) [pressure].
 
-    Tangents vary from point to point: the traction is computed from the Cartesian components of the forces, and its component
-    along the nodal normals is removed.
+    Because tangents vary from point to point, the traction is computed from Cartesian components of the forces. Its component
+    along the nodal normals is then removed.
     """
     nodal = constraints.nodal
     assert nodal is not None
@@ -224,9 +231,9 @@ def _nodal_shear(
 
 
 def approach(constraints: Constraints, solution: Solution, rows: slice, contact: ContactResult) -> Array:
-    """Return the parts (n_nodes, dim) of nodal slips before nodes closed in the step, averaged by contact force [length].
+    """Return the parts (n_nodes, dim) of nodal slips from before nodes closed, weighted by contact forces [length].
 
-    They are known, and not zero, if the step was solved in increments. For parameters see `contact_result`.
+    They are zero unless the step was solved in increments. For parameters see `contact_result`.
     """
     if solution.approach is None or not constraints.tangents:
         return np.zeros_like(contact.coordinates)
@@ -262,7 +269,7 @@ def sliding_load(
     side : Surface
         The secondary side.
     """
-    # The slip of a step as a whole may be elastic; that of increments is sliding, also if the constraint sticks at the end.
+    # In a step solved at once, slip of sticking constraints is elastic. In increments, constraints may slide and then stick.
     slides = over_slip if solution.work is not None else np.where(solution.sticking[rows], 0.0, over_slip)
     return np.maximum(carried(constraints, constraints.normal_forces(slides), closed, side)[1], 0.0)
 
@@ -290,29 +297,34 @@ def _on_deformed_surface(pair: Formulation, contact: ContactResult, displacement
 
 def areas(pair: Formulation, displacement: Array) -> tuple[Array, Array]:
     """Return the tributary areas (n_nodes,) of secondary nodes before and after a displacement (n_points, dim) [area]."""
-    places = pair.points, pair.points + displacement
-    before, after = (lumped_areas(pair.secondary, points, pair.axisymmetric) for points in places)
+    configurations = pair.points, pair.points + displacement
+    before, after = (lumped_areas(pair.secondary, points, pair.axisymmetric) for points in configurations)
     return before, after
 
 
 def _stretch(contact: ContactResult, displacement: Array, before: Array, after: Array) -> tuple[float, float]:
-    """Return the stretch of both bounds of the contact width [-].
+    """Return the ratios of the deformed to the undeformed contact width, for both bounds of the width [-].
 
-    In 3D it is the square root of the area ratio of the closed nodes.
+    In 3D both are the square root of the area ratio of the closed nodes.
     """
     if not contact.active.any():
         return 1.0, 1.0
     if contact.coordinates.shape[1] == 3:
-        grown = float(np.sqrt(after[contact.active].sum() / before[contact.active].sum()))
-        return grown, grown
-    moved = displacement[:, 0] if contact.tangent is None else displacement @ contact.tangent
-    widths = (half_width(contact.place, contact.active, contact.across + fraction * moved) for fraction in (0.0, 1.0))
-    ratios = [now / then if then > 0.0 and np.isfinite(then) else 1.0 for then, now in zip(*widths, strict=True)]
+        stretch = float(np.sqrt(after[contact.active].sum() / before[contact.active].sum()))
+        return stretch, stretch
+    tangential = displacement[:, 0] if contact.tangent is None else displacement @ contact.tangent
+    widths = (
+        half_width(contact.place, contact.active, contact.across + fraction * tangential) for fraction in (0.0, 1.0)
+    )
+    ratios = [
+        deformed / undeformed if undeformed > 0.0 and np.isfinite(undeformed) else 1.0
+        for undeformed, deformed in zip(*widths, strict=True)
+    ]
     return ratios[0], ratios[1]
 
 
-def _joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
-    """Return contact results in which both nodes of a periodic point have one traction, and are closed if either is."""
+def _with_periodic_nodes(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
+    """Return contact results in which both nodes of a periodic pair have the same traction, and close together."""
     results_of_pairs = dict(results)
     for name, contact in results.items() if problem.model.periodic_interfaces else ():
         pair = problem.pairs[name]
@@ -320,19 +332,19 @@ def _joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, Co
         pressure, shear, active = contact.pressure.copy(), contact.shear.copy(), contact.active.copy()
         for interface in problem.model.periodic_interfaces:
             a, b = _rows(problem, contact, interface)
-            share = areas[a] / (areas[a] + areas[b])
-            turn = np.eye(shear.shape[1]) if interface.turn is None else interface.turn
-            pressure[a] = pressure[b] = share * pressure[a] + (1.0 - share) * pressure[b]
-            shear[a] = share[:, None] * shear[a] + (1.0 - share[:, None]) * (shear[b] @ turn)
-            shear[b] = shear[a] @ turn.T
+            weight = areas[a] / (areas[a] + areas[b])
+            rotation = np.eye(shear.shape[1]) if interface.turn is None else interface.turn
+            pressure[a] = pressure[b] = weight * pressure[a] + (1.0 - weight) * pressure[b]
+            shear[a] = weight[:, None] * shear[a] + (1.0 - weight[:, None]) * (shear[b] @ rotation)
+            shear[b] = shear[a] @ rotation.T
             active[a] = active[b] = active[a] | active[b]
         results_of_pairs[name] = replace(contact, pressure=pressure, shear=shear, active=active)
     return results_of_pairs
 
 
 def _rows(problem: Problem, contact: ContactResult, interface: PeriodicInterface) -> tuple[Indices, Indices]:
-    """Return the rows of the first and second nodes of a periodic interface, where both are nodes of a contact."""
-    row = np.full(problem.model.mesh.n_points, -1, np.intp)
-    row[contact.points] = np.arange(len(contact.points))
-    both = (row[interface.first] >= 0) & (row[interface.second] >= 0)
-    return row[interface.first[both]], row[interface.second[both]]
+    """Return the rows, in a contact result, of first and second nodes of a periodic interface that both are its nodes."""
+    row_of_node = np.full(problem.model.mesh.n_points, -1, np.intp)
+    row_of_node[contact.points] = np.arange(len(contact.points))
+    on_side = (row_of_node[interface.first] >= 0) & (row_of_node[interface.second] >= 0)
+    return row_of_node[interface.first[on_side]], row_of_node[interface.second[on_side]]

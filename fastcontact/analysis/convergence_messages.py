@@ -27,34 +27,35 @@ NEARLY_SLIDING = 0.9
 
 
 def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Array, limit: int) -> str:
-    """Return the message for a geometry that did not converge; `change` (n_dofs,) is that of the last update [length].
+    """Return the message for a contact geometry that did not converge.
 
-    The nodes that moved most are added to the last entry of the history.
+    `change` (n_dofs,) is the change of the displacements in the last update [length]. The nodes with the largest
+    changes are added to the last entry of the history.
     """
     last = history[-1]
-    size = np.linalg.norm(change.reshape(problem.shape), axis=1)
+    magnitude = np.linalg.norm(change.reshape(problem.shape), axis=1)
     sides = {name: pair.secondary.points for name, pair in problem.pairs.items()}
     last["nodes"] = {
-        name: points[np.argsort(-size[points], kind="stable")[:3]].tolist() for name, points in sides.items()
+        name: points[np.argsort(-magnitude[points], kind="stable")[:3]].tolist() for name, points in sides.items()
     }
     changes = [entry["displacement_change"] for entry in history]
-    circles = len(changes) > WINDOW and min(changes[-WINDOW:]) > 0.5 * max(changes[-WINDOW:])
-    more = "More updates do not help, since they repeat in a cycle: use" if circles else (
+    cycles = len(changes) > WINDOW and min(changes[-WINDOW:]) > 0.5 * max(changes[-WINDOW:])
+    updates = "More updates do not help, since they repeat in a cycle: use" if cycles else (
         "Allow more (Criteria.max_geometry_updates), use"
     )  # fmt: skip
-    other = _less_bound(problem) + _smoother(problem)
+    advice = _bilateral_advice(problem) + _smoothing_advice(problem)
     return (
         f"the contact geometry did not converge in {limit} updates: the displacement still changes by "
         f"{changes[-1]:.1e} of its largest component, most at "
-        f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. {more} more load steps, a "
-        f"finer mesh on the primary side, {other}a fixed number of updates (Criteria.geometry_updates), or "
+        f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. {updates} more load steps, a "
+        f"finer mesh on the primary side, {advice}a fixed number of updates (Criteria.geometry_updates), or "
         f"accept changes of that size (Criteria.geometry, which is {problem.criteria.geometry:g}, above "
-        f"{max(changes[-WINDOW:]) if circles else changes[-1]:.0e})"
+        f"{max(changes[-WINDOW:]) if cycles else changes[-1]:.0e})"
     )
 
 
-def _less_bound(problem: Problem) -> str:
-    """Return a clause about pairs that close all gaps, which may be far wider than loads move bodies; empty for none."""
+def _bilateral_advice(problem: Problem) -> str:
+    """Return advice for a bilateral pair, whose constraints close gaps of any width; empty if gaps are round-off."""
     for name, pair in problem.pairs.items():
         if pair.options.kind == "bilateral":
             gap = pair.nodal_gap(Configuration.undeformed(pair.points))[0]
@@ -73,33 +74,34 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
             f"{constraints.friction.max():g} there may be no solution: use more load steps or less friction"
         )
     count = int((solution.active != solution.wanted).sum())
-    many = "1 constraint still changes" if count == 1 else f"{count} constraints still change"
-    cause = f"{many}, at {named_nodes(problem, nodes)}" if count else "directions of slip still change"
-    other = ", the direct linear solver" if problem.solver.iterative else ""
+    constraints_text = "1 constraint still changes" if count == 1 else f"{count} constraints still change"
+    cause = f"{constraints_text}, at {named_nodes(problem, nodes)}" if count else "directions of slip still change"
+    remedy = ", the direct linear solver" if problem.solver.iterative else ""
     return (
-        f"the active set did not converge in {solution.iterations} iterations: {cause}. Use more load steps{other} or more "
+        f"the active set did not converge in {solution.iterations} iterations: {cause}. Use more load steps{remedy} or more "
         "iterations (max_active_set_iterations)"
     )
 
 
 def friction_exceeded(bodies: FloatingBodies, factor: float, coefficients: Array) -> str:
-    """Return the message for loads beyond the friction cone, which would hold with `factor` times the `coefficients`."""
-    given = np.unique(coefficients[coefficients > 0.0])
+    """Return the message for loads beyond the friction cone, which `factor` times the `coefficients` would bear."""
+    distinct = np.unique(coefficients[coefficients > 0.0])
     needed = (
-        f"a coefficient of about {factor * given[0]:.2g} where the largest is {given[0]:.3g}"
-        if np.isclose(given[0], given[-1])
-        else f"about {factor:.3g} times the coefficients given, which are from {given[0]:.3g} to {given[-1]:.3g}"
+        f"a coefficient of about {factor * distinct[0]:.2g} where the largest is {distinct[0]:.3g}"
+        if np.isclose(distinct[0], distinct[-1])
+        else f"about {factor:.3g} times the coefficients given, which are from {distinct[0]:.3g} to {distinct[-1]:.3g}"
     )
     return (
-        f"friction cannot hold {', '.join(bodies.motions.by_body())} against the loads: that would take {needed}. Lower the "
-        "loads along the contact, press harder, or support the bodies along the contact"
+        f"friction cannot hold {', '.join(bodies.motions.by_body())} against the loads: this would require {needed}. Lower "
+        "the loads along the contact, press harder, or support the bodies along the contact"
     )
 
 
 def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, friction: bool, gaps: Array) -> str:
-    """Return the message for bodies whose springs still carry force under a load [force], with `friction` or without.
+    """Return the message for floating bodies whose springs still carry force under a generalised `load` [force].
 
-    `gaps` (m, k) are the changes of the gaps for each free motion, which show a motion that contact hardly resists.
+    `friction` is whether contact has friction. `gaps` (m, k) are the changes of the gaps in each free motion, from which a
+    motion that contact hardly resists is identified.
     """
     if len(bodies.names) > 1:
         (weakest,), ratio = least_held(bodies.motions, gaps)
@@ -108,11 +110,11 @@ def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, fric
                 f"contact hardly resists one motion, {weakest}, which changes the gaps {ratio:.1g} times as much as others "
                 "do: fix or prescribe a displacement component that stops it"
             )
-    more = "Add a support or more friction, for which the loads may be too large," if friction else "Add a support,"
+    remedy = "Add a support or more friction, for which the loads may be too large," if friction else "Add a support,"
     return (
         f"contact does not hold {grouped(bodies.moving(rigid))}: after {rigid.positions} positions "
         f"tried, a force of {np.abs(rigid.spring_force).max():.3g} is still missing for equilibrium under a load of "
-        f"{load:.3g}. {more} or use more load steps"
+        f"{load:.3g}. {remedy} or use more load steps"
     )
 
 
@@ -123,14 +125,14 @@ def limit_load(problem: Problem, state: State) -> str:
     )
     if not strain:
         return ""
-    beyond = (
+    validity = (
         f", beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics are valid: "
-        "the model bears less load than the body"
+        "the model then bears smaller loads than the real body"
         if strain > LARGEST_PLASTIC_STRAIN and problem.model.strain == "small"
         else ""
     )
     return (
-        f"; before it the largest plastic strain is {strain:.2g}{beyond}. Bodies that yield may bear no larger forces: "
+        f"; before it the largest plastic strain is {strain:.2g}{validity}. Bodies that yield may bear no larger forces: "
         "prescribe displacements in their place to find the largest"
     )
 
@@ -139,27 +141,27 @@ def friction_used(problem: Problem, state: State) -> str:
     """Return an addition to the message of a failed load step after `state` if floating bodies nearly slide."""
     if problem.floating_bodies is None:
         return ""
-    used = []
+    ratios = []
     for name, forces in state.forces.items():
         capacity = float((problem.pairs[name].friction or 0.0) * np.maximum(forces.pressure, 0.0).sum())
-        used += [float(np.linalg.norm(forces.traction, axis=1).sum()) / capacity] if capacity else []
-    if not used or min(used) < NEARLY_SLIDING:
+        ratios += [float(np.linalg.norm(forces.traction, axis=1).sum()) / capacity] if capacity else []
+    if not ratios or min(ratios) < NEARLY_SLIDING:
         return ""
     return (
-        f"; before it {min(used):.0%} of the friction that contact can bear is used, and more may not hold "
+        f"; before it {min(ratios):.0%} of the friction that contact can bear is used, and more may not hold "
         f"{', '.join(problem.floating_bodies.motions.by_body())}. Add a support, or prescribe displacements instead of forces"
     )
 
 
 def nearest_nodes(problem: Problem, constraints: StackedConstraints, rows: Indices) -> Nodes:
-    """Return, by contact pair, the secondary nodes nearest to constraints, numbered through the pairs."""
+    """Return by contact pair the secondary nodes that are nearest to the constraints `rows`, numbered over all pairs."""
     nodes: Nodes = {}
     for name, rows_of_pair in constraints.rows.items():
         rows_in_pair = rows[(rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)] - rows_of_pair.start
         if len(rows_in_pair):
             points = problem.pairs[name].secondary.points
-            away = constraints.parts[name].positions[rows_in_pair][:, None] - problem.model.mesh.points[points][None]
-            nodes[name] = np.unique(points[np.linalg.norm(away, axis=2).argmin(axis=1)]).tolist()
+            offsets = constraints.parts[name].positions[rows_in_pair][:, None] - problem.model.mesh.points[points][None]
+            nodes[name] = np.unique(points[np.linalg.norm(offsets, axis=2).argmin(axis=1)]).tolist()
     return nodes
 
 
@@ -168,12 +170,12 @@ def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
     texts = []
     for name, points in nodes.items():
         listed = ", ".join(f"{p} {np.array2string(problem.model.mesh.points[p], precision=4)}" for p in points[:3])
-        more = f" and {len(points) - 3} more" if len(points) > 3 else ""
-        texts.append(f"points {listed}{more} of contact '{name}'")
+        remainder = f" and {len(points) - 3} more" if len(points) > 3 else ""
+        texts.append(f"points {listed}{remainder} of contact '{name}'")
     return "; ".join(texts)
 
 
-def _smoother(problem: Problem) -> str:
+def _smoothing_advice(problem: Problem) -> str:
     """Return advice for pairs that alternate between facets at a node, supports of dual functions, or branches of a law."""
     faceted = [name for name, pair in problem.pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
     laws = {name: pair.options.cohesion for name, pair in problem.pairs.items() if pair.options.cohesion is not None}

@@ -5,9 +5,9 @@ the contact constraints, and :math:`\lambda` their Lagrange multipliers. A load 
 
 .. math:: \sum_i f_i(u) = f_{ext} + B(u)^T \lambda
 
-by Newton's method, see `newton`. `Balance` contains the reactions, and the residual with its bound; `StepEquilibrium` the
-solution. Contact is not a term: it is linearised together with its inequalities in `geometry_loop`.
-Only fluid pressure between the contact surfaces is one.
+by Newton's method, see `newton`. `Balance` contains the reactions, and the residual with its bound; `StepEquilibrium`
+contains the solution. Contact is not a term, because it is linearised together with its inequalities in `geometry_loop`.
+The pressure of a fluid between the contact surfaces is a term.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ class Term(Protocol):
     def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array | csr_array | None:
         """Return the derivative (n, n) of the nodal forces with respect to the n displacements of points [force / length].
 
-        The caller may modify the matrix. None means that the derivative is constant, and part of the matrix that `prepare`
-        passed to the linear solver. `geometric` selects how much of the geometric stiffness is included, see
-        `NonlinearBodies.at`.
+        The caller may modify the matrix. None means that the derivative is constant, and included in the matrix that
+        `problem.prepare` passed to the linear solver. `geometric` selects how much of the geometric stiffness is included,
+        see `NonlinearBodies.at`.
         """
         ...
 
@@ -87,24 +87,24 @@ class Bodies(Term):
 
     def __init__(self, problem: Problem, start: State, load: StepLoad) -> None:
         self._problem, self._start, self._rise = problem, start, load.rise
-        self._kept: list[tuple[Array, DeformedBodies]] = []
-        self._taken: Array | None = None
+        self._cache: list[tuple[Array, DeformedBodies]] = []
+        self._tangent_passed_at: Array | None = None
 
     def at(self, u: Array, *, tangent: bool = True) -> DeformedBodies:
         """Return forces, energies, history variables and tangent of the bodies at u (n_dofs,) [length].
 
-        With ``tangent=False`` the tangent is not computed in advance, because it will probably not be needed.
+        With ``tangent=False`` the tangent is not computed until it is needed, which saves time if it never is.
 
         Raises
         ------
         ConvergenceError
             If a cell is inverted.
         """
-        for known, bodies in self._kept:
-            if known is u:
+        for cached_u, bodies in self._cache:
+            if cached_u is u:
                 return bodies
         bodies = self._problem.deformed(u, self._start, self._rise, tangent=tangent)
-        self._kept = [*self._kept[-1:], (u, bodies)]
+        self._cache = [*self._cache[-1:], (u, bodies)]
         return bodies
 
     def residual(self, u: Array) -> tuple[Array, Energies]:
@@ -115,9 +115,9 @@ class Bodies(Term):
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
         """See `Term`."""
-        if geometric < WHOLE or u is self._taken:
+        if geometric < WHOLE or u is self._tangent_passed_at:
             return self._problem.deformed(u, self._start, self._rise, geometric=geometric).K
-        self._taken = u
+        self._tangent_passed_at = u
         return self.at(u).K
 
     def commit(self, u: Array, state: State) -> State:
@@ -144,11 +144,11 @@ class SpringForces(Term):
 
 
 class FollowingForce(Term):
-    """Force of a pressure that follows the deformed surface, in excess of the force that is a constant elsewhere.
+    """Force of a pressure that follows the deformed surface, minus the constant force that is included elsewhere.
 
-    The external forces of the step include the forces of a load on the undeformed surface. The linearised contact problem
-    includes those of a fluid between the contact surfaces at the displacements about which it was linearised. The term
-    therefore is this force minus the force at the current displacements.
+    For a load, the external forces of the step include the force on the undeformed surface. For a fluid between contact
+    surfaces, the linearised contact problem includes the force at the displacements about which it is linearised. The term
+    is therefore the force at these displacements, `at`, minus the force at the current displacements.
 
     Parameters
     ----------
@@ -167,12 +167,12 @@ class FollowingForce(Term):
         factor: float = 1.0,
     ) -> None:  # fmt: skip
         self._displacement, self._force, self._stiffness, self._factor = problem.displacement, force, stiffness, factor
-        self._before = force(problem.displacement(at))
+        self._included = force(problem.displacement(at))
 
     def residual(self, u: Array) -> tuple[Array, Energies]:
         """See `Term`."""
-        force, here = np.zeros_like(u), self._force(self._displacement(u))
-        force[: here.size] = -self._factor * (here - self._before).ravel()
+        force, current = np.zeros_like(u), self._force(self._displacement(u))
+        force[: current.size] = -self._factor * (current - self._included).ravel()
         return force, (0.0, 0.0)
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
@@ -198,34 +198,34 @@ class Terms:
 
     def __init__(self, problem: Problem, start: State, load: StepLoad) -> None:
         self.bodies = None if problem.bodies is None else Bodies(problem, start, load)
-        self._parts: list[Term] = [LinearBodies(problem.system.K)]
+        self._terms: list[Term] = [LinearBodies(problem.system.K)]
         if self.bodies is not None:
             springs, n = problem.model.springs, problem.model.n_dofs
-            self._parts = [self.bodies, *([SpringForces(springs, n)] if springs else [])]
+            self._terms = [self.bodies, *([SpringForces(springs, n)] if springs else [])]
             for (pressure, _), factor in zip(problem.following, load.following, strict=True):
-                force, tangent = (lambda u, part=part, at=pressure.at: at(u)[part] for part in (0, 1))
-                self._parts.append(FollowingForce(problem, force, tangent, np.zeros_like(start.u), factor))
+                force, tangent = (lambda u, index=index, at=pressure.at: at(u)[index] for index in (0, 1))
+                self._terms.append(FollowingForce(problem, force, tangent, np.zeros_like(start.u), factor))
 
-    def residual(self, u: Array, more: Sequence[Term] = ()) -> tuple[Array, Energies]:
-        """Return the sums of the nodal forces and of the energies of all terms, including the terms `more`; see `Term`."""
-        force, energy = self._parts[0].residual(u)
-        for term in (*self._parts[1:], *more):
+    def residual(self, u: Array, others: Sequence[Term] = ()) -> tuple[Array, Energies]:
+        """Return the sums of the nodal forces and of the energies of all terms, including the terms `others`; see `Term`."""
+        force, energy = self._terms[0].residual(u)
+        for term in (*self._terms[1:], *others):
             added, stored = term.residual(u)
             force, energy = force + added, (energy[0] + stored[0], energy[1] + stored[1])
         return force, energy
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
-        """Return the sum of the tangents; see `Term`. It may only be called if the bodies are nonlinear."""
+        """Return the sum of the tangents, see `Term`, of nonlinear bodies and all other terms."""
         assert self.bodies is not None
         K = self.bodies.tangent(u, geometric)
-        for term in self._parts[1:]:
-            if (more := term.tangent(u)) is not None:
-                K = sum_of_blocks(K, more)
+        for term in self._terms[1:]:
+            if (tangent := term.tangent(u)) is not None:
+                K = sum_of_blocks(K, tangent)
         return K
 
     def commit(self, u: Array, state: State) -> State:
         """See `Term`."""
-        for term in self._parts:
+        for term in self._terms:
             state = term.commit(u, state)
         return state
 
@@ -245,13 +245,13 @@ class Balance:
     largest : float
         Largest force of all steps so far [force].
     residual : float
-        Largest residual force. If it exceeds `bound`, the round-off of its row has been subtracted [force].
+        Largest residual force. If it exceeds the criterion, the round-off of each row is subtracted before [force].
     bound : float
         Largest admissible residual force [force].
     relative : float
         Largest residual force relative to the largest force of this step; zero if all forces are round-off [-].
     noise : float
-        Level of round-off: smaller forces are not significant [force].
+        Level of round-off, below which forces are not significant [force].
     energy : (float, float)
         Strain energy, including that of springs, and plastic work since the beginning of the analysis [energy].
     """
@@ -283,10 +283,12 @@ class Balance:
         """Raise a ConvergenceError for step `index` if the residual exceeds its bound."""
         if self.residual <= self.bound:
             return
-        more = f", or accept it with Criteria(relative={2 * self.relative:.0e})" if 2 * self.relative <= NOTABLE else ""
+        tolerance_advice = (
+            f", or accept it with Criteria(relative={2 * self.relative:.0e})" if 2 * self.relative <= NOTABLE else ""
+        )
         remedy = "use the direct solver" if problem.solver.iterative else (
             "round-off allows no less if moduli or displacements differ by many orders of magnitude. Put a rigid obstacle "
-            f"in the place of a stiff body{more}"
+            f"in the place of a stiff body{tolerance_advice}"
         )  # fmt: skip
         raise ConvergenceError(
             f"step {index}: the out-of-balance force {self.residual:.3g} stays above {self.bound:.3g} "
@@ -315,20 +317,20 @@ def balance(
         Nodal forces [force] and energies [energy] of all terms, see `Terms.residual`.
     """
     criteria, (force_of_terms, energy) = problem.criteria, internal
-    out = force_of_terms - contact_force
-    out -= external
-    reaction, residual = problem.system.balance(out)
+    unbalanced = force_of_terms - contact_force
+    unbalanced -= external
+    reaction, residual = problem.system.balance(unbalanced)
     forces = (reaction, contact_force, external)
-    force = max(largest(part) for part in forces)
+    force = max(largest(nodal_forces) for nodal_forces in forces)
     largest_so_far = max(largest_so_far, force)
     bound = max(criteria.relative * force, criteria.absolute or 0.0)
-    off, round_off, noise = residual, 0.0, 0.0
+    full_residual, round_off, noise = residual, 0.0, 0.0
     if not 0.0 < residual <= bound:
         # In stiff parts with large displacements, the round-off of internal forces may exceed the forces in soft parts. If
         # there are no forces, the relative residual is not defined, and the round-off of internal forces is the bound. Both
         # cases need the row sums, which cost as much as a product with K.
         row_sums = problem.system.K.row_sums(problem.accurate_to(u))
-        residual = problem.system.balance(out, SUM_ROUND_OFF * row_sums)[1]
+        residual = problem.system.balance(unbalanced, SUM_ROUND_OFF * row_sums)[1]
         round_off, noise = _round_off(problem, row_sums, forces, largest_so_far)
     reaction = reaction[: problem.model.mesh.points.size]
     if problem.model.springs:
@@ -338,7 +340,7 @@ def balance(
         largest_so_far,
         residual,
         max(bound, round_off),
-        float(off / force) if force > round_off else 0.0,
+        float(full_residual / force) if force > round_off else 0.0,
         noise,
         energy,
     )
@@ -349,15 +351,15 @@ def _round_off(
 ) -> tuple[float, float]:
     """Return a bound of the residual that is due to round-off, and the level of round-off.
 
-    Forces are significant if one of them exceeds the level of round-off, and if the round-off of its row is below the
-    criterion. The bound is then small, so that the round-off of stiff parts does not hide the residual of soft ones. If no
-    force is significant, the bound is the error of the internal forces.
+    A force is significant if it exceeds the level of round-off, and if the round-off of its row is below the criterion. If
+    any force is significant, the bound is small, so that the round-off of stiff parts does not hide the residual of soft
+    ones. Otherwise the bound is the error of the internal forces.
 
     Parameters
     ----------
     problem : Problem
     row_sums : ndarray (n_dofs,)
-        ``abs(K) @ abs(u)`` [force].
+        ``abs(K) @ lengths`` with the lengths of `Problem.accurate_to` [force].
     forces : tuple of ndarray
         Reactions, contact forces and external forces [force].
     largest_force : float
@@ -368,12 +370,12 @@ def _round_off(
     bound, level : float
         [force].
     """
-    slack = ROUND_OFF * largest_force
-    noise = max(slack, SIGNIFICANT * SUM_ROUND_OFF * largest(row_sums))
-    for part in map(np.abs, forces):
-        if ((part > noise) & (part * problem.criteria.relative > SUM_ROUND_OFF * row_sums)).any():
-            return slack, noise
-    return max(max(ROUND_OFF, 10 * problem.solver.tolerance) * largest(row_sums), slack), noise
+    force_round_off = ROUND_OFF * largest_force
+    noise = max(force_round_off, SIGNIFICANT * SUM_ROUND_OFF * largest(row_sums))
+    for magnitudes in map(np.abs, forces):
+        if ((magnitudes > noise) & (magnitudes * problem.criteria.relative > SUM_ROUND_OFF * row_sums)).any():
+            return force_round_off, noise
+    return max(max(ROUND_OFF, 10 * problem.solver.tolerance) * largest(row_sums), force_round_off), noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -425,9 +427,9 @@ class StepEquilibrium:
         }
         if self.terms.bodies is None:
             return counts
-        names = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
-        of_newton = {name: sum(entry[key] for entry in self.newton) for name, key in names.items()}
-        return {**counts, **of_newton, "history": self.newton}
+        keys = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
+        newton_sums = {name: sum(entry[key] for entry in self.newton) for name, key in keys.items()}
+        return {**counts, **newton_sums, "history": self.newton}
 
 
 def with_loads(problem: Problem, load: StepLoad) -> Loaded:
@@ -445,8 +447,8 @@ def solve_displacements(
     """
     system, lift = problem.system, load.lift
     if settled is None:
-        none = csr_array((0, len(lift))), np.empty(0)
-        v = loaded.solve(*none, guess=system.unknowns(guess, lift))[0]
+        no_constraints = csr_array((0, len(lift))), np.empty(0)
+        v = loaded.solve(*no_constraints, guess=system.unknowns(guess, lift))[0]
         return system.displacement(v, lift), np.zeros(len(lift))
     contact_force, rigid = settled.force, settled.iterate.rigid
     if problem.floating_bodies is not None and rigid is not None:

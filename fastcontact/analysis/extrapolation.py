@@ -1,4 +1,4 @@
-"""Predictor of a load step: polynomial extrapolation of displacements in the load, linear of contact forces."""
+"""Predictor of a load step: extrapolation in the load, of displacements by polynomials, of gaps and forces linearly."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fastcontact.arrays import Array, Mask
 GapsAndForces = tuple[Array, Array]
 # Largest ratio of the current load increment to the last one at which steps are extrapolated.
 FARTHEST = 2.0
-# Highest degree of the polynomial that continues steps.
+# Highest degree of the extrapolation polynomial.
 DEGREE = 4
 
 
@@ -30,7 +30,7 @@ class Extrapolation:
         Ratio of each load increment to the one before it, that of the current increment last; zero means that steps are not
         extrapolated across it [-].
     degree : int
-        Degree of the polynomial in the load that continues the steps.
+        Degree of the extrapolation polynomial.
     loads : tuple of tuples of ndarray
         The loads of the last steps and of the current one: prescribed displacements [length] and forces [force].
     states : tuple of (ndarray (n,), dict of str to GapsAndForces)
@@ -47,35 +47,36 @@ class Extrapolation:
         """Ratio of the current load increment to the last one; zero means no extrapolation [-]."""
         return self.ratios[-1] if self.ratios else 0.0
 
-    def to(self, *parts: Array) -> Extrapolation:
+    def to(self, *quantities: Array) -> Extrapolation:
         """Return the extrapolation to the loads of the next step.
 
-        `parts` are arrays of prescribed displacements [length] and of forces [force].
+        `quantities` are arrays of prescribed displacements [length] and of forces [force].
         """
-        loads = (*self.loads[-2:], tuple(part.copy() for part in parts))
+        loads = (*self.loads[-2:], tuple(quantity.copy() for quantity in quantities))
         ratio = _growth(loads) if len(self.states) >= 2 else 0.0
         return replace(self, ratios=(*self.ratios[1 - DEGREE :], ratio), loads=loads)
 
     def converged(self, u: Array, contact: Mapping[str, GapsAndForces], curve: bool = False) -> Extrapolation:
         """Return a copy to which the solution of a step is added.
 
-        `u` (n,) are its displacements [length], and `contact` the gaps and multipliers of each pair. `curve` keeps enough
-        steps for polynomials of more than the first degree. The next step is continued with the highest degree up to which
-        every one came clearly closer to this step than the one below, and with one more where all of them did.
+        `u` (n,) are its displacements [length], and `contact` the gaps and multipliers of each pair. If `curve` is
+        true, enough steps are stored for polynomials of more than the first degree. The degree is increased from 0 while the
+        polynomial of the next degree would have predicted this step clearly better, by the factor DECLINE. If all possible
+        degrees did so, the degree is higher by one. It is at least 1.
         """
         degree, highest = 0, self._highest
         distances = [largest_difference(u, self._continued(k)) for k in range(highest + 1)] if curve else []
         while degree < len(distances) - 1 and distances[degree + 1] < DECLINE * distances[degree]:
-            degree += 1  # with any closer one, indentations past yield, which are not smooth, take 5 % more iterations
+            degree += 1  # if any improvement sufficed, indentations past yield would take 5 % more iterations
         degree = max(1, degree + (degree == highest))
         return replace(self, degree=degree, states=(*self.states[-DEGREE if curve else -1 :], (u.copy(), contact)))
 
     def displacement(self, u: Array) -> Array:
-        """Return initial displacements (n,) of a step [length]; without extrapolation the last ones, `u` (n,)."""
+        """Return linearly extrapolated initial displacements (n,) of a step [length]; without extrapolation `u` (n,)."""
         return self._continued(1) if self.ratio else u
 
     def predicted(self, u: Array) -> Array:
-        """Return initial displacements (n,) as `displacement`, by the polynomial of the chosen degree."""
+        """Return initial displacements (n,) as `displacement` does, but by the polynomial of the chosen degree."""
         return self._continued(min(self.degree, self._highest)) if self.ratio else u
 
     @property
@@ -86,13 +87,15 @@ class Extrapolation:
 
     def _continued(self, degree: int) -> Array:
         """Return the displacements (n,) of the polynomial through the last ``degree + 1`` states, at the current load."""
-        states, out = [u for u, _ in self.states[-degree - 1 :][::-1]], self.states[-1][0]
+        states, extrapolated = [u for u, _ in self.states[-degree - 1 :][::-1]], self.states[-1][0]
         increments = 1.0 / np.cumprod([1.0, *self.ratios[len(self.ratios) - degree : -1][::-1]])
-        loads = np.concatenate([[0.0], -np.cumsum(increments)])  # from the last one, in increments
+        loads = np.concatenate(
+            [[0.0], -np.cumsum(increments)]
+        )  # relative to the last load, in units of the last increment
         for k in range(1, degree + 1):  # Lagrange polynomials
             others = np.delete(loads[: degree + 1], k)
-            out = out + np.prod((self.ratio - others) / (loads[k] - others)) * (states[k] - states[0])
-        return out
+            extrapolated = extrapolated + np.prod((self.ratio - others) / (loads[k] - others)) * (states[k] - states[0])
+        return extrapolated
 
     def active(self, name: str, last_active: Mask) -> Mask:
         """Return the initial active set (m,) of the pair `name`; without extrapolation `last_active` (m,)."""
@@ -112,27 +115,30 @@ class Extrapolation:
         """Return the data as numbers, lists and arrays, without the last displacements, which are saved elsewhere."""
         return {
             "loads": [
-                [{"size": len(part), "places": np.flatnonzero(part), "values": part[part != 0.0]} for part in load]
+                [
+                    {"size": len(quantity), "places": np.flatnonzero(quantity), "values": quantity[quantity != 0.0]}
+                    for quantity in load
+                ]
                 for load in self.loads[-2:]
             ],
             "before": [u for u, _ in self.states[:-1]],
             "ratios": list(self.ratios),
             "degree": self.degree,
-            "contact": [{name: list(both) for name, both in contact.items()} for _, contact in self.states[-2:]],
+            "contact": [{name: list(values) for name, values in contact.items()} for _, contact in self.states[-2:]],
         }
 
     @classmethod
-    def from_dict(cls, kept: Mapping[str, Any], u: Array) -> Extrapolation:
+    def from_dict(cls, data: Mapping[str, Any], u: Array) -> Extrapolation:
         """Return the extrapolation for data of `to_dict`; `u` (n,) are the last displacements [length]."""
-        before = kept["before"]
+        before = data["before"]
         if not isinstance(before, list):  # earlier versions saved one array, or none
             before = [] if before is None else [before]
-        contacts = [{name: (both[0], both[1]) for name, both in contact.items()} for contact in kept["contact"]]
+        contacts = [{name: (values[0], values[1]) for name, values in contact.items()} for contact in data["contact"]]
         contacts = [{}] * (len(before) + 1 - len(contacts)) + contacts
-        states: tuple[Any, ...] = tuple(zip([*before, u], contacts)) if kept["contact"] else ()
+        states: tuple[Any, ...] = tuple(zip([*before, u], contacts)) if data["contact"] else ()
         # Earlier versions saved one array per step, either of displacements or of forces, and did not save which.
-        loads = tuple(tuple(map(_dense, load)) for load in kept["loads"] if isinstance(load, list))
-        return cls(tuple(kept.get("ratios", ())), int(kept.get("degree", 1)), loads, states)
+        loads = tuple(tuple(map(_dense, load)) for load in data["loads"] if isinstance(load, list))
+        return cls(tuple(data.get("ratios", ())), int(data.get("degree", 1)), loads, states)
 
 
 def _growth(loads: tuple[tuple[Array, ...], ...]) -> float:
@@ -146,13 +152,13 @@ def _ratio(first: Array, second: Array, third: Array) -> float | None:
 
     The load has the values `first`, `second` and `third` (n,) in successive steps.
     """
-    now, last = third - second, second - first
-    size = float(np.sum(last * last))
-    return float(np.sum(now * last)) / size if size else None
+    increment, last_increment = third - second, second - first
+    squared_norm = float(np.sum(last_increment * last_increment))
+    return float(np.sum(increment * last_increment)) / squared_norm if squared_norm else None
 
 
-def _dense(kept: Mapping[str, Any]) -> Array:
-    """Return the array (n,) whose nonzero entries `to_dict` has saved."""
-    values = np.zeros(kept["size"])
-    values[kept["places"]] = kept["values"]
+def _dense(data: Mapping[str, Any]) -> Array:
+    """Return the array (n,) whose nonzero entries `Extrapolation.to_dict` has saved."""
+    values = np.zeros(data["size"])
+    values[data["places"]] = data["values"]
     return values

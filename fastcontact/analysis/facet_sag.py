@@ -1,11 +1,11 @@
 """Warnings about straight facets on curved surfaces: the estimated error in pressure due to their sag.
 
 On an elastic half plane, a gap that varies by d over the length L changes pressures by the order of E d / L with Young's
-modulus E, whatever the interference. This estimate is heuristic and calibrated below. Between non-matching facets, d is the
-difference of the gaps of neighbouring nodes, as the formulation measures them: at nodes alone, or means weighted by the
-functions of the nodes, in which sags of facets of equal length nearly cancel. Their mean over the contact changes the
-interference; L then is the length of the contact. On quadratic facets, d is the range of the sag. If the other side is an
-exact rigid shape, d is the range of the sag, and L the length of the contact.
+modulus E, independently of the interference. This estimate is heuristic and calibrated below. Between linear facets, d is
+the difference of the gaps of neighbouring nodes, and L the length of the facet. The gaps are those of the formulation: at
+the nodes, or means weighted by the shape functions, in which sags of facets of equal length nearly cancel. The mean sag over
+the contact changes the interference; d is then this mean, and L the length of the contact. On quadratic facets, d is the
+range of the sag. If the other side is an exact rigid shape, d is this range, and L the length of the contact.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.results.step import ContactResult, StepResult
 
 # Estimated error over the mean pressure above which a warning is given, by the order of facets. On rings the errors of nodal
-# pressures were 0.2 to 3.2 of the estimate on linear facets, except where it is so large that contact opens, and up to 3 on
+# pressures were 0.2 to 3.2 of the estimate on linear facets, except where contact opens due to the error, and up to 3 on
 # quadratic ones; against rigid shapes, where the value for linear facets applies to all, 1.1 to 1.3.
 DOUBTFUL = {1: 0.2, 2: 0.1}
-# Ratio of the estimate to E d / L if the gaps are means: the inverse of the mass matrix amplifies what alternates.
+# Ratio of the estimate to E d / L if the gaps are means: the inverse of the mass matrix amplifies alternating gaps.
 OF_MEANS = 2.0
 
 
@@ -41,17 +41,17 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
         corrected = pair.smoothing is not None or not isinstance(pair.normals, str)
         if corrected or pair.options.tied or pair.options.gap_only or not (contact.pressure > 0.0).any():
             continue
-        at = problem.configuration(name, state, load, displacement, state.u)
-        text = _text(pair, *_sag(pair, at, contact.active), contact)
+        configuration = problem.configuration(name, state, load, displacement, state.u)
+        text = _warning(pair, *_sag(pair, configuration, contact.active), contact)
         if text:
             warnings[name] = f"contact '{name}': {text}"
     return warnings
 
 
-def _text(pair: Formulation, spread: float, slope: float, contact: ContactResult) -> str:
+def _warning(pair: Formulation, spread: float, slope: float, contact: ContactResult) -> str:
     """Return a warning about the pressure error due to the sag, see `_sag`; an empty string if it is small."""
     side, order = pair.secondary, pair.secondary.order
-    size = _size(pair)
+    length = _facet_length(pair)
     doubtful, power = DOUBTFUL[order], 2 * order - 1
     remedy = "surface_smoothing=True measures the gap between the arcs"
     if isinstance(pair.primary, RigidSide):
@@ -61,7 +61,7 @@ def _text(pair: Formulation, spread: float, slope: float, contact: ContactResult
     error = pair.modulus * slope
     if error <= doubtful * mean:
         return ""
-    finer = f"facets of length {size * (doubtful * mean / error) ** (1.0 / power):.2g} instead of {size:.2g}"
+    finer = f"facets of length {length * (doubtful * mean / error) ** (1.0 / power):.2g} instead of {length:.2g}"
     return (
         f"facets of '{side.group}' and of the other side deviate from their arcs by up to {spread:.3g}, which may change "
         f"pressures by about {error:.3g}, compared with a mean of {mean:.3g}: {remedy}; "
@@ -74,55 +74,57 @@ def _lengths(pair: Formulation, block: FacetBlock) -> Array:
     return np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
 
 
-def _size(pair: Formulation) -> float:
+def _facet_length(pair: Formulation) -> float:
     """Return the median length of the facets of the secondary side [length]."""
     return float(np.median(np.concatenate([_lengths(pair, block) for block in pair.secondary.blocks])))
 
 
-def _sag(pair: Formulation, at: Configuration, active: Mask) -> tuple[float, float]:
+def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple[float, float]:
     """Return the range of the sag at closed facets [length], and the ratio d / L of the module's docstring [-]."""
     rules = [_rule(pair, block.element) for block in pair.secondary.blocks]
     points = Candidates.inside(pair.secondary, [xi for xi, _ in rules])
-    deformed, closed = pair.points + at.displacement, np.zeros(len(pair.points), bool)
+    deformed, closed = pair.points + configuration.displacement, np.zeros(len(pair.points), bool)
     closed[pair.secondary.points[active]] = True
-    extent = max(float(np.linalg.norm(np.ptp(pair.points[closed], axis=0))), _size(pair))
+    extent = max(float(np.linalg.norm(np.ptp(pair.points[closed], axis=0))), _facet_length(pair))
     if isinstance(pair.primary, RigidSide):
         rows = np.flatnonzero(closed[points.nodes].all(axis=1))
-        nodes, pose = points.nodes[rows], at.pose
-        at_nodes = pair.primary.facing(deformed[nodes].reshape(-1, deformed.shape[1]), pose)[0].reshape(nodes.shape)
-        inside = pair.primary.facing(points.positions(deformed)[rows], pose)[0]
-        faced = np.isfinite(at_nodes).all(axis=1) & np.isfinite(inside)  # gaps are infinite beyond the edge of a punch
-        off = np.einsum("nk,nk->n", points.shape[rows[faced]], at_nodes[faced]) - inside[faced]
-        spread = float(np.ptp(off)) if len(off) else 0.0
+        nodes, pose = points.nodes[rows], configuration.pose
+        node_gaps = pair.primary.facing(deformed[nodes].reshape(-1, deformed.shape[1]), pose)[0].reshape(nodes.shape)
+        point_gaps = pair.primary.facing(points.positions(deformed)[rows], pose)[0]
+        faced = np.isfinite(node_gaps).all(axis=1) & np.isfinite(point_gaps)  # infinite beyond the edge of a punch
+        sag = np.einsum("nk,nk->n", points.shape[rows[faced]], node_gaps[faced]) - point_gaps[faced]
+        spread = float(np.ptp(sag)) if len(sag) else 0.0
         return spread, spread / extent
-    smoothing, facing = Smoothing.of(pair.secondary, pair.primary, pair.points), pair.facing(points, at)
+    smoothing, facing = Smoothing.of(pair.secondary, pair.primary, pair.points), pair.facing(points, configuration)
     rows = np.flatnonzero(facing.paired)
-    near = closed[points.nodes[rows]].any(axis=1)
-    if smoothing is None or points.facet is None or points.xi is None or not near.any():
+    in_contact = closed[points.nodes[rows]].any(axis=1)
+    if smoothing is None or points.facet is None or points.xi is None or not in_contact.any():
         return 0.0, 0.0
     axes = [frames(side, pair.points, deformed) for side in (pair.secondary, pair.primary)]
-    off = np.full(len(points.nodes), np.nan)
-    off[rows] = smoothing.overlap((points.facet[rows], points.xi[rows]), (facing.facet[rows], facing.xi[rows]), axes)
-    here = off[rows[near]]
-    spread, offset = float(np.ptp(here)), abs(float(here.mean())) / extent
-    return spread, spread / _size(pair) if pair.secondary.order == 2 else max(offset, _slope(pair, rules, off, closed))
+    sag = np.full(len(points.nodes), np.nan)
+    sag[rows] = smoothing.overlap((points.facet[rows], points.xi[rows]), (facing.facet[rows], facing.xi[rows]), axes)
+    sag_in_contact = sag[rows[in_contact]]
+    spread, offset = float(np.ptp(sag_in_contact)), abs(float(sag_in_contact.mean())) / extent
+    return spread, spread / _facet_length(pair) if pair.secondary.order == 2 else max(
+        offset, _slope(pair, rules, sag, closed)
+    )
 
 
-def _slope(pair: Formulation, rules: list[quadrature.Rule], off: Array, closed: Mask) -> float:
+def _slope(pair: Formulation, rules: list[quadrature.Rule], sag: Array, closed: Mask) -> float:
     """Return the largest difference of the sags of the nodes of a closed linear facet, divided by its length [-].
 
-    `off` (n,) is the sag at the points of the `rules` of all facets, NaN where there is no opposite facet [length]. The sag
+    `sag` (n,) is the sag at the points of the `rules` of all facets, NaN where there is no opposite facet [length]. The sag
     of a node is the mean weighted by its function, multiplied by OF_MEANS, or with points at the nodes the value there.
     """
     sums, weights, first, largest = np.zeros(len(pair.points)), np.zeros(len(pair.points)), 0, 0.0
     for block, (xi, w) in zip(pair.secondary.blocks, rules, strict=True):
         nodes = block.facets
-        here = off[first : first + len(nodes) * len(xi)].reshape(len(nodes), len(xi))
-        first += here.size
-        share = w[:, None] * elements.get(block.element).shape(xi) * _lengths(pair, block)[:, None, None]
-        share = np.where(np.isnan(here)[:, :, None], 0.0, share)
-        np.add.at(weights, nodes, share.sum(axis=1))
-        np.add.at(sums, nodes, np.einsum("fqk,fq->fk", share, np.nan_to_num(here)))
+        sag_of_facets = sag[first : first + len(nodes) * len(xi)].reshape(len(nodes), len(xi))
+        first += sag_of_facets.size
+        portions = w[:, None] * elements.get(block.element).shape(xi) * _lengths(pair, block)[:, None, None]
+        portions = np.where(np.isnan(sag_of_facets)[:, :, None], 0.0, portions)
+        np.add.at(weights, nodes, portions.sum(axis=1))
+        np.add.at(sums, nodes, np.einsum("fqk,fq->fk", portions, np.nan_to_num(sag_of_facets)))
     mean = np.divide(sums, weights, out=np.full(len(sums), np.nan), where=weights > 0.0)
     for block in pair.secondary.blocks:
         slopes = np.ptp(mean[block.facets], axis=1) / _lengths(pair, block)
@@ -135,5 +137,5 @@ def _rule(pair: Formulation, element: str) -> quadrature.Rule:
     if pair.name == "node_to_segment":
         nodes = elements.get(element).nodes
         return nodes, np.ones(len(nodes))
-    exact = pair.weighs_gaps and not isinstance(pair.primary, RigidSide)  # integrals over segments, nearly
+    exact = pair.weighs_gaps and not isinstance(pair.primary, RigidSide)  # approximates integrals over segments
     return gauss_rule(element, 5) if exact else fine_rule(element)

@@ -1,13 +1,14 @@
 """Floating bodies, which contact alone restrains: soft springs regularise their singular stiffness matrix.
 
 Each rigid-body mode that supports leave free gets one spring at one node. The springs are anchored at a position of the
-bodies, so that the contact problem is regular. Its solution stretches the springs, and they are anchored again at a new
-position, until they carry no force. Each pairing begins at the last position.
+bodies, so that the contact problem is regular. Its solution stretches the springs, which are then anchored at a new
+position. This is repeated until they carry no force. Each pairing begins at the last position.
 
-If factors give the linear response of the contact problem to the position, Newton's method finds the position at which the
-springs are slack. It takes one step for the final contact state, whatever the stiffness of the springs.
+If the matrix is factorised, the linear response of the contact problem to the position is known, and Newton's method finds
+the position at which the springs are slack. For the final contact state it takes one step, for any stiffness of the springs.
 
-Otherwise the springs are soft compared with the body, and the new position is where they would be slack without contact.
+Otherwise the springs are soft compared with the body, and the new position is that at which they would be slack without
+contact.
 This is the proximal point method for the minimum of the energy under the inequalities of contact (Rockafellar, 1976). If
 contact restrains the bodies, each solution reduces the forces of the springs by about the ratio of their stiffness to that
 of the contact.
@@ -36,9 +37,9 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
-# Stiffness of soft springs relative to that of the softest body. For factors they are as stiff as that body, since soft
+# Stiffness of soft springs relative to that of the softest body. With factors, springs are as stiff as that body, since soft
 # springs reduce the accuracy (with 1e-6, a wedge has an error of 3e-9; with 1e-3, displacements of plates scatter by 2e-11,
-# and with 1 by 1e-12). For multigrid they are soft, since stiff ones would cost more solutions: with 1e-3, 1e-2 and 1, a
+# and with 1 by 1e-12). With multigrid they are soft, since stiff ones would cost more solutions: with 1e-3, 1e-2 and 1, a
 # stack with friction takes 4.1, 4.2 and 65 linear solutions, and a bolt 2.8, 5.3 and 27. Stiff springs also compensate the
 # negative stiffness that rotated bodies may have under load. The reference is the softest body, because a contact is not
 # stiffer than the softer one of its bodies (for a layer that is softer by 2e5, 100 positions did not suffice with the
@@ -95,8 +96,8 @@ class Freed:
     def slackened(self, elongation: Array) -> tuple[Array, float]:
         """Return the change (k,) of the positions that makes springs with an `elongation` (k,) slack [length].
 
-        In motions that contact does not restrain, the springs move by their elongation, which they keep; the largest one
-        that is left is returned, too.
+        In motions that contact does not restrain, positions change by the elongations, which do not relax. The largest
+        remaining elongation is returned as well.
         """
         change = elongation - self._inverse @ (elongation + self.stretched @ elongation)
         return change, float(np.abs(elongation - self.stretched @ (self._inverse @ elongation)).max())
@@ -108,7 +109,7 @@ class Freed:
 
     @cached_property
     def _inverse(self) -> Array:
-        """Inverse (k, k) of `stretched`, zero for motions that contact does not restrain; the others have values about 1."""
+        """Pseudoinverse (k, k) of `stretched`, whose singular values are about 1, or 0 in motions without restraint."""
         U, values, V = np.linalg.svd(self.stretched)
         return np.asarray(
             (V.T * np.divide(1.0, values, out=np.zeros_like(values), where=values > LENGTH_ROUND_OFF)) @ U.T
@@ -174,13 +175,13 @@ class FloatingBodies:
         return np.asarray(self.motions.displacement @ position)
 
     def freed(self, constraints: Constraints, dofs: ActiveDofs, respond: Response) -> Freed:
-        """Return the linear response to positions of the springs, given the one with springs at a fixed position."""
+        """Return the linear response to positions of the springs, given `respond` for springs at a fixed position."""
         modes, springs = self.motions.displacement, dofs.numbers(self.dofs)
-        along = np.stack([rows @ modes for rows in (constraints.B, *constraints.tangents)])
-        still = np.zeros(len(modes))
-        rigid = np.stack([dofs.unknowns(mode, still) for mode in modes.T], axis=1)
+        changes = np.stack([rows @ modes for rows in (constraints.B, *constraints.tangents)])
+        zero_lift = np.zeros(len(modes))
+        rigid = np.stack([dofs.unknowns(mode, zero_lift) for mode in modes.T], axis=1)
         unloaded = np.zeros(len(rigid))
-        strained = np.stack([respond(unloaded, gaps) for gaps in np.moveaxis(along, -1, 0)], axis=1)
+        strained = np.stack([respond(unloaded, gaps) for gaps in np.moveaxis(changes, -1, 0)], axis=1)
         return Freed(respond, rigid + strained, strained[springs], springs)
 
     def report(self, rigid: RigidPosition, load: float) -> dict[str, Any]:
@@ -191,21 +192,22 @@ class FloatingBodies:
         ``relative_to_load``, the largest of these forces divided by `load` [-]; and ``positions``, the number of positions.
         The load step adds ``undetermined``, the result of the method of this name.
         """
-        left = np.abs(rigid.spring_force)
+        remaining = np.abs(rigid.spring_force)
         return {
             "motions": self.names,
             "springs": self._places,
             "spring_stiffness": self.stiffness,
-            "force_left": left.tolist(),
-            "relative_to_load": float(left.max() / load) if load else 0.0,
+            "force_left": remaining.tolist(),
+            "relative_to_load": float(remaining.max() / load) if load else 0.0,
             "positions": rigid.positions,
         }
 
     def undetermined(self, constraints: Constraints, multiplier: Array, u: Array, load: float) -> dict[str, list[str]]:
         """Return the motions that neither contact forces nor bilateral contact restrain at the end of a step, by body.
 
-        Any position without contact forces is then a solution. Forces by round-off, of sides that just touch, do not count:
-        those that are negligible beside the loads, or without loads beside those of the springs in the displacements.
+        Any position without contact forces is then a solution. Contact forces of sides that just touch are round-off and are
+        ignored: they are negligible compared with the loads, or with the force of a spring that is elongated by the largest
+        displacement, whichever is smaller. Without loads, only the latter applies.
 
         Parameters
         ----------
@@ -220,10 +222,10 @@ class FloatingBodies:
         """
         elastic = self.stiffness * float(np.abs(u).max())
         significant = LENGTH_ROUND_OFF * (min(load, elastic) if load else elastic)
-        carries = (np.abs(multiplier) > significant) | constraints.equality
-        rubs = carries & (constraints.friction > 0.0)
-        along = [constraints.B[carries], *(tangent[rubs] for tangent in constraints.tangents)]
-        _, values, V = np.linalg.svd(np.vstack([rows @ self.motions.displacement for rows in along]))
+        loaded = (np.abs(multiplier) > significant) | constraints.equality
+        frictional = loaded & (constraints.friction > 0.0)
+        restraints = [constraints.B[loaded], *(tangent[frictional] for tangent in constraints.tangents)]
+        _, values, V = np.linalg.svd(np.vstack([rows @ self.motions.displacement for rows in restraints]))
         free = np.append(values, np.zeros(len(V) - len(values))) <= SINGLE_PRECISION
         return self.motions.combined(V[free].T).by_body() if free.any() else {}
 
@@ -267,34 +269,40 @@ class FloatingBodies:
         RigidPosition
             The last position, also if the springs do not become slack or if a contact problem does not converge.
         """
-        position, before, iterations, relaxed = start, np.inf, 0, 0.0
+        position, last_stretch, iterations, relaxed = start, np.inf, 0, 0.0
         step, length = None, 1.0
         mixing = Anderson(len(start) + 1, np.arange(len(start)))
         for positions in range(1, MAX_NEWTON_ITERATIONS + 1):
             state = solve_at(position)
             elongation, iterations = state.u[springs], iterations + state.iterations
-            left = float(np.abs(elongation).max())
-            force = max(load, float(np.abs(state.multiplier).max(initial=0.0))) / self.stiffness
+            stretch = float(np.abs(elongation).max())
+            load_stretch = max(load, float(np.abs(state.multiplier).max(initial=0.0))) / self.stiffness
             # Springs are slack if their forces are round-off of the loads and of the contact forces (the only forces if
             # prescribed displacements move the bodies), as small as the accuracy of the linear solver allows, or round-off of
             # the elongation that a Newton step has `relaxed`.
-            slack = left <= max(ROUND_OFF * force, noise * float(np.abs(state.u).max()), LENGTH_ROUND_OFF * relaxed)
+            slack = stretch <= max(
+                ROUND_OFF * load_stretch, noise * float(np.abs(state.u).max()), LENGTH_ROUND_OFF * relaxed
+            )
             # If the forces of the springs no longer decrease, a larger tolerance applies.
-            if not slack and left >= 0.5 * before and positions > 3:
-                slack = left <= max(LENGTH_ROUND_OFF * force, round_off)
+            if not slack and stretch >= 0.5 * last_stretch and positions > 3:
+                slack = stretch <= max(LENGTH_ROUND_OFF * load_stretch, round_off)
             if slack or not state.settled or positions == MAX_NEWTON_ITERATIONS:
                 break
-            if step is not None and length > 0.5**HALVINGS and left > before - DECREASE * length * (before - step[1]):
+            if (
+                step is not None
+                and length > 0.5**HALVINGS
+                and stretch > last_stretch - DECREASE * length * (last_stretch - step[1])
+            ):
                 length *= 0.5
                 position = position - length * step[0]
                 continue
-            if left > before:
+            if stretch > last_stretch:
                 mixing.restart()
-            step, length = None if left > before else _newton_step(freed, state, elongation), 1.0
+            step, length = None if stretch > last_stretch else _newton_step(freed, state, elongation), 1.0
             # Without Newton's method positions are accelerated, because parts much softer than the springs, such as a
             # peeling layer, approach equilibrium slowly.
             position = mixing.mixed(position, position + elongation) if step is None else position + step[0]
-            before, relaxed = left, 0.0 if step is None else left
+            last_stretch, relaxed = stretch, 0.0 if step is None else stretch
         state = dataclasses.replace(state, iterations=iterations)
         return RigidPosition(state, position, self.stiffness * elongation, positions, slack)
 

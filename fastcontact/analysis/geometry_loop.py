@@ -37,9 +37,9 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
-# Smallest number of pairings after which nodes are assumed to alternate between facets: edges are then rounded.
+# Smallest number of pairings after which edges of facets are rounded, because nodes are assumed to alternate between facets.
 PATIENT_UPDATES = 25
-# Safety factor of the contraction that is expected of the next solution, relative to that of the last Newton step.
+# Safety factor of the expected contraction by the next solution, relative to the contraction in the last Newton step.
 SAFETY = 3.0
 
 
@@ -90,10 +90,9 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
     ----------
     step : StepContext
     iterate : Iterate
-        Iterate from which to begin, or the converged iterate of a less accurate iteration of the same step, to continue
-        from. It is modified.
+        Initial iterate, or the converged iterate of a less accurate iteration of the same step. It is modified.
     paired : SettledContact, optional
-        Contact of almost the same displacements in this step, whose last pairing serves as the first.
+        Contact solution at almost the same displacements in this step, whose last pairing is used as the first.
 
     Raises
     ------
@@ -124,7 +123,7 @@ def _settle(
     problem, criteria = step.problem, step.problem.criteria
     limit = 0 if criteria.keep_pairing else criteria.geometry_updates
     limit = criteria.max_geometry_updates if limit is None else limit
-    # A converged iterate is not moved away by extrapolation, and all its solutions are accurate.
+    # From a converged iterate, the loop continues without extrapolation and with accurate solutions.
     extrapolates = problem.until_settled and problem.solver.iterative and not iterate.history
     tolerances = Tolerances(problem.solver, criteria, extrapolates, step.state.gap_round_off, step.expected)
     mixing, watch = _Mixing(step), Watch()
@@ -140,11 +139,13 @@ def _settle(
         # Constraints of several pairs, or of both ends of a period, may be at one node.
         ends = problem.model.periodic_interfaces
         nodes = SharedNodes.of(constraints, ends) if len(problem.pairs) > 1 or ends else None
-        once, closed = (constraints, active) if nodes is None else (nodes.once(constraints), nodes.closed(active))
-        along = touching.step(step, constraints, iterate, nodes)
+        merged, closed = (
+            (constraints, active) if nodes is None else (nodes.merged_constraints(constraints), nodes.closed(active))
+        )
+        step_on_path = touching.step(step, constraints, iterate, nodes)
         if touching.unfinished:
             accuracy = Accuracy(0.0, residual=problem.solver.tolerance)
-        solution, displacement = solve_inequalities(along, once, iterate, closed & once.usable, accuracy)
+        solution, displacement = solve_inequalities(step_on_path, merged, iterate, closed & merged.usable, accuracy)
         if touching.unfinished:
             if not solution.settled:
                 raise ConvergenceError("an increment does not converge", iterate.history)
@@ -173,17 +174,17 @@ def _settle(
                 "contact forces by %.1e (Criteria.geometry = %g)", *astuple(scatter), problem.criteria.geometry,
             )  # fmt: skip
             return replace(settled, scatter=scatter)
-        mixed = mixing.next(settled, moved, displacement, tolerances)
-        iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
+        next_pairing = mixing.next(settled, moved, displacement, tolerances)
+        iterate.u = iterate.u if next_pairing is None else step.dofs.put(iterate.u, next_pairing)
         tolerances.tighten(moved.relative, solution.residual)
         if update == max(limit // 2, PATIENT_UPDATES) and any(pair.faceted for pair in problem.pairs.values()):
-            log.info("nodes flip between facets: from now on the edges of facets are rounded")
+            log.info("nodes alternate between facets: from now on the edges of facets are rounded")
             iterate.rounded = True
             mixing.restart()
             watch.forget()
     if problem.until_settled:
-        changed = step.dofs.put(np.zeros_like(iterate.u), displacement - moved.before)
-        raise ConvergenceError(geometry_moves(problem, iterate.history, changed, limit), iterate.history)
+        change = step.dofs.put(np.zeros_like(iterate.u), displacement - moved.before)
+        raise ConvergenceError(geometry_moves(problem, iterate.history, change, limit), iterate.history)
     touching.check(step, constraints, solution, 0.0, 0.0)
     if touching.due or touching.unfinished:
         del iterate.history[-limit - 1 :]
@@ -205,7 +206,7 @@ class _Moved:
     size : float
         Largest displacement, to which the change is compared [length].
     relative : float
-        The ratio of both, zero without displacements and for changes that are round-off of gaps [-].
+        Ratio of `change` to `size`; zero without displacements, and for changes that are round-off of gaps [-].
     """
 
     before: Array
@@ -223,8 +224,8 @@ def _move(
     # The unknowns of the solution do not include rigid-body motions of floating bodies, which may be much larger.
     size = max(step.dofs.size(solution.u), largest(step.load.lift))
     change = largest_difference(displacement, before)
-    known = size and change > step.state.gap_round_off
-    moved = _Moved(before, change, size, change / size if known else 0.0)
+    significant = size and change > step.state.gap_round_off
+    moved = _Moved(before, change, size, change / size if significant else 0.0)
     iterate.remember(constraints, solution)
     iterate.history.append(
         {
@@ -242,7 +243,7 @@ class _Mixing:
     """Choice of the next iterate: by Newton's method while it converges, and by Anderson acceleration otherwise.
 
     Anderson acceleration uses only iterates with the same active set, between which the geometry varies smoothly, unless an
-    active set returns after another one: each of them is then the solution with the geometry of the other.
+    active set recurs after a different one: each set then results from the geometry of the other.
 
     Parameters
     ----------
@@ -256,7 +257,7 @@ class _Mixing:
 
     def __init__(self, step: StepContext) -> None:
         self._step, self._accelerated = step, None
-        self._known, self._earlier, self._cycles = b"", set[bytes](), False
+        self._last_state, self._earlier_states, self._cycles = b"", set[bytes](), False
         self._newton, self._change, self.contraction = _linearises(step.problem), np.inf, np.inf
 
     _accelerated: Anderson | None
@@ -268,9 +269,9 @@ class _Mixing:
     def next(self, settled: SettledContact, moved: _Moved, displacement: Array, tolerances: Tolerances) -> Array | None:
         """Return the displacements (k,) for the next pairing, of the components of `StepContext.dofs` [length].
 
-        None means those of the solution, `displacement` (k,). Newton's method is given up once changes increase, because it
-        does not converge if nodes alternate between facets. It is also not used if the next solution alone is expected to
-        converge, because a solution without a Newton step costs less.
+        None means the displacements of the solution, `displacement` (k,). Newton's method is abandoned once changes increase,
+        because it does not converge if nodes alternate between facets. It is also omitted if the next solution alone is
+        expected to converge, because a solution without a Newton step is cheaper.
         """
         solution, enough = settled.solution, tolerances.enough(moved.size)
         self._newton, self._change = self._newton and moved.change <= self._change, moved.change
@@ -281,10 +282,10 @@ class _Mixing:
                 next_pairing, self.contraction = stepped
                 return next_pairing
         state = settled.constraints.state(solution.active).tobytes()
-        same = self._known == state
-        self._cycles |= not (same or self._newton) and state in self._earlier
-        self._known = state if solution.settled else b""
-        self._earlier.add(self._known)
+        same = self._last_state == state
+        self._cycles |= not (same or self._newton) and state in self._earlier_states
+        self._last_state = state if solution.settled else b""
+        self._earlier_states.add(self._last_state)
         if tolerances.inexact or not (same or self._cycles or settled.iterate.rounded):
             self.restart()
         if tolerances.inexact:
@@ -308,10 +309,10 @@ def newton_step(
     solution : Solution
         Solution with these constraints, where representatives replace the constraints of shared nodes.
     before, image : ndarray (k,)
-        Active displacements of the pairing and of the solution [length]; displacements that solutions do not determine are
-        taken from the latter.
+        Active displacements of the pairing and of the solution [length]. Displacements that solutions do not determine are
+        taken from `image`.
     accuracy : float
-        Relative accuracy of the change that suffices.
+        Sufficient relative accuracy of the change [-].
     nodes : SharedNodes, optional
         Nodes that several pairs, or both ends of a period, share.
     """
@@ -335,39 +336,41 @@ def newton_step(
         u = step.dofs.put(np.zeros(n_dofs), active)
         force, nodal = np.zeros(n_dofs), step.problem.displacement(u)
         for rows, part in parts:
-            varied, changed = part.along(nodal)
-            gaps[: len(changed), rows] = changed
-            force[: varied.size] += varied.ravel()
-        merged = gaps if nodes is None else nodes.merged(gaps)
+            forces, slips = part.along(nodal)
+            gaps[: len(slips), rows] = slips
+            force[: forces.size] += forces.ravel()
+        merged = gaps if nodes is None else nodes.merged_gaps(gaps)
         return step.dofs.varied(respond(step.dofs.reduced(force), merged))
 
     changed = (image - before)[where]
     system = LinearOperator((len(changed),) * 2, matvec=lambda v: v - varied(v)[where], dtype=float)
-    size = largest(changed) or 1.0
-    # With as much as suffices at the end, steps of plastic bodies take a tenth more pairings.
-    v, _ = gmres(system, changed / size, rtol=max(SINGLE_PRECISION, NOTABLE * accuracy), atol=0.0, maxiter=1)
-    responding = largest_difference(size * v, changed)
+    largest_change = largest(changed) or 1.0
+    # With the tolerance `accuracy` itself, load steps of plastic bodies take 10 % more pairings.
+    v, _ = gmres(system, changed / largest_change, rtol=max(SINGLE_PRECISION, NOTABLE * accuracy), atol=0.0, maxiter=1)
+    response_size = largest_difference(largest_change * v, changed)
     # Far from the solution, a step in which the response exceeds the change itself is unreliable.
-    if not responding <= size:
+    if not response_size <= largest_change:
         return None
-    mixed, determined = image.copy(), step.dofs.determined
+    next_pairing, determined = image.copy(), step.dofs.determined
     if len(determined) > len(where):  # there are springs of floating bodies
-        mixed[determined] += size * varied(v)[determined]
+        next_pairing[determined] += largest_change * varied(v)[determined]
     else:
-        mixed[where] = before[where] + size * v
-    return mixed, responding / (size * largest(v) or 1.0)
+        next_pairing[where] = before[where] + largest_change * v
+    return next_pairing, response_size / (largest_change * largest(v) or 1.0)
 
 
 def _linearised(
     constraints: StackedConstraints, solution: Solution, displacement: Array
 ) -> list[tuple[slice, Linearised]]:
-    """Return the linearised geometry of pairs in contact with the rows of each; empty if a pair has none."""
-    parts = []
+    """Return the rows and the linearised geometry of each pair in contact; empty if one of them has no derivatives."""
+    geometries = []
     for name, rows in constraints.rows.items():
         part, multiplier = constraints.parts[name], solution.multiplier[rows]
         if part.tied is not None or not multiplier.any():
             continue
         if part.geometry is None:
             return []
-        parts.append((rows, part.geometry(multiplier, solution.tangential[rows, : len(part.tangents)], displacement)))
-    return parts
+        geometries.append(
+            (rows, part.geometry(multiplier, solution.tangential[rows, : len(part.tangents)], displacement))
+        )
+    return geometries

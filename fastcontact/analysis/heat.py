@@ -64,14 +64,14 @@ def thermal_loads(model: Model, displacement: Array | None = None) -> ThermalLoa
     """Return the heat exchange of a model, over areas and volumes at a displacement (n_points, dim) [length]."""
     mesh, films = model.mesh, csr_array((model.mesh.n_points,) * 2)
     deformed = mesh if displacement is None else mesh.replace(points=mesh.points + displacement)
-    places = mesh, model.kinematics, deformed
+    geometry = mesh, model.kinematics, deformed
     powers: dict[Table | None, Array] = {}
     ambient: dict[Table | None, Array] = {}
     for load in model.heat_loads:
         if isinstance(load, Heating):
-            powers[load.ramp] = powers.get(load.ramp, 0.0) + load.power(*places)
+            powers[load.ramp] = powers.get(load.ramp, 0.0) + load.power(*geometry)
         elif isinstance(load, Film):
-            matrix, power = load.exchange(*places, model.reference_temperature)
+            matrix, power = load.exchange(*geometry, model.reference_temperature)
             films, ambient[load.ramp] = csr_array(films + matrix), ambient.get(load.ramp, 0.0) + power
     return ThermalLoads(films, powers, ambient)
 
@@ -92,7 +92,7 @@ class Heat:
     loads : ThermalLoads
         Loads and films in that configuration.
     merged : csr_array (n_points, n_points)
-        From the temperatures of merged nodes to those of all nodes [-].
+        Matrix that maps the temperatures of merged nodes to those of all nodes [-].
     body : ndarray of int (n_points,)
         Body of each node, -1 for none.
     fixed : ndarray of bool (n_points,)
@@ -146,8 +146,8 @@ class Heat:
         friction : ndarray (n_points,), optional
             Nodal powers of friction [power].
         obstacles : (csr_array (n_points, n_points), ndarray (n_points,)), optional
-            Films between bodies and rigid obstacles: matrix [power / temperature], and powers due to the obstacles' rise
-            [power].
+            Films between bodies and rigid obstacles: matrix [power / temperature], and nodal powers due to the temperature
+            rise of the obstacles [power].
 
         Raises
         ------
@@ -155,55 +155,59 @@ class Heat:
             If open contacts isolate a body, so that its temperature is undetermined, or heat is not in balance.
         """
         n = (self.model.mesh.n_points,)
-        inner, outer = self.matrix, self.loads
+        conductivity, exchange = self.matrix, self.loads
         if displacement is not None and self.finite:
-            inner, outer = self.conductors(displacement).matrix(), thermal_loads(self.model, displacement)
+            conductivity, exchange = self.conductors(displacement).matrix(), thermal_loads(self.model, displacement)
         rise, loads, ambient = (
-            combined(by_ramp, self.ramp, instant, n) for by_ramp in (self.prescribed, outer.powers, outer.ambient)
+            combined(by_ramp, self.ramp, instant, n) for by_ramp in (self.prescribed, exchange.powers, exchange.ambient)
         )
-        rubbed = np.zeros(n) if friction is None else friction
-        inner = inner if contact is None else csr_array(inner + contact)
-        films = outer.films
+        friction_power = np.zeros(n) if friction is None else friction
+        conductivity = conductivity if contact is None else csr_array(conductivity + contact)
+        films = exchange.films
         if obstacles is not None:
             films, ambient = csr_array(films + obstacles[0]), ambient + obstacles[1]
         self._check_reached(contact, films)
-        P, power = self.merged, loads + ambient + rubbed
-        A, f = csr_array(P.T @ (inner + films) @ P), P.T @ power
+        P, power = self.merged, loads + ambient + friction_power
+        A, f = csr_array(P.T @ (conductivity + films) @ P), P.T @ power
         used = np.zeros(n, bool)
         used[P.indices] = self.body >= 0
         free = np.flatnonzero(used & ~self.fixed)
         rise = np.where(self.fixed, rise, 0.0)
         if len(free):
-            dim, inner_A = self.model.mesh.dim, csr_array(A[free][:, free])
+            dim, free_A = self.model.mesh.dim, csr_array(A[free][:, free])
             solver = choice.make(self.linear_solver, dim=dim, n_dofs=len(free), tolerance=self.linear_tolerance)
             # Sums of sparse matrices drop entries that cancel, also on one side of the diagonal only. Factors need both.
-            inner_A = csr_array(0.5 * (inner_A + inner_A.T))
-            inner_A.sort_indices()
-            blocks = bsr_array((inner_A.data[:, None, None], inner_A.indices, inner_A.indptr), shape=inner_A.shape)
+            free_A = csr_array(0.5 * (free_A + free_A.T))
+            free_A.sort_indices()
+            blocks = bsr_array((free_A.data[:, None, None], free_A.indices, free_A.indptr), shape=free_A.shape)
             solver.prepare(blocks, np.ones((len(free), 1)))
             rise[free] = solver.load(f[free] - (A @ rise)[free]).full_solution(np.zeros(len(free)))
-        out = A @ rise - f
-        reaction = np.where(self.fixed, out, 0.0)
+        heat_flow = A @ rise - f
+        reaction = np.where(self.fixed, heat_flow, 0.0)
         round_off = SUM_ROUND_OFF * float((abs(A) @ np.abs(rise)).max())
         rise = P @ rise
-        given_off = ambient - films @ rise
-        largest = max(float(np.abs(part).max()) for part in (reaction, loads, given_off, rubbed, P.T @ (inner @ rise)))
-        residual = float(np.abs(out[free]).max(initial=0.0))
+        film_power = ambient - films @ rise
+        largest = max(
+            float(np.abs(powers).max())
+            for powers in (reaction, loads, film_power, friction_power, P.T @ (conductivity @ rise))
+        )
+        residual = float(np.abs(heat_flow[free]).max(initial=0.0))
         if residual > max(self.criteria.relative * largest, round_off):
             raise ConvergenceError(
                 f"heat is out of balance by {residual:.3g} at a node, above {self.criteria.relative:g} of the largest heat "
-                f"flow {largest:.3g}: use the direct solver, or look for conductivities of very different magnitudes",
+                f"flow {largest:.3g}: use the direct solver, or check for conductivities that differ by many "
+                "orders of magnitude",
                 smaller_steps_help=False,
             )
-        sums = {"supports": reaction, "loads": loads, "films": given_off, "friction": rubbed}
+        sums = {"supports": reaction, "loads": loads, "films": film_power, "friction": friction_power}
         return Temperatures(rise, reaction, {**{k: float(v.sum()) for k, v in sums.items()}, "imbalance": residual})
 
     def _check_reached(self, contact: csr_array | None, films: csr_array) -> None:
         """Raise ConvergenceError if the temperature of a body is undetermined."""
-        held = self.merged @ self.fixed + films.diagonal() > 0.0
+        determined = self.merged @ self.fixed + films.diagonal() > 0.0
         pairs = coo_array(self.merged if contact is None else self.merged + contact)
         joined = np.stack([pairs.row, pairs.col], axis=1)[pairs.data != 0.0]
-        cut_off = not_reached(self.body, held, joined)
+        cut_off = not_reached(self.body, determined, joined)
         if len(cut_off):
             raise ConvergenceError(
                 f"no heat reaches body {body_name(self.model.mesh, self.body, cut_off[0])}: its contacts are open or conduct "
@@ -214,11 +218,11 @@ class Heat:
 def prepared_heat(
     model: Model, ramp: Ramp, criteria: Criteria, linear_solver: str, linear_tolerance: float
 ) -> Heat | None:
-    """Return the heat conduction of a checked model; None without any."""
+    """Return the heat conduction of a checked model; None if the model does not conduct heat."""
     if not model.conducts:
         return None
-    conduction, same, n = model.conduction(), model.same_temperature(), model.mesh.n_points
-    merged = csr_array((np.ones(n), same, np.arange(n + 1)), shape=(n, n))
+    conduction, merged_node, n = model.conduction(), model.same_temperature(), model.mesh.n_points
+    merged = csr_array((np.ones(n), merged_node, np.arange(n + 1)), shape=(n, n))
     return Heat(
         model, ramp, criteria, conduction, conduction.matrix(), thermal_loads(model), merged, bodies(model.mesh)[1],
         *model.fixed_temperatures(), linear_solver, linear_tolerance,

@@ -96,22 +96,24 @@ def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Itera
         parts[name] = pair.constraints(replace(configuration, pressure=pressure, rounded=iterate.rounded))
         if (wetted := parts[name].wetted) is not None:
             wet = wetted.pressure > 0.0
-            before, displaced = fluid or (wet, np.zeros(len(wet), int))
-            iterate.fluid[name] = wet, displaced + (before & ~wet)
+            was_wet, displaced = fluid or (wet, np.zeros(len(wet), int))
+            iterate.fluid[name] = wet, displaced + (was_wet & ~wet)
         if problem.force_driven.pairs:
             rotates = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
-            moved = configuration.pose.displacement - configuration.pose_start.displacement if rotates else None
-            parts[name] = problem.force_driven.constraints(name, parts[name], configuration.pose.displacement, moved)
+            motion = configuration.pose.displacement - configuration.pose_start.displacement if rotates else None
+            parts[name] = problem.force_driven.constraints(name, parts[name], configuration.pose.displacement, motion)
     return stacked(parts)
 
 
 def initially_active(constraints: StackedConstraints, iterate: Iterate, extrapolation: Extrapolation | None) -> Mask:
     """Return the initial active set (m,): the one predicted by the last solution, or extrapolated at the first pairing."""
-    sets = [_start_of(name, part, iterate, extrapolation) for name, part in constraints.parts.items()]
+    sets = [_initially_active_of_pair(name, part, iterate, extrapolation) for name, part in constraints.parts.items()]
     return np.concatenate(sets)
 
 
-def _start_of(name: str, constraints: Constraints, iterate: Iterate, extrapolation: Extrapolation | None) -> Mask:
+def _initially_active_of_pair(
+    name: str, constraints: Constraints, iterate: Iterate, extrapolation: Extrapolation | None
+) -> Mask:
     """Return the initial active set of the contact pair `name`; see `initially_active`."""
     if constraints.equality.all():
         return constraints.equality
@@ -187,8 +189,8 @@ class StepContext:
                 if isinstance(self.problem.pairs[name].primary, RigidSide):
                     slips[:, rows] += constraints.slip0[:, rows]
                     # If the obstacle moves along the normals, its slips are round-off of this motion.
-                    moved = end.get(name, np.zeros(1)) - begin.get(name, 0.0)
-                    scale = max(scale, largest(constraints.slip0[:, rows]), largest(moved))
+                    motion = end.get(name, np.zeros(1)) - begin.get(name, 0.0)
+                    scale = max(scale, largest(constraints.slip0[:, rows]), largest(motion))
         return np.asarray(slips / (scale or 1.0))
 
 
@@ -275,21 +277,21 @@ def _with_floating_bodies(
         return ConvergenceError(text, iterate.history, **options)
 
     start, modes = iterate.u[bodies.dofs], bodies.motions.displacement
-    size = float(np.ptp(problem.model.mesh.points, axis=0).max())
+    model_size = float(np.ptp(problem.model.mesh.points, axis=0).max())
     # Work of the loads on each free rigid-body motion, and the size of the model.
-    loads = generalised(bodies.motions, step.load.force, state.largest_rigid_force), size
+    loads = generalised(bodies.motions, step.load.force, state.largest_rigid_force), model_size
     if not iterate.history:
         rows, gap0 = resisting(constraints)
-        moved = stopped_at(rows @ modes, gap0 + rows @ iterate.u, *loads)
-        if moved is None:
+        shift = stopped_at(rows @ modes, gap0 + rows @ iterate.u, *loads)
+        if shift is None:
             names = grouped(bodies.names)
             text = f"the loads pull bodies away, and no contact stops them ({names}): reverse the loads or add supports"
             raise failure(text, smaller_steps_help=False)
         if not (active & ~constraints.equality).any():
-            start, u = start + moved, iterate.u + bodies.rigid(moved)
+            start, u = start + shift, iterate.u + bodies.rigid(shift)
             # The linear program of `stopped_at` is solved to a relative accuracy of 1e-7, about that of single precision.
             last_active = active | constraints.usable & (
-                constraints.gap0 + constraints.B @ u <= SINGLE_PRECISION * size
+                constraints.gap0 + constraints.B @ u <= SINGLE_PRECISION * model_size
             )
     relative_accuracy = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
     # The response requires many linear solutions, which are cheap only if the matrix is factorised.

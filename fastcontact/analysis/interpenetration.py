@@ -22,23 +22,23 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 Indices = NDArray[np.signedinteger]
 # Numbers of two bodies, outer nodes of the first (n,), and the depths of these nodes in the second (n,) [length].
 Inside = tuple[int, int, Indices, Array]
-# Depth beside the facets of a contact above which a warning is given, relative to that of nodes in contact.
+# Depth beside the facets of a contact above which a warning is given, relative to the largest depth of nodes in contact.
 HELD = 2.0
 
 
 def interpenetration(problem: Problem, state: State, last: StepResult) -> list[str]:
     """Return warnings about bodies inside each other or inside rigid obstacles, at the end of the `last` step."""
     mesh, u = problem.model.mesh, problem.displacement(state.u)
-    joined = _joined(problem)
-    inside = list(depths(mesh, problem.model.kinematics, mesh.points + u))
+    between = _pairs_between(problem)
+    overlaps = list(depths(mesh, problem.model.kinematics, mesh.points + u))
     return [
-        *_without_contact(problem, joined, inside), *_beside_contact(problem, last, joined, inside),
+        *_without_contact(problem, between, overlaps), *_beside_contact(problem, last, between, overlaps),
         *_through_obstacles(problem, state, last),
     ]  # fmt: skip
 
 
-def _joined(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
-    """Return the contact pairs between each two bodies; none where these are the sides of a pretension section."""
+def _pairs_between(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
+    """Return the contact pairs between each two bodies; an empty list for the two sides of a pretension section."""
     body = bodies(problem.model.mesh)[1]
     groups: dict[frozenset[int], list[str]] = {}
     for name, pair in problem.pairs.items():
@@ -46,28 +46,28 @@ def _joined(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
             for a in np.unique(body[pair.secondary.points]).tolist():
                 for b in np.unique(body[pair.primary.points]).tolist():
                     groups.setdefault(frozenset((a, b)), []).append(name)
-    for cut in problem.model.pretensions:
-        groups[frozenset((int(body[cut.nodes[0]]), int(body[cut.opposite[0]])))] = []
+    for section in problem.model.pretensions:
+        groups[frozenset((int(body[section.nodes[0]]), int(body[section.opposite[0]])))] = []
     return groups
 
 
 def _without_contact(
-    problem: Problem, joined: Mapping[frozenset[int], Sequence[str]], inside: Sequence[Inside]
+    problem: Problem, between: Mapping[frozenset[int], Sequence[str]], overlaps: Sequence[Inside]
 ) -> list[str]:
-    """Return warnings about bodies without a contact pair between them, the deepest first, one for each two bodies."""
+    """Return a warning for each two overlapping bodies without a contact pair between them, the deepest overlap first."""
     mesh = problem.model.mesh
     _, body = bodies(mesh)
     texts: dict[frozenset[int], str] = {}
-    for number, other, points, depth in sorted(inside, key=lambda entry: -float(entry[3].max())):
-        both, row = frozenset((number, other)), int(np.argmax(depth))
+    for first, second, points, depth in sorted(overlaps, key=lambda entry: -float(entry[3].max())):
+        body_pair, row = frozenset((first, second)), int(np.argmax(depth))
         if (
-            both not in joined
-            and both not in texts
+            body_pair not in between
+            and body_pair not in texts
             and depth[row] > LENGTH_ROUND_OFF * np.ptp(mesh.points, axis=0).max()
         ):
             where = mesh.points[points[row]]
-            texts[both] = (
-                f"bodies {body_name(mesh, body, number)} and {body_name(mesh, body, other)} interpenetrate by "
+            texts[body_pair] = (
+                f"bodies {body_name(mesh, body, first)} and {body_name(mesh, body, second)} interpenetrate by "
                 f"{depth[row]:.6g} near {np.array2string(where, precision=4)}, and no contact is defined between them: "
                 "add_contact for the groups that meet"
             )
@@ -75,45 +75,45 @@ def _without_contact(
 
 
 def _beside_contact(
-    problem: Problem, last: StepResult, joined: Mapping[frozenset[int], Sequence[str]], inside: Sequence[Inside]
+    problem: Problem, last: StepResult, between: Mapping[frozenset[int], Sequence[str]], overlaps: Sequence[Inside]
 ) -> list[str]:
     """Return warnings about bodies that pass through each other where the groups of their contact pairs lack facets."""
     mesh, texts = problem.model.mesh, []
     _, body = bodies(mesh)
-    for both, names in joined.items():
-        entries = [entry for entry in inside if names and {*entry[:2]} == both]
+    for body_pair, names in between.items():
+        entries = [entry for entry in overlaps if names and {*entry[:2]} == body_pair]
         if not entries or any(problem.pairs[name].options.wear for name in names):  # worn material is still in the mesh
             continue
         points, depth = np.concatenate([entry[2] for entry in entries]), np.concatenate([entry[3] for entry in entries])
-        held, faced = (mask[points] for mask in _held(problem, last, names))
-        deformed = max(float(np.ptp(last.displacement[body == number], axis=0).max()) for number in both)
-        limit = max(NOTABLE * deformed, HELD * float(depth[held].max(initial=0.0)))
-        depth[held | faced] = 0.0
+        secondary, primary = (mask[points] for mask in _points_of_sides(problem, last, names))
+        deformed = max(float(np.ptp(last.displacement[body == number], axis=0).max()) for number in body_pair)
+        limit = max(NOTABLE * deformed, HELD * float(depth[secondary].max(initial=0.0)))
+        depth[secondary | primary] = 0.0
         row = int(np.argmax(depth))
         if depth[row] > limit and depth[row] - _at_rest(problem, entries, int(points[row])) > limit:
-            label = " and ".join(body_name(mesh, body, number) for number in sorted(both))
+            label = " and ".join(body_name(mesh, body, number) for number in sorted(body_pair))
             texts.append(
-                _lacking(problem, names[0], f"bodies {label} pass through each other", depth[row], points[row])
+                _lacking_facets(problem, names[0], f"bodies {label} pass through each other", depth[row], points[row])
             )
     return texts
 
 
-def _held(problem: Problem, last: StepResult, names: Sequence[str]) -> tuple[Mask, Mask]:
+def _points_of_sides(problem: Problem, last: StepResult, names: Sequence[str]) -> tuple[Mask, Mask]:
     """Return masks (n_points,) of secondary points that face the other side or are excluded, and of all primary points."""
-    held, faced = np.zeros((2, problem.model.mesh.n_points), bool)
+    secondary, primary = np.zeros((2, problem.model.mesh.n_points), bool)
     for name in names:
         pair = problem.pairs[name]
         facing = np.isfinite(last.contact[name].gap) | pair.options.excluded_nodes(pair.secondary)
-        held[pair.secondary.points[facing]] = True
-        faced[pair.primary.points] = True
-    return held, faced
+        secondary[pair.secondary.points[facing]] = True
+        primary[pair.primary.points] = True
+    return secondary, primary
 
 
-def _at_rest(problem: Problem, bodies_of: Sequence[Inside], point: int) -> float:
+def _at_rest(problem: Problem, overlaps: Sequence[Inside], point: int) -> float:
     """Return the depth of a point of one of two bodies in the other before any load [length]."""
     mesh = problem.model.mesh
-    for number, other, points, depth in depths(mesh, problem.model.kinematics, mesh.points):
-        if any((number, other) == entry[:2] for entry in bodies_of) and point in points:
+    for first, second, points, depth in depths(mesh, problem.model.kinematics, mesh.points):
+        if any((first, second) == entry[:2] for entry in overlaps) and point in points:
             return float(depth[points == point][0])
     return 0.0
 
@@ -130,18 +130,19 @@ def _through_obstacles(problem: Problem, state: State, last: StepResult) -> list
         if not len(points):
             continue
         at_rest = pair.primary.facing(mesh.points[points], Pose(np.zeros(mesh.dim)))[0]
-        now = Pose(state.obstacles[name], state.angles.get(name, 0.0))
-        gap = pair.primary.facing(mesh.points[points] + u[points], now)[0]
-        inside = last.contact[name].gap
-        deepest = -float(np.min(inside, initial=0.0, where=np.isfinite(inside)))
-        limit = max(NOTABLE * float(np.ptp(u, axis=0).max()), HELD * deepest)
+        pose = Pose(state.obstacles[name], state.angles.get(name, 0.0))
+        gap = pair.primary.facing(mesh.points[points] + u[points], pose)[0]
+        contact_gap = last.contact[name].gap
+        contact_depth = -float(np.min(contact_gap, initial=0.0, where=np.isfinite(contact_gap)))
+        limit = max(NOTABLE * float(np.ptp(u, axis=0).max()), HELD * contact_depth)
         row = int(np.argmin(np.where(at_rest >= 0.0, gap, np.inf)))
         if at_rest[row] >= 0.0 and -gap[row] > limit:
-            texts.append(_lacking(problem, name, "the body passes through the obstacle", -gap[row], points[row]))
+            texts.append(_lacking_facets(problem, name, "the body passes through the obstacle", -gap[row], points[row]))
     return texts
 
 
-def _lacking(problem: Problem, name: str, subject: str, depth: float, point: int) -> str:
+def _lacking_facets(problem: Problem, name: str, subject: str, depth: float, point: int) -> str:
+    """Return the warning that `subject` penetrates by a depth [length] at a point beside the facets of a contact pair."""
     where, pair = np.array2string(problem.model.mesh.points[point], precision=4), problem.pairs[name]
     between = "' and '".join(side.group for side in (pair.secondary, pair.primary) if isinstance(side, Surface))
     return (

@@ -1,9 +1,9 @@
-"""Solve one load step: evaluate loads, iterate to equilibrium with contact, compute results. Start reading the code here.
+"""Solve one load step: evaluate loads, iterate to equilibrium with contact, and compute results.
 
 First the loads and the prescribed displacements at the end of the step are evaluated. Newton's method (`newton`) then solves
 the equilibrium. Each of its iterations pairs the contact surfaces on the deformed configuration, solves the inequalities of
 contact, and repeats both until the displacements converge (`geometry_loop`). The remaining displacements, the force balance
-and the stresses follow from the contact forces.
+and the stresses follow from the contact forces. This module is the place to start reading the code.
 """
 
 from __future__ import annotations
@@ -67,10 +67,10 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     if problem.heat is not None:
         heated, solution = settle_heat(problem, begin.state, cold, instant, rise, solution, partial(newton, begin))
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
-    return _ended(problem, begin.state, load, solution, iterations, (index, instant), heated)
+    return _end_of_step(problem, begin.state, load, solution, iterations, (index, instant), heated)
 
 
-def _ended(
+def _end_of_step(
     problem: Problem, start: State, load: StepLoad, solution: StepEquilibrium, iterations: dict[str, Any],
     instant: tuple[int, float], heated: Heated | None,
 ) -> tuple[State, StepResult]:  # fmt: skip
@@ -91,9 +91,9 @@ def _ended(
     heated : Heated, optional
         The converged temperatures, in models with conduction of heat.
     """
-    settled, u, balanced = solution.settled, solution.u, solution.balance
+    settled, u, balance = solution.settled, solution.u, solution.balance
     end = replace(
-        start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
+        start, u=u, largest_force=balance.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
         instant=instant[1], rise=None if heated is None else heated.rise,
     )  # fmt: skip
     end = solution.terms.commit(u, end)
@@ -101,9 +101,9 @@ def _ended(
     if settled is not None:
         end = save_contact_history(problem, start, load, settled, end)
         contact = contact_results(problem, start, load, settled, end)
-        end, contact = keep_path(problem, start, load, settled, end, contact, balanced.energy)
+        end, contact = accumulate_results(problem, start, load, settled, end, contact, balance.energy)
     elif start.work is not None:
-        end = replace(end, work=start.work.after(balanced.energy, 0.0, (0.0, 0.0, 0.0)))
+        end = replace(end, work=start.work.after(balance.energy, 0.0, (0.0, 0.0, 0.0)))
     if problem.extrapolates:
         contact_data = {} if settled is None else settled.gaps_and_forces
         extrapolation = start.extrapolation.converged(u, contact_data, problem.bodies is not None)
@@ -117,7 +117,7 @@ def _ended(
             free = problem.floating_bodies.undetermined(*forces, u, end.largest_rigid_force)
             iterations["regularised"]["undetermined"] = free
     end = replace(end, solver=problem.solver.snapshot())
-    result = recover(problem, end, contact, balanced.reaction, iterations, instant, solution.bodies)
+    result = recover(problem, end, contact, balance.reaction, iterations, instant, solution.bodies)
     return end, result if heated is None else heated.completed(problem, result)
 
 
@@ -125,14 +125,14 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
     """Return the beginning of a load step.
 
     Its state is the `state` at the end of the previous step, with the bounds of round-off and of forces for the new `load`.
-    If only forces act in the first step, no displacement is known. The solution without contact then provides the scale of
-    the displacements, `StepContext.expected`.
+    If only forces act in the first step, no prescribed displacement provides a scale. The largest displacement of the
+    solution without contact is then used, see `StepContext.expected`.
     """
-    pushing = load if load.rise is None else expansion_as_force(problem, load)
-    loaded = with_loads(problem, pushing)
+    load_as_force = load if load.rise is None else expansion_as_force(problem, load)
+    loaded = with_loads(problem, load_as_force)
     round_off, rigid_force, expected = state.gap_round_off, state.largest_rigid_force, 0.0
     zero = np.zeros(len(load.lift))
-    if problem.pairs and pushing.force.any() and not (state.u.any() or load.lift.any()):
+    if problem.pairs and load_as_force.force.any() and not (state.u.any() or load.lift.any()):
         expected = largest(loaded.full_solution(zero))
     if problem.pairs and problem.model.springs:
         # Springs of the model may be weak: without contact, bodies on them have large displacements, and gaps are
@@ -140,20 +140,20 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         from_zero = largest(loaded.full_solution(zero))
         round_off = max(round_off, 16 * np.finfo(float).eps * from_zero)
     if problem.floating_bodies is not None:
-        forces = generalised(problem.floating_bodies.motions, pushing.force)
+        forces = generalised(problem.floating_bodies.motions, load_as_force.force)
         rigid_force = max(rigid_force, float(np.abs(forces).max()))
     start = replace(
         state, gap_round_off=round_off, largest_rigid_force=rigid_force, rigid=None, last_change=None,
-        largest_force=max(state.largest_force, largest(pushing.force)),
+        largest_force=max(state.largest_force, largest(load_as_force.force)),
     )  # fmt: skip
     if problem.extrapolates:
-        # Displacements of nonlinear bodies are extrapolated along the motions of rigid obstacles as well as along the loads,
-        # from the state at rest on.
-        parts = [load.lift, pushing.force, *(() if problem.bodies is None else load.obstacles.values())]
+        # Displacements of nonlinear bodies are extrapolated in the motions of rigid obstacles as well as in the loads. The
+        # state at rest is the first of the extrapolated states.
+        quantities = [load.lift, load_as_force.force, *(() if problem.bodies is None else load.obstacles.values())]
         extrapolation = state.extrapolation
         if problem.bodies is not None and not (extrapolation.loads or state.u.any()):
-            extrapolation = extrapolation.to(*map(np.zeros_like, parts)).converged(state.u, {})
-        start = replace(start, extrapolation=extrapolation.to(*parts))
+            extrapolation = extrapolation.to(*map(np.zeros_like, quantities)).converged(state.u, {})
+        start = replace(start, extrapolation=extrapolation.to(*quantities))
     return StepContext(problem, start, load, loaded, problem.dofs, start.extrapolation, expected, index)
 
 
@@ -177,19 +177,19 @@ def save_contact_history(problem: Problem, start: State, load: StepLoad, settled
     displacement, solution, first_contact = problem.displacement(end.u), settled.solution, dict(start.first_contact)
     never_opening, elastic_slip, bonds = dict(start.never_opening), {}, {}
     for name, rows in settled.constraints.rows.items():
-        pair, part = problem.pairs[name], settled.constraints.parts[name]
+        pair, constraints = problem.pairs[name], settled.constraints.parts[name]
         if problem.model.mesh.dim == 3 and name not in first_contact:
             first_contact[name] = pair.first_contact(problem.configuration(name, start, load, displacement, end.u))
         if pair.options.kind == "bilateral_once_closed":
-            # Points that have slid beyond the other side may return to it.
-            closed = solution.active[rows] | part.equality
-            never_opening[name] = part.positions, closed
-        compliant = part.compliance is not None or part.tangential_softness.any()
-        if compliant and part.tangents:
-            slips = part.elastic_slips(solution.multiplier[rows], solution.tangential[rows])
-            elastic_slip[name] = part.positions, slips
-        if isinstance(part.tied, Layer):
-            bonds[name] = part.tied.after(part, end.u)
+            # Points that have slid beyond the other side are included, since they may return to it.
+            closed = solution.active[rows] | constraints.equality
+            never_opening[name] = constraints.positions, closed
+        compliant = constraints.compliance is not None or constraints.tangential_softness.any()
+        if compliant and constraints.tangents:
+            slips = constraints.elastic_slips(solution.multiplier[rows], solution.tangential[rows])
+            elastic_slip[name] = constraints.positions, slips
+        if isinstance(constraints.tied, Layer):
+            bonds[name] = constraints.tied.after(constraints, end.u)
     return replace(
         end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
         last_change=settled.last_change, first_contact=first_contact, never_opening=never_opening,
@@ -197,7 +197,7 @@ def save_contact_history(problem: Problem, start: State, load: StepLoad, settled
     )  # fmt: skip
 
 
-def keep_path(
+def accumulate_results(
     problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, results: dict[str, ContactResult],
     energy: tuple[float, float],
 ) -> tuple[State, dict[str, ContactResult]]:  # fmt: skip
@@ -210,36 +210,38 @@ def keep_path(
     worn, slipped, forces = dict(start.worn), dict(start.slipped), dict(start.forces)
     for name, rows in settled.constraints.rows.items():
         pair, contact, constraints = problem.pairs[name], results[name], settled.constraints.parts[name]
-        at = problem.configuration(name, start, load, displacement, end.u)
+        configuration = problem.configuration(name, start, load, displacement, end.u)
         slip = np.zeros_like(contact.coordinates)
         if contact.active.any() and not pair.options.tied:
-            held = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
-            slip = pair.nodal_slip(at) - approach(constraints, settled.solution, rows, contact)
-            slip = np.where((contact.active & ~held)[:, None], slip, 0.0)
+            rigid_stick = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
+            slip = pair.nodal_slip(configuration) - approach(constraints, settled.solution, rows, contact)
+            slip = np.where((contact.active & ~rigid_stick)[:, None], slip, 0.0)
         slipped[name] = slip + start.slipped.get(name, 0.0)
         results_so_far[name] = replace(contact, slip=slip, slip_total=slipped[name])
         if name in end.bonds:
             results_so_far[name] = replace(results_so_far[name], damage=end.bonds[name].at(contact.coordinates)[1])
         elif not (pair.options.tied or pair.options.gap_only):
-            given = constraints, settled.solution, rows, at, contact, start.forces.get(name)
-            forces[name], work_of_pair, over_slip = contact_work(pair, *given)
+            arguments = constraints, settled.solution, rows, configuration, contact, start.forces.get(name)
+            forces[name], work_of_pair, over_slip = contact_work(pair, *arguments)
             load_of_pair = None
             if pair.friction:
-                earlier = start.forces[name].pressing > 0.0 if name in start.forces else False
-                closed = contact.active | earlier
+                closed_before = start.forces[name].pressing > 0.0 if name in start.forces else False
+                closed = contact.active | closed_before
                 load_of_pair = sliding_load(constraints, settled.solution, rows, over_slip, closed, pair.secondary)
             results_so_far[name] = replace(results_so_far[name], dissipation=work_of_pair[0], sliding_load=load_of_pair)
             works += work_of_pair
         if pair.options.wear is not None:
             before = start.worn.get(name, Worn.nothing(len(contact.points)))
-            worn[name] = before.after(pair, at, results_so_far[name], pair.options.wear)
+            worn[name] = before.after(pair, configuration, results_so_far[name], pair.options.wear)
             results_so_far[name] = replace(results_so_far[name], wear=worn[name].depth)
     stored = sum(entry.stored for entry in forces.values()) + sum(entry.stored for entry in end.bonds.values())
     released = sum(entry.released for entry in end.bonds.values())
     work = None if start.work is None else start.work.after(energy, stored, works.tolist(), released)
     touched = start.touched.union(name for name, contact in results.items() if contact.active.any())
-    met = {name: positions for name, positions in end.first_contact.items() if name in touched}
-    end = replace(end, worn=worn, slipped=slipped, forces=forces, work=work, touched=touched, first_contact=met)
+    first_contact = {name: positions for name, positions in end.first_contact.items() if name in touched}
+    end = replace(
+        end, worn=worn, slipped=slipped, forces=forces, work=work, touched=touched, first_contact=first_contact
+    )
     return end, results_so_far
 
 
@@ -268,13 +270,13 @@ def recover(
     mesh, u = problem.model.mesh, problem.displacement(end.u)
     sections, reaction = problem.model.pretensions, reaction.reshape(-1, mesh.dim)
     parts = problem.model.temperatures, problem.model.initial_states, sections
-    temperature, initial, pulls = (problem.factors(histories, instant[1]) for histories in parts)
+    temperature, initial, pretension = (problem.factors(histories, instant[1]) for histories in parts)
     pressures = [multiplier(table, problem.ramp, instant[1]) for _, table in problem.following]
     factors = {"temperature_factors": temperature, "initial_factors": initial, "pressure_factors": pressures}
     iterations = {**iterations, **{key: multipliers for key, multipliers in factors.items() if multipliers}}
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
     if sections:
-        iterations["pretension"] = section_results(sections, u, reaction, pulls)
+        iterations["pretension"] = section_results(sections, u, reaction, pretension)
     if bodies is not None:
         stress = recovery.nodal_average(mesh, bodies.stress, problem.sides)
     else:
@@ -287,10 +289,10 @@ def recover(
     if len(problem.sides.points):
         materials_of_cells = np.concatenate(list(problem.field.distinct.values()))
         stress, by_material = by_largest_von_mises(problem.sides, materials_of_cells, stress, mesh.n_points)
-    von_mises, named = recovery.von_mises(stress), problem.model.units
+    von_mises, units = recovery.von_mises(stress), problem.model.units
     return StepResult(
         *instant, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction, contact,
         iterations, material_stress=by_material,
         cell_fields={} if bodies is None or problem.bodies is None else problem.bodies.cell_fields(bodies, u),
-        temperature=heat, units=named and units_of_results(named, problem.model.kinematics),
+        temperature=heat, units=units and units_of_results(units, problem.model.kinematics),
     )  # fmt: skip

@@ -80,26 +80,26 @@ class StressScatter:
         self.energy = self.pressure = 0.0
         laws = [material for material, _ in problem.model.materials]
         nu = np.array([law.largest_nu if isinstance(law, LinearElastic) else -1.0 for law in laws])[field.owner]
-        self._nearly = (nu >= SUSPICIOUS) & (problem.model.kinematics != "plane_stress")
+        self._nearly_incompressible = (nu >= SUSPICIOUS) & (problem.model.kinematics != "plane_stress")
         self.nu = float(nu.max(initial=-1.0))
         thermal, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
         offset = problem.model.stress_offset(thermal, initial, field, step.temperature)
         if not self.elements or offset is not None:  # free thermal expansion only causes round-off stresses
             return
-        given = mesh, problem.model.kinematics, field
-        smooth = smoothed_stress(*given, step.displacement, offset)
-        stress = CellStress(*given[:2], field.moduli, step.displacement, field.treatment, offset)
-        sums = sum(self._sums(problem, stress, name, smooth[name]) for name in self.elements)
-        off, energy, off_mean, mean = np.sqrt(sums)
+        arguments = mesh, problem.model.kinematics, field
+        recovered = smoothed_stress(*arguments, step.displacement, offset)
+        stress = CellStress(*arguments[:2], field.moduli, step.displacement, field.treatment, offset)
+        sums = sum(self._sums(problem, stress, name, recovered[name]) for name in self.elements)
+        difference, energy, mean_difference, mean = np.sqrt(sums)
         size = np.ptp(mesh.points, axis=0)
         strain = np.abs(step.displacement).max() / size.max()
         # Root of the energy if the bounding box were filled with the stiffest material under this strain.
-        stretched = strain * np.sqrt(field.moduli.max() * np.prod(size))
-        if energy > LENGTH_ROUND_OFF * stretched:
-            self.energy = float(off / energy)
-            self.pressure = float(off_mean / mean) if mean > 0.0 else 0.0
+        energy_scale = strain * np.sqrt(field.moduli.max() * np.prod(size))
+        if energy > LENGTH_ROUND_OFF * energy_scale:
+            self.energy = float(difference / energy)
+            self.pressure = float(mean_difference / mean) if mean > 0.0 else 0.0
 
-    def _sums(self, problem: Problem, stress: CellStress, name: str, smooth: Array) -> Array:
+    def _sums(self, problem: Problem, stress: CellStress, name: str, recovered: Array) -> Array:
         """Return integrals (4,) over cells: energies and squared mean stresses, of the difference and of the stress."""
         mesh, field, element = problem.model.mesh, problem.field, elements.get(name)
         xi, weights = integration_rule(element, 2)
@@ -108,13 +108,18 @@ class StressScatter:
         n = len(mesh.cells[name])
         for rows in np.array_split(np.arange(n), n * dN.nbytes // BATCH + 1):
             cells, numbers = mesh.cells[name][rows], field.rows[name][rows]
-            rough = stress.at(name, xi, cells, field.loops[name][rows], rows)
-            off = N @ smooth[rows] - rough
+            computed = stress.at(name, xi, cells, field.loops[name][rows], rows)
+            difference = N @ recovered[rows] - computed
             volume = cell_volumes(mesh.points[cells], N, dN, problem.model.kinematics == "axisymmetric") * weights
-            compliance, nearly = field.compliance[numbers][:, None], volume * (self._nearly[numbers] & simplex)[:, None]
+            compliance, mean_weights = (
+                field.compliance[numbers][:, None],
+                volume * (self._nearly_incompressible[numbers] & simplex)[:, None],
+            )
             sums += [
-                (elastic_energy(off, compliance) * volume).sum(), (elastic_energy(rough, compliance) * volume).sum(),
-                (off[..., :3].mean(axis=2) ** 2 * nearly).sum(), (rough[..., :3].mean(axis=2) ** 2 * nearly).sum(),
+                (elastic_energy(difference, compliance) * volume).sum(),
+                (elastic_energy(computed, compliance) * volume).sum(),
+                (difference[..., :3].mean(axis=2) ** 2 * mean_weights).sum(),
+                (computed[..., :3].mean(axis=2) ** 2 * mean_weights).sum(),
             ]  # fmt: skip
         return sums
 
@@ -123,22 +128,24 @@ def nonlinear_scatter_warnings(problem: Problem, state: State, step: StepResult)
     """Return a warning where the mean stress of nearly incompressible nonlinear triangles and tetrahedra alternates."""
     mesh, bodies = problem.model.mesh, problem.bodies
     names = [name for name in SIMPLICES if name in mesh.solids]
-    nearly = problem.field.averaged & (problem.model.kinematics != "plane_stress")
-    if bodies is None or not names or not nearly.any():
+    selected = problem.field.averaged & (problem.model.kinematics != "plane_stress")
+    if bodies is None or not names or not selected.any():
         return []
     rise = problem.model.expanding_rise(step.iterations.get("temperature_factors", ()), step.temperature)
-    stress, off, whole = problem.deformed(state.u, state, rise).stress, 0.0, 0.0
+    stress, difference, norm = problem.deformed(state.u, state, rise).stress, 0.0, 0.0
     for name in names:
-        cells = mesh.cells[name][nearly[problem.field.rows[name]]]
-        mean = stress[name][nearly[problem.field.rows[name]]][..., :3].mean(axis=(1, 2))
-        total, count = (np.bincount(cells.ravel(), part, mesh.n_points) for part in (mean.repeat(cells.shape[1]), None))
+        cells = mesh.cells[name][selected[problem.field.rows[name]]]
+        mean = stress[name][selected[problem.field.rows[name]]][..., :3].mean(axis=(1, 2))
+        total, count = (
+            np.bincount(cells.ravel(), values, mesh.n_points) for values in (mean.repeat(cells.shape[1]), None)
+        )
         smooth = (total / np.maximum(count, 1))[cells].mean(axis=1)
-        off, whole = off + float(((mean - smooth) ** 2).sum()), whole + float((mean**2).sum())
-    if off <= ALTERNATING**2 * whole:
+        difference, norm = difference + float(((mean - smooth) ** 2).sum()), norm + float((mean**2).sum())
+    if difference <= ALTERNATING**2 * norm:
         return []
     return [
         f"{' and '.join(names)} cells lock: in a nearly incompressible material their mean stress scatters by "
-        f"{np.sqrt(off / whole):.0%} about its averages at the nodes, and forces are too large; use quadrangles "
+        f"{np.sqrt(difference / norm):.0%} about its averages at the nodes, and forces are too large; use quadrangles "
         "or hexahedra, or quadratic elements (generate.to_quadratic)"
     ]
 
@@ -171,7 +178,7 @@ AT_NODES = ("tri3", "tet4", "wedge6", "pyramid5")
 
 
 class Comparison:
-    """The forces S u of the excess stiffness; see the module.
+    """The forces S u of the excess stiffness, see the docstring of the module.
 
     Parameters
     ----------
@@ -190,7 +197,7 @@ class Comparison:
         field = model.material_field()
         self._moduli, self._material = field.moduli, field.rows
         self._treatment, self._owner = field.treatment, field.owner
-        nu = np.full(len(self._moduli), -1.0)  # only isotropic materials have a mean dilatation; modes do not lock
+        nu = np.full(len(self._moduli), -1.0)  # below all admissible values, for materials without a mean dilatation
         for number, (material, _) in enumerate(model.materials):
             if isinstance(material, LinearElastic):
                 nu[field.owner == number] = material.largest_nu
@@ -209,17 +216,17 @@ class Comparison:
     def force(self, displacement: Array) -> Array:
         """Return the forces S u (n_points, dim) [force] for displacements u (n_points, dim) [length]."""
         mesh, kinematics = self._model.mesh, self._model.kinematics
-        given = mesh, kinematics, self._moduli, self._material, displacement
-        stress = recovery.stress_at_points(*given, self._treatment)
-        reference = recovery.stress_at_points(*given, self._treatment | self._suspicious)
-        surplus = {name: np.zeros_like(stress[name]) for name in self._cells}
+        arguments = mesh, kinematics, self._moduli, self._material, displacement
+        stress = recovery.stress_at_points(*arguments, self._treatment)
+        reference = recovery.stress_at_points(*arguments, self._treatment | self._suspicious)
+        excess = {name: np.zeros_like(stress[name]) for name in self._cells}
         for name in self._cells:
-            surplus[name][..., :3] = (stress[name] - reference[name])[..., :3].mean(axis=2, keepdims=True)
-        self._add_beyond_nodal_mean(reference, surplus)
-        return recovery.internal_force(mesh, kinematics, surplus)
+            excess[name][..., :3] = (stress[name] - reference[name])[..., :3].mean(axis=2, keepdims=True)
+        self._add_deviation_from_nodal_mean(reference, excess)
+        return recovery.internal_force(mesh, kinematics, excess)
 
-    def _add_beyond_nodal_mean(self, reference: dict[str, Array], surplus: dict[str, Array]) -> None:
-        """Add to `surplus` the deviation of cell mean pressures from the nodal means, material by material."""
+    def _add_deviation_from_nodal_mean(self, reference: dict[str, Array], excess: dict[str, Array]) -> None:
+        """Add to `excess` the deviation of cell mean pressures from the nodal means, material by material."""
         mesh, names = self._model.mesh, [name for name in self._cells if name in AT_NODES]
         volume, pressure = {}, {}
         for name in names:
@@ -227,52 +234,52 @@ class Comparison:
             corners = mesh.points[mesh.cells[name]]
             volumes = cell_volumes(corners, N, dN, self._model.kinematics == "axisymmetric") * weights
             volume[name] = volumes.sum(axis=1)
-            at_points = reference[name][..., :3].mean(axis=2)
-            pressure[name] = (at_points * volumes).sum(axis=1) / volume[name]
+            mean_stress = reference[name][..., :3].mean(axis=2)
+            pressure[name] = (mean_stress * volumes).sum(axis=1) / volume[name]
         for number in np.unique(self._owner[self._suspicious]):
-            whole, work = np.zeros((2, mesh.n_points))
+            nodal_volume, volume_pressure = np.zeros((2, mesh.n_points))
             rows = {name: np.flatnonzero(self._owner[self._material[name]] == number) for name in names}
             for name in names:
                 cells = mesh.cells[name][rows[name]]
                 for node in cells.T:
-                    np.add.at(whole, node, volume[name][rows[name]])
-                    np.add.at(work, node, (volume[name] * pressure[name])[rows[name]])
-            mean = work / np.where(whole > 0.0, whole, 1.0)
+                    np.add.at(nodal_volume, node, volume[name][rows[name]])
+                    np.add.at(volume_pressure, node, (volume[name] * pressure[name])[rows[name]])
+            mean = volume_pressure / np.where(nodal_volume > 0.0, nodal_volume, 1.0)
             for name in names:
-                beyond = pressure[name][rows[name]] - mean[mesh.cells[name][rows[name]]].mean(axis=1)
-                surplus[name][rows[name], :, :3] += beyond[:, None, None]
+                deviation = pressure[name][rows[name]] - mean[mesh.cells[name][rows[name]]].mean(axis=1)
+                excess[name][rows[name], :, :3] += deviation[:, None, None]
 
 
 def excess_of_stiffness(problem: Problem, u: Array, comparison: Comparison) -> float:
-    """Return D over the elastic energy of displacements u (n_dofs,) [length], see the module [-]."""
+    """Return D over the elastic energy of displacements u (n_dofs,) [length], see the docstring of the module [-]."""
     system, n = problem.system, problem.model.n_dofs
 
-    def surplus(displacement: Array) -> Array:
+    def excess(displacement: Array) -> Array:
         force = np.zeros(len(u))
         force[:n] = comparison.force(problem.displacement(displacement)).ravel()
         return force
 
     energy = 0.5 * float(u @ (system.K @ u))
-    own_energy = surplus(u)
-    lower = 0.5 * float(u @ own_energy)
-    zero, still = np.zeros(len(u)), np.zeros(len(u))
-    residual = system.reduced(own_energy)
-    direction, before, kept = zero, 0.0, problem.solver.snapshot()
+    excess_force = excess(u)
+    lower = 0.5 * float(u @ excess_force)
+    zero, zero_lift = np.zeros(len(u)), np.zeros(len(u))
+    residual = system.reduced(excess_force)
+    direction, last_slope, snapshot = zero, 0.0, problem.solver.snapshot()
     for _ in range(ITERATIONS):
         step = problem.solver.load(residual).full_solution(zero)
         slope = float(residual @ step)
         if not slope > ROUND_OFF * energy:
             break
-        direction = step + (slope / before if before else 0.0) * direction
-        moved = system.displacement(direction, still)
-        product = system.reduced(system.K @ moved - surplus(moved))
+        direction = step + (slope / last_slope if last_slope else 0.0) * direction
+        displacement_of_direction = system.displacement(direction, zero_lift)
+        product = system.reduced(system.K @ displacement_of_direction - excess(displacement_of_direction))
         curvature = float(direction @ product)
         if not curvature > 0.0:
             break
         lower += 0.5 * slope**2 / curvature
         residual = residual - slope / curvature * product
-        before = slope
-    problem.solver.put_back(kept)  # discards these loads, which do not belong to the analysis
+        last_slope = slope
+    problem.solver.put_back(snapshot)  # discards these loads, which do not belong to the analysis
     return lower / energy if energy > 0.0 else 0.0
 
 

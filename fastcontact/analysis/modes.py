@@ -162,17 +162,18 @@ class _Vibration:
         held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
         contact = held_contact(model, step, held, hold_sliding)
         slides = step is not None and any((pair.active & ~pair.sticking).any() for pair in step.contact.values())
-        further = held_contact(model, step, held, True) if slides and not hold_sliding else []
-        return cls(model, field, K, M, contact, supported, SINGLE_PRECISION * _uniform(model, K, M), further)
+        sliding = held_contact(model, step, held, True) if slides and not hold_sliding else []
+        return cls(model, field, K, M, contact, supported, SINGLE_PRECISION * _uniform_quotient(model, K, M), sliding)
 
     def warn_of_slides(self, values: Array, vectors: Array) -> None:
         """Warn of eigenvalues (n,) close to zero whose shapes (n_dofs, n) slide where friction holds small motions."""
-        low = vectors[:, np.abs(values) < self.shift]
-        moved = [
-            np.abs(held.rows @ low) > SINGLE_PRECISION * (abs(held.rows) @ np.abs(low)).max(initial=0.0)
+        nearly_rigid = vectors[:, np.abs(values) < self.shift]
+        sliding = [
+            np.abs(held.rows @ nearly_rigid)
+            > SINGLE_PRECISION * (abs(held.rows) @ np.abs(nearly_rigid)).max(initial=0.0)
             for held in self.with_sliding
         ]
-        if low.shape[1] and (count := int(np.any([slides.any(axis=0) for slides in moved], axis=0).sum())):
+        if nearly_rigid.shape[1] and (count := int(np.any([slides.any(axis=0) for slides in sliding], axis=0).sum())):
             warn(
                 f"{count} of {len(values)} modes have frequencies close to zero (the lowest {_frequencies(values)[0]:.3g}), "
                 "since nodes that slide in this step are free along the surface: hold_sliding=True holds them, as friction "
@@ -184,25 +185,25 @@ class _Vibration:
         model, driven = self.model, self.model.force_driven
         locks = [
             bolt.locked(model.mesh.points.size, 0.0) for bolt in model.pretensions
-        ]  # they keep their present length
+        ]  # sections keep their current length
         relations = [*model.relations, *locks]
         K, M, near = driven.stiffness(self.K), driven.stiffness(self.M), driven.near_nullspace(near_nullspace(model))
         supported, massless = driven.supported(self.supported).ravel(), driven.without_stiffness
         if wave is not None:
-            K, M, relations = wave.twice(K), wave.twice(M), wave.relations(model, relations)
-            supported, massless = wave.both(supported), wave.both(massless)
+            K, M, relations = wave.real_blocks(K), wave.real_blocks(M), wave.relations(model, relations)
+            supported, massless = wave.repeated(supported), wave.repeated(massless)
             near = near if wave.single else np.asarray(np.kron(np.eye(2), near), float)
         relations = driven.relations(relations)
-        contact = joined(self.contact, K.shape[0]) if wave is None else joined(self.contact, K.shape[0], wave.joined)
+        contact = joined(self.contact, K.shape[0]) if wave is None else joined(self.contact, K.shape[0], wave.on_ring)
         K = contact.stiffened(K)
-        touched = np.isin(np.arange(K.shape[0]), contact.rows.indices)
-        reduced = Reduced(System(K, supported, relations, massless & touched), M, contact.rows, contact.nodes)
+        in_conditions = np.isin(np.arange(K.shape[0]), contact.rows.indices)
+        reduced = Reduced(System(K, supported, relations, massless & in_conditions), M, contact.rows, contact.nodes)
         if n >= int(reduced.free.sum()):
             raise ModelError(f"n = {n} modes of {int(reduced.free.sum())} free displacements: request fewer")
         solver = choice.make(linear_solver, dim=model.mesh.dim, n_dofs=K.shape[0], columns=True)
         solver.contrast = self.field.contrast
-        soft = np.where(reduced.free[:, None], near, 0.0)
-        values, vectors = lowest(solver, (reduced.K, reduced.M), soft, reduced.free, n, self.shift)
+        free_nullspace = np.where(reduced.free[:, None], near, 0.0)
+        values, vectors = lowest(solver, (reduced.K, reduced.M), free_nullspace, reduced.free, n, self.shift)
         return values, reduced.displacement(vectors)
 
     def of_wave(self, wave: Wave, n: int, linear_solver: str) -> tuple[Array, AnyArray]:
@@ -210,7 +211,10 @@ class _Vibration:
         values, vectors = self.lowest(n if wave.single else 2 * n, linear_solver, wave)
         if wave.single:
             return values, vectors
-        K, M = joined(self.contact, 2 * self.K.shape[0], wave.joined).stiffened(wave.twice(self.K)), wave.twice(self.M)
+        K, M = (
+            joined(self.contact, 2 * self.K.shape[0], wave.on_ring).stiffened(wave.real_blocks(self.K)),
+            wave.real_blocks(self.M),
+        )
         return pairs_of(vectors, K, M, n)
 
 
@@ -235,22 +239,22 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> b
     return bsr_array(K + stress_stiffness(mesh, stresses, field.loops, kinematics == "axisymmetric"))
 
 
-def _uniform(model: Model, K: bsr_array, M: bsr_array) -> float:
+def _uniform_quotient(model: Model, K: bsr_array, M: bsr_array) -> float:
     """Return the least Rayleigh quotient [1 / time^2] of uniform deformations, each linear in one coordinate."""
-    points, densities = model.mesh.points - model.mesh.points.mean(axis=0), []
+    points, quotients = model.mesh.points - model.mesh.points.mean(axis=0), []
     for component in range(model.mesh.dim):
         for axis in range(model.mesh.dim):
             u = np.zeros_like(points)
             u[:, component] = points[:, axis]
-            densities.append(float(u.ravel() @ (K @ u.ravel())) / float(u.ravel() @ (M @ u.ravel())))
-    return min((density for density in densities if density > 0.0), default=1.0)
+            quotients.append(float(u.ravel() @ (K @ u.ravel())) / float(u.ravel() @ (M @ u.ravel())))
+    return min((quotient for quotient in quotients if quotient > 0.0), default=1.0)
 
 
 def _modes(vibration: _Vibration, values: Array, vectors: Array) -> Modes:
     """Return modes from eigenvalues (n,) [1 / time^2] and displacements (n_dofs, n), their largest component positive."""
     momentum = _momentum(vibration)
     dim = momentum.shape[1]
-    vectors = _upright(vectors[: len(momentum)])
+    vectors = _with_positive_peak(vectors[: len(momentum)])
     mass = np.einsum("nii->i", momentum.reshape(-1, dim, dim))
     return Modes(
         _frequencies(values), values, vectors.T.reshape(len(values), -1, dim), vectors.T @ momentum, mass, vibration.model,
@@ -261,21 +265,21 @@ def _modes(vibration: _Vibration, values: Array, vectors: Array) -> Modes:
 def _of_ring(vibration: _Vibration, sectors: Sectors, waves: list[tuple[Wave, Array, AnyArray]]) -> Modes:
     """Return the modes of the whole ring from eigenvalues (n,) and displacements (n_dofs, n) of each wave."""
     momentum, number = _momentum(vibration), sectors.number
-    turns = [np.linalg.matrix_power(sectors.turn, k) for k in range(number)]
+    rotations = [np.linalg.matrix_power(sectors.turn, k) for k in range(number)]
     values: list[float] = []
     shapes, participation, diameters, twins = [], [], [], []
     for wave, eigenvalues, vectors in waves:
-        vectors = (_upright(vectors) if wave.single else np.sqrt(2.0) * vectors) / np.sqrt(number)
+        vectors = (_with_positive_peak(vectors) if wave.single else np.sqrt(2.0) * vectors) / np.sqrt(number)
         phases = np.exp(1j * wave.angle * np.arange(number))
-        ring = np.einsum("nd,k,ked->ne", vectors.T @ momentum, phases, turns)
-        for value, vector, total in zip(eigenvalues.tolist(), vectors.T, ring, strict=True):
+        ring = np.einsum("nd,k,ked->ne", vectors.T @ momentum, phases, rotations)
+        for value, vector, ring_participation in zip(eigenvalues.tolist(), vectors.T, ring, strict=True):
             first = len(values)
             twins += [first] if wave.single else [first + 1, first]
-            for part in (np.real,) if wave.single else (np.real, np.imag):
+            for component in (np.real,) if wave.single else (np.real, np.imag):
                 values.append(value)
                 diameters.append(wave.diameters)
-                shapes.append(part(vector).reshape(-1, momentum.shape[1]))
-                participation.append(part(total))
+                shapes.append(component(vector).reshape(-1, momentum.shape[1]))
+                participation.append(component(ring_participation))
     mass = number * np.einsum("nii->i", momentum.reshape(-1, momentum.shape[1], momentum.shape[1]))
     eigenvalues = np.array(values)
     return Modes(
@@ -291,12 +295,12 @@ def _frequencies(eigenvalues: Array) -> Array:
 def _momentum(vibration: _Vibration) -> Array:
     """Return the momentum (n_dofs, dim) of uniform unit velocities along each axis [mass]."""
     dim = vibration.model.mesh.dim
-    along = np.tile(np.eye(dim), (vibration.M.shape[0] // dim, 1))
+    velocities = np.tile(np.eye(dim), (vibration.M.shape[0] // dim, 1))
     if vibration.model.kinematics == "axisymmetric":
-        along[:, 0] = 0.0  # cancels over the full circle
-    return np.asarray(vibration.M @ along)
+        velocities[:, 0] = 0.0  # cancels over the full circle
+    return np.asarray(vibration.M @ velocities)
 
 
-def _upright(vectors: Array) -> Array:
+def _with_positive_peak(vectors: Array) -> Array:
     """Return vectors (size, n) whose largest component is positive."""
     return np.asarray(vectors * np.sign(vectors[np.abs(vectors).argmax(axis=0), np.arange(vectors.shape[1])]))

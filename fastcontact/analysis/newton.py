@@ -39,9 +39,9 @@ from fastcontact.linear.protocol import TOLERANCE, Loaded
 from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
-# Stiffness of springs along closed gaps, over the largest stiffness of the bodies. Motions that contact does not constrain,
-# such as gaps between values of a pressure field, creep with stiff springs: an O-ring takes 5 and 7 iterations with 5e-5 and
-# 2e-4, and an O-ring under fluid pressure, for which the first is too soft, takes 13 with the second.
+# Stiffness of springs along closed gaps, over the largest stiffness of the bodies. Stiff springs slow down motions that
+# contact does not constrain, such as gaps between the nodes of a pressure field. An O-ring takes 5 iterations with 5e-5 and
+# 7 with 2e-4. An O-ring under fluid pressure takes 13 with 2e-4, and 5e-5 is too soft for it.
 HELD = 2e-4
 # The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
 FORCING = 1e-3
@@ -82,13 +82,13 @@ class Regularisation:
     Attributes
     ----------
     geometric : int
-        Part of the geometric stiffness that it includes, see `NonlinearBodies.at`.
+        Part of the geometric stiffness that is included, see `NonlinearBodies.at`.
     held : float
         Stiffness of springs along closed gaps, over the largest stiffness of the bodies [-].
     stiff : bool
         Whether the springs of floating bodies are as stiff as the bodies.
     replaces : bool
-        Whether the springs along closed gaps replace those of floating bodies, if they resist all motions of these bodies.
+        Whether springs along closed gaps replace those of floating bodies if they resist all motions of these bodies.
     """
 
     geometric: int = WHOLE
@@ -111,10 +111,10 @@ class _Newton:
         settled = None if before is None else before.settled
         self._iterate = Iterate.of(begin.state) if settled is None else settled.iterate
         self._settled: SettledContact | None = None
-        self._kept: Problem | None = None  # the last tangent, if another iteration may use it
-        self._old = False  # whether the last iteration used it
+        self._reusable: Problem | None = None  # problem with the last tangent, if another iteration may use it
+        self._reused = False  # whether the last iteration used the tangent of an earlier one
         self._moved_fully = False  # whether displacements are those of the last contact solution
-        self._by = Regularisation()  # of the last tangent
+        self._regularisation = Regularisation()  # of the last tangent
         self._replaces = bool(begin.problem.force_driven.pairs)  # see `Regularisation.replaces`
 
     @cached_property
@@ -132,7 +132,7 @@ class _Newton:
             except ConvergenceError as error:
                 if not history or error.smaller_steps_help:
                     raise
-                log.info("an iterate is rejected: %s", error)  # which says nothing about the equilibrium
+                log.info("an iterate is rejected: %s", error)  # an equilibrium may exist nevertheless
                 break
             u, fraction = self._reach(before, target, changes)
             balanced = self._balanced(u, contact_force, before)
@@ -141,15 +141,15 @@ class _Newton:
                     return StepEquilibrium(self._settled, u, balanced, self._terms)
                 continue
             if history and fraction == 1.0 and balanced.excess > 1.0:
-                u, fraction = self._searched(before, u, contact_force)
+                u, fraction = self._line_search(before, u, contact_force)
                 balanced = self._balanced(u, contact_force, before) if fraction < 1.0 else balanced
-            moved = largest_difference(u, before)
-            changes.append(self._relative(moved, u))
+            change = largest_difference(u, before)
+            changes.append(self._relative(change, u))
             history.append(_history_entry(self._iterate, changes[-1], balanced, fraction))
-            small = self._stands_still(changes) or moved <= self._start.gap_round_off
+            small = self._has_converged(changes) or change <= self._start.gap_round_off
             if fraction == 1.0 and balanced.excess <= 1.0 and small:
                 return StepEquilibrium(self._settled, u, balanced, self._terms, history)
-            self._moved_fully = fraction == 1.0 and not self._by.linear
+            self._moved_fully = fraction == 1.0 and not self._regularisation.linear
             u = self._accelerated(before, u, changes) if fraction == 1.0 else u
             if len(changes) > WINDOW and min(changes[-WINDOW:]) > DECLINE * min(changes[:-WINDOW]):
                 break
@@ -174,50 +174,50 @@ class _Newton:
         balanced.check(self._begin.index, self._problem, self._iterate.history)
         return True
 
-    def _relative(self, moved: float, u: Array) -> float:
-        """Return the largest change of displacements to u (n_dofs,), `moved` [length], relative to their size."""
+    def _relative(self, change: float, u: Array) -> float:
+        """Return the largest `change` [length] of displacements relative to the largest one; u (n_dofs,) are the new ones."""
         size = max(map(largest, (u, self._load.lift, self._start.u)))
-        return moved / size if size else 0.0
+        return change / size if size else 0.0
 
     @property
-    def _enough(self) -> float:
+    def _tolerance(self) -> float:
         """Relative error of the displacement at which iterations end."""
         return max(self._problem.criteria.geometry, TOLERANCE)
 
-    def _stands_still(self, changes: list[float]) -> bool:
+    def _has_converged(self, changes: list[float]) -> bool:
         """Return whether relative `changes` leave an error below the criterion, or are round-off.
 
-        A change that is small enough to be round-off (SINGLE_PRECISION, reached in slender bodies) counts as such if it
-        exceeds the fraction DECLINE of the previous one. With an old tangent the ratio of the last changes says nothing about
-        points whose plastic flow began or ended since; that of the changes before does.
+        A change that is small enough to be round-off (SINGLE_PRECISION, reached in slender bodies) is regarded as round-off
+        if it exceeds the fraction DECLINE of the previous one. With the tangent of an earlier iteration, the ratio of the
+        last two changes ignores points whose plastic flow has begun or ended since. The ratio before is then used as well.
         """
         before, last = changes[-2:]
         rate = min(last / before, 1.0) if before else 1.0
-        if self._old and changes[-3]:
+        if self._reused and changes[-3]:
             rate = min(max(rate, before / changes[-3]), 1.0)
-        if self._by.linear:
-            return last * rate <= self._enough * (1.0 - rate) or (last <= SINGLE_PRECISION and rate == 1.0)
-        return last * rate <= self._enough or (last <= SINGLE_PRECISION and rate > DECLINE)
+        if self._regularisation.linear:
+            return last * rate <= self._tolerance * (1.0 - rate) or (last <= SINGLE_PRECISION and rate == 1.0)
+        return last * rate <= self._tolerance or (last <= SINGLE_PRECISION and rate > DECLINE)
 
     def _accelerated(self, before: Array, u: Array, changes: list[float]) -> Array:
-        """Return the displacements (n_dofs,) [length] to continue from; the last iteration led from `before` (n_dofs,) to u.
+        """Return the next iterate (n_dofs,) [length], after an iteration from `before` (n_dofs,) to u (n_dofs,).
 
         Anderson acceleration is used where a regularised tangent makes the iterations converge linearly.
         """
-        if not self._by.linear or DECLINE * changes[-1] > changes[-2]:
+        if not self._regularisation.linear or DECLINE * changes[-1] > changes[-2]:
             self._mixing.restart()
             return u
         return self._mixing.mixed(before, u)
 
-    def _serves_again(self, changes: list[float]) -> bool:
+    def _tangent_suffices(self, changes: list[float]) -> bool:
         """Return whether a second iteration with the last tangent is expected to be the last iteration.
 
-        The next change of Newton's method is C times the square of the last one. With an old tangent the error after it
-        is C^2 times the cube.
+        The next change of Newton's method is C times the square of the last one. The error after a further iteration with
+        the same tangent is C^2 times the cube of the last change.
         """
         before, last = changes[-2:] if len(changes) > 2 else (0.0, changes[-1])
         C = last / before**2 if before else 1.0
-        return len(changes) > 1 and C**2 * last**3 <= self._enough
+        return len(changes) > 1 and C**2 * last**3 <= self._tolerance
 
     def _balanced(self, u: Array, contact_force: Array, linearised_at: Array) -> Balance:
         """Return the force balance at displacements u with contact forces linearised at `linearised_at` (n_dofs,)."""
@@ -228,73 +228,78 @@ class _Newton:
         """Return displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of terms linearised at u (n_dofs,).
 
         The contact geometry converges to a fraction of the last relative change of the displacement in `changes`. If the
-        tangent is not positive definite, first the springs of floating bodies are stiffened, then springs are added along
-        closed gaps, soft ones first: convergence stays quadratic except for motions that contact does not hold. If this does
-        not suffice, parts of the geometric stiffness are left out. Once springs were sufficient, they are tried first.
+        tangent is not positive definite, the springs of floating bodies are stiffened. If this does not suffice, springs are
+        added along closed gaps, with which convergence remains quadratic except for motions that contact does not restrain.
+        Finally, parts of the geometric stiffness are omitted. Once springs have been sufficient, they are tried first.
         """
         if self._terms.bodies is None:
             first = self._load is self._begin.load and self._settled is None
             loaded = self._begin.loaded if first else with_loads(self._problem, self._load)
             return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
-        # Forces on a floating body that moves do not balance while springs along gaps do not resist its motion.
-        if self._by.held and changes[-1] > changes[-2] > min(changes):
+        # While a floating body moves along motions that springs along gaps do not resist, its forces are not in balance.
+        if self._regularisation.held and changes[-1] > changes[-2] > min(changes):
             self._replaces = True
-        failed: Exception | None = None
-        for by in self._regularisations():
+        failure: Exception | None = None
+        for regularisation in self._regularisations():
             try:
-                solution = self._linearised_contact(u, changes, by)
+                solution = self._linearised_contact(u, changes, regularisation)
             except (ModelError, ConvergenceError) as error:
-                log.info("the tangent fails with %s: %s", by, error)
-                failed = error
+                log.info("the tangent fails with %s: %s", regularisation, error)
+                failure = error
             else:
-                if by != self._by:
+                if regularisation != self._regularisation:
                     self._mixing.restart()
-                self._by = by
+                self._regularisation = regularisation
                 return solution
-        if isinstance(failed, ConvergenceError):
-            raise failed
+        if isinstance(failure, ConvergenceError):
+            raise failure
         raise ConvergenceError(
-            f"the tangent stiffness cannot be factorised ({failed}): the bodies buckle, or the load step is too large"
+            f"the tangent stiffness cannot be factorised ({failure}): the bodies buckle, or the load step is too large"
         )
 
     def _regularisations(self) -> list[Regularisation]:
         """Return the regularisations to try, in order."""
         floats, settled = self._problem.floating_bodies is not None, self._settled
         closed = settled is not None and settled.solution.active.any()
-        whole = [
+        unmodified = [
             Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + (floats and self._problem.solver.iterative)]
         ]
         replaces = self._replaces or (settled is not None and settled.constraints.tangents != ())
-        held = [Regularisation(held=HELD, stiff=floats, replaces=replaces)] if closed else []
-        if self._by in held:
-            held.remove(self._by)
-            whole, held = [], [self._by, *held]  # the whole tangent failed in an earlier iteration
-        if self._by.geometric < WHOLE:  # so did springs
-            return [*whole, *(Regularisation(less, stiff=floats) for less in range(self._by.geometric + 1)[::-1])]
-        return whole + held + [Regularisation(less, stiff=floats) for less in range(WHOLE)[::-1]]
+        with_springs = [Regularisation(held=HELD, stiff=floats, replaces=replaces)] if closed else []
+        if self._regularisation in with_springs:
+            with_springs.remove(self._regularisation)
+            unmodified, with_springs = [], [self._regularisation, *with_springs]  # the unmodified tangent failed before
+        if self._regularisation.geometric < WHOLE:  # springs failed as well
+            return [
+                *unmodified,
+                *(Regularisation(part, stiff=floats) for part in range(self._regularisation.geometric + 1)[::-1]),
+            ]
+        return unmodified + with_springs + [Regularisation(part, stiff=floats) for part in range(WHOLE)[::-1]]
 
-    def _linearised_contact(self, u: Array, changes: list[float], by: Regularisation) -> tuple[Array, Array]:
+    def _linearised_contact(
+        self, u: Array, changes: list[float], regularisation: Regularisation
+    ) -> tuple[Array, Array]:
         """Return the result of `_solve` for a tangent."""
         terms, iterate = self._terms, self._iterate
-        problem, self._kept = (self._kept, None) if self._serves_again(changes) else (None, None)
-        self._old = problem is not None
+        problem, self._reusable = (self._reusable, None) if self._tangent_suffices(changes) else (None, None)
+        self._reused = problem is not None
         if problem is not None:
             problem = replace(problem, linearised_at=None if problem.linearised_at is None else u)
         else:
-            K = terms.tangent(u, by.geometric)
-            contact = self._stiffness_of_contact(K, u, by) if by.geometric == WHOLE else None
-            problem = linearised(self._problem, K, u, contact, by.stiff, by.replaces)
-            if by.geometric == WHOLE:
-                self._kept = problem
+            K = terms.tangent(u, regularisation.geometric)
+            contact = self._stiffness_of_contact(K, u, regularisation) if regularisation.geometric == WHOLE else None
+            problem = linearised(self._problem, K, u, contact, regularisation.stiff, regularisation.replaces)
+            if regularisation.geometric == WHOLE:
+                self._reusable = problem
         force, floating = self._load.force - terms.residual(u)[0] + problem.system.K @ u, problem.floating_bodies
         if floating is not None and iterate.rigid is not None:
             # Under load, the tangent resists rigid-body rotations, which the unknowns of floating bodies do not include.
             force -= problem.system.K @ floating.rigid(u[floating.dofs])
         load = replace(self._load, force=force)
         iterate.u, iterate.history = u.copy(), []
-        enough = min(max(problem.criteria.geometry, FORCING * changes[-1]), NOTABLE)
-        inner = replace(problem, criteria=replace(problem.criteria, geometry=enough))
-        return self._contact(inner, load, with_loads(problem, load), u, Extrapolation())
+        tolerance = min(max(problem.criteria.geometry, FORCING * changes[-1]), NOTABLE)
+        inner_problem = replace(problem, criteria=replace(problem.criteria, geometry=tolerance))
+        return self._contact(inner_problem, load, with_loads(problem, load), u, Extrapolation())
 
     def _contact(
         self, problem: Problem, load: StepLoad, loaded: Loaded, u: Array, extrapolation: Extrapolation
@@ -317,26 +322,26 @@ class _Newton:
         self._settled = settled
         return solution
 
-    def _stiffness_of_contact(self, K: bsr_array, u: Array, by: Regularisation) -> csr_array | None:
+    def _stiffness_of_contact(self, K: bsr_array, u: Array, regularisation: Regularisation) -> csr_array | None:
         """Return the stiffness that the last contact adds to a tangent at displacements u (n_dofs,) [force / length].
 
         It is the symmetric part of the load stiffness of fluid pressure, and that of springs, slack at u, along closed gaps
         and along the slips of sticking constraints. These displacements hardly change as iterations converge, so that the
         springs affect iterations only to second order (as in the augmented Lagrangian method: Alart and Curnier, 1991).
         """
-        parts = [fluid.tangent(u) for fluid in self._fluid(u)]
-        if by.held and self._settled is not None:
+        matrices = [fluid.tangent(u) for fluid in self._fluid(u)]
+        if regularisation.held and self._settled is not None:
             constraints, solution = self._settled.constraints, self._settled.solution
             dry = np.concatenate([part.contact_forces(np.ones(len(part))) for part in constraints.parts.values()])
             closed = solution.active & (dry > 0.0)
-            stuck = [tangent[np.flatnonzero(closed & solution.sticking)] for tangent in constraints.tangents]
-            rows = csr_array(vstack([constraints.B[np.flatnonzero(closed)], *stuck]))
-            sizes = np.asarray(rows.multiply(rows).sum(axis=1)).ravel()  # zero for tangents of pairs without friction
-            stiffness = by.held * float(K.diagonal().max()) / np.where(sizes > 0.0, sizes, np.inf)
-            parts.append(csr_array(rows.T @ diags_array(stiffness) @ rows))
-        for part in parts:
-            part.resize((len(u), len(u)))
-        return sum(parts[1:], parts[0]) if parts else None
+            sticking_rows = [tangent[np.flatnonzero(closed & solution.sticking)] for tangent in constraints.tangents]
+            rows = csr_array(vstack([constraints.B[np.flatnonzero(closed)], *sticking_rows]))
+            squares = np.asarray(rows.multiply(rows).sum(axis=1)).ravel()  # zero for tangents of pairs without friction
+            stiffness = regularisation.held * float(K.diagonal().max()) / np.where(squares > 0.0, squares, np.inf)
+            matrices.append(csr_array(rows.T @ diags_array(stiffness) @ rows))
+        for matrix in matrices:
+            matrix.resize((len(u), len(u)))
+        return sum(matrices[1:], matrices[0]) if matrices else None
 
     def _fluid(self, at: Array) -> list[FollowingForce]:
         """Return the fluid pressures of the last contact that follow bodies, linearised `at` displacements (n_dofs,)."""
@@ -355,38 +360,38 @@ class _Newton:
         if bodies is None:
             return target, fraction
         changes = [*changes, self._relative(largest_difference(target, u), target)]
-        last = self._stands_still(changes) or (self._kept is not None and self._serves_again(changes))
+        last = self._has_converged(changes) or (self._reusable is not None and self._tangent_suffices(changes))
         for _ in range(HALVINGS):
-            end = target if fraction == 1.0 else u + fraction * (target - u)
+            reached = target if fraction == 1.0 else u + fraction * (target - u)
             try:
-                bodies.at(end, tangent=not last)
+                bodies.at(reached, tangent=not last)
             except ConvergenceError as error:
-                failed = error
+                failure = error
             else:
-                return end, fraction
+                return reached, fraction
             fraction *= 0.5
-        raise failed
+        raise failure
 
-    def _searched(self, u: Array, target: Array, contact_force: Array) -> tuple[Array, float]:
+    def _line_search(self, u: Array, target: Array, contact_force: Array) -> tuple[Array, float]:
         """Return the result of `_reach` after a line search (Crisfield, 1991, section 9.2).
 
         With fixed contact forces (n_dofs,) [force] the potential decreases at the beginning of the step; if its slope at
         the end is positive and larger than the initial one, the step is shortened.
         """
         system, fluid = self._problem.system, self._fluid(u)
-        change, along = target - u, system.unknowns(target - u)
+        change, direction = target - u, system.unknowns(target - u)
 
         def slope(at: Array) -> float:
-            out = self._terms.residual(at, fluid)[0] - contact_force - self._load.force
-            return float(system.reduced(out) @ along)
+            unbalanced = self._terms.residual(at, fluid)[0] - contact_force - self._load.force
+            return float(system.reduced(unbalanced) @ direction)
 
-        first, last, fraction = slope(u), slope(target), 1.0
+        initial_slope, slope_at_end, fraction = slope(u), slope(target), 1.0
         for _ in range(HALVINGS):
-            if not last > abs(first):
+            if not slope_at_end > abs(initial_slope):
                 break
-            fraction *= abs(first) / (abs(first) + last)
+            fraction *= abs(initial_slope) / (abs(initial_slope) + slope_at_end)
             target = u + fraction * change
-            last = slope(target)
+            slope_at_end = slope(target)
         return target, fraction
 
 

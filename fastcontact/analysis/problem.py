@@ -212,9 +212,9 @@ class Problem:
         """
         if self.bodies is None or not self.bodies.finite:
             return u
-        places, sizes = self.model.mesh.points, np.abs(u)
-        sizes[: places.size] += np.abs(places - places.mean(axis=0)).ravel()
-        return sizes
+        points, lengths = self.model.mesh.points, np.abs(u)
+        lengths[: points.size] += np.abs(points - points.mean(axis=0)).ravel()
+        return lengths
 
     def obstacles_at(self, load: StepLoad, u: Array) -> dict[str, Array]:
         """Return the displacement (dim,) of the rigid obstacle of each contact pair [length].
@@ -238,12 +238,12 @@ class Problem:
         u : ndarray (n_dofs,)
             All displacements, which include those of force-driven obstacles [length].
         """
-        still, worn = np.zeros(self.model.mesh.dim), state.worn.get(name)
+        zero, worn = np.zeros(self.model.mesh.dim), state.worn.get(name)
         return Configuration(
             displacement,
             self.displacement(state.u),
-            Pose(self.obstacles_at(load, u).get(name, still), load.angles.get(name, 0.0)),
-            Pose(state.obstacles.get(name, still), state.angles.get(name, 0.0)),
+            Pose(self.obstacles_at(load, u).get(name, zero), load.angles.get(name, 0.0)),
+            Pose(state.obstacles.get(name, zero), state.angles.get(name, 0.0)),
             load.clearance_factors.get(name, 1.0),
             state.never_opening.get(name),
             state.elastic_slip.get(name),
@@ -265,8 +265,8 @@ class Problem:
         [temperature].
         """
         assert self.bodies is not None
-        before = start.history or self.bodies.beginning
-        return self.bodies.at(self.displacement(u), before, rise=rise, geometric=geometric, tangent=tangent)
+        initial_history = start.history or self.bodies.beginning
+        return self.bodies.at(self.displacement(u), initial_history, rise=rise, geometric=geometric, tangent=tangent)
 
     def initial_state(self) -> State:
         """Return the state before the first load step."""
@@ -300,11 +300,13 @@ def prepare(
     held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
     pairs = {pair.name: model.bind(pair, held) for pair in model.contact}
     for name, pair in pairs.items():
-        table = isinstance(pair.options.penalty, OverclosureLaw)
-        if criteria.keep_pairing and (table or pair.options.cohesion is not None or pair.options.source is not None):
+        tabulated = isinstance(pair.options.penalty, OverclosureLaw)
+        if criteria.keep_pairing and (
+            tabulated or pair.options.cohesion is not None or pair.options.source is not None
+        ):
             raise ContactError(
-                f"contact '{name}' has a table of penalties, a cohesive layer, adhesion, or a fluid, which updates of the "
-                "geometry follow: leave keep_pairing out"
+                f"contact '{name}' has a table of penalties, a cohesive layer, adhesion, or a fluid, which require updates "
+                "of the geometry: omit keep_pairing"
             )
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,
@@ -323,9 +325,9 @@ def prepare(
         driven.relations(model.relations),
         driven.without_stiffness,
     )
-    of_driven = mesh.n_points + np.arange(len(driven))
-    of_sides = [side.points for pair in pairs.values() for side in (pair.secondary, pair.primary)]
-    points = np.unique(np.concatenate([of_driven, *of_sides])).astype(np.intp)
+    driven_points = mesh.n_points + np.arange(len(driven))
+    side_points = [side.points for pair in pairs.values() for side in (pair.secondary, pair.primary)]
+    points = np.unique(np.concatenate([driven_points, *side_points])).astype(np.intp)
     contact_dofs = (points[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
     motions = _floating_motions(model, supported)
     bodies = FloatingBodies(motions, system, solver.iterative) if len(motions) else None
@@ -357,8 +359,8 @@ def linearised(
     stiff : bool
         Whether the springs of floating bodies are as stiff as the bodies.
     replaces : bool
-        Whether floating bodies have no springs of their own if `contact` resists all their motions. The iteration of their
-        positions may not converge for a tangent that is nearly singular.
+        Whether the springs of floating bodies are omitted if `contact` resists all their motions. The iteration of positions
+        may not converge for a tangent that is nearly singular.
     """
     K, model, floating = problem.force_driven.stiffness(K), problem.model, problem.floating_bodies
     system = problem.system.renewed(K if contact is None else sum_of_blocks(K, contact))
@@ -367,16 +369,18 @@ def linearised(
     if floating is not None and finite:
         motions = floating.motions
         if model.kinematics != "axisymmetric":
-            turned = _floating_motions(model, model.prescribed_by_ramp()[0], displacement)
-            motions = turned if len(turned) == len(motions) else motions
+            rotated = _floating_motions(model, model.prescribed_by_ramp()[0], displacement)
+            motions = rotated if len(rotated) == len(motions) else motions
         floating = FloatingBodies(motions, system, problem.solver.iterative and not stiff)
     if replaces and floating is not None and contact is not None:
         modes = floating.motions.displacement
         values = np.linalg.eigvalsh(modes.T @ (contact @ modes))
         floating = None if values[0] > SINGLE_PRECISION * values[-1] else floating
     dofs = _prepared_dofs(model, solver, system, floating, problem.contact_dofs, displacement)
-    at = u if finite else None
-    return replace(problem, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=at)
+    linearised_at = u if finite else None
+    return replace(
+        problem, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=linearised_at
+    )
 
 
 def _floating_motions(model: Model, supported: Mask, displacement: Array | float = 0.0) -> FreeMotions:
@@ -427,9 +431,9 @@ def _prepared_dofs(
     if bodies is not None:
         involved, matrix = np.union1d(involved, bodies.dofs), bodies.with_springs(matrix)
     modes = system.unknowns_of(model.force_driven.near_nullspace(near_nullspace(model, displacement)))
-    kept = solver.prepare(matrix, modes, involved, release=True)
+    retained = solver.prepare(matrix, modes, involved, release=True)
     if matrix is system.matrix:
-        system.keep(kept)
+        system.keep(retained)
     springs = np.empty(0, np.intp) if bodies is None else bodies.dofs
     return ActiveDofs(system, contact_dofs, springs, involved if model.contact and solver.condenses else None)
 

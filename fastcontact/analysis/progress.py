@@ -75,12 +75,12 @@ class Progress(StatusLine):
         bar = "#" * round(WIDTH * index / self._total)
         closed = sum(int(contact.active.sum()) for contact in step.contact.values())
         nodes = "1 node" if closed == 1 else f"{closed} nodes"
-        self.draw(f"[{bar:<{WIDTH}}] step {index}/{self._total}, {nodes} in contact{self._left(index)}")
+        self.draw(f"[{bar:<{WIDTH}}] step {index}/{self._total}, {nodes} in contact{self._remaining_time(index)}")
 
-    def _left(self, index: int) -> str:
-        """Return the time left after a step; empty if kernels were compiled in this step."""
+    def _remaining_time(self, index: int) -> str:
+        """Return the text of the remaining time after a step; empty if kernels were compiled in this step."""
         if self._compiled != compiling.count:  # not representative of the following steps
             self._compiled, self._before, self._started = compiling.count, index, time.perf_counter()
             return ""
-        each = (time.perf_counter() - self._started) / max(index - self._before, 1)
-        return f", {each * (self._total - index):.0f} s left"
+        seconds_per_step = (time.perf_counter() - self._started) / max(index - self._before, 1)
+        return f", {seconds_per_step * (self._total - index):.0f} s left"

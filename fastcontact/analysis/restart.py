@@ -1,8 +1,8 @@
 """Restart data, as plain numbers, strings and arrays.
 
-They consist of the state at the end of a step without the displacements, which are in the result of the step, of a
-snapshot of the linear solver, and of the identity of the case. The state includes everything on which the last digits of
-later iterates depend, so that the results of a continued and of an uninterrupted analysis are bitwise identical.
+The data consist of the state at the end of a step, of a snapshot of the linear solver, and of the identity of the case.
+Displacements are not included, since the result of the step contains them. The state includes everything on which the last
+digits of later iterates depend, so that the results of a continued and of an uninterrupted analysis are bitwise identical.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from fastcontact.round_off import ROUND_OFF
 
 FORMAT = 1
 # Criteria on which the solution depends; the others are limits and tolerances.
-ANSWER = ("geometry_updates", "keep_pairing")
+SOLUTION_CRITERIA = ("geometry_updates", "keep_pairing")
 
 
 def identity(model: Model, ramp: Ramp, criteria: Criteria) -> dict[str, Any]:
     """Return the identity of a case: digests of its parts, and its load history."""
-    options = {name: getattr(criteria, name) for name in ANSWER}
+    options = {name: getattr(criteria, name) for name in SOLUTION_CRITERIA}
     return {"parts": fingerprint(model, options), "table": [list(row) for row in ramp.table]}
 
 
@@ -44,34 +44,34 @@ def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
             f"step {step.index} does not contain restart data: use the last step that solve returned, or the last one of a "
             "result file of this version of fastcontact, or start anew"
         )
-    with _whole(step):
-        then, end = state["case"], step.load_factor
-        parts = different(then["parts"], case["parts"])
-        if _history(then["table"], end, case["table"]) != _history(case["table"], end, then["table"]):
+    with _damage_reported(step):
+        saved, end = state["case"], step.load_factor
+        parts = different(saved["parts"], case["parts"])
+        if _history(saved["table"], end, case["table"]) != _history(case["table"], end, saved["table"]):
             parts.append(f"the load history up to {end:g}")
     if parts:
         raise ModelError(
             f"the steps so far belong to another case; changed since: {', '.join(parts)}. Continue with the model they "
-            f"were computed for, or start anew without resuming{_formulations(then['parts'], case['parts'], model)}"
+            f"were computed for, or start anew without resuming{_formulations(saved['parts'], case['parts'], model)}"
         )
 
 
-def _formulations(then: dict[str, str], now: dict[str, str], model: Model) -> str:
-    """Return the end of a message with the formulations to give, if pairs differ in nothing else."""
-    changed = [pair.name for pair in model.contact if then.get(key := f"contact '{pair.name}'") != now[key]]
-    formulations = {name: formulation_behind(model, name, then.get(f"contact '{name}'")) for name in changed}
+def _formulations(saved: dict[str, str], current: dict[str, str], model: Model) -> str:
+    """Return the end of a message that names the formulations of pairs which differ only in the formulation."""
+    changed = [pair.name for pair in model.contact if saved.get(key := f"contact '{pair.name}'") != current[key]]
+    formulations = {name: formulation_behind(model, name, saved.get(f"contact '{name}'")) for name in changed}
     named = [f"contact '{name}' had {text}" for name, text in formulations.items() if text]
     return f" ({'; '.join(named)}: name that)" if named else ""
 
 
 def taken(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any]:
-    """Return the restart data after a step; `case` from `identity`."""
-    kept = state.to_dict(problem.model.n_dofs)
-    extrapolation, memory = kept.pop("extrapolation"), kept.pop("solver")
-    kept = {"format": FORMAT, "case": case, **kept, "solver": {"kind": _kind(problem.solver), "memory": memory}}
+    """Return the restart data after a step; `case` is the value of `identity`."""
+    data = state.to_dict(problem.model.n_dofs)
+    extrapolation, memory = data.pop("extrapolation"), data.pop("solver")
+    data = {"format": FORMAT, "case": case, **data, "solver": {"kind": _kind(problem.solver), "memory": memory}}
     if problem.extrapolates:
-        kept["extrapolation"] = extrapolation
-    return kept
+        data["extrapolation"] = extrapolation
+    return data
 
 
 @on_one_blas_thread
@@ -80,22 +80,22 @@ def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> Sta
 
     `touched` are the contact pairs that were closed at the end of a step so far.
     """
-    kept = step.restart
-    assert kept is not None
-    with _whole(step):
-        if kept["solver"]["kind"] == _kind(problem.solver):
-            problem.solver.put_back(kept["solver"]["memory"])
-        state = State.from_dict(kept, step.displacement, touched)
-        state = replace(state, elastic_slip={**state.elastic_slip, **_of_tractions(problem, kept["pairs"])})
+    data = step.restart
+    assert data is not None
+    with _damage_reported(step):
+        if data["solver"]["kind"] == _kind(problem.solver):
+            problem.solver.put_back(data["solver"]["memory"])
+        state = State.from_dict(data, step.displacement, touched)
+        state = replace(state, elastic_slip={**state.elastic_slip, **_slips_from_tractions(problem, data["pairs"])})
     if not problem.extrapolates:
         state = replace(state, extrapolation=Extrapolation())
     return replace(state, solver=problem.solver.snapshot())
 
 
-def _of_tractions(problem: Problem, pairs: Mapping[str, Any]) -> dict[str, tuple[Array, Array]]:
+def _slips_from_tractions(problem: Problem, pairs: Mapping[str, Any]) -> dict[str, tuple[Array, Array]]:
     """Return the elastic slips [length] of pairs with a penalty from files that contain tangential tractions instead."""
     slips = {}
-    for name in [name for name, kept in pairs.items() if kept.get("traction")]:
+    for name in [name for name, data in pairs.items() if data.get("traction")]:
         (positions, traction), stiffness = pairs[name]["traction"], problem.pairs[name].options.tangential_penalty
         if stiffness is None:
             raise ValueError(f"tractions of contact '{name}', which has no tangential penalty")
@@ -104,7 +104,7 @@ def _of_tractions(problem: Problem, pairs: Mapping[str, Any]) -> dict[str, tuple
 
 
 @contextmanager
-def _whole(step: StepResult) -> Iterator[None]:
+def _damage_reported(step: StepResult) -> Iterator[None]:
     """Convert errors of incomplete or mistyped restart data into one message."""
     try:
         yield
@@ -123,13 +123,13 @@ def remaining(ramp: Ramp, last: StepResult | None) -> list[float]:
     return [t for t in ramp.instants if t > end and abs(t - end) > ROUND_OFF * max(abs(t), abs(end))]
 
 
-def _history(table: Sequence[Sequence[float]], end: float, other: Sequence[Sequence[float]]) -> list[float]:
+def _history(table: Sequence[Sequence[float]], end: float, other_table: Sequence[Sequence[float]]) -> list[float]:
     """Return the multipliers of a load at `end` and at earlier breakpoints of either of two tables."""
     rows = tuple((float(t), float(value)) for t, value in table)
-    instants = sorted({*(t for t, _ in (*rows, *other) if t < end), end})
+    instants = sorted({*(t for t, _ in (*rows, *other_table) if t < end), end})
     return [float(f"{table_value(rows, t):.12g}") for t in instants]
 
 
 def _kind(solver: Any) -> list[Any]:
-    """Return the kind of a solver: solvers of one kind can continue from each other's snapshots."""
+    """Return the kind of a solver. Solvers of the same kind can continue from each other's snapshots."""
     return [getattr(solver, "name", type(solver).__name__), solver.tolerance if solver.asked is None else solver.asked]

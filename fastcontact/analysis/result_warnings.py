@@ -1,8 +1,8 @@
 """Warnings about the accuracy and validity of a finished analysis, which result files store.
 
 In a rotation by a small angle, linear kinematics neglect the strain ``0.5 W.T @ W``, where W is the antisymmetric part of
-the displacement gradient. The work of the stresses on it, relative to that on the linear strain, shows whether it matters:
-it vanishes for a beam in bending, whose stresses cancel over the thickness, but not for a belt in tension.
+the displacement gradient. The work of the stresses on this strain, relative to that on the linear strain, shows whether it
+matters. It vanishes for a beam in bending, whose stresses cancel over the thickness, but not for a belt in tension.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from fastcontact.model.rigid_motions import body_name
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
-# Part of the frictional work that is wrong, work of the stresses on neglected strains over that on strains, and equivalent
-# strain, above which a warning is given: the fraction of a strain that linear kinematics neglect is about as large as the
-# strain. So does wear of this part of the size of the model.
+# Limit of several ratios above which a warning is given: frictional work of nodes while they close to all frictional work,
+# work of the stresses on neglected strains to that on strains, wear depth to the size of the model, and equivalent strain.
+# The fraction of a strain that linear kinematics neglect is about as large as the strain.
 NEGLECTED = 0.1
 # Rotation [radian] beyond which linear kinematics give a warning: they neglect a strain of half its square.
 ROTATION = 0.3
-# Largest factor on the number of steps that is recommended; a larger one indicates a wrong coefficient.
+# Largest recommended factor on the number of steps. A larger factor indicates a wrong coefficient of wear.
 MANY_STEPS = 1000
 # Number of elements across the radius of a contact that resolve its pressure.
 ACROSS = 4
@@ -68,21 +68,25 @@ def result_warnings(
         warnings += nonlinear_scatter_warnings(problem, state, last)
     warnings += [problem.solver.gave_up] if problem.solver.gave_up else []
     load = problem.load_at(last.load_factor)
-    loaded, sagging = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)
+    loaded, sag = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)
     clearances = _clearances(problem, state)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
         if pair.options.gap_only:
             continue
-        lost = [] if name in clearances else _lost(pair, contact, name in state.touched, loaded)
-        at = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
-        warnings += [*_deep(pair, contact, state.u), *lost, *_held(pair, contact, pair.undetermined(at))]
-        warnings += [sagging[name]] if name in sagging else _unresolved(name, pair, contact, state)
+        without_force = [] if name in clearances else _without_force(pair, contact, name in state.touched, loaded)
+        configuration = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
+        warnings += [
+            *_deep_penetration(pair, contact, state.u),
+            *without_force,
+            *_undetermined_tractions(pair, contact, pair.undetermined(configuration)),
+        ]
+        warnings += [sag[name]] if name in sag else _unresolved(name, pair, contact, state)
         warnings += [*wavering(pair, contact), *_too_fast(name, pair, state)]
     return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state), *_slipping_before(state)]
 
 
-def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> Iterator[str]:
+def _deep_penetration(pair: Formulation, contact: ContactResult, displacement: Array) -> Iterator[str]:
     """Yield a warning where the penetration of a penalty is a notable fraction of the largest displacement."""
     size = float(np.abs(displacement).max(initial=0.0))
     penalty, depth = pair.options.penalty, contact.penetration
@@ -93,38 +97,38 @@ def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> Ite
         )
 
 
-def _held(pair: Formulation, contact: ContactResult, undetermined: Mask) -> Iterator[str]:
-    """Yield a warning about closed facets between which and the other side nothing determines a traction.
+def _undetermined_tractions(pair: Formulation, contact: ContactResult, undetermined: Mask) -> Iterator[str]:
+    """Yield a warning about closed facets whose tractions are undetermined, because supports hold both sides.
 
-    `undetermined` (n_nodes,) are their nodes.
+    `undetermined` (n_nodes,) are the nodes of such facets.
     """
-    near = contact.gap <= LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
-    nodes = undetermined & (contact.active | near | pair.options.always_closed)
-    held = sum(int(nodes[block.local].all(axis=1).sum()) for block in pair.secondary.blocks)
-    if held:
+    nearly_closed = contact.gap <= LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
+    nodes = undetermined & (contact.active | nearly_closed | pair.options.always_closed)
+    count = sum(int(nodes[block.local].all(axis=1).sum()) for block in pair.secondary.blocks)
+    if count:
         where = np.array2string(pair.points[pair.secondary.points[nodes]].mean(axis=0), precision=4)
         yield (
-            f"contact '{contact.name}': supports hold {held} of the {pair.secondary.n_facets} facets of "
-            f"'{pair.secondary.group}' and what they face, about {where}: nothing determines what goes from one to the other "
-            "in the held directions, and 0 is reported; the reactions contain it. Free the nodes of one side there"
+            f"contact '{contact.name}': supports hold {count} of the {pair.secondary.n_facets} facets of "
+            f"'{pair.secondary.group}' and the opposite facets, near {where}: tractions in the held directions are "
+            "undetermined there and reported as 0, and the reactions include their forces. Free the nodes of one side there"
         )
 
 
 def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
     """Yield a warning where a contact wears faster than its load steps can follow."""
-    if name not in state.worn or (many := too_fast(pair, state.worn[name])) <= 1.0:
+    if name not in state.worn or (factor := too_fast(pair, state.worn[name])) <= 1.0:
         return
     depth, size = float(state.worn[name].depth.max()), float(np.ptp(pair.points, axis=0).max())
-    if many > MANY_STEPS or depth > NEGLECTED * size:
+    if factor > MANY_STEPS or depth > NEGLECTED * size:
         yield (
             f"contact '{name}' wears off {depth:.3g}, {depth / size:.2g} times the size of the model, in steps "
-            f"{many:.2g} times as long as pressures can follow: is its wear Archard's coefficient divided by the hardness, "
+            f"{factor:.2g} times as long as pressures can follow: is its wear Archard's coefficient divided by the hardness, "
             "in the unit of one over pressure?"
         )
     else:
         yield (
             f"contact '{name}' wears so much in a load step that pressures may oscillate from node to node and depths are "
-            f"too large: use {math.ceil(many)} times as many steps, or larger elements"
+            f"too large: use {math.ceil(factor)} times as many steps, or larger elements"
         )
 
 
@@ -143,7 +147,7 @@ def _unbalanced(state: State) -> Iterator[str]:
 def _slipping_before(state: State) -> Iterator[str]:
     """Yield a warning where nodes that close and slide in one step do much of the frictional work.
 
-    This part must also exceed the energy of a notable error of the displacement: NOTABLE squared over the strain energy.
+    This part must also exceed the energy of a notable error of the displacement, NOTABLE squared times the strain energy.
     Under a sphere that sticks, with a coefficient of 0.6, the frictional work is 2e-4 of the strain energy in long steps,
     and 1e-5 if slip counts from first contact.
     """
@@ -178,7 +182,7 @@ def _loose(problem: Problem, last: StepResult) -> Iterator[str]:
             f"the contact geometry counts as converged although the displacement still changed by {change:.1e} of its "
             f"largest component (Criteria.geometry = {criteria.geometry:g}): results are no more accurate than that"
         )
-    flipped = next((before for before, after in pairwise(history) if "rounded" in after), None)
+    flipped = next((previous for previous, following in pairwise(history) if "rounded" in following), None)
     if flipped is not None:
         yield (
             "nodes alternated between two facets of the primary side, which changed the displacement by "
@@ -213,10 +217,10 @@ def _undetermined(last: StepResult, free: tuple[int, dict[str, list[str]]] | Non
     """Yield a warning about bodies whose position nothing determines, for the first such step `free`."""
     if free is not None:
         index, bodies = free
-        named = "; ".join(f"{body}: {', '.join(motions)}" for body, motions in bodies.items())
+        names = "; ".join(f"{body}: {', '.join(motions)}" for body, motions in bodies.items())
         when = "" if index == last.index else f" in load step {index}"
         yield (
-            f"nothing determines the position of bodies{when}, since no contact force acts against their motion ({named}): "
+            f"nothing determines the position of bodies{when}, since no contact force acts against their motion ({names}): "
             "any position without such a force is a solution; hold them by supports or weak springs, or load them"
         )
 
@@ -226,17 +230,17 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     isotropic = np.array([isinstance(law, LinearElastic) and not law.graded for law in laws])
     # Strains of other materials are computed below.
     shear = np.array(
-        [getattr(law, "shear_modulus", math.inf) if own else math.inf for law, own in zip(laws, isotropic)]
+        [getattr(law, "shear_modulus", math.inf) if constant else math.inf for law, constant in zip(laws, isotropic)]
     )
-    strain, border = 0.0, last.material_stress
-    inside = np.ones(len(last.stress), bool)
-    if border is not None:
-        inside[border.points] = False
-        strain = float((recovery.von_mises(border.stress) / (3 * shear[border.material])).max())
+    strain, interface = 0.0, last.material_stress
+    interior = np.ones(len(last.stress), bool)
+    if interface is not None:
+        interior[interface.points] = False
+        strain = float((recovery.von_mises(interface.stress) / (3 * shear[interface.material])).max())
     for name, block in problem.model.mesh.solids.items():
         for number in np.unique(field.number[name]):
             nodes = np.unique(block[field.number[name] == number])
-            stress = last.von_mises[nodes[inside[nodes]]]
+            stress = last.von_mises[nodes[interior[nodes]]]
             strain = max(strain, float(stress.max(initial=0.0) / (3 * shear[number])))
         others = np.flatnonzero(~isotropic[field.number[name]])
         mean = last.stress[block[others]].mean(axis=1)
@@ -250,9 +254,9 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     else:
         yield from _large_stress_free_strain(problem, last)
     plastic = last.cell_fields.get("plastic_strain")
-    if plastic is not None and (most := float(plastic.max())) > LARGEST_PLASTIC_STRAIN:
+    if plastic is not None and (largest := float(plastic.max())) > LARGEST_PLASTIC_STRAIN:
         yield (
-            f"the largest plastic strain is {most:.2f}, beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics "
+            f"the largest plastic strain is {largest:.2f}, beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics "
             "are valid: contact pressures there are too low"
         )
 
@@ -279,7 +283,7 @@ def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterato
             f"the largest rotation is {angle:.3f} radian, near {np.array2string(where, precision=4)}: linear kinematics "
             f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
         )
-    elif angle > 2.0 * NOTABLE:  # the part of the displacement by a rotation that they neglect is half the angle
+    elif angle > 2.0 * NOTABLE:  # linear kinematics neglect half the angle of the displacement by a rotation
         yield from neglected_rotation(problem, last, angle)
 
 
@@ -305,27 +309,27 @@ def _clearances(problem: Problem, state: State) -> set[str]:
     gap_by_pair = {pair.name: pair.found_gap for pair in problem.model.contact if pair.found_gap is not None}
     if not state.touched & gap_by_pair.keys():
         return set()
-    open_from = LENGTH_ROUND_OFF * float(np.ptp(problem.model.mesh.points, axis=0).max())
-    return {name for name, gap in gap_by_pair.items() if gap > open_from and name not in state.touched}
+    least_gap = LENGTH_ROUND_OFF * float(np.ptp(problem.model.mesh.points, axis=0).max())
+    return {name for name, gap in gap_by_pair.items() if gap > least_gap and name not in state.touched}
 
 
-def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool) -> Iterator[str]:
+def _without_force(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool) -> Iterator[str]:
     """Yield a warning if a pair never closed, or is open although loads still act."""
-    name, reach, facing = contact.name, pair.options.search_distance, contact.gap[np.isfinite(contact.gap)]
-    least = float(facing.min(initial=np.inf))
-    gap = f"the smallest gap is {least:.4g}" if len(facing) else "no node faces the other side"
+    name, search_distance, facing = contact.name, pair.options.search_distance, contact.gap[np.isfinite(contact.gap)]
+    smallest = float(facing.min(initial=np.inf))
+    gap = f"the smallest gap is {smallest:.4g}" if len(facing) else "no node faces the other side"
     if (
         contact.active.any() or contact.damage is not None or contact.fluid_pressure is not None
     ):  # visible in these results
         return
-    if reach is not None and least < -reach:
+    if search_distance is not None and smallest < -search_distance:
         yield (
-            f"contact '{name}' carries nothing where its sides penetrate by {-least:.4g}, more than its "
-            f"search_distance {reach:.4g}: raise that, or use more load steps"
+            f"contact '{name}' carries nothing where its sides penetrate by {-smallest:.4g}, more than its "
+            f"search_distance {search_distance:.4g}: raise that, or use more load steps"
         )
-    elif least < -LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max()) and not touched:
+    elif smallest < -LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max()) and not touched:
         yield (
-            f"contact '{name}' carries nothing although its sides penetrate by {-least:.4g}: supports or relations "
+            f"contact '{name}' carries nothing although its sides penetrate by {-smallest:.4g}: supports or relations "
             "hold its nodes there; leave these nodes free, or out of the contact as 'excluded'"
         )
     elif not touched:
@@ -383,12 +387,12 @@ def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     0.002; under punches of hex8 and tet4, whose pressures are singular at the edges, 0.10 to 0.12, and under a wearing hex8
     sole 0.22.
 
-    Sides that never separate, or adhere, carry tension, too: their mean may be zero or round-off, and is not meaningful.
+    Sides that never separate or that adhere carry tension as well. Their mean may be zero or round-off and is not used.
     """
     if pair.options.always_closed or pair.options.cohesion is not None:
         return
     neighbours = pair.secondary.beside
-    # A node is among its own neighbours here: the number of others is one less.
+    # Here a node is one of its own neighbours, so that the number of others is smaller by one.
     others = np.asarray(neighbours.sum(axis=1)).ravel() - 1.0
     inside = contact.active & (neighbours @ ~contact.active == 0) & (others > 0)
     if inside.sum() < MANY:
@@ -400,15 +404,16 @@ def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
         return
     cells = f"quadrangles or hexahedra along '{pair.secondary.group}', or triangles or tetrahedra there about as deep as wide"
     yield (
-        f"contact '{contact.name}': nodal pressures waver from node to node, by {0.5 * size:.3g} up and down about a mean of "
-        f"{mean:.3g}: trust means over neighbouring nodes, or use {cells if pair.name == 'mortar' else 'formulation mortar'}"
+        f"contact '{contact.name}': nodal pressures waver from node to node, by {0.5 * size:.3g} above and below "
+        f"a mean of {mean:.3g}: trust means over neighbouring nodes, or use "
+        f"{cells if pair.name == 'mortar' else 'formulation mortar'}"
     )
 
 
 def neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Iterator[str]:
     """Yield a warning for the body in which linear kinematics neglect most; `angle` is the largest rotation [radian]."""
     mesh = problem.model.mesh
-    neglected, strained = _works(problem, last)
+    neglected, strained = _works_on_strains(problem, last)
     # Bodies whose work on strains is round-off of that of other bodies are free of stress.
     ratio = np.abs(neglected) / np.maximum(strained, max(SINGLE_PRECISION * strained.max(initial=0.0), TINY))
     worst = int(np.argmax(ratio))
@@ -420,7 +425,7 @@ def neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Iter
         )
 
 
-def _works(problem: Problem, last: StepResult) -> tuple[Array, Array]:
+def _works_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
     """Return the work of the stresses on neglected strains, and its absolute value on strains, both (n_bodies,) [energy]."""
     mesh, dim, axisymmetric = problem.model.mesh, problem.model.mesh.dim, problem.model.kinematics == "axisymmetric"
     count, body = bodies(mesh)
@@ -428,8 +433,8 @@ def _works(problem: Problem, last: StepResult) -> tuple[Array, Array]:
     pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]
     for name, block in mesh.solids.items():
         element = elements.get(name)
-        places, weights = element.quadrature
-        N, dN = element.shape(places), element.gradient(places)
+        xi, weights = element.quadrature
+        N, dN = element.shape(xi), element.gradient(xi)
         for cells in np.array_split(block, len(block) * dN.nbytes // BATCH + 1):
             gradient, volume = gradients_at(mesh.points[cells], dN)
             stress, volume = N @ last.stress[cells], np.abs(volume) * weights
@@ -438,12 +443,14 @@ def _works(problem: Problem, last: StepResult) -> tuple[Array, Array]:
             for column, (i, j) in enumerate(pairs[: stress.shape[2]]):
                 if max(i, j) < dim:
                     tensor[..., i, j] = tensor[..., j, i] = stress[..., column]
-            on_strain = (tensor * slope).sum(axis=(2, 3))
+            strain_work = (tensor * slope).sum(axis=(2, 3))
             if axisymmetric:
-                radius, outward = (values[cells][..., 0] @ N.T for values in (mesh.points, last.displacement))
-                volume, on_strain = volume * radius, on_strain + stress[..., 2] * outward / radius
-            turn = 0.5 * (slope - slope.transpose(0, 1, 3, 2))
-            on_rest = 0.5 * (tensor * (turn.transpose(0, 1, 3, 2) @ turn)).sum(axis=(2, 3))
-            np.add.at(neglected, body[cells[:, 0]], (on_rest * volume).sum(axis=1))
-            np.add.at(strained, body[cells[:, 0]], (np.abs(on_strain) * volume).sum(axis=1))
+                radius, radial_displacement = (
+                    values[cells][..., 0] @ N.T for values in (mesh.points, last.displacement)
+                )
+                volume, strain_work = volume * radius, strain_work + stress[..., 2] * radial_displacement / radius
+            rotation = 0.5 * (slope - slope.transpose(0, 1, 3, 2))
+            neglected_work = 0.5 * (tensor * (rotation.transpose(0, 1, 3, 2) @ rotation)).sum(axis=(2, 3))
+            np.add.at(neglected, body[cells[:, 0]], (neglected_work * volume).sum(axis=1))
+            np.add.at(strained, body[cells[:, 0]], (np.abs(strain_work) * volume).sum(axis=1))
     return neglected, strained

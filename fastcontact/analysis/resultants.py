@@ -162,10 +162,10 @@ def contact_resultants(model: Model, steps: Iterable[StepResult], name: str) -> 
     >>> round(last.normal_force, 9), round(last.area, 9), round(last.pressure_mean, 9)
     (20.0, 10.0, 2.0)
     """
-    pair = _bound(model, name)
+    pair = _formulation(model, name)
     areas, work, resultants = lumped_areas(pair.secondary, pair.points, pair.axisymmetric), 0.0, []
     for step in steps:
-        contact = _of_pair(pair, step, name)
+        contact = _result_of_pair(pair, step, name)
         if model.strain == "finite":
             areas = lumped_areas(pair.secondary, pair.points + step.displacement, pair.axisymmetric)
         work += contact.dissipation
@@ -182,11 +182,13 @@ contact_answers = contact_resultants
 def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: float) -> ContactResultants:
     closed, facing = contact.active, np.isfinite(contact.gap)
     normal = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
-    pushed = np.einsum("nd,nd->n", contact.force_vectors, normal)
-    total, area = float(pushed.sum()), float(areas[closed].sum())
-    pressed = bool(total > 0.0)
+    normal_forces = np.einsum("nd,nd->n", contact.force_vectors, normal)
+    total, area = float(normal_forces.sum()), float(areas[closed].sum())
+    in_compression = bool(total > 0.0)
     moment = contact_moment(contact)
-    centre = pushed @ contact.coordinates / total if pressed else np.full(contact.coordinates.shape[1], np.nan)
+    centre = (
+        normal_forces @ contact.coordinates / total if in_compression else np.full(contact.coordinates.shape[1], np.nan)
+    )
     if axisymmetric:
         centre[0] = np.nan
     return ContactResultants(
@@ -235,16 +237,16 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
     >>> fc.contact_history(model, steps, "joint")["normal_force"].round(9)
     array([10., 20.])
     """
-    answers = contact_resultants(model, steps, name)
+    resultants = contact_resultants(model, steps, name)
     axes = "xyz"[: model.mesh.dim]
-    turns = "z" if model.mesh.dim == 2 else axes
+    moment_axes = "z" if model.mesh.dim == 2 else axes
     rows = [
         (step.index, step.load_factor, *r.force, *r.moment, r.area, *r.centre, r.normal_force, r.mean_gap,
          r.pressure_mean, r.pressure_max, r.dissipation, r.friction_work)
-        for step, r in zip(steps, answers, strict=True)
+        for step, r in zip(steps, resultants, strict=True)
     ]  # fmt: skip
     names = [
-        "load_factor", *(f"force_{axis}" for axis in axes), *(f"moment_{axis}" for axis in turns), "area",
+        "load_factor", *(f"force_{axis}" for axis in axes), *(f"moment_{axis}" for axis in moment_axes), "area",
         *(f"centre_{axis}" for axis in axes), "normal_force", "mean_gap", "pressure_mean", "pressure_max",
         "dissipation", "friction_work",
     ]  # fmt: skip
@@ -302,11 +304,11 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
     """
     if not (np.isfinite(coefficient) and coefficient >= 0.0):
         raise ContactError(f"the coefficient of wear {coefficient} must be a number, zero or more")
-    pair = _bound(model, name)
+    pair = _formulation(model, name)
     depth, depths = np.zeros(len(pair.secondary.points)), []
     before: StepResult | None = None
     for number, step in enumerate(steps, 1):
-        _of_pair(pair, step, name)
+        _result_of_pair(pair, step, name)
         if step.index != number:
             raise ContactError(
                 f"wear accumulates over all load steps: step {number} was expected, but got step {step.index}; pass all "
@@ -327,14 +329,14 @@ def end_of(before: StepResult | None, step: StepResult, name: str) -> Configurat
 
 
 def _pose(step: StepResult, name: str) -> Pose:
-    """Return the position of the obstacle of a pair, zero without one."""
-    contact, still = step.contact[name], np.zeros(step.displacement.shape[1])
-    moved = still if contact.obstacle_displacement is None else np.asarray(contact.obstacle_displacement)
-    return Pose(moved, contact.obstacle_angle or 0.0)
+    """Return the pose of the obstacle of a pair; zero if the pair has no obstacle."""
+    contact, zero = step.contact[name], np.zeros(step.displacement.shape[1])
+    displacement = zero if contact.obstacle_displacement is None else np.asarray(contact.obstacle_displacement)
+    return Pose(displacement, contact.obstacle_angle or 0.0)
 
 
-def _of_pair(pair: Formulation, step: StepResult, name: str) -> ContactResult:
-    """Return the result of a contact pair in a step; ContactError if that is of another model."""
+def _result_of_pair(pair: Formulation, step: StepResult, name: str) -> ContactResult:
+    """Return the result of a contact pair in a step; ContactError if the step belongs to another model."""
     contact = step.contact.get(name)
     if (
         contact is None
@@ -347,7 +349,7 @@ def _of_pair(pair: Formulation, step: StepResult, name: str) -> ContactResult:
     return contact
 
 
-def _bound(model: Model, name: str) -> Formulation:
+def _formulation(model: Model, name: str) -> Formulation:
     """Return the formulation of a contact pair; ContactError if the model has none of that name."""
     for pair in model.contact:
         if pair.name == name:
@@ -392,36 +394,36 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     array([0., 2.])
     """
     _check(model, step)
-    n, (held, _) = model.n_dofs, model.prescribed()
+    n, (supported, _) = model.n_dofs, model.prescribed()
     related = [relation for _, relation in model.related_supports]
     coupling = [relation for relation in model.relations if not any(relation is other for other in related)]
     reaction = step.reaction.ravel() - ground_force(model.springs, step.displacement.ravel())
     rows = [relation.rows for relation in (*related, *coupling)]
     rows += [section.row(n) for section in model.pretensions]  # a locked section transmits a force like a constraint
-    forces = multipliers(reaction, rows, held.ravel())
+    forces = multipliers(reaction, rows, supported.ravel())
     reaction = reaction - sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(n))
     by_support: dict[str, Array] = {}
-    left = np.where(held, reaction.reshape(held.shape), 0.0)
+    unassigned = np.where(supported, reaction.reshape(supported.shape), 0.0)
     for support in model.supports:
         nodes, k = model.mesh.points_of(support.group), support.component
-        by_support.setdefault(support.group, np.zeros(held.shape[1]))[k] += left[nodes, k].sum()
-        left[nodes, k] = 0.0
+        by_support.setdefault(support.group, np.zeros(supported.shape[1]))[k] += unassigned[nodes, k].sum()
+        unassigned[nodes, k] = 0.0
     for (group, relation), force in zip(model.related_supports, forces, strict=False):
-        resultant = (relation.rows.T @ force).reshape(held.shape).sum(axis=0)
+        resultant = (relation.rows.T @ force).reshape(supported.shape).sum(axis=0)
         by_support[group] = by_support.get(group, 0.0) + resultant
     return by_support
 
 
-def multipliers(reaction: Array, rows: Sequence[csr_array], held: Mask) -> list[Array]:
+def multipliers(reaction: Array, rows: Sequence[csr_array], supported: Mask) -> list[Array]:
     """Return the Lagrange multipliers (m,) of multi-point constraints with rows (m, n_dofs) [force].
 
     They follow from the balance of forces at components without supports. `reaction` (n_dofs,) contains the forces of
-    supports and constraints [force], and `held` (n_dofs,) marks the components with supports.
+    supports and constraints [force], and `supported` (n_dofs,) marks the components with supports.
     """
     if not rows:
         return []
-    free = csr_array(csr_array(vstack(rows, format="csr"))[:, np.flatnonzero(~held)])
-    multiplier = lsqr(free.T, reaction[~held], atol=1e-14, btol=1e-14, iter_lim=20 * sum(free.shape))[0]
+    free = csr_array(csr_array(vstack(rows, format="csr"))[:, np.flatnonzero(~supported)])
+    multiplier = lsqr(free.T, reaction[~supported], atol=1e-14, btol=1e-14, iter_lim=20 * sum(free.shape))[0]
     return np.split(multiplier, np.cumsum([block.shape[0] for block in rows])[:-1])
 
 

@@ -14,7 +14,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.problem import Problem, prepare
 from fastcontact.analysis.progress import Progress
 from fastcontact.analysis.result_warnings import result_warnings
-from fastcontact.analysis.stages import go_on, stage_of
+from fastcontact.analysis.stages import next_stage, stage_of
 from fastcontact.errors import ModelError, warn
 from fastcontact.linear.choice import DIRECT_UP_TO, check_tolerance
 from fastcontact.linear.protocol import TOLERANCE
@@ -95,7 +95,7 @@ def solve(
     """
     steps, ramp = Steps(resume), ramp_of(ramp)
     total = len(steps) + len(restart.remaining(ramp, steps[-1] if steps else None))
-    with Progress(total, show=progress, done=len(steps)) as shown:
+    with Progress(total, show=progress, done=len(steps)) as status:
         new = solve_steps(
             model, ramp, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
             linear_precision=linear_precision, criteria=criteria, resume=steps,
@@ -103,7 +103,7 @@ def solve(
         for step in new:
             if on_step is not None:
                 on_step(step)
-            shown.step(step)
+            status.step(step)
             if steps and steps[-1].restart is not None:
                 steps[-1] = replace(steps[-1], restart=None)
             steps.append(step)
@@ -146,17 +146,17 @@ def solve_steps(
     instants = restart.remaining(ramp, last)
     if not instants:
         return iter(())
-    ahead.expect(_kinds(model, linear_solver))
+    ahead.expect(_kernel_sets(model, linear_solver))
     model.check(ramp)
-    prepared = partial(
+    prepare_model = partial(
         prepare, ramp=ramp, criteria=criteria, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
         linear_precision=linear_precision,
     )  # fmt: skip
     touched = _touched(resume)
-    return _marched(model, ramp, prepared, instants, case, last, touched)
+    return _solved_steps(model, ramp, prepare_model, instants, case, last, touched)
 
 
-def _kinds(model: Model, linear_solver: str) -> list[str]:
+def _kernel_sets(model: Model, linear_solver: str) -> list[str]:
     """Return the keys of the table in `_jit.ahead` that lists the kernels to compile in advance for a model."""
     dim = model.mesh.dim
     multigrid = linear_solver == "amg" or (linear_solver == "auto" and model.mesh.n_points * dim > DIRECT_UP_TO[dim])
@@ -174,25 +174,25 @@ def _touched(steps: Sequence[StepResult]) -> frozenset[str]:
     return frozenset(touched)
 
 
-def _marched(
-    model: Model, ramp: Ramp, prepared: Callable[[Model], Problem], instants: list[float], case: dict[str, Any],
+def _solved_steps(
+    model: Model, ramp: Ramp, prepare_model: Callable[[Model], Problem], instants: list[float], case: dict[str, Any],
     last: StepResult | None, touched: frozenset[str],
 ) -> Iterator[StepResult]:  # fmt: skip
     """Yield the steps at `instants`, which follow the step `last`; `touched` are the pairs that were closed before."""
     doubtful = model_warnings(model, ramp)
     for text in doubtful if last is None else ():
         warn(text)
-    problem = prepared(stage_of(model, last, ramp.table[0][0]))
+    problem = prepare_model(stage_of(model, last, ramp.table[0][0]))
     for text in problem.doubtful if last is None else ():  # before the first step: the warning may explain its failure
         warn(text)
     doubtful += problem.doubtful
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
-    begin, before = problem.ramp.table[0][0], 0
+    begin, last_index = problem.ramp.table[0][0], 0
     free: tuple[int, dict[str, list[str]]] | None = None  # first step in which nothing determines positions
     if last is not None:
-        begin, before, last = last.load_factor, last.index, None  # frees the memory of the step
-    for index, instant in enumerate(instants, start=before + 1):
-        problem, state = go_on(prepared, model, problem, state, begin)
+        begin, last_index, last = last.load_factor, last.index, None  # to free the memory of the step
+    for index, instant in enumerate(instants, start=last_index + 1):
+        problem, state = next_stage(prepare_model, model, problem, state, begin)
         state, step = step_halving.advance(problem, state, index, begin, instant)
         free = free or (index, step.iterations.get("regularised", {}).get("undetermined", {}))
         free = free if free[1] else None
@@ -201,5 +201,5 @@ def _marched(
             warn(text)
         warned = (*doubtful * (index == 1), *warnings)
         yield replace(step, warnings=warned, restart=restart.taken(problem, state, case))
-        del step  # frees its memory before the next step is computed
+        del step  # to free its memory before the next step is computed
         begin = instant

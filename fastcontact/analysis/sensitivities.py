@@ -172,23 +172,23 @@ def _derivatives(contact: MovingContact, gradient: Gradient, changes: Sequence[C
     values = np.array([adjoint.derivative(change) for change in changes])
     kinks = contact.kinks(forward, backward)
     if kinks.nnz:
-        other = Adjoint(contact, gradient, csr_array(0.5 * (forward + backward) + kinks))
-        off = np.abs([other.derivative(change) for change in changes] - values)
+        with_kinks = Adjoint(contact, gradient, csr_array(0.5 * (forward + backward) + kinks))
+        jumps = np.abs([with_kinks.derivative(change) for change in changes] - values)
         # One-sided derivatives differ where points project onto edges between facets.
-        if (off > SINGLE_PRECISION * np.abs(values)).any():
-            raise ModelError(_between(contact, kinks, float((off / np.maximum(np.abs(values), TINY)).max())))
+        if (jumps > SINGLE_PRECISION * np.abs(values)).any():
+            raise ModelError(_kink_message(contact, kinks, float((jumps / np.maximum(np.abs(values), TINY)).max())))
     return values, adjoint.solutions
 
 
-def _between(contact: MovingContact, kinks: csr_array, off: float) -> str:
+def _kink_message(contact: MovingContact, kinks: csr_array, jump: float) -> str:
     mesh = contact.problem.model.mesh
     dofs = np.unique(kinks.indices)
     points = np.unique(dofs[dofs < contact.problem.model.n_dofs] // mesh.dim)
     named = ", ".join(f"{p} {np.array2string(mesh.points[p], precision=4)}" for p in points[:3])
-    more = f" and {len(points) - 3} more" if len(points) > 3 else ""
+    rest = f" and {len(points) - 3} more" if len(points) > 3 else ""
     return (
-        f"points {named}{more} lie opposite nodes of the other side, between two of its facets: the one-sided derivatives "
-        f"differ by a fraction of {off:.1e}. {REMEDY}; or keep the pairing (Criteria(keep_pairing=True)), mesh both sides "
+        f"points {named}{rest} lie opposite nodes of the other side, between two of its facets: the one-sided derivatives "
+        f"differ by a fraction of {jump:.1e}. {REMEDY}; or keep the pairing (Criteria(keep_pairing=True)), mesh both sides "
         "differently, or use the default formulation"
     )
 
@@ -211,11 +211,11 @@ def settled_step(
     touched = frozenset(name for name, contact in step.contact.items() if contact.active.any())
     state, load = restart.put_back(problem, step, touched), problem.load_at(step.load_factor)
     state = replace(state, obstacles=problem.obstacles_at(load, state.u))
-    balanced = newton(prepare_start(problem, state, step.index, load), load)
-    settled, u = balanced.settled, balanced.u
+    equilibrium = newton(prepare_start(problem, state, step.index, load), load)
+    settled, u = equilibrium.settled, equilibrium.u
     if settled is None:
-        none, inactive = np.empty(0), np.empty(0, bool)
-        solution = Solution.frictionless(u, none, none, inactive, inactive)
+        no_values, inactive = np.empty(0), np.empty(0, bool)
+        solution = Solution.frictionless(u, no_values, no_values, inactive, inactive)
         return problem, MovingContact(problem, state, load, step.load_factor, u, solution)
     return problem, MovingContact(problem, state, load, step.load_factor, u, settled.solution)
 
@@ -263,26 +263,30 @@ def checked_margin(contact: MovingContact, least: float) -> float:
     constraints, solution = contact.constraints, contact.solution
     size = float(np.abs(contact.u).max(initial=0.0))
     gap = constraints.gap0 + constraints.B @ contact.u
-    near = np.full(len(constraints), np.inf)
+    distance = np.full(len(constraints), np.inf)
     for name, rows in constraints.rows.items():
         active, usable = solution.active[rows], constraints.usable[rows]
         # Forces are divided by areas, since the force of a constraint with a small area is small.
         areas = constraints.parts[name].areas
         force = solution.multiplier[rows] / (1.0 if areas is None else areas)
         largest = float(np.abs(force).max(initial=0.0)) or 1.0
-        near[rows] = np.where(active, force / largest, np.where(usable, gap[rows] / size, np.inf))
-    near[constraints.equality] = np.inf
-    wrong = np.flatnonzero(~(near >= least))
-    if len(wrong):
-        nodes = nearest_nodes(contact.problem, constraints, wrong)
-        shown = float(np.abs(near[wrong]).max())
-        kind = (
-            "open" if solution.active[wrong].all() else "close" if not solution.active[wrong].any() else "open or close"
+        distance[rows] = np.where(active, force / largest, np.where(usable, gap[rows] / size, np.inf))
+    distance[constraints.equality] = np.inf
+    critical = np.flatnonzero(~(distance >= least))
+    if len(critical):
+        nodes = nearest_nodes(contact.problem, constraints, critical)
+        largest_distance = float(np.abs(distance[critical]).max())
+        change = (
+            "open"
+            if solution.active[critical].all()
+            else "close"
+            if not solution.active[critical].any()
+            else "open or close"
         )
-        many = "1 constraint is" if len(wrong) == 1 else f"{len(wrong)} constraints are"
+        count_text = "1 constraint is" if len(critical) == 1 else f"{len(critical)} constraints are"
         raise ModelError(
-            f"{many} about to {kind}, at {named_nodes(contact.problem, nodes)}: forces or gaps are "
-            f"{shown:.1e} of the largest, less than margin = {least:g}. The one-sided derivatives differ there. "
+            f"{count_text} about to {change}, at {named_nodes(contact.problem, nodes)}: forces or gaps are "
+            f"{largest_distance:.1e} of the largest, less than margin = {least:g}. The one-sided derivatives differ there. "
             f"{REMEDY}"
         )
-    return min(1.0, float(near.min(initial=1.0)))
+    return min(1.0, float(distance.min(initial=1.0)))

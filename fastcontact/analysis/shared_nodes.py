@@ -1,13 +1,13 @@
-"""Nodes shared by contact pairs, or by both ends of a period or sector: one constraint, whose force is distributed.
+"""Nodes that contact pairs, or both ends of a period or sector, share: one constraint, whose force is distributed.
 
 A node of several pairs behaves like a node of one pair over all their facets. Its constraints are linearly dependent. They
-determine only the sum of their forces and cannot all be eliminated, so that one constraint replaces them, their mean. It has
-the sum of their areas, so that penalties add up, and their mean coefficient of friction. Each pair carries the fraction of
-the force given by its fraction of the area, so that the pressures are equal. Of several clearances at one node only the
-smallest can close. Constraints with a coupled normal compliance or with different clearances are independent.
+determine only the sum of their forces and cannot all be eliminated, so that their mean replaces them. This constraint has
+the sum of their areas, so that penalties add up, and their mean coefficient of friction. Each pair carries a fraction of the
+force that is proportional to its area, so that the pressures are equal. Of several clearances at one node, only the smallest
+can close. Constraints with a coupled normal compliance or with different clearances are not merged.
 
-Two nodes at the ends of a periodic part also count as one node. Its gap, weighted over the facets at both ends, is the
-area-weighted mean of both gaps. Tangents at the second end are rotated to the first one before they are compared.
+Two nodes at the ends of a periodic part are also regarded as one node, whose gap is the area-weighted mean of both gaps.
+Tangents at the second end are rotated to the first one before they are compared.
 """
 
 from __future__ import annotations
@@ -33,36 +33,36 @@ class SharedNodes:
 
     Attributes
     ----------
-    place : ndarray of int (m,)
+    representative : ndarray of int (m,)
         The representative that replaces each constraint in the solution; usually the constraint itself.
     behind : ndarray of int (k,)
         Constraints that cannot close, because others have a smaller gap.
-    part, along : ndarray (m,)
+    normal_fraction, tangential_fraction : ndarray (m,)
         Fraction of each constraint in the normal and in the tangential force of its representative [-].
     frame : ndarray (m, k, dim)
         Tangents of the constraints, at second ends of periods rotated to the first one [-].
     """
 
-    place: Indices
+    representative: Indices
     behind: Indices
-    part: Array
-    along: Array
+    normal_fraction: Array
+    tangential_fraction: Array
     frame: Array
 
     @classmethod
     def of(cls, constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface] = ()) -> SharedNodes | None:
         """Return the shared nodes of all pairs; None if no node is in several pairs, or at both ends of a period."""
-        first, second, behind = _alike(constraints)
+        first, second, behind = _dependent(constraints)
         ends = _at_periodic_interfaces(constraints, interfaces, behind)
         if not len(second) + len(behind) + ends.shape[1]:
             return None
-        representative = _places(constraints, np.hstack([np.stack([first, second]), ends]))
-        return cls(representative, behind, *_parts(constraints, representative), _frame(constraints, interfaces))
+        representative = _representatives(constraints, np.hstack([np.stack([first, second]), ends]))
+        return cls(representative, behind, *_fractions(constraints, representative), _frame(constraints, interfaces))
 
     @property
     def idle(self) -> Mask:
         """Constraints (m,) that are not solved for."""
-        redundant = self.place != np.arange(len(self.place))
+        redundant = self.representative != np.arange(len(self.representative))
         redundant[self.behind] = True
         return redundant
 
@@ -73,52 +73,56 @@ class SharedNodes:
     def summed(self, values: NDArray[np.generic]) -> Array:
         """Return the sums (m, ...) of values (m, ...) over the constraints of each representative."""
         total = np.zeros(values.shape)
-        np.add.at(total, self.place, values.astype(float))
+        np.add.at(total, self.representative, values.astype(float))
         return total
 
-    def once(self, constraints: StackedConstraints) -> Constraints:
+    def merged_constraints(self, constraints: StackedConstraints) -> Constraints:
         """Return constraints with only the representatives, each with the area of all of its constraints."""
-        mean = self._at_places(self.part)
+        mean = self._summation(self.normal_fraction)
         merged = {
             "B": csr_array(mean @ constraints.B),
             "gap0": mean @ constraints.gap0,
             "tangents": self._tangents(constraints),
             "equality": constraints.equality & ~self.idle,
-            "slip0": self._mean(constraints.slip0.T, self.along).T,
-            "friction": self.summed(self.part * constraints.friction),
+            "slip0": self._mean(constraints.slip0.T, self.tangential_fraction).T,
+            "friction": self.summed(self.normal_fraction * constraints.friction),
         }
         total = self.summed(_stiffness(constraints.softness))
         merged["softness"] = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
         if constraints.tangential_softness.any():
-            stiffness = np.where(self.along > 0.0, _stiffness(constraints.tangential_softness), 0.0)
+            stiffness = np.where(self.tangential_fraction > 0.0, _stiffness(constraints.tangential_softness), 0.0)
             total = self.summed(stiffness)
             merged["tangential_softness"] = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
-            weight = np.divide(stiffness, total[self.place], out=np.ones_like(total), where=np.isfinite(stiffness))
+            weight = np.divide(
+                stiffness, total[self.representative], out=np.ones_like(total), where=np.isfinite(stiffness)
+            )
             merged["elastic_slip"] = self._mean(constraints.elastic_slip.T, weight).T
         return replace(constraints, **merged).without(self.idle)  # type: ignore[arg-type]
 
-    def _at_places(self, weight: Array) -> csr_array:
+    def _summation(self, weight: Array) -> csr_array:
         """Return the matrix (m, m) that sums values with weights (m,) for each representative."""
         m = len(weight)
-        return csr_array((weight, (self.place, np.arange(m))), shape=(m, m))
+        return csr_array((weight, (self.representative, np.arange(m))), shape=(m, m))
 
     def _tangents(self, constraints: Constraints) -> tuple[csr_array, ...]:
         """Return the rows (m, n_dofs) of the mean slip of each representative along its own tangents."""
-        turn = np.einsum("mjd,mkd->jkm", self.frame, self.frame[self.place])
-        parts = [[self._at_places(self.along * each) for each in along] for along in turn]
+        products = np.einsum("mjd,mkd->jkm", self.frame, self.frame[self.representative])
+        sums = [[self._summation(self.tangential_fraction * factor) for factor in factors] for factors in products]
         return tuple(
-            csr_array(sum(each[k] @ T for each, T in zip(parts, constraints.tangents, strict=True)))
-            for k in range(len(parts))
+            csr_array(sum(matrices[k] @ T for matrices, T in zip(sums, constraints.tangents, strict=True)))
+            for k in range(len(sums))
         )
 
-    def _mean(self, along: Array, weight: Array) -> Array:
+    def _mean(self, components: Array, weight: Array) -> Array:
         """Return the weighted means, along the representatives' tangents, of components along the tangents (m, k)."""
-        vectors = np.einsum("mk,mkd->md", weight[:, None] * along, self.frame)
+        vectors = np.einsum("mk,mkd->md", weight[:, None] * components, self.frame)
         return np.einsum("md,mkd->mk", self.summed(vectors), self.frame)
 
-    def merged(self, gaps: Array) -> Array:
+    def merged_gaps(self, gaps: Array) -> Array:
         """Return the mean gaps and slips (1 + k, m) of representatives, given those of all constraints [length]."""
-        return np.vstack([self._at_places(self.part) @ gaps[0], self._mean(gaps[1:].T, self.along).T])
+        return np.vstack(
+            [self._summation(self.normal_fraction) @ gaps[0], self._mean(gaps[1:].T, self.tangential_fraction).T]
+        )
 
     def gathered(
         self, constraints: Constraints, gap: Array, normal: Array, traction: Array, closing: Array
@@ -128,34 +132,34 @@ class SharedNodes:
         The arguments are the same quantities of all constraints.
         """
         tangents = np.stack(constraints.directions, axis=1)
-        weighted = (traction, np.ones(len(gap))), (closing, self.along)
-        parts = (self._mean(np.einsum("md,mkd->mk", vectors, tangents), weight) for vectors, weight in weighted)
-        forces, slips = (np.einsum("mk,mkd->md", along, tangents) for along in parts)
-        return self._at_places(self.part) @ gap, self.summed(normal), forces, slips
+        weighted = (traction, np.ones(len(gap))), (closing, self.tangential_fraction)
+        means = (self._mean(np.einsum("md,mkd->mk", vectors, tangents), weight) for vectors, weight in weighted)
+        forces, slips = (np.einsum("mk,mkd->md", along, tangents) for along in means)
+        return self._summation(self.normal_fraction) @ gap, self.summed(normal), forces, slips
 
     def shared(self, solution: Solution, constraints: StackedConstraints, u: Array) -> Solution:
-        """Return a solution of `once` at displacements `u` (n_dofs,) [length] with forces distributed to all constraints."""
-        representative = self.place
-        normal, gap = self.part * solution.multiplier[representative], solution.gap[representative]
+        """Return a solution of `merged_constraints` at `u` (n_dofs,) [length] with forces distributed to all constraints."""
+        representative = self.representative
+        normal, gap = self.normal_fraction * solution.multiplier[representative], solution.gap[representative]
         gap[self.behind] = constraints.gaps(u)[self.behind]
         active = solution.active[representative]
         frame = self.frame
 
-        def turned(along: Array) -> Array:
-            at_first = np.einsum("md,mkd->mk", np.einsum("mk,mkd->md", along, frame)[representative], frame)
-            return np.where(self.idle[:, None], at_first, along)
+        def along_own_tangents(components: Array) -> Array:
+            at_first = np.einsum("md,mkd->mk", np.einsum("mk,mkd->md", components, frame)[representative], frame)
+            return np.where(self.idle[:, None], at_first, components)
 
         return replace(
             solution,
             multiplier=normal,
             gap=gap,
-            slip=turned(solution.slip),
+            slip=along_own_tangents(solution.slip),
             active=active,
             wanted=active,
             sticking=solution.sticking[representative],
-            work=None if solution.work is None else self.along * solution.work[representative],
-            approach=None if solution.approach is None else turned(solution.approach),
-            tangential=self.along[:, None] * turned(solution.tangential),
+            work=None if solution.work is None else self.tangential_fraction * solution.work[representative],
+            approach=None if solution.approach is None else along_own_tangents(solution.approach),
+            tangential=self.tangential_fraction[:, None] * along_own_tangents(solution.tangential),
         )
 
 
@@ -173,7 +177,7 @@ def _frame(constraints: StackedConstraints, interfaces: Sequence[PeriodicInterfa
 def _at_periodic_interfaces(
     constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface], behind: Indices
 ) -> Indices:
-    """Return the constraints (2, k) at the first and second node of periodic points, both of one pair."""
+    """Return the constraints (2, k) at the first and second nodes of periodic interfaces, both of the same pair."""
     nodes, usable = _nodes(constraints), np.isfinite(_areas(constraints)) & constraints.usable
     usable[behind] = False
     pairs = [np.empty((2, 0), np.intp)]
@@ -189,7 +193,7 @@ def _at_periodic_interfaces(
     return ends[:, constraints.equality[ends[0]] == constraints.equality[ends[1]]]
 
 
-def _places(constraints: Constraints, pairs: Indices) -> Indices:
+def _representatives(constraints: Constraints, pairs: Indices) -> Indices:
     """Return the representative (m,) of each constraint, given linearly dependent `pairs` (2, k).
 
     It is the first of them with friction, or the first of all if none has friction.
@@ -207,24 +211,26 @@ def _stiffness(softness: Array) -> Array:
     return np.divide(1.0, softness, out=np.full_like(softness, np.inf), where=softness > 0.0)
 
 
-def _parts(constraints: StackedConstraints, representative: Indices) -> tuple[Array, Array]:
+def _fractions(constraints: StackedConstraints, representative: Indices) -> tuple[Array, Array]:
     """Return the fractions (m,) of normal and tangential forces that constraints carry [-].
 
     Normal forces are distributed by stiffness if all constraints of a node are compliant, otherwise by area among the exact
     ones. Tangential forces are distributed by friction limit, so that a sliding node slides in each pair.
     """
     m = len(representative)
-    several = np.bincount(representative, minlength=m)[representative] > 1  # others need not have an area
-    weight = np.where(several, _areas(constraints), 1.0)
-    hard = constraints.softness == 0.0
-    held = np.bincount(representative, hard, minlength=m)[representative] > 0
-    weight = np.where(several & ~held, _stiffness(constraints.softness), np.where(hard | ~several, weight, 0.0))
+    is_shared = np.bincount(representative, minlength=m)[representative] > 1  # others may lack an area
+    weight = np.where(is_shared, _areas(constraints), 1.0)
+    exact = constraints.softness == 0.0
+    has_exact = np.bincount(representative, exact, minlength=m)[representative] > 0
+    weight = np.where(
+        is_shared & ~has_exact, _stiffness(constraints.softness), np.where(exact | ~is_shared, weight, 0.0)
+    )
     fraction = weight / np.bincount(representative, weight, minlength=m)[representative]
     if not constraints.tangents:
         return fraction, fraction
-    rubbing = fraction * constraints.friction
-    total = np.bincount(representative, rubbing, minlength=m)[representative]
-    return fraction, np.where(several, np.divide(rubbing, total, out=fraction.copy(), where=total > 0.0), 1.0)
+    friction_limit = fraction * constraints.friction
+    total = np.bincount(representative, friction_limit, minlength=m)[representative]
+    return fraction, np.where(is_shared, np.divide(friction_limit, total, out=fraction.copy(), where=total > 0.0), 1.0)
 
 
 def _areas(constraints: StackedConstraints) -> Array:
@@ -243,24 +249,26 @@ def _nodes(constraints: StackedConstraints) -> Indices:
     return np.concatenate(nodes).astype(np.intp)
 
 
-def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
-    """Return constraints (k,), the linearly dependent constraint (k,) of another pair for each, and those behind others.
+def _dependent(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
+    """Return pairs (k,), (k,) of linearly dependent constraints, and the constraints behind others.
 
-    The latter face the same point along the same normal with a larger clearance, so that the constraint in front, unless
-    it is compliant, prevents them from closing.
+    Constraints behind others face the same point along the same normal with a larger clearance. The constraint in front,
+    unless it is compliant, prevents them from closing.
     """
     first, second = _of_one_node(constraints)
     if not len(first):
         return first, first, first
     difference = abs(constraints.B[first] - constraints.B[second]).max(axis=1).toarray().ravel()
-    alike = difference <= LENGTH_ROUND_OFF
-    alike &= ~(constraints.equality[first] | constraints.equality[second])
-    first, second = first[alike], second[alike]
-    level = constraints.gap0[second] - constraints.gap0[first] <= LENGTH_ROUND_OFF * np.abs(constraints.positions).max()
-    behind = np.setdiff1d(second[~level & (constraints.softness[first] == 0.0)], [])
-    first, second = first[level], second[level]
-    kept = ~(np.isin(first, behind) | np.isin(second, behind))
-    return first[kept], second[kept], behind
+    dependent = difference <= LENGTH_ROUND_OFF
+    dependent &= ~(constraints.equality[first] | constraints.equality[second])
+    first, second = first[dependent], second[dependent]
+    equal_gap = (
+        constraints.gap0[second] - constraints.gap0[first] <= LENGTH_ROUND_OFF * np.abs(constraints.positions).max()
+    )
+    behind = np.setdiff1d(second[~equal_gap & (constraints.softness[first] == 0.0)], [])
+    first, second = first[equal_gap], second[equal_gap]
+    free = ~(np.isin(first, behind) | np.isin(second, behind))
+    return first[free], second[free], behind
 
 
 def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
@@ -271,8 +279,8 @@ def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
     order = order[np.lexsort((constraints.gap0[order], nodes[order]))]
     node, pairs = nodes[order], [np.empty((2, 0), np.intp)]
     shift = 1
-    while len(same := np.flatnonzero(node[shift:] == node[:-shift])):
-        pairs.append(np.stack([order[same], order[same + shift]]))
+    while len(coincident := np.flatnonzero(node[shift:] == node[:-shift])):
+        pairs.append(np.stack([order[coincident], order[coincident + shift]]))
         shift += 1
     first, second = np.concatenate(pairs[::-1], axis=1)
     return first, second

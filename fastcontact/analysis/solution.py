@@ -27,7 +27,7 @@ class Accuracy:
     max_iterations : int
         Largest number of linear solutions without friction. The iteration stops at this number even if it has not converged.
     inexact : bool
-        Whether linear solutions are inexact. Friction then takes a single Newton step, because their errors reverse slips.
+        Whether linear solutions are inexact. Friction then takes a single Newton step, because errors may reverse slips.
     """
 
     gap: float
@@ -48,7 +48,7 @@ def response(loaded: Loaded, R: csr_array, rows: Indices, forces_of: Callable[[A
     Parameters
     ----------
     loaded : Loaded
-        Prepared matrix (n, n) with a right-hand side, which does not matter.
+        Prepared matrix (n, n) with any right-hand side.
     R : csr_array ((1 + k) q, n)
         Derivatives of the gaps of the closed constraints, and of their slips along k tangents [-].
     rows : ndarray of int (q,)
@@ -77,11 +77,11 @@ class Path:
     normal : ndarray (m,)
         Normal forces [force].
     traction : ndarray (m, dim)
-        Vectors of the tangential forces [force].
+        Tangential force vectors [force].
     closing : ndarray (m, dim)
         Tangential relative displacement while the whole gap closes, which is not slip [length].
     waiting : ndarray of bool (m,)
-        Constraints that are open at the beginning of the step, and close at some instant if at all.
+        Constraints that are open at the beginning of the step. They carry no force before they close.
     """
 
     gap: Array
@@ -190,8 +190,8 @@ class Solution:
     @classmethod
     def frictionless(cls, u: Array, multiplier: Array, gap: Array, active: Mask, wanted: Mask) -> Solution:
         """Return the solution for one active set without friction."""
-        settled, none = bool(np.array_equal(active, wanted)), np.zeros((len(gap), 0))
-        return cls(u, multiplier, gap, active, wanted, settled, 1, none, none, active)
+        settled, no_tangents = bool(np.array_equal(active, wanted)), np.zeros((len(gap), 0))
+        return cls(u, multiplier, gap, active, wanted, settled, 1, no_tangents, no_tangents, active)
 
     def forces_along(self, directions: tuple[Array, ...], m: int) -> Array | None:
         """Return normal and tangential forces (1 + k, m) in components along different tangents (m, dim) [force].
@@ -201,5 +201,7 @@ class Solution:
         """
         if self.tangential.shape != (m, len(directions)):
             return None
-        vectors = sum(t[:, None] * along for t, along in zip(self.tangential.T, self.directions, strict=True))
-        return np.vstack([self.multiplier, *((vectors * along).sum(axis=1) for along in directions)])
+        vectors = sum(
+            component[:, None] * tangent for component, tangent in zip(self.tangential.T, self.directions, strict=True)
+        )
+        return np.vstack([self.multiplier, *((vectors * tangent).sum(axis=1) for tangent in directions)])

@@ -35,14 +35,14 @@ def stage_of(model: Model, last: StepResult | None, begin: float = 0.0) -> Model
     return _stage(model, before, last.displacement, None, (last.restart or {}).get("locked", {}))[0]
 
 
-def go_on(
-    prepared: Callable[[Model], Problem], model: Model, problem: Problem, state: State, begin: float
+def next_stage(
+    prepare: Callable[[Model], Problem], model: Model, problem: Problem, state: State, begin: float
 ) -> tuple[Problem, State]:
     """Return the problem and the state of the load step that begins at an instant.
 
     Parameters
     ----------
-    prepared : callable
+    prepare : callable
         Function that returns the `Problem` of a model.
     model : Model
         The complete model of the user.
@@ -53,12 +53,12 @@ def go_on(
     begin : float
         Pseudo-time at the beginning of the step.
     """
-    stage, kept = _stage(model, begin, problem.displacement(state.u), state.rise, state.locked)
+    stage, values = _stage(model, begin, problem.displacement(state.u), state.rise, state.locked)
     if _names(stage) == _names(problem.model):
         return problem, state
-    problem = prepared(stage)
+    problem = prepare(stage)
     return problem, replace(
-        state, solver=problem.solver.snapshot(), extrapolation=Extrapolation(), rigid=None, locked=kept
+        state, solver=problem.solver.snapshot(), extrapolation=Extrapolation(), rigid=None, locked=values
     )
 
 
@@ -69,7 +69,7 @@ def _names(model: Model) -> list[str]:
 
 
 def _stage(
-    model: Model, begin: float, displacement: Array, rise: Array | None, kept: Mapping[str, Any]
+    model: Model, begin: float, displacement: Array, rise: Array | None, stored: Mapping[str, Any]
 ) -> tuple[Model, dict[str, float | Array]]:
     """Return the model of the load step that begins at an instant, and the initial values of its temporary parts.
 
@@ -83,7 +83,7 @@ def _stage(
         Displacements at this instant [length].
     rise : ndarray (n_points,) or None
         Temperature rise at this instant, with conduction of heat [temperature].
-    kept : mapping
+    stored : mapping
         Initial values of parts that acted in earlier steps.
 
     Returns
@@ -92,28 +92,28 @@ def _stage(
     values : dict
         For each part, by its name, the value at the instant at which it became active; see `State.locked`.
     """
-    lengths = locked_lengths(model.pretensions, begin, displacement, kept)
+    lengths = locked_lengths(model.pretensions, begin, displacement, stored)
     locks = [
         item.locked(model.mesh.points.size, lengths[item.label]) for item in model.pretensions if item.label in lengths
     ]
-    reached: dict[str, float | Array] = {**lengths}
+    values: dict[str, float | Array] = {**lengths}
     relations: list[MultiPointConstraint] = []
     for item in model.relations:
         if not isinstance(item, TemporaryConstraint):
             relations.append(item)
         elif item.acts_from(begin):
-            reached[item.name] = kept[item.name] if item.name in kept else item.rows @ displacement.ravel()
-            relations += item.after(np.asarray(reached[item.name]))
+            values[item.name] = stored[item.name] if item.name in stored else item.rows @ displacement.ravel()
+            relations += item.after(np.asarray(values[item.name]))
     loads: list[Any] = []
     for load in model.heat_loads:
         if isinstance(load, FixedTemperature) and load.begins > -np.inf and load.acts_from(begin):
-            at_first = np.zeros(len(displacement)) if rise is None else rise
-            reached[load.label] = kept.get(load.label, at_first)
-            loads.append(replace(load, reached=np.asarray(reached[load.label])))
+            initial_rise = np.zeros(len(displacement)) if rise is None else rise
+            values[load.label] = stored.get(load.label, initial_rise)
+            loads.append(replace(load, reached=np.asarray(values[load.label])))
         elif not isinstance(load, TemporaryHeat) or load.acts_from(begin):
             loads.append(load)
     if not locks and not any(isinstance(item, TEMPORARY) for item in (*model.relations, *model.heat_loads)):
-        return model, reached
-    made = copy.copy(model)
-    made.relations, made.heat_loads = [*relations, *locks], loads
-    return made, reached
+        return model, values
+    stage = copy.copy(model)
+    stage.relations, stage.heat_loads = [*relations, *locks], loads
+    return stage, values

@@ -47,13 +47,14 @@ class State:
     obstacles : dict of str to ndarray (dim,)
         Displacement of the rigid obstacle of each contact pair [length].
     angles : dict of str to float
-        Rotation angle of each rigid obstacle that rotates, by the name of its contact pair [radian].
+        Rotation angle of each rotating rigid obstacle, by the name of its contact pair [radian].
     worn : dict of str to Worn
         Wear of each contact pair with a law of wear.
-    slipped : dict of str to ndarray (m, dim)
+    slipped : dict of str to ndarray (n_nodes, dim)
         Accumulated slip of the secondary nodes of each contact pair [length].
     never_opening : dict of str to (ndarray (m, dim), ndarray of bool (m,))
-        For each contact pair without separation, the positions of constraints [length] and which of them have closed.
+        For each contact pair that does not open again once closed, the positions of constraints [length], and which of them
+        have closed.
     elastic_slip : dict of str to (ndarray (m, dim), ndarray (m, dim))
         For each contact pair with tangential compliance, the positions of constraints and their elastic slips under the
         current forces [length].
@@ -66,14 +67,14 @@ class State:
         at that time [length]; for a temporary constraint, the initial values (m,) of its m equations [length]; for a
         temperature that begins after the first step, the temperature rise (n_points,) at its beginning [temperature].
     extrapolation : Extrapolation
-        The last converged steps, at most three, from which the displacements of the next one are extrapolated.
+        The last converged steps, from which the displacements of the next one are extrapolated.
     largest_force, largest_rigid_force : float
         The largest nodal force of all steps so far, and the largest generalised force of the loads on a rigid-body motion
         that is free [force].
     touched : frozenset of str
         Contact pairs that were closed at the end of a step.
     work : Work, optional
-        Work of all steps so far; None if an earlier version, which did not compute it, wrote the restart.
+        Work of all steps so far; None after a restart from data of an earlier version, which did not compute it.
     forces : dict of str to ContactForces
         Contact forces of each pair at the end of the step, from which the next step computes work.
     last_change : (int, float), optional

@@ -1,4 +1,4 @@
-"""Bisection of load steps that do not converge, or in which nodes slide too far while they close.
+"""Bisection of load steps that do not converge, or in which closing nodes do too much of the frictional work.
 
 A load step that fails leaves the state unchanged, so that it can be divided into two substeps. With nonlinear bodies, later
 substeps have the size of the last one, which doubles after a substep that took few iterations.
@@ -38,21 +38,21 @@ def advance(problem: Problem, state: State, index: int, begin: float, end: float
     ConvergenceError
         If a substep does not converge after `Criteria.max_halvings` halvings, or halving cannot help.
     """
-    state, parts = _parts(problem, state, index, (begin, end), 0)
-    return state, _joined(parts)
+    state, substeps = _substeps(problem, state, index, (begin, end), 0)
+    return state, _summed(substeps)
 
 
-def _parts(
+def _substeps(
     problem: Problem, state: State, index: int, span: tuple[float, float], halved: int
 ) -> tuple[State, list[StepResult]]:
     """Return the state at the end of a span of pseudo-time, and the results of its substeps.
 
-    `span` is (begin, end), and `halved` the number of halvings by which it results from the step.
+    `span` is (begin, end), and `halved` the number of halvings of the load step that lead to this span.
     """
     begin, end = span
     middle = 0.5 * (begin + end)
-    most = problem.criteria.max_halvings * (1 if problem.bodies is None else 2)
-    last = halved >= most or not begin < middle < end
+    max_halvings = problem.criteria.max_halvings * (1 if problem.bodies is None else 2)
+    last = halved >= max_halvings or not begin < middle < end
     if halved >= state.halved or not begin < middle < end:
         try:
             after, result = load_step(problem, state, index, end)
@@ -64,22 +64,22 @@ def _parts(
         except ConvergenceError as error:
             if last or not error.smaller_steps_help:
                 where = f"from {begin:.6g} to {end:.6g}"
-                often = "once" if halved == 1 else f"{halved} times"
-                part = (
-                    f"step {index} was cut in halves {often}, the part {where} fails"
+                times = "once" if halved == 1 else f"{halved} times"
+                location = (
+                    f"step {index} was cut in halves {times}, the part {where} fails"
                     if halved
                     else f"step {index} {where}"
                 )
-                limit = limit_load(problem, state) or friction_used(problem, state)
-                final = ConvergenceError(f"{error} ({part}{limit})", error.history, smaller_steps_help=False)
+                cause = limit_load(problem, state) or friction_used(problem, state)
+                final = ConvergenceError(f"{error} ({location}{cause})", error.history, smaller_steps_help=False)
                 # Keep the traceback of the original error, but do not chain it: its message is part of the new one.
                 raise final.with_traceback(error.__traceback__) from None
             reason = str(error).split(". ")[0]
             for listener in listeners:
                 listener(index, begin, end)
             log.warning("step %d from %.6g to %.6g does not converge, cut in halves: %s", index, begin, end, reason)
-    state, first = _parts(problem, state, index, (begin, middle), halved + 1)
-    state, second = _parts(problem, state, index, (middle, end), halved + 1)
+    state, first = _substeps(problem, state, index, (begin, middle), halved + 1)
+    state, second = _substeps(problem, state, index, (middle, end), halved + 1)
     return state, first + second
 
 
@@ -94,21 +94,21 @@ def _slides_while_touching(problem: Problem, state: State, after: State) -> bool
     return after.work.touching - state.work.touching > allowed * after.work.friction
 
 
-def _joined(parts: list[StepResult]) -> StepResult:
-    """Return the result of the last substep, with iterations, slip and dissipation summed over all substeps."""
-    end = parts[-1]
-    if len(parts) == 1:
+def _summed(substeps: list[StepResult]) -> StepResult:
+    """Return the result of the last substep, with iterations, slips and dissipation summed over all substeps."""
+    end = substeps[-1]
+    if len(substeps) == 1:
         return end
-    logs = [part.iterations for part in parts]
+    logs = [substep.iterations for substep in substeps]
     history = [entry for log in logs for entry in log["history"]]
-    iterations = {**end.iterations, "substeps": [part.load_factor for part in parts], "history": history}
+    iterations = {**end.iterations, "substeps": [substep.load_factor for substep in substeps], "history": history}
     for name in ("geometry_updates", "active_set_iterations", "linear_iterations"):
         iterations[name] = sum(log[name] for log in logs)
     contact = {
         name: replace(
             result,
-            dissipation=sum(part.contact[name].dissipation for part in parts),
-            slip=np.sum([part.contact[name].slip for part in parts], axis=0),
+            dissipation=sum(substep.contact[name].dissipation for substep in substeps),
+            slip=np.sum([substep.contact[name].slip for substep in substeps], axis=0),
         )
         for name, result in end.contact.items()
     }

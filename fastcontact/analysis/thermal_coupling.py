@@ -96,19 +96,19 @@ def settle_heat(
     """
     heat, mixing = problem.heat, Anderson(DEPTH, np.arange(len(rise)))
     assert heat is not None
-    enough = max(problem.criteria.geometry, 10 * heat.linear_tolerance)
-    change, most = np.inf, max(problem.criteria.max_geometry_updates, 1)
-    for exchange in range(1, most + 1):
+    tolerance = max(problem.criteria.geometry, 10 * heat.linear_tolerance)
+    change, limit = np.inf, max(problem.criteria.max_geometry_updates, 1)
+    for exchange in range(1, limit + 1):
         heated = _conducted(problem, start, load, instant, equilibrium)
         change = largest_difference(heated.rise, rise)
-        settled = change <= enough * largest(heated.rise) or not problem.model.expands
-        negligible = max(enough * equilibrium.balance.largest, equilibrium.balance.noise)
+        settled = change <= tolerance * largest(heated.rise) or not problem.model.expands
+        negligible = max(tolerance * equilibrium.balance.largest, equilibrium.balance.noise)
         if settled or largest(problem.model.expansion_forces(problem.field, heated.rise - rise).ravel()) <= negligible:
             return replace(heated, balance={**heated.balance, "exchanges": exchange}), equilibrium
         rise = mixing.mixed(rise, heated.rise)
         equilibrium = solve(expanded(problem, load, rise), equilibrium)
     raise ConvergenceError(
-        f"heat and contact do not converge: after {most} times temperatures still change by {change:.3g}, for "
+        f"heat and contact do not converge: after {limit} times temperatures still change by {change:.3g}, for "
         "instance because a contact opens when heat flows through it and closes when none does; let its "
         "conductance fall gradually with the gap, or grow from zero with the pressure",
         equilibrium.history,
@@ -142,21 +142,21 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
         steady = heat.temperatures(instant, displacement)
         return Heated(steady.rise, steady.reaction, {**steady.balance, "contacts": {}}, {})
     n, solution, laws = problem.model.mesh.n_points, settled.solution, problem.model.conductances()
-    matrix, rubbed, crossings = csr_array((n, n)), np.zeros(n), {}
-    obstacles, given = csr_array((n, n)), np.zeros(n)
+    matrix, friction_power, crossings = csr_array((n, n)), np.zeros(n), {}
+    obstacles, obstacle_power = csr_array((n, n)), np.zeros(n)
     for name, rows in settled.constraints.rows.items():
         pair, law = problem.pairs[name], laws.get(name)
         if law is None and not pair.options.friction_heat:
             continue
-        at = problem.configuration(name, start, load, displacement, u)
-        constraints, force, gap = _pressed(problem, settled, name, rows, at)
+        configuration = problem.configuration(name, start, load, displacement, u)
+        constraints, force, gap = _normal_state(problem, settled, name, rows, configuration)
         assert constraints.nodal is not None
         link = crossing(constraints, pair.secondary, pair.primary, pair.points.shape)
-        grown = np.ones(n)  # ratio of deformed to undeformed area at each node
+        area_ratio = np.ones(n)  # ratio of deformed to undeformed area at each node
         if heat.finite:
             before, after = areas(pair, displacement)
-            grown[pair.secondary.points] = after / before
-            link = replace(link, area=link.area * (link.secondary @ grown))
+            area_ratio[pair.secondary.points] = after / before
+            link = replace(link, area=link.area * (link.secondary @ area_ratio))
         if law is not None:
             h, facing = np.zeros(len(gap)), link.area > 0.0
             h[facing] = law(force[facing] / link.area[facing], gap[facing])
@@ -166,20 +166,22 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
             else:
                 obstacle_rise = pair.options.obstacle_temperature - problem.model.reference_temperature
                 obstacles = csr_array(obstacles + link.matrix(h))
-                given = given + link.secondary.T @ (h * link.area * obstacle_rise)
-            crossings[name] = link, constraints.nodal, h, obstacle_rise, grown[pair.secondary.points]
+                obstacle_power = obstacle_power + link.secondary.T @ (h * link.area * obstacle_rise)
+            crossings[name] = link, constraints.nodal, h, obstacle_rise, area_ratio[pair.secondary.points]
         if pair.options.friction_heat:
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
-            rubbed += link.shared(pair.options.friction_heat * work / (instant - start.instant))
-    steady = heat.temperatures(instant, displacement, matrix, rubbed, (obstacles, given))
-    powers = {name: h * link.area * (link.jump @ steady.rise - at) for name, (link, _, h, at, _) in crossings.items()}
+            friction_power += link.shared(pair.options.friction_heat * work / (instant - start.instant))
+    steady = heat.temperatures(instant, displacement, matrix, friction_power, (obstacles, obstacle_power))
+    powers = {
+        name: h * link.area * (link.jump @ steady.rise - rise) for name, (link, _, h, rise, _) in crossings.items()
+    }
     fluxes = {name: crossings[name][1].over_whole_side(power) / crossings[name][4] for name, power in powers.items()}
     balance = {**steady.balance, "contacts": {name: float(power.sum()) for name, power in powers.items()}}
     return Heated(steady.rise, steady.reaction, balance, fluxes)
 
 
-def _pressed(
-    problem: Problem, settled: SettledContact, name: str, rows: slice, at: Configuration
+def _normal_state(
+    problem: Problem, settled: SettledContact, name: str, rows: slice, configuration: Configuration
 ) -> tuple[Constraints, Array, Array]:
     """Return the constraints of a pair, their normal forces (m,) [force], and their gaps (m,), zero if closed [length]."""
     pair, constraints, solution = problem.pairs[name], settled.constraints.parts[name], settled.solution
@@ -187,14 +189,14 @@ def _pressed(
     forces = np.maximum(constraints.normal_forces(constraints.contact_forces(solution.multiplier[rows])), 0.0)
     if pair.options.tied:
         return pair.unilateral(Configuration.undeformed(pair.points)), forces, np.zeros(len(forces))
-    closed, layer, wet = solution.active[rows], constraints.tied, constraints.wetted
-    if not pair.options.gap_only and layer is None and wet is None:
+    closed, layer, wetted = solution.active[rows], constraints.tied, constraints.wetted
+    if not pair.options.gap_only and layer is None and wetted is None:
         gap = np.maximum(solution.gap[rows], 0.0)
         return constraints, forces, np.where(closed | (gap <= touching), 0.0, gap)
-    constraints = pair.unilateral(at)
-    gap = np.maximum(constraints.gaps(at.displacement), 0.0)
-    if wet is not None:
-        closed = closed & ~wet.rows
+    constraints = pair.unilateral(configuration)
+    gap = np.maximum(constraints.gaps(configuration.displacement), 0.0)
+    if wetted is not None:
+        closed = closed & ~wetted.rows
     elif isinstance(layer, Layer):  # adhesion conducts up to its strength, a cohesive layer until it is broken
         closed = layer.damage == 0.0 if layer.law.reversible else layer.damage < 1.0
     elif pair.options.gap_only:

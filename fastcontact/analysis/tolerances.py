@@ -4,7 +4,7 @@ With an iterative linear solver, the tolerances of the first solutions of a step
 of the displacements, like the forcing terms of an inexact Newton method.
 
 The geometry loop also ends if further changes are round-off. The size of round-off depends on the condition numbers of the
-stiffness matrix and of the constraints, which are not known in advance, but it can be seen in the last displacements. If an
+stiffness matrix and of the constraints, which are not known in advance, but the last displacements show it. If an
 iteration converges slowly, it moves in one direction: the first and the last displacements of a window of iterations differ
 by the sum of all changes. Round-off oscillates, as do the errors of iterative linear solutions: the displacements of the
 window then differ by hardly more than one change.
@@ -24,16 +24,16 @@ from fastcontact.arrays import Array
 from fastcontact.linear.protocol import LinearSolver
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Relative residual of the solutions of a step by an iterative solver, over the last relative change of the displacements or
-# the last residual, whichever is smaller: the pairing is no more accurate. It is NOTABLE in the first solution.
+# Relative residual of solutions by an iterative solver, over the last relative change of the displacements or the last
+# residual, whichever is smaller; the pairing is not more accurate. In the first solution of a step the residual is NOTABLE.
 RESIDUAL = 0.03
 # With friction the tolerance decreases at least by this factor, because inaccurate linear solutions may prevent the
 # residual of the friction law from decreasing.
 LEAST_FALL = 0.2
 # Number of updates, or of Newton iterations, within which changes must decline.
 WINDOW = 8
-# Changes, or distances, below this fraction of earlier ones count as decreasing: the iteration counts as converging if those
-# in the second half of the window are below this fraction of those in the first.
+# Changes or distances below this fraction of earlier ones are regarded as decreasing. An iteration is regarded as converging
+# if the changes in the second half of the window are below this fraction of those in the first half.
 DECLINE = 0.5
 
 
@@ -69,21 +69,21 @@ class Tolerances:
         `law_residual` is the residual of the friction law, relative to the largest force. If it is larger than the change, it
         determines the tolerance, because the next step of Newton's method is no more accurate.
         """
-        worth = RESIDUAL * min(self._residual, relative_change)
-        if RESIDUAL * law_residual > worth:
-            worth = min(RESIDUAL * law_residual, LEAST_FALL * self._residual)
-        self._residual = max(self._solver.tolerance, worth)
+        residual = RESIDUAL * min(self._residual, relative_change)
+        if RESIDUAL * law_residual > residual:
+            residual = min(RESIDUAL * law_residual, LEAST_FALL * self._residual)
+        self._residual = max(self._solver.tolerance, residual)
 
     def accuracy(self, scale: float) -> Accuracy:
-        """Return the tolerances and limits of the next contact solution; `scale` is that of the displacements [length].
+        """Return the tolerances and limits of the next contact solution, for displacements of the size `scale` [length].
 
         While linear solutions are inexact, surfaces are paired again after one iteration of the active set or one Newton step
         of friction.
         """
-        noise = max(10 * self._solver.tolerance, self._residual if self._solver.iterative else 0.0)
+        relative_error = max(10 * self._solver.tolerance, self._residual if self._solver.iterative else 0.0)
         return Accuracy(
-            gap=max(noise * (scale or self._expected), self._round_off),
-            multiplier=noise,
+            gap=max(relative_error * (scale or self._expected), self._round_off),
+            multiplier=relative_error,
             residual=max(self._residual, self._solver.tolerance),
             max_iterations=1 if self.inexact else self._criteria.max_active_set_iterations,
             inexact=self.inexact,
@@ -94,10 +94,10 @@ class Tolerances:
 
         `size` is the largest displacement [length].
         """
-        # The errors of iterative solutions are about the tolerance times the contrast of cells; smaller changes are not
-        # reached.
-        least = self._solver.tolerance * (self._solver.contrast if self._solver.iterative else 1.0)
-        return max(max(self._criteria.geometry, least) * size, self._round_off)
+        # The errors of iterative solutions are about the tolerance times the contrast of cells, so that changes need not
+        # become smaller.
+        relative_error = self._solver.tolerance * (self._solver.contrast if self._solver.iterative else 1.0)
+        return max(max(self._criteria.geometry, relative_error) * size, self._round_off)
 
 
 @dataclass(frozen=True)
@@ -123,13 +123,13 @@ class Watch:
         self._window: deque[tuple[Array, Array, float]] = deque(maxlen=WINDOW)
 
     def seen(
-        self, unknowns: Array, force: Array, change: float, size: float, contraction: float = np.inf
+        self, displacement: Array, force: Array, change: float, size: float, contraction: float = np.inf
     ) -> Scatter | None:
         """Add an update to the window, and return the scatter of the window.
 
         Parameters
         ----------
-        unknowns : ndarray (k,)
+        displacement : ndarray (k,)
             Displacements [length].
         force : ndarray (n,)
             Nodal contact forces [force].
@@ -149,13 +149,13 @@ class Watch:
         if not change <= SINGLE_PRECISION * size:
             self.forget()
             return None
-        self._window.append((unknowns.copy(), force.copy(), change))
+        self._window.append((displacement.copy(), force.copy(), change))
         sooner = contraction <= DECLINE and change <= LENGTH_ROUND_OFF * size
         window = WINDOW // 2 if sooner else WINDOW
         if len(self._window) < window:
             return None
-        (parts, forces, changes), half = zip(*list(self._window)[-window:], strict=True), window // 2
-        scatter = Scatter(_last_change(parts) / size, _last_change(forces) / (largest(force) or 1.0))
+        (displacements, forces, changes), half = zip(*list(self._window)[-window:], strict=True), window // 2
+        scatter = Scatter(_last_change(displacements) / size, _last_change(forces) / (largest(force) or 1.0))
         declining = np.median(changes[half:]) < DECLINE * np.median(changes[:half])
         # Displacements that move in one direction are apart by about WINDOW changes.
         if declining or scatter.displacement * size > half * float(np.median(changes)):

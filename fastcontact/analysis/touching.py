@@ -25,14 +25,14 @@ NEGLIGIBLE = 1e-3
 
 
 class Touching:
-    """Decides whether, and from which pairing on, friction of a load step is solved in increments; see `geometry_loop`.
+    """Decision whether, and from which pairing on, friction of a load step is solved in increments; see `geometry_loop`.
 
     Parameters
     ----------
     step : StepContext
     newton : bool
         Whether the geometry converges quadratically. The increments are then solved once it has nearly converged, otherwise
-        once it has.
+        once it has converged.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Touching:
     done : bool
         Whether increments have been solved.
     unfinished : bool
-        Whether this was the last pairing, so that its last increment is to be solved again.
+        Whether the last pairing was solved in increments, so that its last increment is to be solved again.
     """
 
     def __init__(self, step: StepContext, newton: bool) -> None:
@@ -64,11 +64,11 @@ class Touching:
     ) -> None:
         """Set `due`, given the solution of a pairing.
 
-        `excess` is the change of the displacements beyond that which suffices, and `size` the largest displacement [length].
+        `excess` is the change of the displacements beyond the tolerance, and `size` the largest displacement [length].
         """
-        near = solution.settled and excess <= self._near * size
+        settled = solution.settled and excess <= self._near * size
         self.due = (
-            near and not self.done and self._allowed < 1.0 and _slides(step, constraints, solution, self._allowed)
+            settled and not self.done and self._allowed < 1.0 and _slides(step, constraints, solution, self._allowed)
         )
 
 
@@ -77,8 +77,8 @@ def _slides(step: StepContext, constraints: StackedConstraints, solution: Soluti
     if not constraints.tangents or (forces := _forces(step, constraints)) is None:
         return False
     shear, capacity = np.linalg.norm(solution.tangential, axis=1), constraints.friction * solution.multiplier
-    rubs = solution.active & (constraints.friction > 0.0)
-    return bool(shear[rubs & (forces[0] == 0.0)].sum() > allowed * capacity[rubs].sum())
+    frictional = solution.active & (constraints.friction > 0.0)
+    return bool(shear[frictional & (forces[0] == 0.0)].sum() > allowed * capacity[frictional].sum())
 
 
 def _path(
@@ -101,16 +101,18 @@ def _path(
 def _allowed(problem: Problem) -> float:
     """Return `Criteria.friction_while_touching`, or its default, which is 1 where friction is solved in whole steps.
 
-    Formulations that reproduce code_aster between bodies do as it does.
+    Slip is counted from the beginning of the step in formulations that reproduce code_aster between bodies, as in code_aster.
     """
     criteria = problem.criteria
     if problem.bodies is not None:
         return 1.0
     if criteria.friction_while_touching is not None:
         return criteria.friction_while_touching
-    plain = problem.model.mesh.dim == 3 or criteria.geometry_updates is not None or problem.floating_bodies is not None
+    whole_steps = (
+        problem.model.mesh.dim == 3 or criteria.geometry_updates is not None or problem.floating_bodies is not None
+    )
     pairs = [pair for pair in problem.pairs.values() if pair.friction and isinstance(pair.primary, Surface)]
-    return NEGLIGIBLE if not plain and all(pair.weighs_gaps for pair in pairs) else 1.0
+    return NEGLIGIBLE if not whole_steps and all(pair.weighs_gaps for pair in pairs) else 1.0
 
 
 def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> Array:
@@ -123,9 +125,9 @@ def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> 
     for name, rows in constraints.rows.items():
         if isinstance(step.problem.pairs[name].primary, Surface):
             tangents = np.stack([tangent[rows] for tangent in constraints.directions])
-            now = constraints.parts[name].gaps(step.state.u)
-            more = np.divide(gap[rows], now, out=np.ones_like(now), where=now > 0.0)
-            closing[rows] = np.einsum("km,kmd->md", more * constraints.slip0[:, rows], tangents)
+            begin_gap = constraints.parts[name].gaps(step.state.u)
+            ratio = np.divide(gap[rows], begin_gap, out=np.ones_like(begin_gap), where=begin_gap > 0.0)
+            closing[rows] = np.einsum("km,kmd->md", ratio * constraints.slip0[:, rows], tangents)
     return closing
 
 
@@ -146,14 +148,16 @@ def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, 
 
 
 def _gaps(step: StepContext, constraints: StackedConstraints, iterate: Iterate) -> Array:
-    """Return the gaps (m,) at the beginning of the step, in the configuration of that time [length]."""
+    """Return the gaps (m,) at the beginning of the step, in the configuration at this instant [length]."""
     state = step.state
     begin = replace(step.load, obstacles=state.obstacles, angles=state.angles)
     initial = pair_surfaces(step.problem, state, begin, Iterate.of(state))
     gaps = []
     for name, part in initial.parts.items():
-        now = constraints.parts[name]
-        then = part if np.array_equal(part.positions, now.positions) else now
-        known = np.isfinite(then.gap0) & then.usable
-        gaps.append(np.where(known, then.gap0 + then.B @ state.u, now.gap0 + now.B @ state.u))
+        current = constraints.parts[name]
+        initial_part = part if np.array_equal(part.positions, current.positions) else current
+        determined = np.isfinite(initial_part.gap0) & initial_part.usable
+        gaps.append(
+            np.where(determined, initial_part.gap0 + initial_part.B @ state.u, current.gap0 + current.B @ state.u)
+        )
     return np.maximum(np.concatenate(gaps), 0.0)

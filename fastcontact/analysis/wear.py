@@ -38,27 +38,30 @@ class Worn:
         """Return the initial state, for `count` nodes."""
         return cls(np.zeros(count), np.zeros(count))
 
-    def after(self, pair: Formulation, at: Configuration, contact: ContactResult, coefficient: float) -> Worn:
+    def after(
+        self, pair: Formulation, configuration: Configuration, contact: ContactResult, coefficient: float
+    ) -> Worn:
         """Return the wear after one more load step; for parameters see `worn_in_step`."""
-        more = worn_in_step(pair, at, contact, self.pressure, coefficient)
+        depth = worn_in_step(pair, configuration, contact, self.pressure, coefficient)
         mean = 0.5 * np.maximum(contact.pressure + self.pressure, 0.0)
-        pace = np.divide(more, mean, out=np.zeros_like(more), where=mean > 0.0)
-        return Worn(self.depth + more, contact.pressure, max(self.pace, float(pace.max(initial=0.0))))
+        pace = np.divide(depth, mean, out=np.zeros_like(depth), where=mean > 0.0)
+        return Worn(self.depth + depth, contact.pressure, max(self.pace, float(pace.max(initial=0.0))))
 
 
 def worn_in_step(
-    pair: Formulation, at: Configuration, contact: ContactResult, before: Array | float, coefficient: float
-) -> Array:
+    pair: Formulation, configuration: Configuration, contact: ContactResult, earlier_pressure: Array | float,
+    coefficient: float,
+) -> Array:  # fmt: skip
     """Return the wear depth (m,) of a load step at the secondary nodes [length].
 
     Parameters
     ----------
     pair : Formulation
-    at : Configuration
+    configuration : Configuration
         Configuration at the end of the step.
     contact : ContactResult
         Contact result at the end of the step.
-    before : ndarray (m,) or float
+    earlier_pressure : ndarray (m,) or float
         Nodal pressures at the beginning of the step [pressure]. Wear without friction is computed with the mean of the
         pressures at the beginning and at the end, and the slip from the beginning of the step.
     coefficient : float
@@ -66,18 +69,18 @@ def worn_in_step(
     """
     if contact.sliding_load is not None:
         return coefficient * contact.sliding_load
-    distance = np.linalg.norm(pair.nodal_slip(at), axis=1)
+    distance = np.linalg.norm(pair.nodal_slip(configuration), axis=1)
     if pair.friction:
         distance = np.where(contact.sticking, 0.0, distance)
-    pressure = np.maximum(contact.pressure + before, 0.0)
+    pressure = np.maximum(contact.pressure + earlier_pressure, 0.0)
     return np.asarray(coefficient * 0.5 * pressure * distance)
 
 
 def at_points(points: Numbers, depth: Array, n_points: int) -> Array:
     """Return wear depths (m,) at `points` (m,) as depths of all points (n_points,), zero elsewhere [length]."""
-    whole = np.zeros(n_points)
-    whole[points] = depth
-    return whole
+    depths = np.zeros(n_points)
+    depths[points] = depth
+    return depths
 
 
 def too_fast(pair: Formulation, worn: Worn) -> float:
@@ -91,6 +94,6 @@ def too_fast(pair: Formulation, worn: Worn) -> float:
     """
     edge = np.inf
     for block in pair.secondary.blocks:
-        size = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
-        edge = min(edge, float(size.min()) / elements.get(block.element).order)
+        lengths = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
+        edge = min(edge, float(lengths.min()) / elements.get(block.element).order)
     return worn.pace * np.pi * pair.modulus / (2.0 * edge)

@@ -1,8 +1,8 @@
 """Energy balance of a load step: strain energy, external work, frictional work, energy of penalties, and imbalance.
 
 The work of a force in a step is integrated by the trapezoidal rule: it is the mean of the forces at the beginning and at
-the end, times the displacement. There are two exceptions. A normal force does no work on a gap that is open at one of the
-ends, and sliding friction has its limit traction in the complete step, whatever it was at the beginning.
+the end, multiplied by the displacement. There are two exceptions. A normal force does no work on a gap that is open at one
+of the ends. Sliding friction has its limit traction during the complete step, whatever it was at the beginning.
 
 The external work is the sum of the strain energy, these works, and the imbalance. The imbalance is the work of contact
 forces at constraints that stay closed or stick. It is an error of long steps, in which normals rotate.
@@ -70,18 +70,18 @@ class ContactForces:
         rows = nearest(self.positions, positions)[1]
         return self.pressure[rows], self.traction[rows]
 
-    def kept(self, other: ContactForces, moved: Array) -> float:
+    def work_at_closed(self, other: ContactForces, displacement: Array) -> float:
         """Return half the work of normal forces at constraints that are closed at both ends of the step [energy].
 
-        `other` are the forces at the other end of the step, and `moved` (n_points, dim) the displacements in the step
-        [length]. Gaps that open or close in the step are left out, because no force acts on an open gap.
+        `other` are the forces at the other end of the step, and `displacement` (n_points, dim) the displacements in the step
+        [length]. Gaps that open or close in the step are omitted, because no force acts on an open gap.
         """
-        shut = other.at(self.positions)[0] != 0.0
+        closed = other.at(self.positions)[0] != 0.0
         data, indices, start = self.rows
-        opening = csr_array((data, indices, start), shape=(len(start) - 1, moved.size)) @ moved.ravel()
-        return -0.5 * float(opening[shut].sum())
+        opening = csr_array((data, indices, start), shape=(len(start) - 1, displacement.size)) @ displacement.ravel()
+        return -0.5 * float(opening[closed].sum())
 
-    def alone(self, other: ContactForces) -> float:
+    def energy_at_single(self, other: ContactForces) -> float:
         """Return the energy of normal penalties at constraints without a force at the other end of the step [energy]."""
         return 0.5 * float(self.energy[other.at(self.positions)[0] == 0.0].sum())
 
@@ -139,8 +139,8 @@ class Work:
             Energy dissipated by cohesive layers so far [energy].
         """
         friction, touching, imbalance = works
-        more = self.friction + friction, self.touching + touching, self.imbalance + imbalance
-        work = Work(energy[0], *more, stored, plastic=energy[1], released=released)
+        sums = self.friction + friction, self.touching + touching, self.imbalance + imbalance
+        work = Work(energy[0], *sums, stored, plastic=energy[1], released=released)
         terms = (self.largest, *energy, work.friction, abs(work.external))
         return replace(work, largest=max(terms))
 
@@ -155,8 +155,8 @@ class Work:
 
 
 def contact_work(
-    pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, at: Configuration, contact: ContactResult,
-    before: ContactForces | None,
+    pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, configuration: Configuration,
+    contact: ContactResult, before: ContactForces | None,
 ) -> tuple[ContactForces, tuple[float, float, float], Array]:  # fmt: skip
     """Return the contact forces of a pair at the end of a load step, and the works of contact in this step.
 
@@ -169,7 +169,7 @@ def contact_work(
         Contact solution of all pairs.
     rows : slice
         Rows of the pair in the solution.
-    at : Configuration
+    configuration : Configuration
         Configuration at the end of the step.
     contact : ContactResult
         Contact result at the end of the step.
@@ -186,38 +186,45 @@ def contact_work(
     """
     normal, k = constraints.contact_forces(solution.multiplier[rows]), len(constraints.tangents)
     tangents, slip = solution.tangential[rows, :k], solution.slip[rows, :k]
-    none = np.zeros((len(constraints), 0, contact.coordinates.shape[1]))
-    directions = np.stack(constraints.directions, axis=1) if k else none
-    force, moved = (np.einsum("mk,mkd->md", values, directions) for values in (tangents, slip))
-    now = _forces(pair, constraints, normal, tangents, force, contact, _added(pair, at, contact))
-    before = before or _nothing(now)
+    no_tangents = np.zeros((len(constraints), 0, contact.coordinates.shape[1]))
+    directions = np.stack(constraints.directions, axis=1) if k else no_tangents
+    force, slips = (np.einsum("mk,mkd->md", values, directions) for values in (tangents, slip))
+    after = _forces(pair, constraints, normal, tangents, force, contact, _added(pair, configuration, contact))
+    before = before or _no_forces(after)
     areas = constraints.finite_areas
     pressure, traction = before.at(constraints.positions)
     ratio = np.divide(pressure * areas, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
-    along, earlier = (-0.5 * np.einsum("md,md->m", own, moved) for own in (force, areas[:, None] * traction))
-    work = np.where(normal != 0.0, (1.0 + ratio) * along, np.maximum(earlier, 0.0))
+    work_at_end, work_at_begin = (
+        -0.5 * np.einsum("md,md->m", vectors, slips) for vectors in (force, areas[:, None] * traction)
+    )
+    work = np.where(normal != 0.0, (1.0 + ratio) * work_at_end, np.maximum(work_at_begin, 0.0))
     closing = pressure == 0.0
-    if along[closing].any():
+    if work_at_end[closing].any():
         # The secondary nodes nearest to these constraints were open at the beginning of the step.
-        gap = pair.nodal_gap(replace(at, displacement=at.start, pose=at.pose_start))[0]
-        apart = gap > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
-        closing &= apart[nearest(pair.points[pair.secondary.points], constraints.positions)[1]]
-    touching = float(along[closing].sum())
+        gap = pair.nodal_gap(replace(configuration, displacement=configuration.start, pose=configuration.pose_start))[0]
+        open_before = gap > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
+        closing &= open_before[nearest(pair.points[pair.secondary.points], constraints.positions)[1]]
+    touching = float(work_at_end[closing].sum())
     if solution.work is not None:
         work, touching = solution.work[rows], 0.0
     friction, mu = float(work.sum()), constraints.friction
-    over_slip = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(moved, axis=1)
+    over_slip = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(slips, axis=1)
     np.divide(work, mu, out=over_slip, where=mu > 0.0)
-    sliding = float((along + earlier).sum())
-    moved = at.displacement - at.start
+    sliding = float((work_at_end + work_at_begin).sum())
+    displacement = configuration.displacement - configuration.start
     if isinstance(pair.primary, RigidSide):  # relative to the obstacle
         points = pair.secondary.points
-        moved[points] -= pair.carried(Candidates(points[:, None], np.ones((len(points), 1))), at)
-    gained = now.kept(before, moved) + before.kept(now, moved) + now.alone(before) - before.alone(now)
-    wider = np.where((now.pressing != 0.0) & (before.pressing != 0.0), now.added - before.added, 0.0)
-    gained -= 0.5 * float((now.pressing + before.pressing) @ wider)
-    gained -= 0.5 * float(((now.tangential + before.tangential) * moved).sum())
-    return now, (friction, touching, gained - (now.stored - before.stored) - sliding), over_slip
+        displacement[points] -= pair.carried(Candidates(points[:, None], np.ones((len(points), 1))), configuration)
+    gained = (
+        after.work_at_closed(before, displacement)
+        + before.work_at_closed(after, displacement)
+        + after.energy_at_single(before)
+        - before.energy_at_single(after)
+    )
+    added_gap = np.where((after.pressing != 0.0) & (before.pressing != 0.0), after.added - before.added, 0.0)
+    gained -= 0.5 * float((after.pressing + before.pressing) @ added_gap)
+    gained -= 0.5 * float(((after.tangential + before.tangential) * displacement).sum())
+    return after, (friction, touching, gained - (after.stored - before.stored) - sliding), over_slip
 
 
 def _forces(
@@ -243,51 +250,54 @@ def _forces(
     size, dim = pair.points.size, contact.coordinates.shape[1]
     rows = csr_array(diags_array(normal) @ constraints.B)[:, :size]
     rows.eliminate_zeros()
-    along = np.zeros(size)
-    for tangent, own in zip(constraints.tangents, tangents.T, strict=False):
-        along += (tangent.T @ own)[:size]
-    rates = rows.sum(axis=0).reshape(-1, dim)[pair.secondary.points]
-    facing = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
-    share = 1.0 / np.where(constraints.finite_areas > 0.0, constraints.finite_areas, np.inf)
-    give = (
+    nodal_forces = np.zeros(size)
+    for tangent, components in zip(constraints.tangents, tangents.T, strict=False):
+        nodal_forces += (tangent.T @ components)[:size]
+    force_vectors = rows.sum(axis=0).reshape(-1, dim)[pair.secondary.points]
+    normals = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
+    inverse_area = 1.0 / np.where(constraints.finite_areas > 0.0, constraints.finite_areas, np.inf)
+    penetration = (
         np.zeros(len(constraints))
         if constraints.normal_compliance is None
         else constraints.normal_compliance.apply(normal)
     )
     if constraints.law is not None:  # The energy of the law is not that of a linear spring.
-        energy = 2.0 * constraints.finite_areas * constraints.law.energy(normal * share)
-        give = np.divide(energy, normal, out=np.zeros_like(normal), where=normal != 0.0)
+        energy = 2.0 * constraints.finite_areas * constraints.law.energy(normal * inverse_area)
+        penetration = np.divide(energy, normal, out=np.zeros_like(normal), where=normal != 0.0)
     return ContactForces(
-        constraints.positions, normal * share, force * share[:, None], give * normal, (rows.data, rows.indices, rows.indptr),
-        along.reshape(-1, dim), np.einsum("nd,nd->n", rates, facing), added, _stored(constraints, normal, tangents, give),
+        constraints.positions, normal * inverse_area, force * inverse_area[:, None], penetration * normal,
+        (rows.data, rows.indices, rows.indptr), nodal_forces.reshape(-1, dim),
+        np.einsum("nd,nd->n", force_vectors, normals), added, _stored(constraints, normal, tangents, penetration),
     )  # fmt: skip
 
 
-def _stored(constraints: Constraints, normal: Array, tangents: Array, give: Array) -> float:
+def _stored(constraints: Constraints, normal: Array, tangents: Array, penetration: Array) -> float:
     """Return the energy stored in penalties [energy].
 
-    `normal` (m,) and `tangents` (m, k) are normal and tangential forces [force], and `give` (m,) the penetrations under the
-    normal forces [length].
+    `normal` (m,) and `tangents` (m, k) are normal and tangential forces [force], and `penetration` (m,) the penetrations
+    under the normal forces [length].
     """
-    total = float(normal @ give) + float(constraints.tangential_softness @ (tangents**2).sum(axis=1))
+    total = float(normal @ penetration) + float(constraints.tangential_softness @ (tangents**2).sum(axis=1))
     all_forces = np.column_stack([normal, tangents]).T
-    along = np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)])
-    return 0.5 * (total + float((along**2).sum()))
+    amplitudes = np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)])
+    return 0.5 * (total + float((amplitudes**2).sum()))
 
 
-def _nothing(now: ContactForces) -> ContactForces:
-    """Return contact forces that are zero, with the sizes of `now`, as the state before the first step."""
-    dim = now.positions.shape[1]
+def _no_forces(forces: ContactForces) -> ContactForces:
+    """Return contact forces that are zero, with the sizes of `forces`, as the state before the first step."""
+    dim = forces.positions.shape[1]
     rows = np.empty(0), np.empty(0, np.int32), np.zeros(1, np.int32)
     return ContactForces(
-        np.empty((0, dim)), np.empty(0), np.empty((0, dim)), np.empty(0), rows, np.zeros_like(now.tangential),
-        np.zeros_like(now.pressing), now.added, 0.0,
+        np.empty((0, dim)), np.empty(0), np.empty((0, dim)), np.empty(0), rows, np.zeros_like(forces.tangential),
+        np.zeros_like(forces.pressing), forces.added, 0.0,
     )  # fmt: skip
 
 
-def _added(pair: Formulation, at: Configuration, contact: ContactResult) -> Array:
+def _added(pair: Formulation, configuration: Configuration, contact: ContactResult) -> Array:
     """Return the contribution of clearances and wear to the gaps (n_nodes,) of the secondary nodes [length]."""
-    if pair.options.clearance is None and at.worn is None:
+    if pair.options.clearance is None and configuration.worn is None:
         return np.zeros(len(contact.gap))
-    bare = pair.nodal_gap(at, with_clearance=False)[0]
-    return np.subtract(contact.gap, bare, out=np.zeros_like(bare), where=np.isfinite(bare) & np.isfinite(contact.gap))
+    gap_alone = pair.nodal_gap(configuration, with_clearance=False)[0]
+    return np.subtract(
+        contact.gap, gap_alone, out=np.zeros_like(gap_alone), where=np.isfinite(gap_alone) & np.isfinite(contact.gap)
+    )

@@ -1,7 +1,7 @@
 r"""Unilateral contact and Coulomb's law as a nonsmooth complementarity function, and Newton's method for it.
 
 The unknowns of a constraint are its normal force n and its k tangential forces t. Its gap g and its slips s along the k
-tangents belong to these forces. All values are scaled such that the compliance of each constraint is near one: forces, gaps
+tangents belong to these forces. All values are scaled such that the compliance of each constraint is near one. Forces, gaps
 and slips then have the same unit, and ``n - g`` is meaningful. The solution is the zero of
 
 .. math:: n - [n - g]_+, \qquad t - P(t - s), \qquad P \text{ the projection on the disc of radius } \mu [n - g]_+
@@ -41,7 +41,7 @@ class Law:
     mu : ndarray (m,)
         Coefficients of friction [-].
     equality : ndarray of bool (m,)
-        Constraints that are equations: they are closed whatever the sign of the normal force.
+        Constraints that are equations, which are closed for either sign of the normal force.
     """
 
     mu: Array
@@ -61,9 +61,9 @@ class Law:
         Its rows are ``n - max(n - g, 0)`` and ``t - P(t - s)``, where P is the projection onto the friction disc.
         """
         n, t, reach, radius = self.trial(y, gaps)
-        inside = np.divide(radius, reach, out=np.ones_like(reach), where=reach > radius)
-        pushed = np.where(self.equality, n, np.maximum(n, 0.0))
-        return np.vstack([y[0] - pushed, y[1:] - t * inside])
+        scale = np.divide(radius, reach, out=np.ones_like(reach), where=reach > radius)
+        normal = np.where(self.equality, n, np.maximum(n, 0.0))
+        return np.vstack([y[0] - normal, y[1:] - t * scale])
 
     def state(self, y: Array, gaps: Array) -> tuple[Mask, Mask]:
         """Return which constraints (m,) are closed, and which (m,) of the closed ones stick."""
@@ -82,8 +82,8 @@ class Law:
             the norm of t - s, at most 1.
         """
         _, t, reach, radius = self.trial(y, gaps)
-        along = np.maximum(reach[sliding], TINY)
-        return t[:, sliding] / along, np.minimum(radius[sliding] / along, 1.0)
+        length = np.maximum(reach[sliding], TINY)
+        return t[:, sliding] / length, np.minimum(radius[sliding] / length, 1.0)
 
     def linearised(self, y: Array, gaps: Array, rows: Indices, sticking: Mask) -> tuple[Array, Array]:
         """Return E and D (1 + k, 1 + k, q) of the equations ``E y + D gaps = 0`` of the closed constraints `rows` (q,).
@@ -91,13 +91,13 @@ class Law:
         They are the equations of the semismooth Newton method. If a constraint is `sticking` (m,), its gap and its slips
         vanish. If it slides, its gap vanishes and ``t = mu n d``, where the direction d of t - s is linearised.
         """
-        parts, slipping = np.arange(len(y)), np.flatnonzero(~sticking[rows])
+        components, slipping = np.arange(len(y)), np.flatnonzero(~sticking[rows])
         E, D = np.zeros((2, len(y), len(y), len(rows)))
-        D[parts, parts] = 1.0
+        D[components, components] = 1.0
         d, turning = self.slide(y, gaps, rows[slipping])
-        turn = turning * (np.eye(len(d))[:, :, None] - d[:, None] * d)
-        D[1:, 1:, slipping] = turn
-        E[1:, 1:, slipping] = np.eye(len(d))[:, :, None] - turn
+        projection = turning * (np.eye(len(d))[:, :, None] - d[:, None] * d)
+        D[1:, 1:, slipping] = projection
+        E[1:, 1:, slipping] = np.eye(len(d))[:, :, None] - projection
         E[1:, 0, slipping] = -self.mu[rows[slipping]] * d
         return E, D
 
@@ -176,24 +176,24 @@ def newton(
     patience = MAX_NEWTON_ITERATIONS if patience is None else patience
     law = problem.law
     residual = law.residual(y, gaps)
-    size = float(np.linalg.norm(residual))
+    norm = float(np.linalg.norm(residual))
     best = y, gaps, np.inf
     for iteration in range(patience + 1):
         largest = float(np.abs(y).max())
-        off = float(np.abs(residual).max())
-        relative = off / largest if largest else float(off > problem.round_off)
+        largest_residual = float(np.abs(residual).max())
+        relative = largest_residual / largest if largest else float(largest_residual > problem.round_off)
         if relative < best[2]:
             best = y, gaps, relative
-        settled = iteration >= least and off <= exact * largest + problem.round_off
+        settled = iteration >= least and largest_residual <= exact * largest + problem.round_off
         if settled or iteration == patience:
             break
-        trial, gaps_there = problem.step(y, gaps, *law.state(y, gaps))
-        step, change = trial - y, gaps_there - gaps
+        trial, trial_gaps = problem.step(y, gaps, *law.state(y, gaps))
+        step, change = trial - y, trial_gaps - gaps
         damping = 1.0
         while (
             line_search
             and np.linalg.norm(law.residual(y + damping * step, gaps + damping * change))
-            > (1 - DECREASE * damping) * size
+            > (1 - DECREASE * damping) * norm
         ):
             damping *= 0.5
             if (
@@ -201,9 +201,9 @@ def newton(
             ):  # at a kink there may be no step that decreases the residual: take the full step
                 damping = 1.0
                 break
-        y, gaps = (trial, gaps_there) if damping == 1.0 else (y + damping * step, gaps + damping * change)
+        y, gaps = (trial, trial_gaps) if damping == 1.0 else (y + damping * step, gaps + damping * change)
         residual = law.residual(y, gaps)
-        size = float(np.linalg.norm(residual))
+        norm = float(np.linalg.norm(residual))
     if not settled:
         y, gaps, relative = best
     return Forces(y, gaps, *law.state(y, gaps), settled, relative, iteration)

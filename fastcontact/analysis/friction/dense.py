@@ -78,8 +78,8 @@ def solve(
     if guess is not None:
         guess = guess / (length * unit)
     for compliance in REGULARISATION if _dependent(F) else (0.0,):
-        given = np.append(np.flatnonzero(equality), np.arange(m, len(F)))
-        F[given, given] += compliance
+        regularised = np.append(np.flatnonzero(equality), np.arange(m, len(F)))
+        F[regularised, regularised] += compliance
         problem = _Problem(F, free * unit / length, law)
         for start, line_search in problem.starts(closed, guess):
             # At least one iteration: the residual of forces of an earlier geometry update may be below the round-off bound,
@@ -87,7 +87,7 @@ def solve(
             forces = newton(problem, start, problem.gaps(start), line_search=line_search, least=1)
             iterations += 1 + forces.iterations
             if best is None or forces.residual < best.residual:
-                best, elastic_slip = forces, compliance * float(np.abs(forces.y.ravel()[given]).max(initial=0.0))
+                best, elastic_slip = forces, compliance * float(np.abs(forces.y.ravel()[regularised]).max(initial=0.0))
             if forces.settled:
                 break
         if best is not None and best.settled and elastic_slip <= SINGLE_PRECISION:
@@ -124,12 +124,12 @@ class _Problem:
 
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
         """See `cone_newton.Linearised`."""
-        new, rows = np.zeros_like(y), np.flatnonzero(closed)
+        forces, rows = np.zeros_like(y), np.flatnonzero(closed)
         if len(rows):
             A, D = _equations(self.law, self.F, y, gaps, rows, sticking)
-            right = -np.einsum("abq,bq->aq", D, self.free[:, rows])
-            new[:, rows] = _solved(A, right.ravel()).reshape(right.shape)
-        return new, self.gaps(new)
+            right_side = -np.einsum("abq,bq->aq", D, self.free[:, rows])
+            forces[:, rows] = _solved(A, right_side.ravel()).reshape(right_side.shape)
+        return forces, self.gaps(forces)
 
     def starts(self, closed: Mask, guess: Array | None) -> Iterator[tuple[Array, bool]]:
         """Yield initial forces (1 + k, m) of Newton's method and whether to use a line search, in order of increasing cost.
@@ -142,19 +142,19 @@ class _Problem:
             yield guess, True
         equality = self.law.equality
         sticking = closed & ~equality if (closed & ~equality).any() else (self.free[0] < 0) & ~equality
-        stuck = self.step(np.zeros_like(self.free), self.free, sticking | equality, sticking)[0]
-        yield stuck, True
-        yield self._softened(stuck), True
+        stick_forces = self.step(np.zeros_like(self.free), self.free, sticking | equality, sticking)[0]
+        yield stick_forces, True
+        yield self._softened(stick_forces), True
         if guess is not None:
             yield guess, False
-        yield stuck, False
+        yield stick_forces, False
         for edges in EDGES if len(self.free) == 3 else (2,):
             edge_forces = _on_edges(self, edges)
             if edge_forces is not None:
                 yield edge_forces, True
 
     def _softened(self, y: Array) -> Array:
-        """Return forces (1 + k, m) near a solution: those with a compliance that decreases to round-off, from `y` on."""
+        """Return forces (1 + k, m) near a solution, from `y` with a compliance that decreases to round-off."""
         compliance, last = SOFT, 1.0
         while ROUND_OFF < compliance < SMALLEST_STEP * last:
             softened = _Problem(self.F + compliance * np.eye(len(self.F)), self.free, self.law)
@@ -195,8 +195,8 @@ def response(F: Array, law: Law, forces: Forces) -> Callable[[Array], Array]:
     factors = lu_factors(A)
 
     def varied(gaps: Array) -> Array:
-        change, right = np.zeros_like(gaps), -np.einsum("abq,bq->aq", D, (gaps * unit)[:, rows])
-        change[:, rows] = lu_solve(factors, right.ravel()).reshape(right.shape)
+        change, right_side = np.zeros_like(gaps), -np.einsum("abq,bq->aq", D, (gaps * unit)[:, rows])
+        change[:, rows] = lu_solve(factors, right_side.ravel()).reshape(right_side.shape)
         return change * unit
 
     return varied
@@ -235,8 +235,8 @@ def _on_edges(problem: _Problem, edges: int) -> Array | None:
     if size > LARGEST:
         return None
     angle = 2 * np.pi * np.arange(edges) / edges
-    along = np.column_stack([np.cos(angle), np.sin(angle)])[:, :k]
-    X = np.kron(np.block([[np.ones((1, 1)), np.zeros((1, edges))], [np.zeros((k, 1)), along.T]]), np.eye(m))
+    edge_directions = np.column_stack([np.cos(angle), np.sin(angle)])[:, :k]
+    X = np.kron(np.block([[np.ones((1, 1)), np.zeros((1, edges))], [np.zeros((k, 1)), edge_directions.T]]), np.eye(m))
     X = np.hstack([X, -np.eye(len(X))[:, equations]])
     M = np.zeros((size, size))
     M[:last, :last] = X.T @ problem.F @ X
@@ -277,17 +277,17 @@ def lemke(M: Array, q: Array, max_pivots: int) -> tuple[Array | None, int]:
     # Rows: basic variables as affine functions of the nonbasic ones. The variable w_i has the number i, z_i the number n + i,
     # and the artificial variable the number 2 n.
     table = np.column_stack([M, np.ones(n), q])
-    basic, others = np.arange(n), np.arange(n, 2 * n + 1)
+    basic, nonbasic = np.arange(n), np.arange(n, 2 * n + 1)
     row, column = int(q.argmin()), n
     for count in range(1, max_pivots + 1):
         _exchange(table, row, column)
         leaving = int(basic[row])
-        basic[row], others[column] = others[column], leaving
+        basic[row], nonbasic[column] = nonbasic[column], leaving
         if leaving == 2 * n:
             in_basis = basic >= n
             z[basic[in_basis] - n] = np.maximum(table[in_basis, -1], 0.0)
             return z, count
-        column = int(np.flatnonzero(others == (leaving + n if leaving < n else leaving - n))[0])
+        column = int(np.flatnonzero(nonbasic == (leaving + n if leaving < n else leaving - n))[0])
         blocking = _blocking(table, basic, column)
         if blocking is None:
             return None, count

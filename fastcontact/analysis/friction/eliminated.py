@@ -80,7 +80,7 @@ def solve(
             state = problem.law.state(y, gaps)
         # At least one step is necessary, because initial forces and displacements are not in equilibrium.
         y, gaps = problem.step(y, gaps, *state)
-        if not state[0].any():  # all were open: close those that penetrate in the solution without contact
+        if not state[0].any():  # if all were open, close those that penetrate in the solution without contact
             y, gaps = problem.step(y, gaps, gaps[0] < 0.0, gaps[0] < 0.0)
         exact = max(ROUND_OFF, ENOUGH * tolerance)
         iterate = newton(problem, y, gaps, exact, 0 if accuracy.inexact else None)
@@ -91,7 +91,7 @@ def solve(
             iterate = replace(iterate, settled=iterate.residual <= ACCEPTABLE * tolerance)
             if not iterate.settled:
                 return None
-        if iterate.y is not problem.reached:  # a damped step: displacements are only known at the ends of full steps
+        if iterate.y is not problem.reached:  # after a damped step: displacements are only known at full steps
             problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)
     except ConvergenceError:
         return None
@@ -121,38 +121,40 @@ class Eliminated:
         self._inexact, self._last = inexact, tolerance
         self._nodes = np.arange(len(constraints)) if constraints.nodes is None else constraints.nodes
         k, m = len(rows) - 1, len(constraints)
-        yielding = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
-        self._gives = diagonal_compliance(constraints)
-        compliance = self._compliance_of_rows(rows, yielding)
+        unknown_compliance = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
+        self._compliance = diagonal_compliance(constraints)
+        compliance = self._compliance_of_rows(rows, unknown_compliance)
         self._turn = aligning(compliance, constraints.directions) if k == 2 else None
         if self._turn is not None:
             turned = csr_array(self._turn @ vstack(rows, format="csr"))
             rows = tuple(turned[a * m : (a + 1) * m] for a in range(3))
             free = (self._turn @ free.ravel()).reshape(free.shape)
-            compliance = self._compliance_of_rows(rows, yielding)
-        still = idle(compliance)
-        moved = still & constraints.moved_past(np.arange(m), self._turn)
-        self._gives[1:][moved] += np.broadcast_to(GIVING * compliance[0, 0], still.shape)[moved]
-        slipping = [scaled(T, np.where(off, 0.0, 1.0)) for T, off in zip(rows[1:], still, strict=True)]
-        self._rows = (rows[0], *slipping)
-        self._free = np.vstack([free[0], np.where(still & ~moved, 0.0, free[1:])])
-        self._slips = ~still | moved
+            compliance = self._compliance_of_rows(rows, unknown_compliance)
+        idle_slips = idle(compliance)
+        prescribed = idle_slips & constraints.moved_past(np.arange(m), self._turn)
+        self._compliance[1:][prescribed] += np.broadcast_to(GIVING * compliance[0, 0], idle_slips.shape)[prescribed]
+        slip_rows = [scaled(T, np.where(is_idle, 0.0, 1.0)) for T, is_idle in zip(rows[1:], idle_slips, strict=True)]
+        self._rows = (rows[0], *slip_rows)
+        self._free = np.vstack([free[0], np.where(idle_slips & ~prescribed, 0.0, free[1:])])
+        self._slips = ~idle_slips | prescribed
         softer = SOFTER / np.sqrt(max(1.0, loaded.contrast / MILD))
-        self._unit = np.sqrt(1.0 / (np.where(compliance[0, 0] > 0.0, compliance[0, 0], 1.0) / softer + self._gives[0]))
+        self._unit = np.sqrt(
+            1.0 / (np.where(compliance[0, 0] > 0.0, compliance[0, 0], 1.0) / softer + self._compliance[0])
+        )
         self.law = Law(np.where(usable, mu, 0.0), constraints.equality & usable)
         self.u = u
         self.round_off = float(
             16 * np.finfo(float).eps * np.abs(self._unit * self._gaps(u))[:, usable].max(initial=0.0)
         )
 
-    def _compliance_of_rows(self, rows: tuple[csr_array, ...], yielding: Array) -> Array:
+    def _compliance_of_rows(self, rows: tuple[csr_array, ...], unknown_compliance: Array) -> Array:
         """Return the sum of `compliance_of_rows` and the tangential compliance of the constraints themselves.
 
         Tangents with such a compliance are thus not idle.
         """
-        compliance = compliance_of_rows(rows, yielding)
+        compliance = compliance_of_rows(rows, unknown_compliance)
         slips = np.arange(1, len(rows))
-        compliance[slips, slips] += self._gives[1:]
+        compliance[slips, slips] += self._compliance[1:]
         return compliance
 
     def start(self, forces: Array | None) -> tuple[Array, Array]:
@@ -176,7 +178,8 @@ class Eliminated:
         return Forces(y, gaps, scaled.closed, scaled.sticking, scaled.settled, scaled.residual, 1 + scaled.iterations)
 
     def _gaps(self, u: Array, forces: Array | float = 0.0) -> Array:
-        return self._free + np.stack([R @ u for R in self._rows]) + self._gives * forces
+        """Return gaps and slips (1 + k, m) at unknowns u (n,) [length], with the compliance under `forces` [force]."""
+        return self._free + np.stack([R @ u for R in self._rows]) + self._compliance * forces
 
     def _scaled(self, gaps: Array) -> Array:
         """Return scaled gaps (1 + k, m), given `gaps` [length]; constraints that cannot close get a positive gap."""
@@ -187,23 +190,23 @@ class Eliminated:
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
         """See `cone_newton.Linearised.step`."""
         closed = closed & self._usable
-        shut = np.flatnonzero(closed)
-        equations = (shut, *(np.flatnonzero(closed & sticking & slips) for slips in self._slips))
-        B = csr_array(vstack([taken(R, at) for R, at in zip(self._rows, equations, strict=True)], format="csr"))
-        c = -np.concatenate([free[at] for free, at in zip(self._free, equations, strict=True)])
+        closed_rows = np.flatnonzero(closed)
+        equations = (closed_rows, *(np.flatnonzero(closed & sticking & slips) for slips in self._slips))
+        B = csr_array(vstack([taken(R, rows) for R, rows in zip(self._rows, equations, strict=True)], format="csr"))
+        c = -np.concatenate([free[rows] for free, rows in zip(self._free, equations, strict=True)])
         sliding = self._sliding(y, gaps, np.flatnonzero(closed & ~sticking & (self.law.mu > 0.0)))
-        drag = self._drag(B, shut, sliding) if len(sliding.at) else None
+        friction_terms = self._friction_terms(B, closed_rows, sliding) if len(sliding.at) else None
         nodes = self._nodes[np.concatenate(equations)]
-        C = np.concatenate([gives[at] for gives, at in zip(self._gives, equations, strict=True)])
+        C = np.concatenate([compliance[rows] for compliance, rows in zip(self._compliance, equations, strict=True)])
         self._last = self._accuracy(y, gaps)
-        u, multiplier = self._loaded.solve_nonsymmetric(B, c, nodes, self.u, self._last, drag, C)
-        new, first = np.zeros_like(y), 0
-        for increment, at in zip(new, equations, strict=True):
-            increment[at] = multiplier[first : first + len(at)]
-            first += len(at)
-        new[1:, sliding.at] += sliding.force(new[0, sliding.at], u)
-        self.u, self.reached = u, new / self._unit
-        return self.reached, self._scaled(self._gaps(u, new))
+        u, multiplier = self._loaded.solve_nonsymmetric(B, c, nodes, self.u, self._last, friction_terms, C)
+        forces, first = np.zeros_like(y), 0
+        for component, rows in zip(forces, equations, strict=True):
+            component[rows] = multiplier[first : first + len(rows)]
+            first += len(rows)
+        forces[1:, sliding.at] += sliding.force(forces[0, sliding.at], u)
+        self.u, self.reached = u, forces / self._unit
+        return self.reached, self._scaled(self._gaps(u, forces))
 
     def _accuracy(self, y: Array, gaps: Array) -> float:
         """Return the relative residual to which the linear system of a step from forces `y` and `gaps` is solved.
@@ -213,9 +216,9 @@ class Eliminated:
         """
         if not self._inexact:
             return self._tolerance
-        size = float(np.abs(y).max(initial=0.0))
-        off = float(np.abs(self.law.residual(y, gaps)).max(initial=0.0))
-        return max(self._tolerance, min(RESIDUAL * off / size, LOOSEST) if size else LOOSEST)
+        force = float(np.abs(y).max(initial=0.0))
+        residual = float(np.abs(self.law.residual(y, gaps)).max(initial=0.0))
+        return max(self._tolerance, min(RESIDUAL * residual / force, LOOSEST) if force else LOOSEST)
 
     def finish(self) -> bool:
         """Use the full tolerance in further steps; return whether the last step was less accurate."""
@@ -231,24 +234,24 @@ class Eliminated:
         across = np.stack([-d[1], d[0]])
         rows = sum(scaled(taken(T, at), factor) for factor, T in zip(across, self._rows[1:], strict=True))
         spring = np.minimum(turning / np.maximum(1.0 - turning, TINY), STIFFEST) * self._unit[at] ** 2
-        spring = spring / (1.0 + spring * self._gives[1, at])  # in series with the compliance of the constraint
+        spring = spring / (1.0 + spring * self._compliance[1, at])  # in series with the compliance of the constraint
         return _Sliding(
             at, pull, _Across(across, Springs(csr_array(rows), spring), (across * self._free[1:, at]).sum(axis=0))
         )
 
-    def _drag(self, B: csr_array, shut: Indices, sliding: _Sliding) -> FrictionTerms:
-        """Return the friction terms of the linear system, whose equations `B` begin with the gaps of constraints `shut`."""
+    def _friction_terms(self, B: csr_array, closed_rows: Indices, sliding: _Sliding) -> FrictionTerms:
+        """Return the friction terms of the linear system, whose equations `B` begin with the gaps of `closed_rows`."""
         pull = np.zeros((len(self._rows) - 1, len(self._usable)))
         pull[:, sliding.at] = sliding.pull
-        through = taken(self._rows[0], shut)
+        force_rows = taken(self._rows[0], closed_rows)
         for T, factor in zip(self._rows[1:], pull, strict=True):
-            through = through + scaled(taken(T, shut), factor[shut])
-        through = csr_array(vstack([through, B[len(shut) :]], format="csr"))
+            force_rows = force_rows + scaled(taken(T, closed_rows), factor[closed_rows])
+        force_rows = csr_array(vstack([force_rows, B[len(closed_rows) :]], format="csr"))
         if sliding.springs is None:
-            return FrictionTerms(through)
+            return FrictionTerms(force_rows)
         across = sliding.springs
-        pushed = across.springs.rows.T @ (across.springs.stiffness * across.free)
-        return FrictionTerms(through, across.springs, -pushed)
+        preload = across.springs.rows.T @ (across.springs.stiffness * across.free)
+        return FrictionTerms(force_rows, across.springs, -preload)
 
 
 def diagonal_compliance(constraints: Constraints) -> Array:
@@ -294,8 +297,8 @@ class _Sliding:
 
     def force(self, normal: Array, u: Array) -> Array:
         """Return the tangential forces (k, q) for normal forces (q,) [force] and unknowns u (n,) [length]."""
-        dragged = self.pull * normal
+        friction = self.pull * normal
         if self.springs is None:
-            return dragged
+            return friction
         across, springs = self.springs, self.springs.springs
-        return np.asarray(dragged - across.along * springs.stiffness * (springs.rows @ u + across.free))
+        return np.asarray(friction - across.along * springs.stiffness * (springs.rows @ u + across.free))

@@ -2,11 +2,10 @@
 
 If a load step is solved at once, the slip of a constraint is counted from the beginning of the step, although a constraint
 that closes within the step slides only after it has closed. Here the load increment is divided at the instants at which
-constraints close, and constraints carry no forces before. In 3D several constraints close in one increment; each slides from
-its own instant. These instants are found by linear interpolation of gaps: with
-the geometry and the Delassus operator F at the end of the step, gaps vary linearly with the load while no constraint closes
-or opens, and none changes between stick and slip. The result therefore hardly depends on whether a force or a motion grows
-linearly in the step.
+constraints close, and constraints carry no forces before they close. In 3D several constraints close in one increment; each
+slides from its own instant. These instants are found by linear interpolation of gaps. With the geometry and the Delassus
+operator F at the end of the step, gaps vary linearly with the load while no constraint closes or opens, and none changes
+between stick and slip. The result therefore hardly depends on whether a force or a motion grows linearly in the step.
 
 Let ``(g, s) = free + F y`` be the gaps and slips at the end of the step for forces y. At its beginning there are gaps g0,
 forces y0 and no slips. At a fraction p of the step, gaps and slips for forces y are
@@ -31,8 +30,8 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.round_off import SINGLE_PRECISION
 
-# Calculation of an increment from gaps and slips (1 + k, m) [length] to be added, constraints (m,) that may close, those of
-# them that are closed initially, and initial forces (1 + k, m) [force] or None.
+# Function that solves an increment, given gaps and slips (1 + k, m) [length] to be added, the constraints (m,) that may
+# close, those of them that are closed initially, and initial forces (1 + k, m) [force] or None.
 Increment = Callable[[Array, Mask, Mask, Array | None], Forces]
 # Largest number of constraints that begin to carry forces together, relative to the number of closed ones.
 GROWTH = 1 / 32
@@ -66,7 +65,7 @@ def along(
         [force] at the beginning of the last increment; see `Slid`.
     """
     closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros(lag.shape[1]), 0, True
-    gap = now = closing[0]
+    gap = last_gap = closing[0]
     approach = np.zeros_like(slip)
     added = np.where(gap > 0.0, closing[1:], 0.0)
     lag = lag + np.vstack([np.zeros_like(gap), added])
@@ -76,23 +75,23 @@ def along(
         remaining[1:] -= slip
         return solve(remaining, ~waiting, closed, y if y.any() else None)
 
-    def slid(since: Array, gaps: Array) -> Array:
-        """Return the slips (k, m) of slips `since` (k, m) and the closing motion of gaps (m,), which is removed."""
-        left = np.divide(np.maximum(gaps, 0.0), gap, out=np.zeros_like(gap), where=gap > 0.0)
-        return np.asarray(slip + since - left * added)
+    def slip_after(since: Array, gaps: Array) -> Array:
+        """Return the slips (k, m) after further slips `since` (k, m), less the closing motion of open `gaps` (m,)."""
+        open_fraction = np.divide(np.maximum(gaps, 0.0), gap, out=np.zeros_like(gap), where=gap > 0.0)
+        return np.asarray(slip + since - open_fraction * added)
 
     begin = 0.0
     while begin < 1.0:
         end, forces = 1.0, increment(1.0)
         iterations += forces.iterations
         if (waiting & (forces.gaps[0] < 0.0)).any():
-            # In 3D as many constraints close together as a row at the edge of the closed ones has.
+            # In 3D about as many constraints close together as lie along the edge of the closed region.
             together = max(int(closed.sum() ** (1.0 - 1.0 / len(slip))), int(GROWTH * closed.sum()), 1)
-            instants, touching = _touching(now, forces.gaps[0], waiting, together)
-            part = min(float(instants[touching].max()), 1.0)
-            end = begin + part * (1.0 - begin)
+            instants, touching = _touching(last_gap, forces.gaps[0], waiting, together)
+            fraction = min(float(instants[touching].max()), 1.0)
+            end = begin + fraction * (1.0 - begin)
             slip = np.where(
-                touching, slid(np.where(touching, instants, 0.0) * forces.gaps[1:], np.zeros_like(gap)), slip
+                touching, slip_after(np.where(touching, instants, 0.0) * forces.gaps[1:], np.zeros_like(gap)), slip
             )
             approach = np.where(touching, slip, approach)
             waiting = waiting & ~touching
@@ -100,24 +99,24 @@ def along(
             iterations += forces.iterations
         before = slip, approach, work.copy(), y[0]
         work += friction_work(y[0], forces.y[0], forces.y[1:], np.where(forces.closed, forces.gaps[1:], 0.0))
-        whole = slip + forces.gaps[1:]
-        slip = slid(forces.gaps[1:], forces.gaps[0])
-        begin, y, closed, now = end, forces.y, forces.closed, forces.gaps[0]
+        total_slip = slip + forces.gaps[1:]
+        slip = slip_after(forces.gaps[1:], forces.gaps[0])
+        begin, y, closed, last_gap = end, forces.y, forces.closed, forces.gaps[0]
         settled &= forces.settled
-    gaps = np.vstack([forces.gaps[:1], whole])
+    gaps = np.vstack([forces.gaps[:1], total_slip])
     return replace(forces, iterations=iterations, settled=settled), gaps, before
 
 
-def _touching(now: Array, end: Array, waiting: Mask, count: int) -> tuple[Array, Mask]:
+def _touching(begin: Array, end: Array, waiting: Mask, count: int) -> tuple[Array, Mask]:
     """Return the fractions (m,) of the remaining step at which constraints close, and the next `count` of them (m,).
 
-    `now` and `end` are the gaps (m,) now and at the end of the step, if the `waiting` constraints (m,) carry no forces
+    `begin` and `end` are the gaps (m,) now and at the end of the step, if the `waiting` constraints (m,) carry no forces
     [length]. Fractions of constraints that do not close are infinite.
     """
     closing = waiting & (end < 0.0)
     # Constraints that penetrate more now than at the end close at once.
     instants = np.where(closing, 0.0, np.inf)
-    fraction = np.divide(np.maximum(now, 0.0), now - end, out=instants, where=closing & (now > end))
+    fraction = np.divide(np.maximum(begin, 0.0), begin - end, out=instants, where=closing & (begin > end))
     last = np.sort(fraction[closing])[:count][-1]
     return fraction, closing & (fraction <= last * (1.0 + SINGLE_PRECISION))
 

@@ -4,8 +4,8 @@ At a constraint on a symmetry plane or on an axis, supports prevent slip along o
 such tangents by the compliance of each constraint, rotate the two tangents of a constraint in 3D so that one of them is the
 direction in which slip is prevented, and mark this tangent as idle.
 
-The compliance of m constraints, each on its own, is an array (1 + k, 1 + k, m): the changes of the gap and of the k slips
-of a constraint by its normal force and its k tangential forces [length / force], in this order.
+The compliance of m constraints, without their coupling, is an array (1 + k, 1 + k, m): the changes of the gap and of the k
+slips of a constraint by its normal force and its k tangential forces [length / force], in this order.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ def own_compliance(F: Array, parts: int) -> Array:
     return np.asarray(F[index[:, None], index[None]])
 
 
-def compliance_of_rows(rows: tuple[csr_array, ...], yielding: Array) -> Array:
+def compliance_of_rows(rows: tuple[csr_array, ...], unknown_compliance: Array) -> Array:
     """Return the compliance (1 + k, 1 + k, m) of each constraint for a diagonal stiffness matrix.
 
     Parameters
     ----------
     rows : tuple of csr_array (m, n)
         Derivatives of the gaps, and of the slips along each of k tangents, with respect to the n unknowns [-].
-    yielding : ndarray (n,)
+    unknown_compliance : ndarray (n,)
         Compliance of each unknown, the reciprocal of its stiffness [length / force].
     """
-    weighted = [csr_array((R.data * yielding[R.indices], R.indices, R.indptr), shape=R.shape) for R in rows]
+    weighted = [csr_array((R.data * unknown_compliance[R.indices], R.indices, R.indptr), shape=R.shape) for R in rows]
     return np.array([[weighted_rows.multiply(R).sum(axis=1) for R in rows] for weighted_rows in weighted])
 
 
@@ -71,10 +71,10 @@ def aligning(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array
     mixed = compliance[1, 2] - compliance[1, 0] * compliance[2, 0] / gap
     radius = np.hypot(0.5 * (first - second), mixed)
     largest, least = 0.5 * (first + second) + radius, 0.5 * (first + second) - radius
-    across = (least <= TOLERANCE * np.maximum(largest, gap)) & (np.abs(mixed) > TOLERANCE * np.maximum(largest, gap))
-    if not across.any() and not directions:
+    oblique = (least <= TOLERANCE * np.maximum(largest, gap)) & (np.abs(mixed) > TOLERANCE * np.maximum(largest, gap))
+    if not oblique.any() and not directions:
         return None
-    angle = np.where(across, 0.5 * np.arctan2(2 * mixed, first - second), _to_axes(*directions) if directions else 0.0)
+    angle = np.where(oblique, 0.5 * np.arctan2(2 * mixed, first - second), _to_axes(*directions) if directions else 0.0)
     c, s, zero = diags_array(np.cos(angle)), diags_array(np.sin(angle)), csr_array((m, m))
     return csr_array(block_array([[diags_array(np.ones(m)), zero, zero], [zero, c, s], [zero, -s, c]], format="csr"))
 
@@ -89,16 +89,16 @@ def _to_axes(tangent: Array, second_tangent: Array) -> Array:
     return np.asarray(np.arctan2((aligned * second_tangent).sum(axis=1), (aligned * tangent).sum(axis=1)))
 
 
-def idle(directions: Array) -> Mask:
-    """Return which tangents (k, m) are idle, given the compliance `directions` (1 + k, 1 + k, m) of each constraint.
+def idle(compliance: Array) -> Mask:
+    """Return which tangents (k, m) are idle, given the `compliance` (1 + k, 1 + k, m) of each constraint.
 
     Along an idle tangent, supports allow no motion, or only a motion that is proportional to the change of the gap. The
     equation of its slip would be empty or linearly dependent. This occurs on axes and in planes of symmetry. Compliances are
     no more accurate than the solutions of iterative solvers.
     """
-    k = len(directions) - 1
-    along = directions[np.arange(1, k + 1), np.arange(1, k + 1)]
+    k = len(compliance) - 1
+    of_slips = compliance[np.arange(1, k + 1), np.arange(1, k + 1)]
     return np.asarray(
-        along * directions[0, 0] - directions[1:, 0] ** 2
-        <= TOLERANCE * directions[0, 0] * np.maximum(along, directions[0, 0])
+        of_slips * compliance[0, 0] - compliance[1:, 0] ** 2
+        <= TOLERANCE * compliance[0, 0] * np.maximum(of_slips, compliance[0, 0])
     )

@@ -5,8 +5,8 @@ load step are ``(g, s) = free + F (n, t)``, where `free` are their values withou
 ``F = R K^-1 R.T + C``, where K is the stiffness matrix, R contains the derivatives of gaps and slips with respect to the
 displacements, and C is the compliance of the constraints themselves. `dense` solves this problem without regularisation,
 unless slips are linearly dependent: the slip of a sticking constraint is zero, and the force of a sliding constraint lies on
-the friction cone. If the linear solver
-can eliminate constraints, `eliminated` is tried first. It solves the same problem without forming F.
+the friction cone. If the linear solver can eliminate constraints, `eliminated` is tried first. It solves the same problem
+without forming F.
 """
 
 from __future__ import annotations
@@ -63,23 +63,23 @@ def solve(
         Data at the beginning of the step, if it is solved in increments along the load path.
     """
     forces = None if guess is None else guess.forces_along(constraints.directions, len(constraints))
-    together = constraints.coupled
-    if isinstance(loaded, LoadedNonsymmetric) and not together:
-        equilibrium = _eliminated(loaded, constraints, closed, accuracy, u, forces, path)
-        if equilibrium is not None:
-            return equilibrium
+    coupled = constraints.coupled
+    if isinstance(loaded, LoadedNonsymmetric) and not coupled:
+        solution = _eliminated(loaded, constraints, closed, accuracy, u, forces, path)
+        if solution is not None:
+            return solution
         log.info("friction: the iteration on eliminated constraints did not converge, their compliance is formed")
     usable = constraints.usable
-    begun = closed | constraints.equality if path is None else closed | constraints.equality | ~path.waiting
-    chosen = usable if together else usable & begun
+    initial = closed | constraints.equality if path is None else closed | constraints.equality | ~path.waiting
+    chosen = usable if coupled else usable & initial
     iterations = 0
     while True:
-        equilibrium = _among(chosen, loaded, constraints, closed, u, forces, path)
-        equilibrium.gap[~usable], equilibrium.slip[~usable] = np.inf, 0.0
-        iterations += equilibrium.iterations
-        missing = usable & ~chosen & (equilibrium.gap < 0.0)
+        solution = _with_chosen(chosen, loaded, constraints, closed, u, forces, path)
+        solution.gap[~usable], solution.slip[~usable] = np.inf, 0.0
+        iterations += solution.iterations
+        missing = usable & ~chosen & (solution.gap < 0.0)
         if not missing.any():
-            return replace(equilibrium, iterations=iterations)
+            return replace(solution, iterations=iterations)
         chosen = chosen | missing
 
 
@@ -95,34 +95,34 @@ def _eliminated(
         solution = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
         if solution is None:
             raise ConvergenceError("friction: the iteration on eliminated constraints did not converge")
-        u, cone = solution
-        cone.gaps[:, ~usable] = 0.0
-        return cone
+        u, result = solution
+        result.gaps[:, ~usable] = 0.0
+        return result
 
-    def beside(offset: Array, among: Mask, closed: Mask, forces: Array | None) -> dense.Forces:
-        at = constraints.gaps_at_rest() + offset
-        at[0, ~among] += far
-        cone = solved(
-            replace(constraints, gap0=at[0], slip0=at[1:], elastic_slip=np.empty(0)), closed, accuracy, forces
+    def increment(offset: Array, carrying: Mask, closed: Mask, forces: Array | None) -> dense.Forces:
+        gaps = constraints.gaps_at_rest() + offset
+        gaps[0, ~carrying] += distance
+        result = solved(
+            replace(constraints, gap0=gaps[0], slip0=gaps[1:], elastic_slip=np.empty(0)), closed, accuracy, forces
         )
-        cone.gaps[0, ~among] -= far
-        return cone
+        result.gaps[0, ~carrying] -= distance
+        return result
 
     try:
         if path is None:
-            cone = solved(constraints, closed, accuracy, forces)
+            result = solved(constraints, closed, accuracy, forces)
         else:
             y, closing = path.along(constraints.directions, np.arange(len(constraints)))
             lag = _lag(loaded, constraints, path, y)
-            far = 4.0 * float(np.abs(lag[0]).max())  # further than constraints can close
-            cone, gaps, before = along(lag, closing, y, path.waiting, beside)
-            cone = replace(cone, gaps=gaps)
+            distance = 4.0 * float(np.abs(lag[0]).max())  # further than constraints can close
+            result, gaps, before = along(lag, closing, y, path.waiting, increment)
+            result = replace(result, gaps=gaps)
     except ConvergenceError:
         return None
-    gap, active = np.where(usable, cone.gaps[0], np.inf), cone.closed & usable
+    gap, active = np.where(usable, result.gaps[0], np.inf), result.closed & usable
     return Solution(
-        u, cone.y[0], gap, active, active, cone.settled, cone.iterations, cone.y[1:].T, cone.gaps[1:].T, cone.sticking,
-        cone.residual, constraints.directions,
+        u, result.y[0], gap, active, active, result.settled, result.iterations, result.y[1:].T, result.gaps[1:].T,
+        result.sticking, result.residual, constraints.directions,
         slid=None if before is None else _slid(before, None, np.arange(len(constraints)), constraints),
     )  # fmt: skip
 
@@ -136,7 +136,7 @@ def _lag(loaded: Loaded, constraints: Constraints, path: Path, y: Array) -> Arra
     return np.where(constraints.usable, lag, 0.0)
 
 
-def _among(
+def _with_chosen(
     chosen: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None, path: Path | None
 ) -> Solution:  # fmt: skip
     """Return the solution with the `chosen` constraints (m,) alone, by the dense Delassus operator.
@@ -151,47 +151,47 @@ def _among(
     at_rest = constraints.gaps_at_rest()
     free, F = loaded.delassus(R)
     slips = np.arange(len(rows), len(F))
-    # Before idle tangents are detected: compliant ones are not idle.
+    # This compliance is added before idle tangents are detected, since compliant tangents are not idle.
     F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
     Q = aligning(own_compliance(F, 3)) if k == 2 else None
     C = own_compliance(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k)
     idle_slips = idle(C)
-    still = np.flatnonzero(idle_slips) + len(rows)
+    idle_rows = np.flatnonzero(idle_slips) + len(rows)
     _add_compliance(F, constraints, rows)
     free = free.reshape(1 + k, -1) + at_rest[:, rows]
-    start = None if forces is None else forces[:, rows]
-    begin, closing = np.zeros_like(free), np.zeros_like(free)
+    guess = None if forces is None else forces[:, rows]
+    y0, closing = np.zeros_like(free), np.zeros_like(free)
     if path is not None:
-        begin, closing = path.along(constraints.directions, rows)
+        y0, closing = path.along(constraints.directions, rows)
     if Q is not None:
         F = np.asarray(Q @ (Q @ F).T)
-        free, begin, closing = ((Q @ values.ravel()).reshape(free.shape) for values in (free, begin, closing))
-        start = None if start is None else (Q @ start.ravel()).reshape(free.shape)
-    if len(still):
-        moved = idle_slips & constraints.moved_past(rows, Q)
-        F[still], F[:, still] = 0.0, 0.0
-        F[still, still] = np.where(moved, GIVING * C[0, 0], np.diag(F).max())[idle_slips]
-        free[1:][idle_slips & ~moved] = 0.0
-        begin[1:][idle_slips], closing[1:][idle_slips] = 0.0, 0.0
+        free, y0, closing = ((Q @ values.ravel()).reshape(free.shape) for values in (free, y0, closing))
+        guess = None if guess is None else (Q @ guess.ravel()).reshape(free.shape)
+    if len(idle_rows):
+        prescribed = idle_slips & constraints.moved_past(rows, Q)
+        F[idle_rows], F[:, idle_rows] = 0.0, 0.0
+        F[idle_rows, idle_rows] = np.where(prescribed, GIVING * C[0, 0], np.diag(F).max())[idle_slips]
+        free[1:][idle_slips & ~prescribed] = 0.0
+        y0[1:][idle_slips], closing[1:][idle_slips] = 0.0, 0.0
     mu, equations = constraints.friction[rows], constraints.equality[rows]
     if path is None:
-        result, before = dense.solve(F, free, mu, closed[rows], start, equations), None
-        relative = result.gaps
+        result, before = dense.solve(F, free, mu, closed[rows], guess, equations), None
+        gaps_of_chosen = result.gaps
     else:
-        lag = -free - (F @ begin.ravel()).reshape(free.shape)
+        lag = -free - (F @ y0.ravel()).reshape(free.shape)
         lag[0] += closing[0]
 
-        def increment(beside: Array, among: Mask, closed: Mask, start: Array | None) -> dense.Forces:
-            return _with_forces_among(F, free + beside, mu, among, closed, equations, start)
+        def increment(offset: Array, carrying: Mask, closed: Mask, guess: Array | None) -> dense.Forces:
+            return _with_forces_among(F, free + offset, mu, carrying, closed, equations, guess)
 
-        result, relative, before = along(lag, closing, begin, path.waiting[rows], increment)
+        result, gaps_of_chosen, before = along(lag, closing, y0, path.waiting[rows], increment)
     y = result.y
     if Q is not None:
-        y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
+        y, gaps_of_chosen = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ gaps_of_chosen.ravel()).reshape(y.shape)
     u = loaded.involved_solution(R.T @ y.ravel(), u)
-    full = np.zeros((1 + k, m))
+    all_forces = np.zeros((1 + k, m))
     gaps = at_rest + np.stack([matrix @ u for matrix in (constraints.B, *constraints.tangents)])
-    full[:, rows], gaps[:, rows] = y, relative
+    all_forces[:, rows], gaps[:, rows] = y, gaps_of_chosen
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = result.closed, result.sticking
 
@@ -199,14 +199,16 @@ def _among(
     mu = np.where(equations, 0.0, mu)
     at_end = replace(result, sticking=result.sticking & ~equations)
     return Solution(
-        u, full[0], gaps[0], active, active, result.settled, result.iterations, full[1:].T, gaps[1:].T, sticking,
-        result.residual, constraints.directions, slid=None if before is None else _slid(before, Q, rows, constraints),
+        u, all_forces[0], gaps[0], active, active, result.settled, result.iterations, all_forces[1:].T, gaps[1:].T,
+        sticking, result.residual, constraints.directions,
+        slid=None if before is None else _slid(before, Q, rows, constraints),
         response=partial(_response, loaded, (R, rows, Q), idle_slips, (F, Law(mu, equations), at_end)),
     )  # fmt: skip
 
 
 def _response(
-    loaded: Loaded, among: tuple[csr_array, Indices, csr_array | None], held: Mask, forces: tuple[Array, Law, dense.Forces]
+    loaded: Loaded, among: tuple[csr_array, Indices, csr_array | None], idle_slips: Mask,
+    forces: tuple[Array, Law, dense.Forces],
 ) -> Response:  # fmt: skip
     """Return the linear response of a solution to additional forces and gaps.
 
@@ -215,7 +217,7 @@ def _response(
     loaded : Loaded
     among : (csr_array ((1 + k) q, n), ndarray of int (q,), csr_array or None)
         R, and the numbers of its q constraints; rotation Q of their tangents.
-    held : ndarray of bool (k, q)
+    idle_slips : ndarray of bool (k, q)
         Idle tangents, along which slips do not vary.
     forces : tuple
         Arguments of `dense.response`.
@@ -223,8 +225,8 @@ def _response(
     (R, rows, Q), varied = among, dense.response(*forces)
 
     def forces_of(values: Array) -> Array:
-        values = (values if Q is None else Q @ values).reshape(1 + len(held), len(rows))
-        values[1:][held] = 0.0
+        values = (values if Q is None else Q @ values).reshape(1 + len(idle_slips), len(rows))
+        values[1:][idle_slips] = 0.0
         change = varied(values).ravel()
         return change if Q is None else np.asarray(Q.T @ change)
 
@@ -252,11 +254,11 @@ def _slid(
     m, dim = constraints.positions.shape
     slid = Slid(np.zeros((m, dim)), np.zeros((m, dim)), np.zeros(m), np.zeros(m))
     for vectors, slip in zip((slid.slip, slid.approach), slips, strict=True):
-        turned = slip
+        unrotated = slip
         if Q is not None:
-            turned = (Q.T @ np.vstack([np.zeros(len(rows)), slip]).ravel()).reshape(-1, len(rows))[1:]
+            unrotated = (Q.T @ np.vstack([np.zeros(len(rows)), slip]).ravel()).reshape(-1, len(rows))[1:]
         tangents = np.stack([tangent[rows] for tangent in constraints.directions])
-        vectors[rows] = np.einsum("km,kmd->md", turned, tangents)
+        vectors[rows] = np.einsum("km,kmd->md", unrotated, tangents)
     slid.work[rows], slid.normal[rows] = work, normal
     return slid
 
@@ -265,7 +267,7 @@ def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
     """Add, in place, the compliance of the constraints `rows` (q,) to their Delassus operator F ((1 + k) q, (1 + k) q)."""
     if constraints.compliance is not None and len(rows):
         frame = np.stack([direction[rows] for direction in constraints.coupled_directions or constraints.directions])
-        F += _turned(constraints.compliance.block(rows), frame)
+        F += _of_components(constraints.compliance.block(rows), frame)
     if constraints.low_rank_compliance.size and len(rows):
         Z = constraints.low_rank_compliance[:, rows].reshape(len(F), -1)
         F += Z @ Z.T
@@ -273,23 +275,23 @@ def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
 
 
 def _with_forces_among(
-    F: Array, free: Array, mu: Array, among: Mask, closed: Mask, equality: Mask, start: Array | None
+    F: Array, free: Array, mu: Array, carrying: Mask, closed: Mask, equality: Mask, start: Array | None
 ) -> dense.Forces:
-    """Return the solution of `dense.solve` if only the constraints `among` (m,) carry forces."""
-    rows = np.flatnonzero(among)
-    unknown = (np.arange(len(free))[:, None] * len(among) + rows).ravel()
+    """Return the solution of `dense.solve` if only the constraints `carrying` (m,) carry forces."""
+    rows = np.flatnonzero(carrying)
+    unknown = (np.arange(len(free))[:, None] * len(carrying) + rows).ravel()
     start = None if start is None else start[:, rows]
-    part = dense.solve(F[np.ix_(unknown, unknown)], free[:, rows], mu[rows], closed[rows], start, equality[rows])
+    result = dense.solve(F[np.ix_(unknown, unknown)], free[:, rows], mu[rows], closed[rows], start, equality[rows])
     y = np.zeros_like(free)
-    y[:, rows] = part.y
-    now, sticking = np.zeros((2, len(among)), bool)
-    now[rows], sticking[rows] = part.closed, part.sticking
-    gaps = free + (F[:, unknown] @ part.y.ravel()).reshape(free.shape)
-    return replace(part, y=y, gaps=gaps, closed=now, sticking=sticking)
+    y[:, rows] = result.y
+    closed_of_all, sticking = np.zeros((2, len(carrying)), bool)
+    closed_of_all[rows], sticking[rows] = result.closed, result.sticking
+    gaps = free + (F[:, unknown] @ result.y.ravel()).reshape(free.shape)
+    return replace(result, y=y, gaps=gaps, closed=closed_of_all, sticking=sticking)
 
 
-def _turned(C: Array, along: Array) -> Array:
-    """Return the compliance ((1 + k) m, (1 + k) m) with respect to normal and tangential forces.
+def _of_components(C: Array, along: Array) -> Array:
+    """Return a compliance ((1 + k) m, (1 + k) m) with respect to the components of forces along normals and tangents.
 
     C couples force vectors. Their components along normals and tangents are coupled by the scalar products of these
     directions, which vary from one constraint to the next.

@@ -1,4 +1,4 @@
-"""Waves round a ring of equal sectors, of which one is modelled (Thomas, Int. J. Numer. Meth. Engng 14, 1979).
+"""Waves in a ring of equal sectors, of which one is modelled (Thomas, Int. J. Numer. Meth. Engng 14, 1979).
 
 A mode of d nodal diameters is a wave: the displacement of sector k is that of the first one, rotated k times and
 multiplied by ``exp(2 pi i d k / N)``. Complex matrices A are represented by real ones of twice the size, ``[[Re A, -Im
@@ -58,31 +58,33 @@ class Sectors:
                     "nodal diameters need one axis and one number of sectors: the cyclic symmetries differ"
                 )
         points = model.mesh.points
-        off = points[first.second].mean(axis=0) - first.turn @ points[first.first].mean(axis=0)
+        offset = points[first.second].mean(axis=0) - first.turn @ points[first.first].mean(axis=0)
         return cls(
-            first.sectors, first.turn, periodic_interfaces, np.linalg.lstsq(np.eye(len(off)) - first.turn, off)[0]
+            first.sectors, first.turn, periodic_interfaces, np.linalg.lstsq(np.eye(len(offset)) - first.turn, offset)[0]
         )
 
     def diameters(self, chosen: int | str | Sequence[int]) -> list[int]:
         """Return the requested nodal diameters, ascending; ModelError if the ring cannot have one of them."""
-        most = self.number // 2
+        highest = self.number // 2
         if isinstance(chosen, str):
             if chosen != "all":
-                raise ModelError(f"nodal_diameters = '{chosen}': write \"all\", or whole numbers from 0 to {most}")
-            return list(range(most + 1))
+                raise ModelError(f"nodal_diameters = '{chosen}': write \"all\", or whole numbers from 0 to {highest}")
+            return list(range(highest + 1))
         diameters = sorted({chosen} if isinstance(chosen, int) else set(chosen))
-        wrong = [d for d in diameters if not 0 <= d <= most]
-        if wrong or not diameters:
-            raise ModelError(f"nodal_diameters = {chosen}: a ring of {self.number} sectors has those from 0 to {most}")
+        invalid = [d for d in diameters if not 0 <= d <= highest]
+        if invalid or not diameters:
+            raise ModelError(
+                f"nodal_diameters = {chosen}: a ring of {self.number} sectors has those from 0 to {highest}"
+            )
         return diameters
 
 
-def _sense(interface: PeriodicInterface, turn: Array) -> int:
-    """Return 1 if the rotation of an interface is `turn` (dim, dim), -1 if it is the inverse, and 0 otherwise."""
+def _sense(interface: PeriodicInterface, rotation: Array) -> int:
+    """Return 1 if the rotation of an interface is `rotation` (dim, dim), -1 if it is the inverse, and 0 otherwise."""
     assert interface.turn is not None
-    if np.allclose(interface.turn, turn, atol=LENGTH_ROUND_OFF):
+    if np.allclose(interface.turn, rotation, atol=LENGTH_ROUND_OFF):
         return 1
-    return -1 if np.allclose(interface.turn, turn.T, atol=LENGTH_ROUND_OFF) else 0
+    return -1 if np.allclose(interface.turn, rotation.T, atol=LENGTH_ROUND_OFF) else 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +101,7 @@ class Wave:
 
     @property
     def single(self) -> bool:
-        """Whether the wave is a standing one; other modes come in pairs, a quarter of a wave apart."""
+        """Whether the wave is a standing wave. Other modes occur in pairs that are shifted by a quarter of a wave."""
         return 2 * self.diameters in (0, self.sectors.number)
 
     def phase(self, interface: PeriodicInterface) -> complex:
@@ -114,8 +116,8 @@ class Wave:
         blocks.eliminate_zeros()
         return blocks
 
-    def twice(self, K: bsr_array) -> bsr_array:
-        """Return the real form of a real block matrix (n, n), of the same block size."""
+    def real_blocks(self, K: bsr_array) -> bsr_array:
+        """Return the real form of a real block matrix (n, n), with the same block size."""
         if self.single:
             return K
         n, entries = K.shape[0] // K.blocksize[0], len(K.indices)
@@ -123,8 +125,8 @@ class Wave:
         indices, indptr = np.concatenate([K.indices, K.indices + n]), np.concatenate([K.indptr, entries + K.indptr[1:]])
         return bsr_array((data, indices, indptr), shape=(2 * K.shape[0], 2 * K.shape[0]))
 
-    def both(self, values: AnyArray) -> AnyArray:
-        """Return values (n, ...) of nodes or displacements, repeated for the imaginary part unless the wave is standing."""
+    def repeated(self, values: AnyArray) -> AnyArray:
+        """Return values (n, ...) of nodes or displacements, repeated for the imaginary part unless `single`."""
         return values if self.single else np.concatenate([values, values])
 
     def relations(self, model: Model, others: Sequence[MultiPointConstraint]) -> list[MultiPointConstraint]:
@@ -137,91 +139,101 @@ class Wave:
         ]
         return [*(MultiPointConstraint(constraint.name, self.real(constraint.rows)) for constraint in others), *ends]
 
-    def joined(self, held: Conditions) -> Conditions:
+    def on_ring(self, conditions: Conditions) -> Conditions:
         """Return contact conditions in the real form, one at each point of the ring.
 
         The test function of a condition at one end of a sector extends into the next sector, which is represented by the
         other end; at the axis it extends over all sectors.
         """
-        P, kept = self._combined(held)
-        nodes = held.nodes[kept]
-        n_points = held.rows.shape[1] // self.sectors.turn.shape[0]
-        compliance = None if held.compliance is None else self.real(P @ held.compliance @ P.conj().T)
-        twins = nodes if self.single else np.concatenate([nodes, nodes + n_points])
-        return Conditions(self.real(P @ held.rows), twins, self.both(held.areas[kept]), compliance=compliance)
+        P, main = self._combined(conditions)
+        nodes = conditions.nodes[main]
+        n_points = conditions.rows.shape[1] // self.sectors.turn.shape[0]
+        compliance = None if conditions.compliance is None else self.real(P @ conditions.compliance @ P.conj().T)
+        ring_nodes = nodes if self.single else np.concatenate([nodes, nodes + n_points])
+        return Conditions(
+            self.real(P @ conditions.rows), ring_nodes, self.repeated(conditions.areas[main]), compliance=compliance
+        )
 
-    def _combined(self, held: Conditions) -> tuple[csr_array, Indices]:
-        """Return the matrix (k, q) from conditions to those of the ring, and the main condition (k,) of each."""
-        left, blocks = np.ones(len(held.nodes), bool), []
+    def _combined(self, conditions: Conditions) -> tuple[csr_array, Indices]:
+        """Return the matrix (k, q) that maps conditions to those of the ring, and the main condition (k,) of each."""
+        is_single, blocks = np.ones(len(conditions.nodes), bool), []
         for interface in self.sectors.periodic_interfaces:
-            on_interface = np.flatnonzero(np.isin(held.nodes, interface.first) | np.isin(held.nodes, interface.second))
+            on_interface = np.flatnonzero(
+                np.isin(conditions.nodes, interface.first) | np.isin(conditions.nodes, interface.second)
+            )
             for a, b in zip(interface.first.tolist(), interface.second.tolist(), strict=True):
-                here, there = on_interface[held.nodes[on_interface] == a], on_interface[held.nodes[on_interface] == b]
-                if a == b and len(here):
-                    blocks.append((self._around(held, here), here, here))
-                    left[here] = False
-                elif len(here) and len(there):
-                    block = self._across(held, interface, here, there)
-                    blocks.append((block, here, np.concatenate([here, there])))
-                    left[here] = left[there] = False
-        rest = np.flatnonzero(left)
-        rows, columns, values = [np.arange(len(rest))], [rest], [np.ones(len(rest), complex)]
-        kept, count = [rest], len(rest)
-        for block, like, among in blocks:
-            rows.append(np.repeat(count + np.arange(len(block)), len(among)))
-            columns.append(np.tile(among, len(block)))
+                first, second = (
+                    on_interface[conditions.nodes[on_interface] == a],
+                    on_interface[conditions.nodes[on_interface] == b],
+                )
+                if a == b and len(first):
+                    blocks.append((self._around(conditions, first), first, first))
+                    is_single[first] = False
+                elif len(first) and len(second):
+                    block = self._across(conditions, interface, first, second)
+                    blocks.append((block, first, np.concatenate([first, second])))
+                    is_single[first] = is_single[second] = False
+        single = np.flatnonzero(is_single)
+        rows, columns, values = [np.arange(len(single))], [single], [np.ones(len(single), complex)]
+        main_conditions, count = [single], len(single)
+        for block, main, members in blocks:
+            rows.append(np.repeat(count + np.arange(len(block)), len(members)))
+            columns.append(np.tile(members, len(block)))
             values.append(block.ravel())
-            kept.append(like[: len(block)])
+            main_conditions.append(main[: len(block)])
             count += len(block)
         entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-        return csr_array(coo_array(entries, shape=(count, len(held.nodes)))), np.concatenate(kept)
+        return csr_array(coo_array(entries, shape=(count, len(conditions.nodes)))), np.concatenate(main_conditions)
 
-    def _across(self, held: Conditions, interface: PeriodicInterface, here: Indices, there: Indices) -> AnyArray:
+    def _across(
+        self, conditions: Conditions, interface: PeriodicInterface, at_first: Indices, at_second: Indices
+    ) -> AnyArray:
         """Return the combinations (k, k + l) of the k and l conditions at the first and second node of an interface."""
         assert interface.turn is not None
-        share = np.nan_to_num(held.areas[np.concatenate([here, there])], posinf=0.0)
-        first, second = share[: len(here)].max(), share[len(here) :].max()
-        part = first / (first + second) if first + second > 0.0 else 0.5
-        alike = np.ones((len(here), len(there)))
-        if held.directions is not None:
-            alike = held.directions[here] @ (held.directions[there] @ interface.turn).T
-        return np.hstack([part * np.eye(len(here)), (1.0 - part) * np.conj(self.phase(interface)) * alike])
+        areas = np.nan_to_num(conditions.areas[np.concatenate([at_first, at_second])], posinf=0.0)
+        first, second = areas[: len(at_first)].max(), areas[len(at_first) :].max()
+        weight = first / (first + second) if first + second > 0.0 else 0.5
+        products = np.ones((len(at_first), len(at_second)))
+        if conditions.directions is not None:
+            products = conditions.directions[at_first] @ (conditions.directions[at_second] @ interface.turn).T
+        return np.hstack([weight * np.eye(len(at_first)), (1.0 - weight) * np.conj(self.phase(interface)) * products])
 
-    def _around(self, held: Conditions, here: Indices) -> AnyArray:
+    def _around(self, conditions: Conditions, at_node: Indices) -> AnyArray:
         """Return the combinations (k, q) of the conditions of a node on the axis that do not cancel over the ring."""
-        directions = None if held.directions is None else held.directions[here]
-        total, turn = np.zeros((len(here), len(here)), complex), np.eye(len(self.sectors.turn))
+        directions = None if conditions.directions is None else conditions.directions[at_node]
+        total, rotation = np.zeros((len(at_node), len(at_node)), complex), np.eye(len(self.sectors.turn))
         for k in range(self.sectors.number):
-            alike = np.eye(len(here)) if directions is None else directions @ (directions @ turn.T).T
-            total += np.exp(1j * self.angle * k) * alike / self.sectors.number
-            turn = self.sectors.turn @ turn
+            products = np.eye(len(at_node)) if directions is None else directions @ (directions @ rotation.T).T
+            total += np.exp(1j * self.angle * k) * products / self.sectors.number
+            rotation = self.sectors.turn @ rotation
         strength, vectors = np.linalg.eigh(0.5 * (total + total.conj().T))
         return np.asarray(vectors[:, strength > 0.5].conj().T)
 
 
 def without_ends(model: Model, sectors: Sectors) -> Model:
     """Return the model without the constraints between the ends of its sector."""
-    made = copy.copy(model)
-    made.relations = [
+    open_model = copy.copy(model)
+    open_model.relations = [
         relation
         for relation in model.relations
         if not any(relation is interface.relation for interface in sectors.periodic_interfaces)
     ]
-    return made
+    return open_model
 
 
 def pairs_of(vectors: Array, K: bsr_array, M: bsr_array, n: int) -> tuple[Array, AnyArray]:
     """Return the n lowest eigenvalues (n,) and complex vectors (size, n) in the span of real forms (2 size, k).
 
-    Each pair appears twice, a quarter of a wave apart, or once if an iteration has missed its twin; both are the same complex
-    vector. By the Rayleigh-Ritz method, normalised to unit modal mass and a real positive largest component.
+    In the real form each pair appears twice, shifted by a quarter of a wave, or once if an iteration has missed its twin;
+    both are the same complex vector. The pairs are computed by the Rayleigh-Ritz method. Vectors have unit modal mass, and
+    their largest component is real and positive.
     """
     Z = _complex(vectors)
-    stiff, heavy = (Z.conj().T @ _complex(matrix @ vectors) for matrix in (K, M))
-    weight, basis = np.linalg.eigh(heavy)
-    positive = weight > 1e-8 * weight.max()
-    basis = basis[:, positive] / np.sqrt(weight[positive])
-    values, eigenvectors = np.linalg.eigh(basis.conj().T @ stiff @ basis)
+    small_K, small_M = (Z.conj().T @ _complex(matrix @ vectors) for matrix in (K, M))
+    masses, basis = np.linalg.eigh(small_M)
+    positive = masses > 1e-8 * masses.max()
+    basis = basis[:, positive] / np.sqrt(masses[positive])
+    values, eigenvectors = np.linalg.eigh(basis.conj().T @ small_K @ basis)
     shapes = Z @ (basis @ eigenvectors[:, :n])
     largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
     return values[:n], shapes * (np.abs(largest) / largest)

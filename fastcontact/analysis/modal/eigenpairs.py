@@ -73,17 +73,17 @@ def lowest(
     else:
         pairs = _by_factors(solver, shifted, M, rng.normal(size=len(free)) * free, n)
     # Ritz pairs in the span of the iterates are more accurate, and their vectors are orthogonal for equal eigenvalues.
-    small, mass = pairs.T @ (K @ pairs), pairs.T @ (M @ pairs)
-    lower = np.linalg.inv(np.linalg.cholesky(mass))
-    values, vectors = np.linalg.eigh(lower @ (0.5 * (small + small.T)) @ lower.T)
-    return values[:n], (pairs @ (lower.T @ vectors))[:, :n]
+    small_K, small_M = pairs.T @ (K @ pairs), pairs.T @ (M @ pairs)
+    inverse_factor = np.linalg.inv(np.linalg.cholesky(small_M))
+    values, vectors = np.linalg.eigh(inverse_factor @ (0.5 * (small_K + small_K.T)) @ inverse_factor.T)
+    return values[:n], (pairs @ (inverse_factor.T @ vectors))[:, :n]
 
 
 def _of_few(K: bsr_array, M: bsr_array, free: Indices, n: int, shift: float) -> tuple[Array, Array]:
     """Return the result of `lowest` for few unknowns `free` (k,), by a dense eigenvalue problem."""
-    stiff, heavy = (np.asarray(matrix.tocsr()[free][:, free].todense()) for matrix in (K, M))
-    try:  # the inverse eigenvalues, since M may be singular
-        inverse, modes = eigh(heavy, stiff + shift * heavy, subset_by_index=[len(free) - n, len(free) - 1])
+    dense_K, dense_M = (np.asarray(matrix.tocsr()[free][:, free].todense()) for matrix in (K, M))
+    try:  # for the inverse eigenvalues, since M may be singular
+        inverse, modes = eigh(dense_M, dense_K + shift * dense_M, subset_by_index=[len(free) - n, len(free) - 1])
     except np.linalg.LinAlgError as error:
         raise ModelError(UNSTABLE) from error
     vectors = np.zeros((K.shape[0], n))
@@ -105,19 +105,21 @@ def _by_factors(solver: LinearSolver, shifted: bsr_array, M: bsr_array, start: A
 
 def _by_multigrid(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Array, n: int) -> Array:
     def cycle(residuals: Array) -> Array:
-        out = np.zeros((residuals.shape[1], residuals.shape[0]))
-        for z, residual in zip(out, residuals.T, strict=True):
+        corrections = np.zeros((residuals.shape[1], residuals.shape[0]))
+        for z, residual in zip(corrections, residuals.T, strict=True):
             r = np.ascontiguousarray(residual)
             if norm := float(np.linalg.norm(r)):
                 solver.precondition(r, norm, z)
-        return out.T
+        return corrections.T
 
-    unit = LinearOperator(shifted.shape, matvec=lambda r: cycle(r.reshape(-1, 1)).ravel(), matmat=cycle, dtype=float)
+    preconditioner = LinearOperator(
+        shifted.shape, matvec=lambda r: cycle(r.reshape(-1, 1)).ravel(), matmat=cycle, dtype=float
+    )
     vectors = start
-    for _ in range(MAX_ITERATIONS // 20):  # of the 20 iterations that LOBPCG makes by default
+    for _ in range(MAX_ITERATIONS // 20):  # LOBPCG makes 20 iterations by default
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # a warning that a round has few iterations
-            values, vectors = lobpcg(shifted, vectors, M, unit, tol=1e-300, largest=False)
+            warnings.simplefilter("ignore", UserWarning)  # of LOBPCG, that 20 iterations do not reach the tolerance
+            values, vectors = lobpcg(shifted, vectors, M, preconditioner, tol=1e-300, largest=False)
         residuals = shifted @ vectors[:, :n] - (M @ vectors[:, :n]) * values[:n]
         # The error is measured by its energy, independent of units; the error of eigenvalues is of second order.
         if (np.einsum("ij,ij->j", residuals, cycle(residuals)) <= TOLERANCE * values[:n]).all():
@@ -136,11 +138,11 @@ class Reduced:
     system : System
         System with supports and multi-point constraints.
     mass : bsr_array (n, n)
-        [mass].
+        Mass matrix [mass].
     rows : csr_array (m, n)
         Equations, possibly linearly dependent [-].
     nodes : ndarray of int (m,)
-        A node of each row, whose unknowns are preferred for elimination.
+        Node of each row, whose unknowns are preferred for elimination.
 
     Attributes
     ----------
@@ -153,19 +155,19 @@ class Reduced:
 
     def __init__(self, system: System, mass: bsr_array, rows: csr_array, nodes: Indices) -> None:
         n, size = mass.shape[0], mass.blocksize[0]
-        unit = diags_array(system.free.astype(float))
-        self._T = csr_array(unit if system.T is None else system.T @ unit)
+        free_part = diags_array(system.free.astype(float))
+        self._T = csr_array(free_part if system.T is None else system.T @ free_part)
         self.K, self.free = system.matrix, system.free.copy()
         rows_of_unknowns = system.rows(rows, np.zeros(rows.shape[0]), np.zeros(n))[0]
-        kept = np.flatnonzero(np.diff(rows_of_unknowns.indptr) > 0)
-        if len(kept):
-            pivots, weights = _eliminated(csr_array(rows_of_unknowns[kept]), nodes[kept], size)
+        nonempty = np.flatnonzero(np.diff(rows_of_unknowns.indptr) > 0)
+        if len(nonempty):
+            pivots, weights = _eliminated(csr_array(rows_of_unknowns[nonempty]), nodes[nonempty], size)
             self.free[pivots] = False
             at_pivots = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
-            among = csr_array(diags_array(self.free.astype(float)) + at_pivots @ weights)
-            K = csr_array(among.T @ self.K.tocsr() @ among).tobsr((size, size))
+            projection = csr_array(diags_array(self.free.astype(float)) + at_pivots @ weights)
+            K = csr_array(projection.T @ self.K.tocsr() @ projection).tobsr((size, size))
             K.sort_indices()
-            self.K, self._T = supports_apart(K, ~self.free)[0], csr_array(self._T @ among)
+            self.K, self._T = supports_apart(K, ~self.free)[0], csr_array(self._T @ projection)
         self.M = csr_array(self._T.T @ mass.tocsr() @ self._T).tobsr((size, size))
 
     def displacement(self, v: Array) -> Array:
@@ -174,7 +176,7 @@ class Reduced:
 
 
 def _eliminated(rows: csr_array, nodes: Indices, size: int) -> tuple[Indices, csr_array]:
-    """Return the unknowns (p,) that equations (m, n) eliminate, and their weights (p, n) of the others.
+    """Return the unknowns (p,) that equations (m, n) eliminate, as weighted sums (p, n) of the other unknowns.
 
     Linearly dependent equations, as at corners where several sides meet, are dropped.
     """
@@ -190,5 +192,5 @@ def _independent(rows: csr_array) -> tuple[Indices, csr_array]:
     _, R, order = qr(rows[:, columns].toarray(), mode="economic", pivoting=True)
     rank = int((np.abs(np.diag(R)) > LENGTH_ROUND_OFF * abs(R[0, 0])).sum())
     weights, others = csr_array(-solve_triangular(R[:rank, :rank], R[:rank, rank:])), columns[order[rank:]]
-    of_all = csr_array((weights.data, others[weights.indices], weights.indptr), shape=(rank, rows.shape[1]))
-    return columns[order[:rank]].astype(np.intp), of_all
+    full_weights = csr_array((weights.data, others[weights.indices], weights.indptr), shape=(rank, rows.shape[1]))
+    return columns[order[:rank]].astype(np.intp), full_weights

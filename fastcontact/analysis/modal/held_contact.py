@@ -32,9 +32,9 @@ class Conditions:
     Attributes
     ----------
     rows : csr_array (m, n_dofs)
-        [-].
+        Derivatives of the relative displacements with respect to all displacements [-].
     nodes : ndarray of int (m,)
-        The secondary node of each.
+        Secondary node of each condition.
     areas : ndarray (m,)
         Area of each condition, where known [area].
     directions : ndarray (m, dim), optional
@@ -59,7 +59,7 @@ class HeldContact:
     rows : csr_array (m, n_dofs)
         Relative displacements that vanish [-].
     nodes : ndarray of int (m,)
-        The secondary node of each.
+        Secondary node of each relative displacement.
     springs : list of (csr_array (m, n_dofs), ndarray (m, m))
         Compliant rows [-], and their compliance [length / force].
     """
@@ -78,15 +78,17 @@ class HeldContact:
 def joined(
     held: Sequence[Conditions], n_dofs: int, join: Callable[[Conditions], Conditions] = lambda conditions: conditions
 ) -> HeldContact:
-    """Return all conditions as one, for `n_dofs` displacements; `join` first maps each to conditions of a whole ring."""
+    """Return all conditions together, for `n_dofs` displacements; `join` may first map each to those of a whole ring."""
     equations, nodes, springs = [csr_array((0, n_dofs))], [np.empty(0, np.intp)], []
     for conditions in map(join, held):
-        kept = np.flatnonzero(np.diff(conditions.rows.indptr) > 0)
+        nonempty = np.flatnonzero(np.diff(conditions.rows.indptr) > 0)
         if conditions.compliance is None:
-            equations.append(csr_array(conditions.rows[kept]))
-            nodes.append(conditions.nodes[kept])
-        elif len(kept):
-            springs.append((csr_array(conditions.rows[kept]), conditions.compliance.toarray()[np.ix_(kept, kept)]))
+            equations.append(csr_array(conditions.rows[nonempty]))
+            nodes.append(conditions.nodes[nonempty])
+        elif len(nonempty):
+            springs.append(
+                (csr_array(conditions.rows[nonempty]), conditions.compliance.toarray()[np.ix_(nonempty, nonempty)])
+            )
     return HeldContact(csr_array(vstack(equations, format="csr")), np.concatenate(nodes), springs)
 
 
@@ -94,70 +96,81 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_
     """Return the conditions of all pairs at the end of a step; without a step, those of tied and bilateral pairs."""
     conditions: list[Conditions] = []
     for pair in model.contact:
-        bound, contact = model.bind(pair, held, sectors_alike=False), None if step is None else step.contact[pair.name]
-        if bound.options.gap_only:
+        formulation, contact = (
+            model.bind(pair, held, sectors_alike=False),
+            None if step is None else step.contact[pair.name],
+        )
+        if formulation.options.gap_only:
             continue
-        if bound.options.cohesion is not None:
+        if formulation.options.cohesion is not None:
             raise ModelError(f"modes do not support cohesion or adhesion: tie contact '{pair.name}', or leave it out")
-        at = Configuration.undeformed(model.mesh.points) if step is None else end_of(step, step, pair.name)
+        configuration = Configuration.undeformed(model.mesh.points) if step is None else end_of(step, step, pair.name)
         if contact is not None and contact.wear is not None:
-            at = replace(at, worn=at_points(contact.points, contact.wear, model.mesh.n_points))
-        constraints = bound.constraints(at)
+            configuration = replace(configuration, worn=at_points(contact.points, contact.wear, model.mesh.n_points))
+        constraints = formulation.constraints(configuration)
         if model.force_driven.pairs:
-            constraints = model.force_driven.constraints(pair.name, constraints, at.pose.displacement)
-        conditions += _conditions(bound, constraints, contact, hold_sliding)
+            constraints = model.force_driven.constraints(pair.name, constraints, configuration.pose.displacement)
+        conditions += _conditions(formulation, constraints, contact, hold_sliding)
     return conditions
 
 
 def _conditions(
-    pair: Formulation, part: Constraints, contact: ContactResult | None, hold_sliding: bool
+    pair: Formulation, constraints: Constraints, contact: ContactResult | None, hold_sliding: bool
 ) -> Iterator[Conditions]:
     """Yield conditions along the normals and along the tangents.
 
     The test functions are the formulation's multipliers, as for tied pairs, see `contact.tied`.
     """
-    tied = part.tied if isinstance(part.tied, TiedPair) else None
-    moments, areas = moments_of(part) if tied is None else (tied.moments, tied.areas)
-    node = pair.nodes_of(part, moments)
-    owners, n = pair.secondary.points[node].astype(np.intp), len(node)
+    tied = constraints.tied if isinstance(constraints.tied, TiedPair) else None
+    moments, areas = moments_of(constraints) if tied is None else (tied.moments, tied.areas)
+    side_rows = pair.nodes_of(constraints, moments)
+    nodes, n = pair.secondary.points[side_rows].astype(np.intp), len(side_rows)
     areas = np.ones(n) if areas is None else areas
-    along = part.directions if tied is None else tied.directions
-    directions = [np.asarray(moments @ tangent) for tangent in along]
+    tangents = constraints.directions if tied is None else tied.directions
+    directions = [np.asarray(moments @ tangent) for tangent in tangents]
     if tied is not None:
-        yield Conditions(tied.rows[0], owners, areas)
+        yield Conditions(tied.rows[0], nodes, areas)
         if directions:
-            yield _along(directions, tied.rows[1:], np.arange(n), owners, areas)
+            yield _along(directions, tied.rows[1:], np.arange(n), nodes, areas)
         return
-    closed = abs(moments) @ part.equality.astype(float) > 0.0
+    closed = abs(moments) @ constraints.equality.astype(float) > 0.0
     sticking = np.zeros(len(closed), bool)
     if contact is not None:
-        closed |= contact.active[node]
-        rubs = abs(moments) @ (part.friction > 0.0).astype(float) > 0.0
-        sticking = (contact.active & (contact.sticking | hold_sliding))[node] & rubs
-    held, stuck = np.flatnonzero(closed), np.flatnonzero(sticking)
-    tested = csr_array(moments[held])
+        closed |= contact.active[side_rows]
+        frictional = abs(moments) @ (constraints.friction > 0.0).astype(float) > 0.0
+        sticking = (contact.active & (contact.sticking | hold_sliding))[side_rows] & frictional
+    closed_rows, sticking_rows = np.flatnonzero(closed), np.flatnonzero(sticking)
+    weights = csr_array(moments[closed_rows])
     yield Conditions(
-        csr_array(tested @ part.B), owners[held], areas[held], compliance=_compliance(tested, part.softness)
+        csr_array(weights @ constraints.B),
+        nodes[closed_rows],
+        areas[closed_rows],
+        compliance=_compliance(weights, constraints.softness),
     )
-    if part.tangents:
-        tested = csr_array(moments[stuck])
-        rows, give = [tested @ T for T in part.tangents], _compliance(tested, part.tangential_softness)
-        yield _along(directions, rows, stuck, owners, areas, give)
+    if constraints.tangents:
+        weights = csr_array(moments[sticking_rows])
+        rows, compliance = (
+            [weights @ T for T in constraints.tangents],
+            _compliance(weights, constraints.tangential_softness),
+        )
+        yield _along(directions, rows, sticking_rows, nodes, areas, compliance)
 
 
 def _along(
-    directions: Sequence[Array], rows: Sequence[csr_array], kept: Indices, owners: Indices, areas: Array,
+    directions: Sequence[Array], rows: Sequence[csr_array], selected: Indices, nodes: Indices, areas: Array,
     compliance: csr_array | None = None,
 ) -> Conditions:  # fmt: skip
-    """Return the conditions along all tangents, with rows (k, n_dofs) for the `kept` (k,) of the q multipliers of a pair."""
+    """Return the conditions along all tangents, with rows (k, n_dofs) for `selected` (k,) multipliers of a pair."""
     count = len(rows)
-    give = None if compliance is None else csr_array(block_diag([compliance] * count, format="csr"))
+    stacked_compliance = None if compliance is None else csr_array(block_diag([compliance] * count, format="csr"))
     stacked = csr_array(vstack(rows, format="csr"))
-    tangents = np.concatenate([direction[kept] for direction in directions])
-    return Conditions(stacked, np.tile(owners[kept], count), np.tile(areas[kept], count), tangents, give)
+    tangents = np.concatenate([direction[selected] for direction in directions])
+    return Conditions(
+        stacked, np.tile(nodes[selected], count), np.tile(areas[selected], count), tangents, stacked_compliance
+    )
 
 
-def _compliance(tested: csr_array, softness: Array) -> csr_array | None:
-    if not (tested @ softness).any():
+def _compliance(weights: csr_array, softness: Array) -> csr_array | None:
+    if not (weights @ softness).any():
         return None
-    return csr_array(tested @ diags_array(softness) @ tested.T)
+    return csr_array(weights @ diags_array(softness) @ weights.T)

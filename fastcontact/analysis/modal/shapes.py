@@ -54,7 +54,7 @@ def _as_step(number: int, frequency: float, u: Array, stress: Array, model: Mode
     signed = recovery.von_mises_signed(stress, equivalent)
     lengths = {
         key: name for key, name in model.units.items() if key == "length"
-    }  # of the mesh, since shapes have no scale
+    }  # only of the mesh, since shapes have no scale
     return StepResult(
         number + 1, float(frequency), u, stress, equivalent, signed, np.zeros_like(u),
         iterations={"parameter": "frequency"}, units=lengths,
@@ -68,8 +68,8 @@ class Modes(Shapes):
     Attributes
     ----------
     frequencies : ndarray (n,)
-        Ascending, for each number of nodal diameters [1 / time]; about zero for rigid-body modes, negative for
-        unstable modes.
+        Natural frequencies, ascending for each number of nodal diameters [1 / time]; about zero for rigid-body modes,
+        negative for unstable modes.
     eigenvalues : ndarray (n,)
         Squares of the angular frequencies [1 / time^2].
     shapes : ndarray (n, n_points, dim)
@@ -141,27 +141,27 @@ class Modes(Shapes):
 
     @property
     def _columns(self) -> tuple[str, ...]:
-        round_the_ring = () if self.nodal_diameters is None else ("nodal diameters", "twin")
+        ring_columns = () if self.nodal_diameters is None else ("nodal diameters", "twin")
         masses = (f"effective mass {axis}" for axis in "xyz"[: len(self.mass)])
-        return ("mode", *round_the_ring, "frequency", *masses)
+        return ("mode", *ring_columns, "frequency", *masses)
 
     def _rows(self, numbers: str) -> list[tuple[str, ...]]:
         rows, masses_shown = [], np.where(self.effective_mass > ROUND_OFF * self.mass, self.effective_mass, 0.0)
         for k, (f, masses) in enumerate(zip(self.frequencies, masses_shown)):
-            round_the_ring: tuple[str, ...] = ()
+            ring_columns: tuple[str, ...] = ()
             if self.nodal_diameters is not None and self.twins is not None:
                 twin = "" if self.twins[k] == k else str(self.twins[k] + 1)
-                round_the_ring = (str(self.nodal_diameters[k]), twin)
-            rows.append((str(k + 1), *round_the_ring, *(numbers.format(value) for value in (f, *masses))))
+                ring_columns = (str(self.nodal_diameters[k]), twin)
+            rows.append((str(k + 1), *ring_columns, *(numbers.format(value) for value in (f, *masses))))
         return rows
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the table as a ``pandas.DataFrame``; FileError if pandas is not installed."""
-        whole = [np.arange(1, len(self) + 1)]
+        integer_columns = [np.arange(1, len(self) + 1)]
         if self.nodal_diameters is not None and self.twins is not None:
-            whole += [self.nodal_diameters, self.twins + 1]
-        data = np.column_stack([*whole, self.frequencies, self.effective_mass])
-        return data_frame(data, {}, self._columns).astype(dict.fromkeys(self._columns[: len(whole)], int))
+            integer_columns += [self.nodal_diameters, self.twins + 1]
+        data = np.column_stack([*integer_columns, self.frequencies, self.effective_mass])
+        return data_frame(data, {}, self._columns).astype(dict.fromkeys(self._columns[: len(integer_columns)], int))
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,33 +196,35 @@ class RingModes(Shapes):
         return self.modes._model.kinematics
 
     @cached_property
-    def _turns(self) -> list[Array]:
+    def _rotations(self) -> list[Array]:
         return [np.linalg.matrix_power(self._sectors.turn, k) for k in range(self._sectors.number)]
 
     @cached_property
     def mesh(self) -> Mesh:
         """Mesh of all sectors, see `RingModes`."""
-        part, centre = self.modes._model.mesh, self._sectors.centre
-        return union(*(part.replace(points=(part.points - centre) @ turn.T + centre) for turn in self._turns))
+        sector, centre = self.modes._model.mesh, self._sectors.centre
+        return union(
+            *(sector.replace(points=(sector.points - centre) @ rotation.T + centre) for rotation in self._rotations)
+        )
 
     def _step(self, number: int) -> StepResult:
         modes = self.modes
         assert modes.nodal_diameters is not None
         assert modes.twins is not None
         twin, d = int(modes.twins[number]), int(modes.nodal_diameters[number])
-        here, there = modes[number], modes[twin]
-        sign = float(np.sign(twin - number))  # the second of a pair is the imaginary part
+        mode, twin_mode = modes[number], modes[twin]
+        sign = float(np.sign(twin - number))  # the second mode of a pair is the imaginary part
         u, stress = [], []
-        for k, turn in enumerate(self._turns):
+        for k, rotation in enumerate(self._rotations):
             angle = 2.0 * math.pi * d * k / self._sectors.number
             real, imaginary = math.cos(angle), -sign * math.sin(angle)
-            u.append((real * here.displacement + imaginary * there.displacement) @ turn.T)
-            stress.append(_turned(real * here.stress + imaginary * there.stress, turn))
+            u.append((real * mode.displacement + imaginary * twin_mode.displacement) @ rotation.T)
+            stress.append(_rotated(real * mode.stress + imaginary * twin_mode.stress, rotation))
         return _as_step(number, modes.frequencies[number], np.concatenate(u), np.concatenate(stress), modes._model)
 
 
-def _turned(stress: Array, turn: Array) -> Array:
+def _rotated(stress: Array, rotation: Array) -> Array:
     """Return stresses (n, 4 or 6) of a body rotated by a rotation matrix (dim, dim) [pressure]."""
     Q, size = np.eye(3), stress.shape[1]
-    Q[: len(turn), : len(turn)] = turn
+    Q[: len(rotation), : len(rotation)] = rotation
     return np.asarray(stress @ rotations(Q.T[None])[0, :size, :size].T)

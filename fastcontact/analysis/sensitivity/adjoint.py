@@ -1,8 +1,9 @@
 """Adjoint solution of a converged load step.
 
-With y = (w, mu) for the unknowns and the multipliers, ``(J0 + E).T y = q``. J0 is the symmetric saddle-point matrix of the
-step, stiffness and active constraints. E contains the derivatives of the pairing on the deformed configuration, and
-subtracts the springs of floating bodies. GMRES solves ``s + E.T J0^-T s = E.T J0^-T q`` for ``s = E.T y``.
+The adjoint variables y = (w, mu), of the unknowns and of the multipliers, satisfy ``(J0 + E).T y = q``, where q is the
+gradient of the quantity. J0 is the symmetric saddle-point matrix of the step, with the stiffness and the active constraints.
+E contains the derivatives of the pairing on the deformed configuration, minus the stiffness of the springs of floating
+bodies. GMRES solves ``s + E.T J0^-T s = E.T J0^-T q`` for ``s = E.T y``.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ class Change:
 
     Attributes
     ----------
-    out : ndarray (n_dofs,)
+    residual : ndarray (n_dofs,)
         Derivative of internal minus external forces, without contact forces [force / unit of the parameter].
     lift : ndarray (n_dofs,)
         Derivative of the prescribed displacements [length / unit of the parameter].
@@ -60,7 +61,7 @@ class Change:
         Derivative of `Sample.all` [its unit / unit of the parameter].
     """
 
-    out: Array
+    residual: Array
     lift: Array
     sample: Array
 
@@ -96,58 +97,60 @@ class Adjoint:
         """Return the derivative of the quantity with respect to a parameter."""
         gradient, n = self._gradient, len(self._contact.u)
         sample = change.sample + self._moving @ change.lift
-        out = change.out + self._system.K @ change.lift - sample[:n]
+        residual = change.residual + self._system.K @ change.lift - sample[:n]
         gap = sample[n : n + self._k] + self._B @ change.lift
-        derivative = gradient.displacement @ change.lift - self._w @ self._system.reduced(out) - self._mu @ gap
+        derivative = gradient.displacement @ change.lift - self._w @ self._system.reduced(residual) - self._mu @ gap
         if gradient.sample is not None:
             derivative += gradient.sample @ sample
         if gradient.reaction is not None:
-            derivative += gradient.reaction @ out
+            derivative += gradient.reaction @ residual
         return float(derivative)
 
-    def _right(self) -> tuple[Array, Array]:
+    def _right_side(self) -> tuple[Array, Array]:
         """Return the derivatives of the quantity with respect to all unknowns (n,) and the multipliers (k,)."""
         gradient = self._gradient
-        whole, multiplier = gradient.displacement.copy(), gradient.multiplier.copy()
+        displacement, multiplier = gradient.displacement.copy(), gradient.multiplier.copy()
         if gradient.sample is not None:
-            whole += self._moving.T @ gradient.sample
+            displacement += self._moving.T @ gradient.sample
         if gradient.reaction is not None:
-            whole += self._system.K @ gradient.reaction - self._force.T @ gradient.reaction
+            displacement += self._system.K @ gradient.reaction - self._force.T @ gradient.reaction
             multiplier -= self._B @ gradient.reaction
-        return self._system.reduced(whole), multiplier
+        return self._system.reduced(displacement), multiplier
 
     def _solve(self) -> tuple[Array, Array]:
-        right, multiplier = self._right()
-        w, mu = self._solve_transposed(right, multiplier)
-        first = self._transposed(w, mu)
-        if not first.any():
+        right_side, multiplier = self._right_side()
+        w, mu = self._solve_transposed(right_side, multiplier)
+        pairing_terms = self._transposed(w, mu)
+        if not pairing_terms.any():
             return w, mu
-        none = np.zeros(self._k)
+        zero = np.zeros(self._k)
 
         def product(s: Array) -> Array:
-            return s + self._transposed(*self._solve_transposed(s, none))
+            return s + self._transposed(*self._solve_transposed(s, zero))
 
-        n = len(right)
-        s, info = gmres(LinearOperator((n, n), product), first, rtol=TOLERANCE, atol=0.0, restart=SOLUTIONS, maxiter=1)
+        n = len(right_side)
+        s, info = gmres(
+            LinearOperator((n, n), product), pairing_terms, rtol=TOLERANCE, atol=0.0, restart=SOLUTIONS, maxiter=1
+        )
         if info:
             raise ConvergenceError(
                 f"the adjoint equations of the moving contact geometry do not converge in {self.solutions} solutions: "
                 "keep the pairing (Criteria(keep_pairing=True)), or use finite differences of two solutions"
             )
-        return self._solve_transposed(right - s, multiplier)
+        return self._solve_transposed(right_side - s, multiplier)
 
-    def _solve_transposed(self, right: Array, multiplier: Array) -> tuple[Array, Array]:
+    def _solve_transposed(self, right_side: Array, multiplier: Array) -> tuple[Array, Array]:
         """Return ``J0^-T`` applied to right-hand sides (n,) and (k,), by the linear solver of the analysis."""
         self.solutions += 1
-        loaded = self._solver.load(np.ascontiguousarray(right))
+        loaded = self._solver.load(np.ascontiguousarray(right_side))
         w, force = loaded.solve(self._rows, -multiplier, self._C)
         return w, -force
 
     def _transposed(self, w: Array, mu: Array) -> Array:
         """Return ``E.T y`` (n,)."""
         system, bodies = self._system, self._contact.problem.floating_bodies
-        along = w if system.T is None else system.T @ w
-        product = system.reduced(self._gap.T @ mu - self._force.T @ along)
+        displacement = w if system.T is None else system.T @ w
+        product = system.reduced(self._gap.T @ mu - self._force.T @ displacement)
         if bodies is not None:
             product[bodies.dofs] -= bodies.stiffness * w[bodies.dofs]
         return product

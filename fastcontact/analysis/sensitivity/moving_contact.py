@@ -2,7 +2,7 @@
 
 Contact is paired on the deformed configuration: forces ``B.T multiplier`` and gaps ``gap0 + B u`` also depend on the
 displacement through B and gap0 (Wriggers, Computational Contact Mechanics, 2006, chapter 6). These derivatives are taken by
-central differences of the pairing alone, which is cheap and smooth; no load step is solved again. A point of a surface only
+finite differences of the pairing alone, which is cheap and smooth; no load step is solved again. A point of a surface only
 affects the constraints around it, so that distant points are moved simultaneously (Curtis, Powell and Reid, J. Inst. Math.
 Appl. 13, 1974).
 """
@@ -28,10 +28,10 @@ from fastcontact.errors import ModelError
 from fastcontact.round_off import DIFFERENCES
 
 REMEDY = "Change the load slightly, or use one-sided finite differences between two solutions"
-# Increment of central differences, relative to the admissible range of a constant or to the largest force.
+# Increment of finite differences, relative to the admissible range of a constant or to the largest force.
 CHANGED = 1e-3
-# A difference of one-sided derivatives above this is a kink; for forces it is relative to the largest force over the
-# shortest edge, for gaps it is absolute.
+# Half the difference of one-sided derivatives above which there is a kink. It is relative to the largest force over the
+# shortest edge for forces, and absolute for gaps.
 SMOOTH = 1e-3
 # Error of the derivatives from simultaneous moves, relative to the largest derivative, above which points are moved one by
 # one.
@@ -130,13 +130,13 @@ class MovingContact:
         forces = part.normal_forces(part.contact_forces(multiplier[constraints.rows[self.pair]]))
         return carried(part, forces, self.closed, self.problem.pairs[self.pair].secondary)[1]
 
-    def along(self, changed: Callable[[float], MovingContact], by: float) -> Array:
-        """Return the derivative of `Sample.all`; `changed(d)` returns the contact with the parameter changed by d."""
-        return np.asarray((changed(by).at(self.u).all - changed(-by).at(self.u).all) / (2.0 * by))
+    def parameter_derivative(self, changed: Callable[[float], MovingContact], increment: float) -> Array:
+        """Return the derivative of `Sample.all` with respect to a parameter, which `changed(d)` increases by d."""
+        return np.asarray((changed(increment).at(self.u).all - changed(-increment).at(self.u).all) / (2.0 * increment))
 
     @cached_property
     def step(self) -> float:
-        """Step by which points are moved [length]."""
+        """Increment by which points are moved [length]."""
         edges = [np.inf]
         for block in (block for side in self._surfaces() for block in side.blocks):
             corners = self.problem.model.mesh.points[block.facets]
@@ -155,8 +155,8 @@ class MovingContact:
         """
         n = len(self.u)
         size = n + len(self.active) + (len(self.problem.pairs[self.pair].secondary.points) if self.pair else 0)
-        keep = self.problem.criteria.keep_pairing or not len(self.active)
-        dofs = np.empty(0, np.intp) if keep else self._moving_dofs()
+        fixed = self.problem.criteria.keep_pairing or not len(self.active)
+        dofs = np.empty(0, np.intp) if fixed else self._moving_dofs()
         if not len(dofs):
             return csr_array((size, n)), csr_array((size, n))
         reached = self._reached()
@@ -171,18 +171,18 @@ class MovingContact:
         force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * DIFFERENCES / self.step
         row = np.repeat(np.arange(jump.shape[0]), np.diff(jump.indptr))
         # Pressures follow from forces: they are smooth where forces are.
-        size = np.where(row < n, force, np.where(row < n + len(self.active), 1.0, np.inf))
-        jump.data[np.abs(jump.data) <= SMOOTH * size] = 0.0
+        scale = np.where(row < n, force, np.where(row < n + len(self.active), 1.0, np.inf))
+        jump.data[np.abs(jump.data) <= SMOOTH * scale] = 0.0
         jump.eliminate_zeros()
         return jump
 
     def _moving_dofs(self) -> Indices:
         """Return the displacement components that active constraints may depend on."""
-        dim, free = self.problem.model.mesh.dim, self.problem.contact_dofs
+        dim, contact_dofs = self.problem.model.mesh.dim, self.problem.contact_dofs
         reached = np.unique(self._reached().nonzero()[1])
-        extra = free[free >= self.problem.model.n_dofs]
+        obstacle_dofs = contact_dofs[contact_dofs >= self.problem.model.n_dofs]
         dofs = (reached[:, None] * dim + np.arange(dim)).ravel()
-        return np.concatenate([dofs, extra]).astype(np.intp)
+        return np.concatenate([dofs, obstacle_dofs]).astype(np.intp)
 
     @cached_property
     def _involved(self) -> csr_array:
@@ -199,18 +199,18 @@ class MovingContact:
     def _reached(self) -> csr_array:
         """Return the incidence (k, n_points) of active constraints and the points they may depend on, neighbours included."""
         n = self.problem.model.mesh.n_points
-        near = eye_array(n, format="csr")
+        neighbours = eye_array(n, format="csr")
         for side in self._surfaces():
             local = csr_array(
                 (np.ones(len(side.points)), (side.points, np.arange(len(side.points)))), (n, len(side.points))
             )
-            near = near + local @ side.near @ local.T
+            neighbours = neighbours + local @ side.near @ local.T
         tied = [name for name, pair in self.problem.pairs.items() if pair.options.tied]
-        moves = np.ones(len(self.active))
+        moving = np.ones(len(self.active))
         for name in tied:  # paired once, before any load
             rows = self.constraints.rows[name]
-            moves[(self.active >= rows.start) & (self.active < rows.stop)] = 0.0
-        return _ones(csr_array((self._involved * moves[:, None]) @ near))
+            moving[(self.active >= rows.start) & (self.active < rows.stop)] = 0.0
+        return _ones(csr_array((self._involved * moving[:, None]) @ neighbours))
 
     def _differences(self, groups: list[Indices], reached: csr_array | None) -> tuple[csr_array, csr_array]:
         base, n = self.at(self.u).all, len(self.u)
@@ -230,7 +230,7 @@ class MovingContact:
         return forward, backward
 
     def _owners(self, rows: Indices, dofs: Indices, reached: csr_array) -> Indices:
-        """Return which of the components `dofs`, moved together, has changed each of the values `rows`."""
+        """Return, for each of the values `rows`, which of the simultaneously moved components `dofs` has changed it."""
         dim, n = self.problem.model.mesh.dim, len(self.u)
         by_constraint = np.full(reached.shape[0], dofs[0])
         by_point = np.full(self.problem.model.mesh.n_points, dofs[0])
@@ -242,10 +242,10 @@ class MovingContact:
                 self._involved.indices[self._involved.indptr[constraint] : self._involved.indptr[constraint + 1]]
             ] = by_constraint[constraint]
         nodes = self.problem.pairs[self.pair].secondary.points if self.pair else np.empty(0, np.intp)
-        everywhere = np.concatenate(
+        dof_of_value = np.concatenate(
             [np.repeat(by_point, dim), np.full(n - dim * len(by_point), dofs[0]), by_constraint, by_point[nodes]]
         )
-        return everywhere[rows].astype(np.intp)
+        return dof_of_value[rows].astype(np.intp)
 
     def _agrees(self, derivative: csr_array, dofs: Indices) -> bool:
         """Return whether the derivative agrees with that along a direction in which all points move."""
@@ -255,20 +255,22 @@ class MovingContact:
             2 * self.step
         )
         n, k = len(self.u), len(self.active)
-        off = np.abs(difference - derivative @ shift)
-        parts = (slice(0, n), slice(n, n + k), slice(n + k, None))
-        return all(off[p].max(initial=0.0) <= TOGETHER * np.abs(difference[p]).max(initial=0.0) for p in parts)
+        error = np.abs(difference - derivative @ shift)
+        blocks = (slice(0, n), slice(n, n + k), slice(n + k, None))
+        return all(
+            error[block].max(initial=0.0) <= TOGETHER * np.abs(difference[block]).max(initial=0.0) for block in blocks
+        )
 
 
 def _independent_groups(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
     """Return groups of components, no two of which affect the same constraint or constraints that share points."""
     n_points = reached.shape[1]
     points = np.unique(dofs[dofs < n_points * dim] // dim)
-    around = _ones(csr_array(reached.T @ reached))
-    further = _ones(csr_array(around @ around))
+    adjacent = _ones(csr_array(reached.T @ reached))
+    dependent = _ones(csr_array(adjacent @ adjacent))
     colour: dict[int, int] = {}
     for point in points.tolist():
-        neighbours = further.indices[further.indptr[point] : further.indptr[point + 1]].tolist()
+        neighbours = dependent.indices[dependent.indptr[point] : dependent.indptr[point + 1]].tolist()
         used = {colour[other] for other in neighbours if other in colour}
         colour[point] = next(c for c in range(len(points)) if c not in used)
     groups: list[Indices] = []
@@ -279,6 +281,7 @@ def _independent_groups(dofs: Indices, reached: csr_array, dim: int) -> list[Ind
 
 
 def _ones(pattern: csr_array) -> csr_array:
+    """Return the matrix `pattern` with ones in place of its nonzero entries; it is modified."""
     pattern.eliminate_zeros()
     pattern.data[:] = 1.0
     return pattern

@@ -37,10 +37,10 @@ def _by_constant(contact: MovingContact, parameter: Label) -> Change:
     number, material, component = _constant_of(model, parameter)
     step = CHANGED * _admissible_range(material, name, component)
 
-    def at(by: float) -> MovingContact:
+    def with_increment(increment: float) -> MovingContact:
         changed_model = copy.copy(model)
         changed_model.materials = [
-            (_changed(m, name, component, by) if i == number else m, groups)
+            (_with_constant(m, name, component, increment) if i == number else m, groups)
             for i, (m, groups) in enumerate(model.materials)
         ]
         pairs = {
@@ -50,11 +50,14 @@ def _by_constant(contact: MovingContact, parameter: Label) -> Change:
 
     # Central differences with an error of fourth order in the step.
     differences = [
-        weight * (_internal_forces(at(distance * step)) - _internal_forces(at(-distance * step)))
+        weight
+        * (_internal_forces(with_increment(distance * step)) - _internal_forces(with_increment(-distance * step)))
         for distance, weight in ((1, 8.0), (2, -1.0))
     ]
-    change = replace(_zero_change(contact), out=(differences[0] + differences[1]) / (12.0 * step))
-    return replace(change, sample=contact.along(at, step)) if contact.problem.pairs else change
+    change = replace(_zero_change(contact), residual=(differences[0] + differences[1]) / (12.0 * step))
+    return (
+        replace(change, sample=contact.parameter_derivative(with_increment, step)) if contact.problem.pairs else change
+    )
 
 
 def _constant_of(model: Model, parameter: Label) -> tuple[int, Material, int | None]:
@@ -106,13 +109,13 @@ def _admissible_range(material: Material, name: str, component: int | None) -> f
     return float(np.linalg.eigvalsh(S / np.outer(size, size))[0] * size[j] / size[i])
 
 
-def _changed(material: Material, name: str, component: int | None, by: float) -> Material:
-    """Return the material with a constant, or one of its components, changed by `by`."""
+def _with_constant(material: Material, name: str, component: int | None, increment: float) -> Material:
+    """Return the material with a constant, or one of its components, changed by `increment`."""
     value = getattr(material, name)
     if isinstance(value, tuple):
-        value = tuple(v + by * (component in (None, i)) for i, v in enumerate(value))
+        value = tuple(v + increment * (component in (None, i)) for i, v in enumerate(value))
     else:
-        value = value + by
+        value = value + increment
     if isinstance(material, LinearElastic):
         volumetric = "mean_dilatation" if material.averaged else "plain"
         return replace(
@@ -167,11 +170,11 @@ def check_parameter(model: Model, parameter: Label) -> None:
     KINDS[kind][0](model, parameter)
 
 
-def _item(kind: str, known: Mapping[str, Any], parameter: Label) -> Any:
+def _item(kind: str, items: Mapping[str, Any], parameter: Label) -> Any:
     """Return the item whose name is `parameter[1]`; ModelError if there is none."""
-    if parameter[1] not in known:
-        raise ModelError(unknown(kind, str(parameter[1]), known))
-    return known[str(parameter[1])]
+    if parameter[1] not in items:
+        raise ModelError(unknown(kind, str(parameter[1]), items))
+    return items[str(parameter[1])]
 
 
 def _zero_change(contact: MovingContact) -> Change:
@@ -216,26 +219,28 @@ def _of_load(contact: MovingContact, parameter: Label) -> Change:
     """Return the derivatives with respect to a factor of the loads on a group, or of the force on an obstacle."""
     problem = contact.problem
     driven = problem.force_driven.number(str(parameter[1]))
-    out = -_forces(contact, _loads(problem.model, parameter))
+    residual = -_forces(contact, _loads(problem.model, parameter))
     if driven is not None:
         pair = problem.force_driven.pairs[driven]
         force = [value or 0.0 for value in pair.force]
         factor = multiplier(pair.ramp, problem.ramp, contact.instant)
-        out[problem.force_driven.dofs(driven)] -= np.array(force) * factor
-    return replace(_zero_change(contact), out=out)
+        residual[problem.force_driven.dofs(driven)] -= np.array(force) * factor
+    return replace(_zero_change(contact), residual=residual)
 
 
 def _speeds(model: Model, parameter: Label) -> list[Centrifugal]:
     """Return the centrifugal forces on a group."""
-    turning = [load for load in model.loads if isinstance(load, Centrifugal)]
-    return _named("group with a centrifugal force", turning, parameter)
+    centrifugal = [load for load in model.loads if isinstance(load, Centrifugal)]
+    return _named("group with a centrifugal force", centrifugal, parameter)
 
 
 def _of_speed(contact: MovingContact, parameter: Label) -> Change:
     """Return the derivatives with respect to the angular speed of a group; forces are proportional to its square."""
     loads = [load for load in _speeds(contact.problem.model, parameter) if load.speed]
-    out = [-2.0 / load.speed * _forces(contact, [load]) for load in loads]
-    return replace(_zero_change(contact), out=np.sum(out, axis=0) if out else np.zeros(len(contact.u)))
+    derivatives = [-2.0 / load.speed * _forces(contact, [load]) for load in loads]
+    return replace(
+        _zero_change(contact), residual=np.sum(derivatives, axis=0) if derivatives else np.zeros(len(contact.u))
+    )
 
 
 def _temperatures(model: Model, parameter: Label) -> list[Temperature]:
@@ -249,7 +254,7 @@ def _of_temperature(contact: MovingContact, parameter: Label) -> Change:
     heated = copy.copy(problem.model)
     heated.temperatures = _temperatures(heated, parameter)
     forces = combined(heated.thermal_forces_by_ramp(), problem.ramp, contact.instant, heated.mesh.points.shape)
-    change.out[: heated.n_dofs] = -forces.ravel()
+    change.residual[: heated.n_dofs] = -forces.ravel()
     return change
 
 
@@ -267,20 +272,20 @@ def _of_pretension(contact: MovingContact, parameter: Label) -> Change:
         relation_numbers = [i for i, relation in enumerate(model.relations) if relation.name == section.prescribed]
         return _of_prescribed_values(contact, np.zeros(contact.problem.shape), relation_numbers)
     forces = [load for load in model.loads if isinstance(load, PretensionForce) and load.section is section]
-    return replace(_zero_change(contact), out=-_forces(contact, forces))
+    return replace(_zero_change(contact), residual=-_forces(contact, forces))
 
 
 def _prescribing(model: Model, parameter: Label) -> tuple[list[Support], list[int]]:
     """Return the supports on a group, and the numbers of constraints that prescribe displacements along normals or axes."""
-    group, only = parameter[1], "xyz".find(str(parameter[2])) if len(parameter) == 3 else None
-    supports = [s for s in model.supports if s.group == group and only in (None, s.component)]
-    kinds = ("normal", "x", "y", "z") if only is None else (str(parameter[2]),)
+    group, component = parameter[1], "xyz".find(str(parameter[2])) if len(parameter) == 3 else None
+    supports = [s for s in model.supports if s.group == group and component in (None, s.component)]
+    kinds = ("normal", "x", "y", "z") if component is None else (str(parameter[2]),)
     names = {kind: displacement_name(kind, str(group)) for kind in kinds}
-    wanted = {names.get("normal"), *(f"{name} along axes" for name in names.values())}
-    relation_numbers = [number for number, relation in enumerate(model.relations) if relation.name in wanted]
+    relation_names = {names.get("normal"), *(f"{name} along axes" for name in names.values())}
+    relation_numbers = [number for number, relation in enumerate(model.relations) if relation.name in relation_names]
     if not (supports or relation_numbers):
-        known = list(dict.fromkeys(s.group for s in model.supports))
-        raise ModelError(unknown("group whose displacement is prescribed", ", ".join(map(str, parameter[1:])), known))
+        groups = list(dict.fromkeys(s.group for s in model.supports))
+        raise ModelError(unknown("group whose displacement is prescribed", ", ".join(map(str, parameter[1:])), groups))
     return supports, relation_numbers
 
 
@@ -296,8 +301,8 @@ def _of_prescribed(contact: MovingContact, parameter: Label) -> Change:
     values = np.zeros(problem.shape)
     for support in supports:
         nodes = model.mesh.points_of(support.group)
-        given = evaluated(support.value, model.mesh.points[nodes], support.name)
-        values[nodes, support.component] = given * multiplier(support.ramp, problem.ramp, instant)
+        displacements = evaluated(support.value, model.mesh.points[nodes], support.name)
+        values[nodes, support.component] = displacements * multiplier(support.ramp, problem.ramp, instant)
     if model.kinematics == "axisymmetric":
         values[model.axis_nodes, 0] = 0.0
     return _of_prescribed_values(contact, values, relation_numbers)
@@ -317,33 +322,33 @@ def _of_prescribed_values(contact: MovingContact, values: Array, relation_number
     return replace(_zero_change(contact), lift=lift)
 
 
-def _moved(model: Model, parameter: Label) -> ContactPair:
+def _with_motion(model: Model, parameter: Label) -> ContactPair:
     """Return the pair of a rigid obstacle with a prescribed motion."""
-    moved = {pair.name: pair for pair in model.contact if any(pair.motion)}
-    obstacle: ContactPair = _item("rigid obstacle with a motion", moved, parameter)
+    pairs = {pair.name: pair for pair in model.contact if any(pair.motion)}
+    obstacle: ContactPair = _item("rigid obstacle with a motion", pairs, parameter)
     return obstacle
 
 
 def _of_motion(contact: MovingContact, parameter: Label) -> Change:
     """Return the derivatives with respect to a factor of the motion of a rigid obstacle."""
     problem, name = contact.problem, str(parameter[1])
-    pair = _moved(problem.model, parameter)
+    pair = _with_motion(problem.model, parameter)
     motion = np.array(pair.motion) * multiplier(pair.ramp, problem.ramp, contact.instant)
     number = problem.force_driven.number(name)
     if number is not None:
         values = np.zeros(len(contact.u))
         values[problem.force_driven.dofs(number)] = motion
-        none = [0.0] * len(problem.model.relations)
-        return replace(_zero_change(contact), lift=problem.system.lift(values, problem.system.values(none)))
+        zero_factors = [0.0] * len(problem.model.relations)
+        return replace(_zero_change(contact), lift=problem.system.lift(values, problem.system.values(zero_factors)))
 
-    def changed(by: float) -> MovingContact:
-        obstacles = {**contact.load.obstacles, name: contact.load.obstacles[name] + by * motion}
+    def changed(increment: float) -> MovingContact:
+        obstacles = {**contact.load.obstacles, name: contact.load.obstacles[name] + increment * motion}
         return replace(contact, load=replace(contact.load, obstacles=obstacles))
 
     size = float(np.abs(motion).max())
     if size == 0.0:
         return _zero_change(contact)
-    return replace(_zero_change(contact), sample=contact.along(changed, contact.step / size))
+    return replace(_zero_change(contact), sample=contact.parameter_derivative(changed, contact.step / size))
 
 
 def _with_clearance(model: Model, parameter: Label) -> None:
@@ -358,11 +363,11 @@ def _of_clearance(contact: MovingContact, parameter: Label) -> Change:
     pair = contact.problem.pairs[name]
     count = len(pair.secondary.points)
 
-    def changed(by: float) -> MovingContact:
-        worn = {**contact.state.worn, name: Worn(np.full(count, by), np.zeros(count))}
+    def changed(increment: float) -> MovingContact:
+        worn = {**contact.state.worn, name: Worn(np.full(count, increment), np.zeros(count))}
         return replace(contact, state=replace(contact.state, worn=worn))
 
-    return replace(_zero_change(contact), sample=contact.along(changed, contact.step))
+    return replace(_zero_change(contact), sample=contact.parameter_derivative(changed, contact.step))
 
 
 KINDS: dict[str, tuple[Callable[[Model, Label], object], Callable[[MovingContact, Label], Change]]] = {
@@ -372,6 +377,6 @@ KINDS: dict[str, tuple[Callable[[Model, Label], object], Callable[[MovingContact
     "temperature": (_temperatures, _of_temperature),
     "pretension": (_pretension, _of_pretension),
     "prescribed": (_prescribing, _of_prescribed),
-    "motion": (_moved, _of_motion),
+    "motion": (_with_motion, _of_motion),
     "clearance": (_with_clearance, _of_clearance),
 }

@@ -44,21 +44,21 @@ def check_quantity(model: Model, quantity: Label) -> None:
 
 
 def with_gradient(contact: MovingContact, step: StepResult, quantity: Label) -> tuple[MovingContact, Gradient]:
-    """Return the gradient of a quantity that `check_quantity` has accepted, and the contact whose samples it needs.
+    """Return the contact, whose samples include the quantity, and the gradient of the quantity.
 
-    Raises ModelError if the quantity has no sensitivities in this state.
+    `check_quantity` must have accepted the quantity. Raises ModelError if it has no sensitivities in this state.
     """
-    none = Gradient(0.0, np.zeros(len(contact.u)), np.zeros(len(contact.active)))
+    zero = Gradient(0.0, np.zeros(len(contact.u)), np.zeros(len(contact.active)))
     if quantity[0] == "displacement":
         model = contact.problem.model
         dof = _point(model, quantity[1]) * model.mesh.dim + _axis(model, quantity)
-        none.displacement[dof] = 1.0
-        return contact, replace(none, value=float(contact.u[dof]))
+        zero.displacement[dof] = 1.0
+        return contact, replace(zero, value=float(contact.u[dof]))
     if quantity[0] == "reaction":
-        return contact, _reaction(contact, none, quantity)
+        return contact, _reaction(contact, zero, quantity)
     if quantity[0] == "contact_force":
-        return contact, _contact_force(contact, none, step, quantity)
-    return _pressure(contact, none, step, quantity)
+        return contact, _contact_force(contact, zero, step, quantity)
+    return _pressure(contact, zero, step, quantity)
 
 
 def _axis(model: Model, quantity: Label) -> int:
@@ -77,28 +77,28 @@ def _point(model: Model, point: str | int) -> int:
     return point
 
 
-def _reaction(contact: MovingContact, none: Gradient, quantity: Label) -> Gradient:
+def _reaction(contact: MovingContact, zero: Gradient, quantity: Label) -> Gradient:
     model = contact.problem.model
     axis, points = _axis(model, quantity), model.mesh.points_of(str(quantity[1]))
     if model.springs:
         raise ModelError(
             "reactions of a model with springs have no sensitivities: request a displacement or a contact force"
         )
-    whole = np.zeros(len(contact.u))
-    whole[points * model.mesh.dim + axis] = 1.0
-    balance = contact.problem.system.balance(whole)[0]
+    unit_displacement = np.zeros(len(contact.u))
+    unit_displacement[points * model.mesh.dim + axis] = 1.0
+    balance = contact.problem.system.balance(unit_displacement)[0]
     if not balance.any():
         raise ModelError(f"no support acts along {quantity[-1]} on group '{quantity[1]}': its reaction is zero")
     force = contact.at(contact.u).force if contact.problem.pairs else 0.0
-    out = contact.problem.system.K @ contact.u - contact.load.force - force
-    return replace(none, value=float(balance @ out), reaction=balance)
+    residual = contact.problem.system.K @ contact.u - contact.load.force - force
+    return replace(zero, value=float(balance @ residual), reaction=balance)
 
 
-def _contact_force(contact: MovingContact, none: Gradient, step: StepResult, quantity: Label) -> Gradient:
+def _contact_force(contact: MovingContact, zero: Gradient, step: StepResult, quantity: Label) -> Gradient:
     contact_of_step, axis = step.contact[str(quantity[1])], _axis(contact.problem.model, quantity)
-    others = [name for name in contact.problem.pairs if name != quantity[1]]
+    other_names = [name for name in contact.problem.pairs if name != quantity[1]]
     nodes = np.setdiff1d(contact_of_step.points, contact_of_step.primary_points)
-    for name in others:
+    for name in other_names:
         other_pair = contact.problem.pairs[name]
         shared = np.intersect1d(nodes, [*other_pair.secondary.points, *getattr(other_pair.primary, "points", ())])
         if len(shared):
@@ -111,18 +111,20 @@ def _contact_force(contact: MovingContact, none: Gradient, step: StepResult, qua
     sample = np.zeros(size)
     sample[nodes * dim + axis] = 1.0
     rows = contact.constraints.B[contact.active]
-    return replace(none, value=float(contact_of_step.force[axis]), multiplier=rows @ sample[:n], sample=sample)
+    return replace(zero, value=float(contact_of_step.force[axis]), multiplier=rows @ sample[:n], sample=sample)
 
 
-def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: Label) -> tuple[MovingContact, Gradient]:
-    name, result = str(asked[1]), step.contact[str(asked[1])]
+def _pressure(
+    contact: MovingContact, zero: Gradient, step: StepResult, quantity: Label
+) -> tuple[MovingContact, Gradient]:
+    name, result = str(quantity[1]), step.contact[str(quantity[1])]
     row = int(result.pressure.argmax())
-    if asked[0] == "pressure":
-        point = _point(contact.problem.model, asked[2])
-        places = np.flatnonzero(result.points == point)
-        if not len(places):
+    if quantity[0] == "pressure":
+        point = _point(contact.problem.model, quantity[2])
+        rows_of_point = np.flatnonzero(result.points == point)
+        if not len(rows_of_point):
             raise ModelError(f"point {point} is not a node of the secondary side of contact '{name}'")
-        row = int(places[0])
+        row = int(rows_of_point[0])
     if not result.active[row]:
         raise ModelError(f"point {result.points[row]} of contact '{name}' is open: its pressure is zero")
     if contact.problem.model.periodic_interfaces:
@@ -130,14 +132,14 @@ def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: L
             "pressures of periodic and cyclic models have no sensitivities: request a force or a displacement"
         )
     contact = replace(contact, pair=name, closed=result.active)
-    multiplier, by_multiplier = contact.solution.multiplier, none.multiplier
+    multiplier, by_multiplier = contact.solution.multiplier, zero.multiplier
     rows_of_pair, rows = contact.constraints.rows[name], contact.active
     change = CHANGED * (float(np.abs(multiplier[rows_of_pair]).max(initial=0.0)) or 1.0)
     base = contact.pressure(multiplier)[row]
     for k in np.flatnonzero((rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)):
-        more = multiplier.copy()
-        more[rows[k]] += change
-        by_multiplier[k] = (contact.pressure(more)[row] - base) / change
+        increased = multiplier.copy()
+        increased[rows[k]] += change
+        by_multiplier[k] = (contact.pressure(increased)[row] - base) / change
     sample = np.zeros(len(contact.u) + len(rows) + len(result.points))
     sample[len(contact.u) + len(rows) + row] = 1.0
-    return contact, replace(none, value=float(base), sample=sample)
+    return contact, replace(zero, value=float(base), sample=sample)

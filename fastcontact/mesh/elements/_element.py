@@ -163,7 +163,7 @@ def with_middles(linear: Element) -> Array:
 
 
 def serendipity(box: Element) -> Functions:
-    """Return the nodes (n_nodes, dim) [-], shape functions and derivatives of the serendipity square or cube.
+    """Return nodes (n_nodes, dim) [-], shape functions and derivatives of a serendipity square or cube.
 
     The function of a mid-side node with the coordinates X is the product of 1 - x^2 for the coordinate x along its edge,
     where X is 0, and of (1 + x X) / 2 for the others. The function of a corner is its linear function times the sum of all

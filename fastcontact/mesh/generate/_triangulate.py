@@ -238,8 +238,8 @@ def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
     """Return points (n, 2) [length] after relaxation by repulsive bars along the edges.
 
     The bars of a truss push its nodes apart until their lengths follow the function `size` (n,) [length] of positions (P.-O.
-    Persson and G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Of the
-    `points` (n, 2) [length] only those with True in `movable` (n,) move, in `steps` steps.
+    Persson and G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Only those of
+    the `points` (n, 2) [length] with True in `movable` (n,) move, in `steps` steps.
     """
     points = points.copy()
     if not movable.any():

@@ -40,13 +40,13 @@ def test_the_compliance_of_components_is_that_of_the_vectors(dim):
     vectors = components[0][:, None] * normal + np.einsum("km,kmd->md", components[1:], along)
     given = C @ vectors  # (m, dim)
     wanted = np.concatenate([[np.einsum("md,md->m", given, normal)], np.einsum("md,kmd->km", given, along)])
-    found = friction._turned(C, along) @ components.ravel()
+    found = friction._of_components(C, along) @ components.ravel()
     np.testing.assert_allclose(found, wanted.ravel(), atol=1e-12)
 
 
 def test_constraints_without_friction_keep_their_own_compliance():
     C = np.array([[2.0, 1.0], [1.0, 3.0]])
-    found = friction._turned(C, np.zeros((1, 2, 2)))
+    found = friction._of_components(C, np.zeros((1, 2, 2)))
     np.testing.assert_array_equal(found[:2, :2], C)
     assert not found[2:].any()
 
