@@ -156,7 +156,7 @@ def no_attribute(owner: str, name: str, known: Collection[str]) -> AttributeErro
         text += f": use {owners[0]}.{name}"
     elif similar := nearest(name, known):
         text += ": did you mean " + " or ".join(map(repr, similar)) + "?"
-    return AttributeError(text, name=name, obj=text)  # a string as `obj` prevents suggestions by Python
+    return AttributeError(text, name=name)  # without `obj`, Python adds no suggestion
 
 
 class Suggesting:

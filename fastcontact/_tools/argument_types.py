@@ -81,6 +81,10 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
     return checking
 
 
+# First components of a load, a support or an initial state, by the name of the parameter that collects them.
+COMPONENTS = {"components": ["x", "y"], "tensor_components": ["xx", "yy"]}
+
+
 def _refusal(
     call: Callable[..., Any], signature: inspect.Signature, called: str, args: tuple[Any, ...], kwargs: dict[str, Any]
 ) -> TypeError:
@@ -93,8 +97,8 @@ def _refusal(
     keywords = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
     if len(args) > len(positional) and keywords:
         required = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY and p.default is p.empty]
-        axes = [*"xy"] * ("components" in signature.parameters)  # the direction of a load or a support
-        example = ", ".join(f"{key}=..." for key in (required or axes or keywords)[:3])
+        components = next((COMPONENTS.get(p.name, []) for p in parameters if p.kind is p.VAR_KEYWORD), [])
+        example = ", ".join(f"{key}=..." for key in (required or components or keywords)[:3])
         names = ", ".join([p.name for p in positional if p.name != "self"]) or "nothing"
         return TypeError(f"{called} takes {names} by position and all other arguments by keyword: write {example}")
     try:

@@ -146,8 +146,7 @@ def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any],
         for key, parameter in [*inspect.signature(add).parameters.items()][1:]:  # the first parameter is the model
             kinds = toml_types(annotated[key])
             if parameter.kind is parameter.VAR_KEYWORD:
-                initial = add in (Model.add_initial_stress, Model.add_initial_strain)
-                known |= dict.fromkeys(COMPONENTS, kinds) if initial else AXES
+                known |= dict.fromkeys(COMPONENTS, kinds) if key == "tensor_components" else AXES
             else:
                 known[key] = kinds if key in (*VALUES, "axes") else tuple(kind for kind in kinds if kind is not dict)
                 required += [key] * (parameter.default is parameter.empty)

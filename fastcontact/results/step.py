@@ -591,7 +591,7 @@ class _Steps(Suggesting):
         def __getattr__(self, name: str) -> object:
             if not name.startswith("_") and (name in StepResult.__dataclass_fields__ or hasattr(StepResult, name)):
                 text = f"'{type(self).__name__}' has no attribute '{name}': each step has one, such as [-1].{name}"
-                raise AttributeError(text, name=name, obj=text)
+                raise AttributeError(text, name=name)
             return super().__getattr__(name)
 
 

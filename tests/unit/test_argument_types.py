@@ -234,6 +234,14 @@ def test_imaginary_parts_are_not_lost_without_a_word(what):
             lambda model: model.add_force("TOP", -1.0),
             "Model.add_force takes group by position and all other arguments by keyword: write x=..., y=...",
         ),
+        (
+            lambda model: model.fix("TOP", "x", "y"),
+            "Model.fix takes group, components by position and all other arguments by keyword: write axes=...",
+        ),
+        (
+            lambda model: model.add_initial_stress("TOP", 1.0),
+            "Model.add_initial_stress takes groups by position and all other arguments by keyword: write xx=..., yy=...",
+        ),
         (lambda model: model.fix("TOP"), "Model.fix() missing 1 required positional argument: 'components'"),
     ],
 )

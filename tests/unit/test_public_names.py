@@ -4,6 +4,7 @@ import ast
 import copy
 import importlib
 import pickle
+import sys
 from pathlib import Path
 
 import pytest
@@ -32,6 +33,18 @@ def test_a_name_is_what_the_stub_says(name):
     home = importlib.import_module(module)
     found = getattr(home, there) if hasattr(home, there) else importlib.import_module(f"{module}.{there}")
     assert getattr(fc, name) is found
+
+
+@pytest.mark.parametrize(
+    "owner", [fc, fc.generate, fc.generate.block(), Steps([])], ids=["fc", "module", "mesh", "steps"]
+)
+@pytest.mark.parametrize("name", ["strp", "zfil", "group_nams", "displacement"])
+def test_python_adds_no_suggestion(owner, name, capsys):
+    """Python would suggest methods of strings if the error had one in place of the object."""
+    with pytest.raises(AttributeError) as caught:
+        getattr(owner, name)
+    sys.excepthook(caught.type, caught.value, None)
+    assert "Did you mean" not in capsys.readouterr().err
 
 
 def test_the_package_declares_its_types():

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.blocks import Block, refusing, registered
+from fastcontact.cases.decks.blocks import Block, as_number, refusing, registered
 from fastcontact.cases.decks.content import Content, Material
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.materials import LinearElastic
@@ -128,8 +128,11 @@ def hyperelastic(content: Content, current: Material, block: Block) -> None:
     kinds = [kind for kind in HYPERELASTIC if kind in block.parameters]
     if len(kinds) != 1:
         raise block.refuse(f"{current.about}one of {', '.join(HYPERELASTIC)} is supported")
-    kind, terms = kinds[0], int(block.get("N", "1")) if kinds[0] == "OGDEN" else 1
-    numbers, (n_deviatoric, n_volumetric) = block.numbers(), (count * terms for count in HYPERELASTIC[kind])
+    kind = kinds[0]
+    terms = as_number(block.location, block.get("N", "1")) if kind == "OGDEN" else 1.0
+    if not terms.is_integer() or terms < 1.0:
+        raise block.refuse(f"{current.about}the number of terms N = {terms:g} must be a positive whole number")
+    numbers, (n_deviatoric, n_volumetric) = block.numbers(), (count * int(terms) for count in HYPERELASTIC[kind])
     if len(numbers) < n_deviatoric:
         raise block.refuse(f"{current.about}{kind} has {n_deviatoric} constants, {len(numbers)} are given")
     constants, (D1, *others) = numbers[:n_deviatoric], [*numbers[n_deviatoric:], 0.0][:n_volumetric]

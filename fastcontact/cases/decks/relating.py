@@ -69,12 +69,13 @@ def _equation(deck_mesh: DeckMesh, equation: Equation, axes: Mapping[int, Array]
 def _pin_rows(deck_mesh: DeckMesh, pin: MultiPoint) -> list[list[Term]]:
     """Return the equations of nodes with the same displacement; CaseError if the numbers of nodes do not match."""
     first, second = (deck_mesh.nodes(name, pin.location) for name in pin.nodes)
+    numbers = f"{len(first)} and {len(second)}"
     if len(second) == 1:
         second = second * len(first)
     if len(first) != len(second) or set(zip(first, second, strict=True)) & set(zip(second, first, strict=True)):
         raise pin.refuse(
-            f"'{pin.nodes[0]}' and '{pin.nodes[1]}' have {len(first)} and {len(second)} nodes: the numbers must be equal, or "
-            "the second one, and the nodes must differ"
+            f"'{pin.nodes[0]}' and '{pin.nodes[1]}' have {numbers} nodes: the numbers must be equal, or the second number 1, "
+            "and no node may be tied to itself"
         )
     return [
         [(p, axis, 1.0), (q, axis, -1.0)] for p, q in zip(first, second, strict=True) for axis in range(deck_mesh.dim)

@@ -158,7 +158,7 @@ class ModelInitialStates(ModelLoads):
         *,
         axes: Axes = None,
         ramp: History = None,
-        **components: Constant | None,
+        **tensor_components: Constant | None,
     ) -> None:
         """Prescribe an initial stress in groups of solid cells.
 
@@ -174,7 +174,7 @@ class ModelInitialStates(ModelLoads):
             `Orthotropic`; by default the axes of the mesh.
         ramp : Ramp or iterable of (float, float), optional
             History of the stress; by default the full stress acts from the first step on.
-        **components : float, callable or ndarray (n,)
+        **tensor_components : float, callable or ndarray (n,)
             Components ``xx``, ``yy``, ``zz``, ``xy``, ``yz`` and ``xz`` of the stress at multiplier 1, by default zero:
             numbers, functions of position or arrays, as described for the parameter E of `LinearElastic` [pressure].
 
@@ -189,7 +189,7 @@ class ModelInitialStates(ModelLoads):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_initial_stress(xx=lambda points: 100.0 * (1.0 - 2.0 * points[:, 1]))
         """
-        self._add_initial("stress", groups, components, axes, ramp)
+        self._add_initial("stress", groups, tensor_components, axes, ramp)
 
     def add_initial_strain(
         self,
@@ -197,7 +197,7 @@ class ModelInitialStates(ModelLoads):
         *,
         axes: Axes = None,
         ramp: History = None,
-        **components: Constant | None,
+        **tensor_components: Constant | None,
     ) -> None:
         """Prescribe a stress-free strain, for example shrinkage, swelling or misfit, in groups of solid cells.
 
@@ -210,7 +210,7 @@ class ModelInitialStates(ModelLoads):
             `Orthotropic`; by default the axes of the mesh.
         ramp : Ramp or iterable of (float, float), optional
             History of the strain; by default the full strain acts from the first step on.
-        **components : float, callable or ndarray (n,)
+        **tensor_components : float, callable or ndarray (n,)
             Components ``xx``, ``yy``, ``zz``, ``xy``, ``yz`` and ``xz`` of the strain at multiplier 1, by default zero:
             numbers, functions of position or arrays, as described for the parameter E of `LinearElastic`. The components xy,
             yz and xz are engineering shear strains, which are twice the components of the strain tensor [-].
@@ -226,7 +226,7 @@ class ModelInitialStates(ModelLoads):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_initial_strain("BLOCK", xx=-0.002, yy=-0.002, zz=-0.002)  # shrinkage
         """
-        self._add_initial("strain", groups, components, axes, ramp)
+        self._add_initial("strain", groups, tensor_components, axes, ramp)
 
     def _add_initial(
         self, kind: str, groups: Sequence[str] | str | None, components: Mapping[str, Any], axes: Axes, ramp: History

@@ -117,6 +117,16 @@ def test_hyperelastic_materials(tmp_path, keyword, law):
     assert deck.solve()[-1].displacement[:, 2].min() < -0.01
 
 
+@pytest.mark.parametrize(
+    ("n", "message"),
+    [("0", "N = 0 must be a positive whole number"), ("1.5", "N = 1.5 must be"), ("two", "'two' is not a number")],
+)
+def test_the_number_of_terms_of_ogden_is_checked(tmp_path, n, message):
+    keyword = f"*Hyperelastic, ogden, n={n}\n0.8, 2., 0.2\n"
+    with pytest.raises(fc.CaseError, match=rf"line \d+, \*HYPERELASTIC: .*{message}"):
+        deck_of(tmp_path, WHOLE.replace("*Elastic\n200000., 0.\n", keyword))
+
+
 def test_plastic_tables_and_kinematic_hardening(tmp_path):
     for text, law in (
         ("*Plastic\n50., 0.\n60., 0.01\n", {"hardening": [(0.0, 50.0), (0.01, 60.0)]}),

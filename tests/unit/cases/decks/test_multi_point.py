@@ -83,6 +83,7 @@ def test_a_line_stays_straight(tmp_path):
         ("PIN, 11, 5, 6\n", "PIN needs two nodes"),
         ("PIN, low_face, x0\n", "'low_face' and 'x0' have 4 and 8 nodes"),
         ("PIN, 11, 11\n", "'11' and '11' have 1 and 1 nodes"),
+        ("PIN, low_face, 5\n", "'low_face' and '5' have 4 and 1 nodes: .* no node may be tied to itself"),
         ("TIE, 99, 5\n", "node 99"),
         ("BEAM, 11, top\n", "'top' has 4 nodes, but one is needed"),
         ("PLANE, 5, 6, 7\n", r"line 48, \*MPC: PLANE needs 4 different nodes or more"),
