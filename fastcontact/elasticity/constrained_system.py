@@ -20,7 +20,7 @@ from fastcontact._jit.norms_kernels import largest
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.elasticity.multipoint_constraints import Elimination, MultiPointConstraint, eliminate
 from fastcontact.errors import ModelError
-from fastcontact.linear.sparse_rows import stacked_rows
+from fastcontact.linear.sparse_rows import entry_rows, stacked_rows
 from fastcontact.round_off import ROUND_OFF
 
 # Relative tolerance of the conditions for consistent supports and constraints.
@@ -255,7 +255,7 @@ def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
     K = _with_diagonal(K)
     diagonal, size = K.diagonal(), K.blocksize[0]
     pivots = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0)).reshape(-1, size)
-    supported, row = fixed.reshape(-1, size), np.repeat(np.arange(len(K.indptr) - 1), np.diff(K.indptr))
+    supported, row = fixed.reshape(-1, size), entry_rows(K)
     on_support = np.asarray(supported.any(axis=1))
     affected = np.flatnonzero(on_support[row] | on_support[K.indices])
     row, column, blocks = row[affected], K.indices[affected], K.data[affected]

@@ -53,13 +53,18 @@ def sum_of_blocks(K: bsr_array, more: csr_array | bsr_array) -> bsr_array:
     return total
 
 
+def entry_rows(matrix: csr_array | bsr_array) -> Indices:
+    """Return the row (nnz,) of each entry, or of each block, of a matrix."""
+    return np.repeat(np.arange(len(matrix.indptr) - 1), np.diff(matrix.indptr))
+
+
 def rows_of(weights: csr_array, direction: Array) -> csr_array:
     """Return rows (m, n_dofs) that yield components along `direction` (m, dim) of weighted sums of nodal vectors.
 
     `weights` (m, n_points) contains the weights of the nodes.
     """
     dim = direction.shape[1]
-    row = np.repeat(np.arange(weights.shape[0]), np.diff(weights.indptr))
+    row = entry_rows(weights)
     values = weights.data[:, None] * direction[row]
     columns = weights.indices[:, None] * dim + np.arange(dim)
     size = (weights.shape[0], weights.shape[1] * dim)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import DTypeLike
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.arrays import AnyArray, Indices
-from fastcontact.linear.sparse_rows import scaled
+from fastcontact.linear.sparse_rows import entry_rows, scaled
 
 # Relative difference of two sets of springs, or of weights of eliminated unknowns, up to which a preconditioner for one set
 # serves for the other.
@@ -35,16 +36,20 @@ class Springs:
     stiffness: AnyArray
     through: csr_array | None = None
 
+    @cached_property
+    def _spring(self) -> Indices:
+        """Springs (k,) of the entries of `rows`."""
+        return entry_rows(self.rows)
+
     def subtract_forces(self, u: AnyArray, r: AnyArray, factor: float = 1.0) -> None:
         """Subtract `factor` times the product of the stiffness matrix of the springs and `u` (n,) from `r` (n,), in place."""
         R = self.rows
         if self.through is not None:
             r -= factor * (self.through.T @ (self.stiffness * (R @ u)))
             return
-        row = np.repeat(np.arange(len(self.stiffness)), np.diff(R.indptr))
-        force = factor * self.stiffness * np.bincount(row, R.data * u[R.indices], len(self.stiffness))
+        force = factor * self.stiffness * np.bincount(self._spring, R.data * u[R.indices], len(self.stiffness))
         # If the precision is not that of r, `subtract.at` takes twenty times as long.
-        np.subtract.at(r, R.indices, (R.data * force[row]).astype(r.dtype, copy=False))
+        np.subtract.at(r, R.indices, (R.data * force[self._spring]).astype(r.dtype, copy=False))
 
     def joined(self, others: Springs | None) -> Springs:
         """Return these springs together with `others`."""

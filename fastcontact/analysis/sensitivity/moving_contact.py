@@ -25,6 +25,7 @@ from fastcontact.contact.closed_nodes import carried
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ModelError
+from fastcontact.linear.sparse_rows import entry_rows
 from fastcontact.round_off import DIFFERENCES
 
 REMEDY = "Change the load slightly, or use one-sided finite differences between two solutions"
@@ -169,7 +170,7 @@ class MovingContact:
         """Return half the difference of the two `derivatives` where points project onto an edge between two facets."""
         jump, n = csr_array(0.5 * (forward - backward)), len(self.u)
         force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * DIFFERENCES / self.step
-        row = np.repeat(np.arange(jump.shape[0]), np.diff(jump.indptr))
+        row = entry_rows(jump)
         # Pressures follow from forces: they are smooth where forces are.
         scale = np.where(row < n, force, np.where(row < n + len(self.active), 1.0, np.inf))
         jump.data[np.abs(jump.data) <= SMOOTH * scale] = 0.0
@@ -189,7 +190,7 @@ class MovingContact:
         """Incidence matrix (k, n_points), 0 or 1, of active constraints and the points that they involve."""
         dim, B = self.problem.model.mesh.dim, csr_array(self.constraints.B[self.active])
         keep = (B.indices < self.problem.model.n_dofs) & (B.data != 0.0)
-        row = np.repeat(np.arange(B.shape[0]), np.diff(B.indptr))[keep]
+        row = entry_rows(B)[keep]
         pattern = csr_array(
             (np.ones(len(row)), (row, B.indices[keep] // dim)),
             shape=(len(self.active), self.problem.model.mesh.n_points),
@@ -235,7 +236,7 @@ class MovingContact:
         by_constraint = np.full(reached.shape[0], dofs[0])
         by_point = np.full(self.problem.model.mesh.n_points, dofs[0])
         moved = csr_array(reached[:, dofs // dim])
-        first = np.repeat(np.arange(reached.shape[0]), np.diff(moved.indptr))
+        first = entry_rows(moved)
         by_constraint[first] = dofs[moved.indices]
         for constraint in np.unique(first):
             by_point[

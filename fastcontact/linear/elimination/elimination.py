@@ -7,6 +7,7 @@ of B that belong to the pivots, and the remaining columns R, this is ``u[pivots]
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -14,6 +15,7 @@ from scipy.sparse import csr_array
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledPivots, Inverse, SparseInverse
+from fastcontact.linear.sparse_rows import entry_rows
 
 NONE = SparseInverse(csr_array((0, 0)))
 
@@ -58,14 +60,20 @@ class Elimination:
         """Whether pivots are coupled: equations of many nodes involve each other's pivots."""
         return isinstance(self.own, CoupledPivots)
 
+    @cached_property
+    def _equation(self) -> tuple[Indices, Indices]:
+        """Equations (k,) of the entries of `weights` and of `force_weights`."""
+        of_weights = entry_rows(self.weights)
+        return of_weights, of_weights if self.force_weights is self.weights else entry_rows(self.force_weights)
+
     def multiplier(self, forces: Array) -> Array:
         """Return the multipliers (m,) [force], given their `forces` (m,) at the pivots, ``(K u - f)[pivots]`` [force]."""
         return self.inverse.solve_transposed(forces)
 
     def complete(self, x: Array, offset: Array | None = None) -> None:
         """Set the pivots of `x` (n,), in place, to the weighted sums of the other unknowns, plus `offset` (m,)."""
-        W, row = self.weights, np.repeat(np.arange(len(self.pivots)), np.diff(self.weights.indptr))
-        x[self.pivots] = np.bincount(row, W.data * x[W.indices], len(self.pivots))  # sums in double precision
+        W, m = self.weights, len(self.pivots)
+        x[self.pivots] = np.bincount(self._equation[0], W.data * x[W.indices], m)  # sums in double precision
         if self.coupled:
             x[self.pivots] = self.own.solve(x[self.pivots])
         if offset is not None:
@@ -77,7 +85,7 @@ class Elimination:
         if isinstance(self.inverse, CoupledPivots):
             r[self.pivots] = self.inverse.solve_transposed(r[self.pivots])
         forces, r[self.pivots] = r[self.pivots], 0.0
-        np.add.at(r, W.indices, W.data * np.repeat(forces, np.diff(W.indptr)))
+        np.add.at(r, W.indices, W.data * forces[self._equation[1]])
 
     def full_weights(self) -> csr_array:
         """Return the matrix W (m, n) with ``u[pivots] = W @ u + offset``; if pivots are coupled, it has many entries."""

@@ -27,6 +27,7 @@ from fastcontact.linear.elimination.coupled_pivots import (
     SparseInverse,
     block_inverse,
 )
+from fastcontact.linear.sparse_rows import entry_rows
 
 # Smallest ratio of a pivot to the largest entry of its equation.
 SMALLEST = 0.25
@@ -167,7 +168,7 @@ def of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
 def _in_layers(B: csr_array, groups: Indices, layers: int) -> Indices:
     """Return the pivots (m,) in up to `layers` layers, -1 for equations without one; see `of_groups`."""
     m, n = B.shape
-    group, row = np.unique(groups, return_inverse=True)[1], np.repeat(np.arange(m), np.diff(B.indptr))
+    group, row = np.unique(groups, return_inverse=True)[1], entry_rows(B)
     pivots = np.full(m, -1, np.intp)
     for _ in range(layers):
         unassigned = pivots[row] < 0
@@ -183,7 +184,7 @@ def _in_layers(B: csr_array, groups: Indices, layers: int) -> Indices:
 
 def of_nodes(B: csr_array, nodes: Indices, size: int) -> Indices | None:
     """Return the pivots (m,), chosen among the unknowns of the node of each equation; None if a pivot is too small."""
-    row = np.repeat(np.arange(B.shape[0]), np.diff(B.indptr))
+    row = entry_rows(B)
     pivots = _pivots_in_groups(B, np.unique(nodes, return_inverse=True)[1], B.indices // size == nodes[row])
     return pivots if (pivots >= 0).all() else None
 
@@ -204,7 +205,7 @@ def _pivots_in_groups(B: csr_array, group: Indices, eligible: Mask) -> Indices:
         Entries of B that may be pivots. Each of their columns must have such entries in one group only.
     """
     m, n = B.shape
-    row, entries = np.repeat(np.arange(m), np.diff(B.indptr)), np.flatnonzero(eligible)
+    row, entries = entry_rows(B), np.flatnonzero(eligible)
     pivots = np.full(m, -1, np.intp)
     if not len(entries):
         return pivots

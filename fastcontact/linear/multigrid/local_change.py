@@ -17,7 +17,7 @@ from scipy.sparse import bsr_array, csc_array, csr_array
 
 from fastcontact.arrays import AnyArray, Indices
 from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
-from fastcontact.linear.sparse_rows import scaled
+from fastcontact.linear.sparse_rows import entry_rows, scaled
 from fastcontact.linear.springs import Springs
 
 
@@ -142,7 +142,7 @@ class SymmetricChange:
     @staticmethod
     def _keys(rows: bsr_array) -> Indices:
         """Return keys (k,) of the k stored blocks of `rows` (m, n), which identify their block row and block column."""
-        row = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
+        row = entry_rows(rows)
         return np.asarray(row * rows.shape[1] + rows.indices, np.intp)
 
     def on_finest(self) -> csc_array:
