@@ -267,8 +267,7 @@ class _Newton:
         replaces = self._replaces or (settled is not None and settled.constraints.tangents != ())
         with_springs = [Regularisation(held=HELD, stiff=floats, replaces=replaces)] if closed else []
         if self._regularisation in with_springs:
-            with_springs.remove(self._regularisation)
-            unmodified, with_springs = [], [self._regularisation, *with_springs]  # the unmodified tangent failed before
+            unmodified = []  # the unmodified tangent failed before
         if self._regularisation.geometric < WHOLE:  # springs failed as well
             return [
                 *unmodified,

@@ -37,7 +37,7 @@ class Springs:
     through: csr_array | None = None
 
     @cached_property
-    def _spring(self) -> Indices:
+    def _entry_springs(self) -> Indices:
         """Springs (k,) of the entries of `rows`."""
         return entry_rows(self.rows)
 
@@ -47,9 +47,9 @@ class Springs:
         if self.through is not None:
             r -= factor * (self.through.T @ (self.stiffness * (R @ u)))
             return
-        force = factor * self.stiffness * np.bincount(self._spring, R.data * u[R.indices], len(self.stiffness))
+        force = factor * self.stiffness * np.bincount(self._entry_springs, R.data * u[R.indices], len(self.stiffness))
         # If the precision is not that of r, `subtract.at` takes twenty times as long.
-        np.subtract.at(r, R.indices, (R.data * force[self._spring]).astype(r.dtype, copy=False))
+        np.subtract.at(r, R.indices, (R.data * force[self._entry_springs]).astype(r.dtype, copy=False))
 
     def joined(self, others: Springs | None) -> Springs:
         """Return these springs together with `others`."""

@@ -61,8 +61,8 @@ class Elimination:
         return isinstance(self.own, CoupledPivots)
 
     @cached_property
-    def _equation(self) -> tuple[Indices, Indices]:
-        """Equations (k,) of the entries of `weights` and of `force_weights`."""
+    def _entry_equations(self) -> tuple[Indices, Indices]:
+        """Equations of the entries of `weights` (k,) and of `force_weights` (l,)."""
         of_weights = entry_rows(self.weights)
         return of_weights, of_weights if self.force_weights is self.weights else entry_rows(self.force_weights)
 
@@ -73,7 +73,7 @@ class Elimination:
     def complete(self, x: Array, offset: Array | None = None) -> None:
         """Set the pivots of `x` (n,), in place, to the weighted sums of the other unknowns, plus `offset` (m,)."""
         W, m = self.weights, len(self.pivots)
-        x[self.pivots] = np.bincount(self._equation[0], W.data * x[W.indices], m)  # sums in double precision
+        x[self.pivots] = np.bincount(self._entry_equations[0], W.data * x[W.indices], m)  # sums in double precision
         if self.coupled:
             x[self.pivots] = self.own.solve(x[self.pivots])
         if offset is not None:
@@ -85,7 +85,7 @@ class Elimination:
         if isinstance(self.inverse, CoupledPivots):
             r[self.pivots] = self.inverse.solve_transposed(r[self.pivots])
         forces, r[self.pivots] = r[self.pivots], 0.0
-        np.add.at(r, W.indices, W.data * forces[self._equation[1]])
+        np.add.at(r, W.indices, W.data * forces[self._entry_equations[1]])
 
     def full_weights(self) -> csr_array:
         """Return the matrix W (m, n) with ``u[pivots] = W @ u + offset``; if pivots are coupled, it has many entries."""
