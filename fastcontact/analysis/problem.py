@@ -297,7 +297,11 @@ def prepare(
     """
     mesh, driven = model.mesh, model.force_driven
     supported, prescribed = model.prescribed_by_ramp()
-    held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
+    moved = np.any([values != 0.0 for values in prescribed.values()], axis=0) & supported
+    for relation in model.relations:
+        moving = np.flatnonzero(np.broadcast_to(relation.value, relation.rows.shape[0]))
+        moved.flat[relation.rows[moving].indices] = True
+    held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs), moved)
     pairs = {pair.name: model.bind(pair, held) for pair in model.contact}
     for name, pair in pairs.items():
         tabulated = isinstance(pair.options.penalty, OverclosureLaw)

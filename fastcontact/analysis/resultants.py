@@ -17,7 +17,7 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas
-from fastcontact.contact.obstacles.rigid_side import Pose
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.elasticity.springs import ground_force
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.model.model import Model
@@ -85,7 +85,7 @@ class ContactResultants:
     area : float
         Contact area: sum of the tributary areas of the closed nodes, in finite strain on the deformed facets; in the
         plane a length times unit thickness, in axisymmetry over the full circle [length^2]. Accurate to a row of
-        facets at the edge.
+        facets at the edge. Mortar contact between bodies leaves out the parts of facets without an opposite side.
     centre : ndarray (dim,)
         Centre of pressure of the normal forces; NaN without contact [length]. In axisymmetry it lies on the axis, and its
         radial component is NaN.
@@ -163,11 +163,15 @@ def contact_resultants(model: Model, steps: Iterable[StepResult], name: str) -> 
     (20.0, 10.0, 2.0)
     """
     pair = _formulation(model, name)
-    areas, work, resultants = lumped_areas(pair.secondary, pair.points, pair.axisymmetric), 0.0, []
+    work, resultants = 0.0, []
     for step in steps:
         contact = _result_of_pair(pair, step, name)
-        if model.strain == "finite":
-            areas = lumped_areas(pair.secondary, pair.points + step.displacement, pair.axisymmetric)
+        displacement = step.displacement if model.strain == "finite" else np.zeros_like(step.displacement)
+        areas = lumped_areas(pair.secondary, pair.points + displacement, pair.axisymmetric)
+        if not isinstance(pair.primary, RigidSide):
+            field = pair.unilateral(end_of(None, step, name)).nodal
+            assert field is not None
+            areas = areas * field.covered
         work += contact.dissipation
         resultants.append(_resultants(contact, areas, pair.axisymmetric, work))
     return resultants

@@ -3,7 +3,7 @@
 In axisymmetry the middle lies on the axis if the surface reaches the axis, or if it faces along the axis and its radius
 changes monotonically. Otherwise the middle is the centre of pressure of the contact, completed by reflection at the planes of
 symmetry that it reaches: a half or quarter model has its middle on these planes. In a plane of symmetry, supports hold the
-nodes at an end of the surface in the direction normal to the plane.
+nodes at an end of the surface at rest in the direction normal to the plane, and the opposite body ends there, too.
 
 In plane models, positions are arc lengths along the surface, so that a ring is unrolled. The same holds in axisymmetry where
 the surface runs along the axis rather than across it, as in a press fit of cylinders, or closes on itself, like that of an
@@ -24,7 +24,7 @@ from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.formulations._formulation import LEANING
-from fastcontact.contact.held_motions import TOGETHER, HeldMotions
+from fastcontact.contact.held_motions import TOGETHER
 from fastcontact.contact.pairing import FACING
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
@@ -186,7 +186,7 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
         meets_axis or (abs(mean[0]) <= abs(mean[1]) and _radius_is_monotone(surface, pair.points))
     ):
         return ContactMiddle(np.array([0.0, float(weight @ points[:, 1])]), direction=np.array([0.0, 1.0]))
-    planes = symmetry_planes(surface, pair.points, pair.held)
+    planes = symmetry_planes(pair)
     if closed.any():  # only the planes that the contact reaches
         reached = [
             any(closed[block.local[np.isin(block.local, nodes).any(axis=1)]].any() for block in surface.blocks)
@@ -223,22 +223,26 @@ def _radius_is_monotone(surface: Surface, coordinates: Array) -> bool:
     return bool(steps.min() >= -noise or steps.max() <= noise)
 
 
-def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions | None) -> list[tuple[int, Indices]]:
+def symmetry_planes(pair: Formulation) -> list[tuple[int, Indices]]:
     """Return the planes of symmetry at the ends of a surface, by the axis normal to each and the nodes of the surface on it.
 
-    `coordinates` (n_points, dim) are those of all points; without supports there are no planes.
+    Supports hold the nodes in a plane of symmetry at rest, and the opposite body does not extend beyond the plane.
     """
+    surface, coordinates, motions = pair.secondary, pair.points, pair.held
     if motions is None:
         return []
-    points = coordinates[surface.points]
+    points, opposite = coordinates[surface.points], coordinates[pair.primary.points]
     held = np.diagonal(motions.at(surface.points), axis1=1, axis2=2) >= TOGETHER**2
+    held &= ~motions.driven[surface.points]
     tolerance, planes = SINGLE_PRECISION * float(np.ptp(points, axis=0).max()), []
     across = np.abs(nodal_normals(surface, coordinates)) < LEANING  # otherwise the plane does not cut the surface
     for axis in range(points.shape[1]):
         x = points[:, axis]
         if np.ptp(x) <= 10 * tolerance:
             continue
-        for end in (x.min(), x.max()):
+        for end, outward in ((x.min(), -1.0), (x.max(), 1.0)):
+            if (outward * (opposite[:, axis] - end) > 10 * tolerance).any():
+                continue
             on_end = np.abs(x - end) <= tolerance
             nodes = np.flatnonzero(on_end & held[:, axis] & ~held.all(axis=1) & across[:, axis])
             if len(nodes) and len(nodes) == np.count_nonzero(on_end & ~held.all(axis=1)):

@@ -33,13 +33,16 @@ class HeldMotions:
         Nodes with a prescribed displacement in at least one direction, in ascending order.
     projectors : ndarray (h, dim, dim)
         Orthogonal projectors onto the prescribed directions of each node [-].
+    driven : ndarray of bool (n_points, dim)
+        Components with a prescribed displacement other than zero.
     """
 
     nodes: Indices
     projectors: Array
+    driven: Mask
 
     @classmethod
-    def of(cls, supported: Mask, mpc_rows: csr_array) -> HeldMotions:
+    def of(cls, supported: Mask, mpc_rows: csr_array, driven: Mask | None = None) -> HeldMotions:
         """Return the prescribed components.
 
         Parameters
@@ -48,6 +51,8 @@ class HeldMotions:
             Components that supports hold.
         mpc_rows : csr_array (m, n_dofs)
             Rows of multi-point constraints; only those that involve a single node count.
+        driven : ndarray of bool (n_points, dim), optional
+            Components with a prescribed displacement other than zero; by default none.
         """
         dim = supported.shape[1]
         single_nodes, normals = _rows_of_single_nodes(mpc_rows, dim)
@@ -59,7 +64,7 @@ class HeldMotions:
             np.add.at(projectors, index, np.einsum("md,me->mde", normals, normals))
             constrained = np.unique(index)
             projectors[constrained] = spanned(projectors[constrained], SINGLE_PRECISION)
-        return cls(nodes, projectors)
+        return cls(nodes, projectors, np.zeros_like(supported) if driven is None else driven)
 
     def at(self, nodes: NDArray[np.integer]) -> Array:
         """Return the projectors (..., dim, dim) of `nodes` (...); zero for nodes that are free."""

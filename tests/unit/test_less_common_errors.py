@@ -399,12 +399,6 @@ def test_groups_without_points():
             act(model(mesh))
 
 
-def test_without_supports_there_is_no_plane_of_symmetry():
-    from fastcontact.contact.contact_middle import symmetry_planes
-
-    assert symmetry_planes(None, SQUARE.points, None) == []
-
-
 def test_loads_on_groups_of_cells_and_facets_act_on_the_cells():
     facets = SQUARE.cell_groups["TOP"].tolist()
     solids = [SQUARE.offsets[name] + k for name, block in SQUARE.solids.items() for k in range(len(block))]

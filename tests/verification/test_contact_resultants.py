@@ -124,6 +124,29 @@ def test_the_area_of_hertz_lies_between_the_brackets_of_the_radius():
         assert found.moment == pytest.approx(0.0)
 
 
+@pytest.mark.parametrize("wide_is_secondary", [False, True])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_area_of_mortar_contact_is_that_of_the_narrow_body(dim, wide_is_secondary):
+    if dim == 2:
+        wide, narrow = block((6.0, 2.0), (9, 3), origin=(-3.0, -2.0)), block((2.0, 1.0), (4, 2), origin=(-1.07, 0.0))
+        kinematics, top, bottom, up, area = "plane_strain", "TOP", "BOTTOM", "y", 2.0
+    else:
+        wide, narrow = (
+            box((6.0, 6.0, 2.0), (6, 6, 1), origin=(-3.0, -3.0, -2.0)),
+            box((2.0, 2.0, 1.0), (3, 3, 1), origin=(-1.07, -1.13, 0.0)),
+        )
+        kinematics, top, bottom, up, area = "3d", "ZMAX", "ZMIN", "z", 4.0
+    model = elastic_model(united(WIDE_=wide, NARROW_=narrow), kinematics, E=E, nu=0.0)
+    model.fix(f"WIDE_{bottom}", "xyz"[: model.mesh.dim])
+    model.prescribe(f"NARROW_{top}", **dict.fromkeys("xyz"[: model.mesh.dim], 0.0) | {up: -1e-8})
+    sides = f"WIDE_{top}", f"NARROW_{bottom}"
+    secondary, primary = sides if wide_is_secondary else sides[::-1]
+    model.add_contact("c", secondary=secondary, primary=primary)
+    (resultants,) = fc.contact_resultants(model, fc.solve(model, 1), "c")
+    assert resultants.area == pytest.approx(area, rel=1e-7)
+    assert resultants.pressure_mean == pytest.approx(resultants.normal_force / area, rel=1e-7)
+
+
 WEAR = 1e-6
 RAMP_DOWN, RAMP_ALONG = [(0.0, 0.0), (1.0, 1.0), (9.0, 1.0)], [(0.0, 0.0), (1.0, 0.0), (9.0, 1.0)]
 

@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, supported, united
 
 import fastcontact as fc
 from fastcontact.analytic.pressure_curve import pressure_curve
@@ -67,6 +67,26 @@ def test_the_half_width_is_that_of_hertz_wherever_the_contact_lies(x0, facing, h
     line = max(fc.plot.pressure_profile(contact, hertz).lines, key=lambda line: len(line.get_xdata()))
     exact = hertz.pressure(np.abs(line.get_xdata()))
     np.testing.assert_allclose(line.get_ydata(), exact)  # theory is drawn where the contact is
+
+
+@pytest.mark.parametrize("component", ["normal", "x"])
+def test_a_face_that_is_driven_is_not_a_plane_of_symmetry(component):
+    model = elastic_model(fc.generate.block((4.0, 1.0), (8, 2)), "plane_strain", E=E, TOP={"y": -0.01})
+    model.prescribe("RIGHT", **{component: 0.1}, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
+    model.add_obstacle("c", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0)))
+    for step in fc.solve(model, fc.linear_ramp(2, end=2.0)):
+        pressure = step.contact["c"].pressure
+        centre = step.contact["c"].force_vectors[:, 1] @ step.contact["c"].coordinates / step.contact["c"].force[1]
+        assert pressure.min() > 0.0
+        np.testing.assert_allclose(step.contact["c"].middle, centre, atol=1e-9)
+
+
+def test_an_end_beyond_which_the_other_body_extends_is_not_a_plane_of_symmetry():
+    upper, lower = fc.generate.block((2.0, 1.0), (4, 2)), fc.generate.block((6.0, 1.0), (9, 2), origin=(-3.0, -1.0))
+    model = elastic_model(united(U_=upper, L_=lower), "plane_strain", E=E, L_BOTTOM="xy", U_LEFT="x", U_TOP={"y": -0.01})
+    model.add_contact("c", secondary="U_BOTTOM", primary="L_TOP")
+    contact = fc.solve(model, 1)[-1].contact["c"]
+    assert 0.8 < contact.middle[0] < 1.2
 
 
 @pytest.mark.parametrize("swapped", [False, True], ids=["cylinder", "block"])
