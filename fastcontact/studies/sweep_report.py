@@ -202,16 +202,20 @@ class Sweep(Report):
 
         The fields are the parameters, ``h`` [length] if known, ``n_dofs``, ``seconds`` [s] and, for each quantity, its value
         [unit of the quantity] and, if known, the relative differences ``..._from_theory``, ``..._from_theory_at_equal_force``
-        and ``..._from_reference`` [-].
+        and ``..._from_reference`` [-]. A result that has the name of a parameter, such as ``force``, is in the field
+        ``computed_force``.
         """
-        columns: dict[str, list[Any]] = {name: [p.parameters[name] for p in self.points] for name in self.parameters}
-        for attribute in ("h", "n_dofs", "seconds"):
-            columns[attribute] = [getattr(point, attribute) for point in self.points]
+        columns: dict[str, list[Any]] = {
+            name: [getattr(point, name) for point in self.points] for name in ("h", "n_dofs", "seconds")
+        }
         for name in self.quantities:
             columns[name] = [point.values.get(name, math.nan) for point in self.points]
             for other, key in DIFFERENCES.items():
                 columns[f"{name}_{key}"] = [point.ratio(name, other) - 1.0 for point in self.points]
-        return self.structured_known(columns)
+        results = {f"computed_{name}" if name in self.parameters else name: values for name, values in columns.items()}
+        return self.structured_known(
+            {name: [p.parameters[name] for p in self.points] for name in self.parameters} | results
+        )
 
     def tables(self) -> list[tuple[str, Rows]]:
         """See `Report`."""

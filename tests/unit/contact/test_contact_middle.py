@@ -83,7 +83,9 @@ def test_a_face_that_is_driven_is_not_a_plane_of_symmetry(component):
 
 def test_an_end_beyond_which_the_other_body_extends_is_not_a_plane_of_symmetry():
     upper, lower = fc.generate.block((2.0, 1.0), (4, 2)), fc.generate.block((6.0, 1.0), (9, 2), origin=(-3.0, -1.0))
-    model = elastic_model(united(U_=upper, L_=lower), "plane_strain", E=E, L_BOTTOM="xy", U_LEFT="x", U_TOP={"y": -0.01})
+    model = elastic_model(
+        united(U_=upper, L_=lower), "plane_strain", E=E, L_BOTTOM="xy", U_LEFT="x", U_TOP={"y": -0.01}
+    )
     model.add_contact("c", secondary="U_BOTTOM", primary="L_TOP")
     contact = fc.solve(model, 1)[-1].contact["c"]
     assert 0.8 < contact.middle[0] < 1.2

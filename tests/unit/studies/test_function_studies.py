@@ -107,6 +107,9 @@ def test_a_sweep_calls_the_function_with_all_choices():
     assert list(single.table()["bore"]) == list(found.table()["bore"][::2])
     frame = pytest.importorskip("pandas").DataFrame(single.table())
     assert frame.equals(single.to_pandas())
+    loaded = fc.parameter_sweep(lambda force: tube(0.5), {"force": [7.0]}, quantities={"force": bore}, workers=1)
+    assert loaded.table()["force"].tolist() == [7.0]
+    assert loaded.table()["computed_force"].tolist() == [loaded.points[0].values["force"]]
     case = fc.parameter_sweep("forma04a", {"approach": [0.4]}, quantities=["von_mises_max"], level=0, workers=1)
     assert any("von_mises_max" in line for line in case.lines())
 
