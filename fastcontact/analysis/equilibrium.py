@@ -438,17 +438,18 @@ def with_loads(problem: Problem, load: StepLoad) -> Loaded:
 
 
 def solve_displacements(
-    problem: Problem, load: StepLoad, loaded: Loaded, settled: SettledContact | None, guess: Array
-) -> tuple[Array, Array]:
+    problem: Problem, load: StepLoad, loaded: Loaded, settled: SettledContact | None, guess: Array,
+    tolerance: float | None = None,
+) -> tuple[Array, Array]:  # fmt: skip
     """Return all displacements (n_dofs,) [length] and the nodal contact forces (n_dofs,) [force].
 
     `settled` is the contact solution, None without contact. Iterative solvers then begin with the displacements `guess`
-    (n_dofs,) [length].
+    (n_dofs,) [length], and stop at a relative residual `tolerance` [-] or at their own tolerance.
     """
     system, lift = problem.system, load.lift
     if settled is None:
         no_constraints = csr_array((0, len(lift))), np.empty(0)
-        v = loaded.solve(*no_constraints, guess=system.unknowns(guess, lift))[0]
+        v = loaded.solve(*no_constraints, guess=system.unknowns(guess, lift), tolerance=tolerance)[0]
         return system.displacement(v, lift), np.zeros(len(lift))
     contact_force, rigid = settled.force, settled.iterate.rigid
     if problem.floating_bodies is not None and rigid is not None:

@@ -43,7 +43,8 @@ log = logging.getLogger("fastcontact")
 # contact does not constrain, such as gaps between the nodes of a pressure field. An O-ring takes 5 iterations with 5e-5 and
 # 7 with 2e-4. An O-ring under fluid pressure takes 13 with 2e-4, and 5e-5 is too soft for it.
 HELD = 2e-4
-# The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
+# The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement. In
+# iterations without contact that are not the last, residuals of linear solutions fall to this fraction.
 FORCING = 1e-3
 
 
@@ -113,6 +114,7 @@ class _Newton:
         self._settled: SettledContact | None = None
         self._reusable: Problem | None = None  # problem with the last tangent, if another iteration may use it
         self._reused = False  # whether the last iteration used the tangent of an earlier one
+        self._linear_tolerance: float | None = None  # of the last linear solution, if larger than that of the solver
         self._moved_fully = False  # whether displacements are those of the last contact solution
         self._regularisation = Regularisation()  # of the last tangent
         self._replaces = bool(begin.problem.force_driven.pairs)  # see `Regularisation.replaces`
@@ -185,19 +187,29 @@ class _Newton:
         return max(self._problem.criteria.geometry, TOLERANCE)
 
     def _has_converged(self, changes: list[float]) -> bool:
-        """Return whether relative `changes` leave an error below the criterion, or are round-off.
+        """Return whether relative `changes` after an accurate linear solution leave an error below the criterion.
 
         A change that is small enough to be round-off (SINGLE_PRECISION, reached in slender bodies) is regarded as round-off
-        if it exceeds the fraction DECLINE of the previous one. With the tangent of an earlier iteration, the ratio of the
-        last two changes ignores points whose plastic flow has begun or ended since. The ratio before is then used as well.
+        if it exceeds the fraction DECLINE of the previous one.
         """
-        before, last = changes[-2:]
-        rate = min(last / before, 1.0) if before else 1.0
-        if self._reused and changes[-3]:
-            rate = min(max(rate, before / changes[-3]), 1.0)
+        if self._linear_tolerance is not None:
+            return False
+        rate, last = self._rate(changes), changes[-1]
         if self._regularisation.linear:
             return last * rate <= self._tolerance * (1.0 - rate) or (last <= SINGLE_PRECISION and rate == 1.0)
         return last * rate <= self._tolerance or (last <= SINGLE_PRECISION and rate > DECLINE)
+
+    def _rate(self, changes: list[float]) -> float:
+        """Return the rate of convergence [-], the ratio of the last two `changes`.
+
+        With the tangent of an earlier iteration, this ratio ignores points whose plastic flow has begun or ended since. The
+        ratio before is then used as well.
+        """
+        before, last = changes[-2:]
+        rate = last / before if before else 1.0
+        if self._reused and changes[-3]:
+            rate = max(rate, before / changes[-3])
+        return min(rate, 1.0)
 
     def _accelerated(self, before: Array, u: Array, changes: list[float]) -> Array:
         """Return the next iterate (n_dofs,) [length], after an iteration from `before` (n_dofs,) to u (n_dofs,).
@@ -210,11 +222,13 @@ class _Newton:
         return self._mixing.mixed(before, u)
 
     def _tangent_suffices(self, changes: list[float]) -> bool:
-        """Return whether a second iteration with the last tangent is expected to be the last iteration.
+        """Return whether a further iteration with the last tangent is expected to be the last iteration.
 
-        The next change of Newton's method is C times the square of the last one. The error after a further iteration with
-        the same tangent is C^2 times the cube of the last change.
+        The next change of Newton's method is C times the square of the last one. The error after a second iteration with
+        the same tangent is C^2 times the cube of the last change. Further ones reduce it by a constant rate.
         """
+        if self._reused:
+            return self._rate(changes) ** 2 * changes[-1] <= self._tolerance
         before, last = changes[-2:] if len(changes) > 2 else (0.0, changes[-1])
         C = last / before**2 if before else 1.0
         return len(changes) > 1 and C**2 * last**3 <= self._tolerance
@@ -280,7 +294,7 @@ class _Newton:
     ) -> tuple[Array, Array]:
         """Return the result of `_solve` for a tangent."""
         terms, iterate = self._terms, self._iterate
-        problem, self._reusable = (self._reusable, None) if self._tangent_suffices(changes) else (None, None)
+        problem, self._reusable = self._reusable if self._tangent_suffices(changes) else None, None
         self._reused = problem is not None
         if problem is not None:
             problem = replace(problem, linearised_at=None if problem.linearised_at is None else u)
@@ -288,17 +302,33 @@ class _Newton:
             K = terms.tangent(u, regularisation.geometric)
             contact = self._stiffness_of_contact(K, u, regularisation) if regularisation.geometric == WHOLE else None
             problem = linearised(self._problem, K, u, contact, regularisation.stiff, regularisation.replaces)
-            if regularisation.geometric == WHOLE:
-                self._reusable = problem
-        force, floating = self._load.force - terms.residual(u)[0] + problem.system.K @ u, problem.floating_bodies
+        unbalanced, floating = self._load.force - terms.residual(u)[0], problem.floating_bodies
+        force = unbalanced + problem.system.K @ u
         if floating is not None and iterate.rigid is not None:
             # Under load, the tangent resists rigid-body rotations, which the unknowns of floating bodies do not include.
             force -= problem.system.K @ floating.rigid(u[floating.dofs])
         load = replace(self._load, force=force)
         iterate.u, iterate.history = u.copy(), []
+        self._linear_tolerance = self._forcing(problem, load, u, unbalanced)
         tolerance = min(max(problem.criteria.geometry, FORCING * changes[-1]), NOTABLE)
         inner_problem = replace(problem, criteria=replace(problem.criteria, geometry=tolerance))
-        return self._contact(inner_problem, load, with_loads(problem, load), u, Extrapolation())
+        solution = self._contact(inner_problem, load, with_loads(problem, load), u, Extrapolation())
+        self._reusable = problem if regularisation.geometric == WHOLE else None
+        return solution
+
+    def _forcing(self, problem: Problem, load: StepLoad, u: Array, unbalanced: Array) -> float | None:
+        """Return the tolerance of the linear solution from u (n_dofs,), None for that of the solver (inexact Newton method).
+
+        `unbalanced` (n_dofs,) are the residual forces of the terms at u. If their ratio to the forces of the linear problem
+        is small, the next ratio, which is about the square of this one, may be that of the last iteration.
+        """
+        system, lift = problem.system, load.lift
+        scale = largest(system.right(load.force, lift))
+        if problem.pairs or not problem.solver.iterative or scale == 0.0:
+            return None
+        missing = largest_difference(system.displacement(system.unknowns(u, lift), lift), u)  # prescribed displacements
+        ratio = max(largest(system.reduced(unbalanced)) / scale, missing and missing / max(largest(u), largest(lift)))
+        return FORCING * ratio if ratio**2 > self._tolerance else None
 
     def _contact(
         self, problem: Problem, load: StepLoad, loaded: Loaded, u: Array, extrapolation: Extrapolation
@@ -317,7 +347,7 @@ class _Newton:
             paired = self._settled if self._moved_fully and problem.linearised_at is None else None
             settled = settle_geometry(step, self._iterate, paired)
             self._iterate = settled.iterate
-        solution = solve_displacements(problem, load, loaded, settled, u)
+        solution = solve_displacements(problem, load, loaded, settled, u, self._linear_tolerance)
         self._settled = settled
         return solution
 

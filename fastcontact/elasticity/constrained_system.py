@@ -156,19 +156,25 @@ class System(ConstrainedMotion):
         super().__init__(supported | ((diagonal == 0.0) & ~related & ~without_stiffness), relations)
         self._reacting: Mask = self.fixed | related  # supports and constraints may exert forces here
         self._independent, self._without_stiffness = self.free, without_stiffness
+        self._entries: _SupportedEntries | None = None  # of the last `renewed` matrix
         self._set_stiffness(K, diagonal)
 
     def renewed(self, K: bsr_array) -> System:
         """Return the system with another stiffness K (n, n) [force / length], which is modified as in the constructor."""
+        if self.T is None and not (self._entries and self._entries.are_of(K)):
+            K = _with_diagonal(K)
+            self._entries = _SupportedEntries(K, self.fixed)
         system = copy.copy(self)
-        system._set_stiffness(K, K.diagonal())
+        system._set_stiffness(K, self._entries.diagonal_of(K) if self._entries else K.diagonal())
         return system
 
     def _set_stiffness(self, K: bsr_array, diagonal_of_K: Array) -> None:
         """Set the stiffness K (n, n) and what follows from it, given its diagonal (n,)."""
         self.free = self._independent.copy()
         if self.T is None:
-            self.K = Stiffness(supports_apart(K, self.fixed))
+            self.K = Stiffness(
+                (K, self._entries.removed_from(K)) if self._entries else supports_apart(K, self.fixed)
+            )
             self.matrix = self.K.parts[0]
             self.weightless: Mask = self.free & (diagonal_of_K == 0.0)
         else:
@@ -253,22 +259,52 @@ def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
         The original K minus `matrix`.
     """
     K = _with_diagonal(K)
-    diagonal, size = K.diagonal(), K.blocksize[0]
-    pivots = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0)).reshape(-1, size)
-    supported, row = fixed.reshape(-1, size), entry_rows(K)
-    on_support = np.asarray(supported.any(axis=1))
-    affected = np.flatnonzero(on_support[row] | on_support[K.indices])
-    row, column, blocks = row[affected], K.indices[affected], K.data[affected]
-    remaining, diagonal_blocks = np.zeros_like(blocks), np.flatnonzero(row == column)
-    remaining[diagonal_blocks[:, None], range(size), range(size)] = pivots[row[diagonal_blocks]]
-    changes = (supported[row][:, :, None] | supported[column][:, None]) & np.not_equal(blocks, remaining)
-    block, i, j = np.nonzero(changes)
-    K.data[affected[block], i, j] = remaining[changes]
-    rows = size * row[block] + i
-    order = np.argsort(rows, kind="stable")
-    start = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=K.shape[0]))]).astype(np.int32)
-    columns, removed = (size * column[block] + j).astype(np.int32), (blocks - remaining)[changes]
-    return K, csr_array((removed[order], columns[order], start), shape=K.shape)
+    return K, _SupportedEntries(K, fixed).removed_from(K)
+
+
+class _SupportedEntries:
+    """Entries in the rows and columns of the degrees of freedom `fixed` (n,), for the pattern of a matrix K (n, n).
+
+    K has a block in every place of the diagonal.
+    """
+
+    def __init__(self, K: bsr_array, fixed: Mask) -> None:
+        self._pattern, size = (K.indptr, K.indices), K.blocksize[0]
+        supported, row = fixed.reshape(-1, size), entry_rows(K)
+        on_support, on_diagonal = np.asarray(supported.any(axis=1)), np.flatnonzero(row == K.indices)
+        affected = np.flatnonzero(on_support[row] | on_support[K.indices])
+        row, column = row[affected], K.indices[affected]
+        block, i, j = np.nonzero(supported[row][:, :, None] | supported[column][:, None])
+        rows, columns = size * row[block] + i, size * column[block] + j
+        order = np.argsort(rows, kind="stable")
+        self._places = ((affected[block] * size + i) * size + j)[order]
+        self._columns = columns[order].astype(np.int32)
+        self._start = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(fixed)))]).astype(np.int32)
+        self._diagonal = np.flatnonzero((rows == columns)[order])
+        self._whole_diagonal = (size**2 * on_diagonal[:, None] + (size + 1) * np.arange(size)).ravel()
+
+    def are_of(self, K: bsr_array) -> bool:
+        """Return whether K has the pattern of these entries."""
+        return all(map(np.array_equal, self._pattern, (K.indptr, K.indices)))
+
+    def diagonal_of(self, K: bsr_array) -> Array:
+        """Return the diagonal (n,) of K."""
+        return np.asarray(K.data.reshape(-1)[self._whole_diagonal])
+
+    def removed_from(self, K: bsr_array) -> csr_array:
+        """Set the entries of K to zero, but those on the diagonal to positive numbers, and return the difference."""
+        K.data = np.ascontiguousarray(K.data)
+        numbers = K.data.reshape(-1)
+        removed = numbers[self._places]
+        diagonal = removed[self._diagonal]
+        if not (stiff := diagonal > 0.0).all():
+            diagonal[~stiff] = self.diagonal_of(K).max(initial=1.0)
+        numbers[self._places] = 0.0
+        numbers[self._places[self._diagonal]] = diagonal
+        removed[self._diagonal] -= diagonal
+        difference = csr_array((removed, self._columns, self._start), shape=K.shape, copy=True)
+        difference.eliminate_zeros()
+        return difference
 
 
 def _with_diagonal(K: bsr_array) -> bsr_array:

@@ -68,28 +68,14 @@ def entry_of(numbers, slot, a, b, size):
 
 
 @kernel
-def _store_row(i, indptr, indices, storage, factor, row, square, high, low):
-    """Store the high and low parts of the blocks of a row times `factor`; `row` contains the numbers of all its blocks."""
-    first, end = part_of(storage, i)
-    outside = diagonal = above = indptr[i]  # slots of the next block outside the part, on and above the diagonal
-    if end:
-        outside, diagonal, above = storage[0][i], storage[1][i] - 1, storage[1][i]
-    for k in range(indptr[i + 1] - indptr[i]):
-        j = indices[indptr[i] + k]
-        if first <= j < i and end:
-            continue
-        if j < first or j >= end:
-            slot = outside
-            outside += 1
-        elif j == i:
-            slot = diagonal
-        else:
-            slot = above
-            above += 1
-        for e in range(square):
-            number = factor * row[k * square + e]
-            high[slot * square + e] = number
-            low[slot * square + e] = number - np.float64(high[slot * square + e])
+def _store_blocks(row, begin, end, slot, factor, square, high, low):
+    """Store the high and low parts of blocks `begin` to ``end - 1`` of `row` times `factor` in successive slots."""
+    shift = (slot - begin) * square
+    for e in range(begin * square, end * square):
+        number = factor * row[e]
+        high_part = np.float32(number)
+        high[shift + e] = high_part
+        low[shift + e] = number - np.float64(high_part)
 
 
 @kernel
@@ -97,13 +83,26 @@ def store_rows(begin, end, shift, widest, indptr, indices, storage, factor, numb
     """Fill the parts of the stored blocks of rows ``shift + begin`` to ``shift + end - 1`` times `factor`.
 
     Rows have up to `widest` blocks of `square` numbers. `low` may be the beginning of `numbers`: a row is read before its
-    memory is overwritten.
+    memory is overwritten. Columns ascend within a row, unless every block is stored.
     """
     row = np.empty(widest * square)
     for i in range(shift + begin, shift + end):
-        for e in range((indptr[i + 1] - indptr[i]) * square):
+        count = indptr[i + 1] - indptr[i]
+        for e in range(count * square):
             row[e] = numbers[indptr[i] * square + e]
-        _store_row(i, indptr, indices, storage, factor, row, square, high, low)
+        first, after = part_of(storage, i)
+        if after == 0:
+            _store_blocks(row, 0, count, indptr[i], factor, square, high, low)
+            continue
+        before_part = before_diagonal = up_to_part = 0  # numbers of blocks
+        for k in range(indptr[i], indptr[i + 1]):
+            before_part += indices[k] < first
+            before_diagonal += indices[k] < i
+            up_to_part += indices[k] < after
+        outside = storage[0][i]
+        _store_blocks(row, 0, before_part, outside, factor, square, high, low)
+        _store_blocks(row, up_to_part, count, outside + before_part, factor, square, high, low)
+        _store_blocks(row, before_diagonal, up_to_part, storage[1][i] - 1, factor, square, high, low)
 
 
 @kernel
