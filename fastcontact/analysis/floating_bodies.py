@@ -27,6 +27,7 @@ from numpy.linalg import LinAlgError
 from scipy.linalg import qr
 from scipy.sparse import bsr_array
 
+from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.anderson import Anderson
 from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS
@@ -86,21 +87,31 @@ class Freed:
         Change of the elongations of the springs for each position [-].
     springs : ndarray of int (k,)
         Numbers of the unknowns at springs.
+    approach : ndarray (m, k)
+        Change of the gaps of all constraints in the rigid-body motion of each position [-].
     """
 
     held: Response
     moved: Array
     stretched: Array
     springs: Indices
+    approach: Array
 
-    def slackened(self, elongation: Array) -> tuple[Array, float]:
+    def slackened(self, elongation: Array, gap: Array) -> tuple[Array, float]:
         """Return the change (k,) of the positions that makes springs with an `elongation` (k,) slack [length].
 
-        In motions that contact does not restrain, positions change by the elongations, which do not relax. The largest
-        remaining elongation is returned as well.
+        In motions that contact does not restrain, elongations do not relax: the bodies move until the first of the gaps
+        `gap` (m,) [length] closes, and by the elongations. The largest remaining elongation is returned as well.
         """
         change = elongation - self._inverse @ (elongation + self.stretched @ elongation)
-        return change, float(np.abs(elongation - self.stretched @ (self._inverse @ elongation)).max())
+        free = elongation - self.stretched @ (self._inverse @ elongation)
+        remaining = largest(free)
+        if remaining > SINGLE_PRECISION * largest(elongation):
+            approach = -self.approach @ free
+            closing = (gap > 0.0) & (approach > LENGTH_ROUND_OFF * remaining)
+            if closing.any():
+                change += free * np.min(gap[closing] / approach[closing])
+        return change, remaining
 
     def respond(self, force: Array, gaps: Array) -> Array:
         """Return the `Response` with springs that stay slack."""
@@ -182,7 +193,7 @@ class FloatingBodies:
         rigid = np.stack([dofs.unknowns(mode, zero_lift) for mode in modes.T], axis=1)
         unloaded = np.zeros(len(rigid))
         strained = np.stack([respond(unloaded, gaps) for gaps in np.moveaxis(changes, -1, 0)], axis=1)
-        return Freed(respond, rigid + strained, strained[springs], springs)
+        return Freed(respond, rigid + strained, strained[springs], springs, changes[0])
 
     def report(self, rigid: RigidPosition, load: float) -> dict[str, Any]:
         """Return a report of the regularisation, as a dict of numbers and strings.
@@ -314,6 +325,6 @@ def _newton_step(
     if freed is None or state.response is None:
         return None
     try:
-        return freed(state.response()).slackened(elongation)
+        return freed(state.response()).slackened(elongation, state.gap)
     except LinAlgError:  # the constraints are linearly dependent
         return None

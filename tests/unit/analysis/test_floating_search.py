@@ -70,7 +70,7 @@ def test_newton_steps_that_overshoot_are_halved(start):
         return dataclasses.replace(solution(-stretch), response=lambda: None)
 
     def freed(held):
-        return Freed(held, np.eye(1), np.array([[-slopes[-1]]]), DOFS)
+        return Freed(held, np.eye(1), np.array([[-slopes[-1]]]), DOFS, np.zeros((0, 1)))
 
     found = bodies_at(DOFS).settle(solve_at, freed, DOFS, np.array([start]), 1.0, 0.0, 0.0)
     assert found.slack
