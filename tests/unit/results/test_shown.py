@@ -130,15 +130,6 @@ def test_a_force_with_friction_shows_its_parts():
     assert f"force {total:.6g} (normal {normal:.6g}, tangential {tangential:.6g})" in repr(contact)
 
 
-def test_principal_stresses(steps):
-    step = steps[-1]
-    low, middle, high = step.principal_stress.T
-    assert np.allclose(low + middle + high, step.stress[:, :3].sum(axis=1))
-    equivalent = np.sqrt(0.5 * ((low - middle) ** 2 + (middle - high) ** 2 + (high - low) ** 2))
-    assert np.allclose(equivalent, step.von_mises)
-    assert np.array_equal(step.tresca, high - low)
-
-
 def test_the_table_of_steps_has_a_row_a_pair(steps):
     html = steps._repr_html_()
     assert html.count("<tr>") == 1 + len(steps)
