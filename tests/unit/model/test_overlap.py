@@ -356,15 +356,6 @@ def test_facets_of_an_earlier_pair_are_refused(mesh, first, second, formulation)
     assert len(model.contact) == 1
 
 
-@pytest.mark.parametrize("swapped", [False, True])
-def test_both_groups_are_the_same(mesh, swapped):
-    model = elastic_model(mesh)
-    sides = ("CONT_UPPER", "CONT_LOWER")
-    model.add_contact("first", secondary=sides[0], primary=sides[1])
-    with pytest.raises(fc.ContactError, match="which contact 'first' pairs already"):
-        model.add_contact("second", secondary=sides[swapped], primary=sides[not swapped])
-
-
 def test_facets_that_stand_in_the_mesh_twice_are_the_same(mesh):
     """Mesh generators write a facet once for each group that holds it."""
     again = {name: np.concatenate([b, mesh.cells_of("CONT_UPPER").get(name, b[:0])]) for name, b in mesh.cells.items()}

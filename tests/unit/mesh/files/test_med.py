@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from matplotlib_pictures import contact_of
 from models import members
 
 from fastcontact.errors import FastcontactWarning, FileError, MeshError
@@ -19,7 +20,7 @@ from fastcontact.mesh.files.med import read_med, read_med_field, write_med_mesh
 from fastcontact.mesh.files.mesh_files import read_mesh_report
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.med import write_med_results
-from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.step import StepResult
 
 CASES = Path(__file__).resolve().parents[5] / "shared" / "cases"
 FLAT = {name: element for name, element in elements.ELEMENTS.items() if element.dim <= 2}
@@ -66,12 +67,7 @@ def some_steps(mesh, count=3):
 
 
 def contact(points, pressure):
-    m, zero = len(points), np.zeros(len(points))
-    vectors = np.zeros((m, 2))
-    return ContactResult(
-        "contact", "node_to_segment", points.astype(np.int32), vectors, zero, zero, pressure, zero, vectors,
-        vectors, zero.astype(bool), np.zeros(2), (0.0, 1.0),
-    )  # fmt: skip
+    return contact_of(points.astype(np.int32), np.zeros((len(points), 2)), name="contact", pressure=pressure)
 
 
 def run(*command):
