@@ -61,3 +61,52 @@ class DenseCompliance:
 def reference(name):
     """Return the stored values of a theory, with their source."""
     return json.loads((Path(__file__).parents[1] / "data" / "reference" / f"{name}.json").read_text())
+
+
+def derivative(function, point, step):
+    """Return the central difference of fourth order of a function of two coordinates along `step` (2,)."""
+    values = [function(*(point + k * step)) for k in (-2, -1, 1, 2)]
+    return (values[0] - 8.0 * values[1] + 8.0 * values[2] - values[3]) / (12.0 * np.linalg.norm(step))
+
+
+def assert_largest(hertz, nu):
+    """Assert that the largest von Mises stress of a theory with a contact radius of 2 is the largest of its field."""
+    x, y = np.meshgrid(np.linspace(0.0, 4.0, 161), -np.linspace(0.0, 4.0, 161))
+    field, top = hertz.von_mises(x, y, nu).max(), hertz.von_mises_maximum(nu).value
+    assert 0.999 * top < field <= top * (1.0 + 1e-12)
+
+
+def plates(friction):
+    """Return three plates that do not match, pressed on each other, and with friction sheared."""
+    parts = {}
+    for i, (width, n) in enumerate(((8.0, 6), (6.0, 5), (7.0, 7))):
+        parts[str(i)] = fc.generate.box((width, width, 2.0), (n, n, 2), origin=(-width / 2, -width / 2, 2.0 * i))
+    model = fc.Model(joined(parts), "3d")
+    for i, E in enumerate((2e5, 1e4, 7e4)):
+        model.add_material(fc.LinearElastic(E, 0.3), groups=[f"BOX{i}"])
+    model.fix("ZMIN0", "xyz")
+    model.add_pressure("ZMAX2", 10.0)
+    for i in (1, 2):
+        model.add_contact(f"c{i}", secondary=f"ZMIN{i}", primary=f"ZMAX{i - 1}", friction=friction)
+        if not friction:
+            supported(model, **{f"XMIN{i}": "x", f"YMIN{i}": "y"})
+    if friction:
+        model.add_traction("ZMAX2", x=1.0)
+    return model
+
+
+def joined(parts):
+    """Return meshes by name as one, each group with the name behind its own."""
+    return fc.generate.union(
+        *(
+            fc.generate.renamed(mesh, {group: group + name for group in mesh.group_names})
+            for name, mesh in parts.items()
+        )
+    )
+
+
+def cubes(n, m):
+    """Return the mesh of two cubes on each other, of n and m cells a side, with the groups ZMIN_LOW to ZMAX_HIGH."""
+    low = fc.generate.box((1.0, 1.0, 1.0), (n, n, n), name="LOW")
+    high = fc.generate.box((1.0, 1.0, 1.0), (m, m, m), origin=(0.0, 0.0, 1.0), name="HIGH")
+    return joined({"_LOW": low, "_HIGH": high})

@@ -68,23 +68,22 @@ def turned(cells):
     return cells
 
 
-def square(**supports):
-    model = fc.Model(block((1.0, 1.0), (2, 2)), "plane_strain")
+def held(mesh, kinematics="plane_strain", **supports):
+    """A body of one material whose groups are fixed."""
+    model = fc.Model(mesh, kinematics)
     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
     for group, components in supports.items():
         model.fix(group, components)
     return model
 
 
+def square(**supports):
+    return held(block((1.0, 1.0), (2, 2)), **supports)
+
+
 def cracked():
     """A square of two halves whose nodes were not merged, each held by itself."""
-    model = fc.Model(
-        generate.union(block((0.5, 1.0), (2, 2), name="A"), block((0.5, 1.0), (2, 2), origin=(0.5, 0.0), name="B")),
-        "plane_strain",
-    )
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("BOTTOM", "xy")
-    return model
+    return held(square_in_two().mesh, BOTTOM="xy")
 
 
 def torn():
@@ -93,10 +92,7 @@ def torn():
         generate.renamed(block((1.0, 1.0), (2, 2)), {"BLOCK": "A_BLOCK", "BOTTOM": "A_BOTTOM"}),
         block((1.0, 1.0), (4, 2), origin=(0.0, 1.0)),
     )
-    model = fc.Model(generate.merge_points(mesh, 1e-9), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("A_BOTTOM", "xy")
-    return model
+    return held(generate.merge_points(mesh, 1e-9), A_BOTTOM="xy")
 
 
 def hanging_together():
@@ -105,10 +101,7 @@ def hanging_together():
         generate.renamed(block((1.0, 1.0), (2, 2)), {"BLOCK": "A_BLOCK", "BOTTOM": "A_BOTTOM"}),
         generate.renamed(block((1.0, 1.0), (2, 2), origin=(1.0, 1.0)), {"BLOCK": "B_BLOCK", "BOTTOM": "B_BOTTOM"}),
     )
-    model = fc.Model(generate.merge_points(mesh, 1e-9), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("A_BOTTOM", "xy")
-    return model
+    return held(generate.merge_points(mesh, 1e-9), A_BOTTOM="xy")
 
 
 def with_materials(*given):
@@ -218,17 +211,7 @@ def folded_box():
 
 def square_in_two():
     mesh = generate.union(block((0.5, 1.0), (2, 2), name="A"), block((0.5, 1.0), (2, 2), origin=(0.5, 0.0), name="B"))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("A", "xy")
-    return model
-
-
-def held(mesh):
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("ALL", "xy")
-    return model
+    return held(mesh, A="xy")
 
 
 def flat_cell():
@@ -237,7 +220,8 @@ def flat_cell():
             [[0, 0], [1, 0], [0.5, 0.02], [0.5, 1]],
             {"tri3": [[0, 1, 2], [0, 2, 3], [1, 3, 2]]},
             point_groups={"ALL": [0, 1]},
-        )
+        ),
+        ALL="xy",
     )
 
 
@@ -253,10 +237,7 @@ def uneven():
 
 
 def nearly_folded():
-    model = fc.Model(uneven(), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("BOTTOM", "xy")
-    return model
+    return held(uneven(), BOTTOM="xy")
 
 
 # fmt: off
@@ -337,9 +318,7 @@ SUPPORTS = [
 
 def on_axis(add):
     """A cylinder that stands on its bottom, with something wrong added."""
-    model = fc.Model(block((1.0, 1.0), (2, 2)), "axisymmetric")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("BOTTOM", "y")
+    model = held(block((1.0, 1.0), (2, 2)), "axisymmetric", BOTTOM="y")
     add(model)
     return model
 

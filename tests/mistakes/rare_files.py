@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import h5py
 import numpy as np
+from library import blocks, square
 
 import fastcontact as fc
 from fastcontact._tools import hdf5, packing, paths
@@ -20,24 +21,11 @@ from fastcontact.cli import _outputs, _results
 from fastcontact.cli._outputs import write_json
 from fastcontact.mesh.files import abaqus
 from fastcontact.mesh.files.meshio_content import build_mesh
-from fastcontact.mesh.generate import block, block_on_block
-
-
-def held():
-    model = fc.Model(block((1.0, 1.0), (2, 2)), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
-    model.fix("BOTTOM", "xy")
-    return model
 
 
 def solved(folder):
     """A result file of one step."""
-    model = fc.Model(block_on_block(), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LOWER_BOTTOM", "xy")
-    model.fix("UPPER_TOP", "x")
-    model.prescribe("UPPER_TOP", y=-0.01)
-    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")
+    model = blocks()
     with fc.ResultWriter(folder / "run.vtkhdf", model) as out:
         fc.solve(model, fc.linear_ramp(1), on_step=out.write)
     return folder / "run.vtkhdf"
@@ -127,24 +115,24 @@ def cell_field_cut_off(file):
 
 
 def announced(folder):
-    fc.ResultWriter(folder / "a.vtkhdf", held(), cell_fields=["two words"])
+    fc.ResultWriter(folder / "a.vtkhdf", square(BOTTOM="xy"), cell_fields=["two words"])
 
 
 def not_announced(folder):
-    model = held()
+    model = square(BOTTOM="xy")
     with fc.ResultWriter(folder / "a.vtkhdf", model, cell_fields=["error"]) as out:
         fc.solve(model, fc.linear_ramp(1), on_step=out.write)
 
 
 def changed_by_others(folder, patch):
-    model = held()
+    model = square(BOTTOM="xy")
     with fc.ResultWriter(folder / "a.vtkhdf", model) as out:
         patch.setattr(type(out._committed), "intact", lambda self: False)
         fc.solve(model, fc.linear_ramp(1), on_step=out.write)
 
 
 def no_step_yet(folder):
-    fc.ResultWriter(folder / "a.vtkhdf", held()).close()
+    fc.ResultWriter(folder / "a.vtkhdf", square(BOTTOM="xy")).close()
     with fc.open_results(folder / "a.vtkhdf") as results:
         _results.chosen_step(results, -1)
 

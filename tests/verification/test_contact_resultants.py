@@ -8,7 +8,6 @@ import pytest
 from models import elastic_model, supported, united
 
 import fastcontact as fc
-from fastcontact.cases.case import read_case
 from fastcontact.cli._main import main
 from fastcontact.mesh.generate import block, block_on_block, box
 
@@ -420,31 +419,6 @@ def test_what_cannot_wear_is_refused():
         shoe(kind="bilateral")
     with pytest.raises(fc.ContactError, match=r"wear = -1\.0 of contact 'sole' must be positive"):
         shoe(wear=-1.0)
-
-
-def test_a_case_file_wears(tmp_path):
-    fc.write_mesh(tmp_path / "shoe.med", shoe().mesh)
-    text = """
-title = "A shoe"
-kinematics = "plane_strain"
-mesh = { file = "shoe.med" }
-material = [{ E = 1000.0, nu = 0.3 }]
-support = [{ group = "TOP", x = 0.0, y = -0.03, ramp = [[0.0, 0.0], [1.0, 1.0], [5.0, 1.0]] }]
-ramp = { instants = [1.0, 2.0, 3.0], table = [[0.0, 0.0], [5.0, 5.0]] }
-[obstacle.sole]
-secondary = "BOTTOM"
-shape = { kind = "half_space", point = [0.0, 0.0], normal = [0.0, 1.0] }
-motion = { x = 2.0 }
-ramp = [[0.0, 0.0], [1.0, 0.0], [5.0, 4.0]]
-wear = 2e-5
-"""
-    path = tmp_path / "shoe.toml"
-    path.write_text(text, encoding="utf-8")
-    case = read_case(path)
-    steps = fc.solve(case.model, case.ramp, criteria=case.criteria)
-    first, last = steps[0].contact["sole"], steps[-1].contact["sole"]
-    assert last.force[1] < 0.99 * first.force[1]  # held in place, the block loses its pressure as it wears
-    assert last.wear.max() > 0.0
 
 
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])

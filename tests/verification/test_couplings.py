@@ -5,7 +5,6 @@ import pytest
 from models import elastic_model, supported
 
 import fastcontact as fc
-from fastcontact.cases.case import build_case, read_case
 from fastcontact.model.couplings import WEIGHTINGS
 
 pytestmark = pytest.mark.pairwise
@@ -118,29 +117,6 @@ def test_a_liquid_presses_by_its_depth(level):
     (step,) = fc.solve(model, 1)
     exact = level**2 - max(level - 1.0, 0.0) ** 2
     assert step.reaction[:, 0].sum() == pytest.approx(-exact, rel=1e-9)
-
-
-CASE = {
-    "kinematics": "plane_stress",
-    "mesh": {"generator": "box"},
-    "material": [{"E": E, "nu": 0.0}],
-    "support": [{"group": "LEFT", "x": 0.0, "y": 0.0}],
-    "coupling": [{"reference": "REF", "group": "RIGHT", "place": [12.0, 0.5], "kind": "distributing"}],
-    "moment": [{"group": "REF", "z": MOMENT}],
-    "hydrostatic_pressure": [{"group": "TOP", "weight": 0.001, "level": 2.0, "axis": "y"}],
-}
-
-
-def test_a_case_file_has_couplings_moments_and_liquids():
-    mesh = fc.generate.block((LENGTH, HEIGHT), (10, 2), "quad8")
-    case = build_case(CASE, name="beam", mesh=mesh)
-    same = elastic_model(fc.generate.with_reference_points(mesh, {"REF": (12.0, 0.5)}), "plane_stress", E=E, nu=0.0)
-    same.fix("LEFT", "xy")
-    same.add_coupling("REF", "RIGHT", kind="distributing")
-    same.add_moment("REF", z=MOMENT)
-    same.add_pressure("TOP", lambda x: 0.001 * (2.0 - x[:, 1]))
-    steps = [fc.solve(model, 1)[0] for model in (case.model, same)]
-    assert steps[0].displacement == pytest.approx(steps[1].displacement, rel=1e-12, abs=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -415,44 +391,3 @@ def test_no_force_acts_through_a_place_of_a_ring():
     model = fc.Model(fc.generate.block((1.0, 1.0), (2, 2), "quad4", (1.0, 0.0)), "axisymmetric")
     with pytest.raises(fc.ModelError, match="in axisymmetry a force cannot act at a point"):
         model.add_force("TOP", y=1.0, at=(1.5, 1.0))
-
-
-def test_in_a_case_file(tmp_path):
-    fc.write_mesh(tmp_path / "two.med", two_blocks("quad4"))
-    (tmp_path / "case.toml").write_text("""
-kinematics = "plane_stress"
-[mesh]
-file = "two.med"
-[[material]]
-E = 1000.0
-nu = 0.0
-[[support]]
-group = "BOTTOM"
-x = 0.0
-y = 0.0
-[[spring]]
-group = "TOP"
-to = "BOTTOM2"
-axial = 30.0
-transverse = 10.0
-translation = [0.0, 0.5]
-[[force]]
-group = "TOP2"
-y = -1.0
-at = [0.5, 2.5]
-weighting = "quadratic"
-radius = 1.0
-[ramp]
-steps = 1
-""")
-    case = read_case(tmp_path / "case.toml")
-    step = fc.solve(case.model, case.ramp)[-1]
-    assert step.reaction[case.model.mesh.points_of("BOTTOM"), 1].sum() == pytest.approx(1.0, rel=1e-9)
-    springs = case.model.springs[0]
-    pull = springs.rows.T @ springs.tension(step.displacement)  # what they do to the nodes
-    below = case.model.mesh.points_of("TOP")
-    vertical = pull.reshape(-1, 2)[below, 1]
-    assert vertical.sum() == pytest.approx(1.0, rel=1e-9)
-    # In balance about the place through which the force acts.
-    moment = vertical @ (case.model.mesh.points[below, 0] - 0.5) - pull.reshape(-1, 2)[below, 0] @ (0.0 * below - 1.5)
-    assert moment == pytest.approx(0.0, abs=1e-9)

@@ -2,29 +2,13 @@
 
 import numpy as np
 import pytest
+from models import plates
 
 import fastcontact as fc
 
 
 def numbered(mesh, i):
     return fc.generate.renamed(mesh, {name: f"{name}{i}" for name in mesh.group_names})
-
-
-def stack():
-    """Three loose plates on each other, pressed and pushed along."""
-    plates, z = [], 0.0
-    for i, (width, n) in enumerate(((8.0, 6), (6.0, 5), (7.0, 7))):
-        plates.append(numbered(fc.generate.box((width, width, 2.0), (n, n, 2), origin=(-width / 2, -width / 2, z)), i))
-        z += 2.0
-    model = fc.Model(fc.generate.union(*plates), "3d")
-    for i, E in enumerate((2e5, 1e4, 7e4)):
-        model.add_material(fc.LinearElastic(E, 0.3), groups=[f"BOX{i}"])
-    model.fix("ZMIN0", "xyz")
-    model.add_pressure("ZMAX2", 10.0)
-    model.add_traction("ZMAX2", x=1.0)
-    for i in (1, 2):
-        model.add_contact(f"c{i}", secondary=f"ZMIN{i}", primary=f"ZMAX{i - 1}", friction=0.3)
-    return model
 
 
 def wedge():
@@ -83,7 +67,7 @@ def gasket():
 @pytest.mark.parametrize(
     ("model", "of_linear", "held", "force"),
     # Iterations of a linear solution of the same bodies on the springs; the load that the first pair carries along an axis.
-    [(stack, 15, 2, 490.0), (wedge, 11, 1, 13.5), (gasket, 19, 2, 378.0 * 10.0 * np.sin(np.pi / 18))],
+    [(lambda: plates(0.3), 15, 2, 490.0), (wedge, 11, 1, 13.5), (gasket, 19, 2, 378.0 * 10.0 * np.sin(np.pi / 18))],
 )
 def test_ten_linear_solutions_hold_loose_bodies(model, of_linear, held, force):
     (step,) = fc.solve(model(), 1, linear_solver="amg")

@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
-from case_texts import of_block
 from models import supported
 
 import fastcontact as fc
-from fastcontact.cases.case import read_case
 
 pytestmark = pytest.mark.pairwise
 
@@ -123,16 +121,3 @@ def test_a_missing_density_is_told_before_any_numerics():
         fc.ModelError, match="gravity on all solid cells needs densities, but the materials of 24 solid"
     ):
         model.check()
-
-
-def test_loads_by_mass_in_a_case_file(tmp_path):
-    fc.write_mesh(tmp_path / "block.med", fc.generate.block(divisions=(2, 2)))
-    loads = (
-        "[[gravity]]\ny = -3.0\n"
-        "[[centrifugal]]\nspeed = 2.0\norigin = [-1.0, 0.5]\nramp = [[0.0, 0.0], [1.0, 0.5]]"
-    )  # fmt: skip
-    text = of_block(loads, "plane_strain", "E = 1.0\nnu = 0.3\ndensity = 2.0", BOTTOM="xy")
-    (tmp_path / "case.toml").write_text(text)
-    model = read_case(tmp_path / "case.toml").model
-    found = [force.sum(axis=0) for force in model.forces_by_ramp().values()]
-    np.testing.assert_allclose(found, [[0.0, -6.0], [2.0 * 4.0 * 1.5, 0.0]], atol=1e-12)

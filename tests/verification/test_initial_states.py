@@ -193,20 +193,6 @@ def case(tmp_path, text, kinematics="plane_stress"):
     return read_case(tmp_path / "case.toml").model
 
 
-def test_initial_states_in_a_case_file(tmp_path):
-    model = case(tmp_path, "[[initial_stress]]\nxx = 5.0\n[[initial_strain]]\ngroups = 'BLOCK'\nyy = 1e-3")
-    step = solved(model)
-    np.testing.assert_allclose(step.displacement[:, 0], -5.0 / 1000 * model.mesh.points[:, 0], atol=1e-12)
-    np.testing.assert_allclose(step.displacement[:, 1], (1e-3 + 0.3 * 5.0 / 1000) * model.mesh.points[:, 1], atol=1e-12)
-    turned = case(
-        tmp_path,
-        "[[initial_strain]]\nxx = {along = 'x', table = [[0, 0], [2, 1e-3]]}\naxes = {origin = [-1, 0, 0]}\n"
-        "ramp = [[0, 0], [1, 1]]",
-    )
-    assert turned.initial_states[0].axes == fc.CylindricalAxes((-1.0, 0.0, 0.0))
-    assert "Initial strain: xx = " in turned.describe()
-
-
 @pytest.mark.parametrize(
     ("text", "kinematics", "message"),
     [

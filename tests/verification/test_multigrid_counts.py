@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import cubes, elastic_model
 from pairwise import first_of
 from scipy.sparse import csr_array
 from stepping import Stepping
@@ -17,15 +17,7 @@ pytestmark = pytest.mark.pairwise
 
 def blocks(n, formulation="node_to_segment"):
     """Return two cubes whose meshes do not match, pressed together."""
-    m = round(0.7 * n)
-    parts = [
-        fc.generate.renamed(mesh, {group: f"{group}_{name}" for group in mesh.cell_groups})
-        for name, mesh in {
-            "LOW": fc.generate.box((1.0, 1.0, 1.0), (n, n, n), name="LOW"),
-            "HIGH": fc.generate.box((1.0, 1.0, 1.0), (m, m, m), origin=(0.0, 0.0, 1.0), name="HIGH"),
-        }.items()
-    ]
-    model = elastic_model(fc.generate.union(*parts), ZMIN_LOW="xyz", ZMAX_HIGH={"x": 0.0, "y": 0.0, "z": -0.01})
+    model = elastic_model(cubes(n, round(0.7 * n)), ZMIN_LOW="xyz", ZMAX_HIGH={"x": 0.0, "y": 0.0, "z": -0.01})
     model.add_contact("c", secondary="ZMIN_HIGH", primary="ZMAX_LOW", formulation=formulation)
     return model
 

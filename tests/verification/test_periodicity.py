@@ -5,7 +5,6 @@ import pytest
 from pairwise import first_of
 
 import fastcontact as fc
-from fastcontact.cases.case import read_case
 from fastcontact.mesh.generate import block, box, merge_points, renamed, union
 
 pytestmark = pytest.mark.each_value
@@ -362,35 +361,3 @@ def test_ends_that_do_not_match_are_refused():
     axisymmetric = fc.Model(block(), "axisymmetric")
     with pytest.raises(fc.ModelError, match="is the whole ring already"):
         axisymmetric.add_cyclic_symmetry("LEFT", "RIGHT", sectors=4)
-
-
-def test_a_case_file_has_sectors_and_periods(tmp_path):
-    fc.write_mesh(tmp_path / "sector.med", sector(5))
-    text = """
-title = "A sector"
-kinematics = "plane_strain"
-mesh = { file = "sector.med" }
-material = [{ E = 1000.0, nu = 0.3 }]
-support = [{ group = "TOP", x = 0.0, y = 0.0 }]
-pressure = [{ group = "BOTTOM", value = 10.0 }]
-ramp = { steps = 1 }
-[[cyclic_symmetry]]
-first = "LEFT"
-second = "RIGHT"
-sectors = 5
-"""
-    path = tmp_path / "sector.toml"
-    path.write_text(text, encoding="utf-8")
-    case = read_case(path)
-    step = fc.solve(case.model, case.ramp, criteria=case.criteria)[-1]
-    model = ring(sector(5))
-    model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=5)
-    model.add_pressure("BOTTOM", 10.0)
-    model.fix("TOP", "xy")
-    assert step.displacement == pytest.approx(fc.solve(model, 1)[-1].displacement, abs=1e-12)
-    fc.write_mesh(tmp_path / "sector.med", block())
-    text = text.replace("cyclic_symmetry", "periodicity").replace(
-        "sectors = 5", "x = 0.01\nramp = [[0.0, 0.0], [1.0, 1.0]]"
-    )
-    path.write_text(text.replace("x = 0.0, y = 0.0", "y = 0.0"), encoding="utf-8")
-    assert len(read_case(path).model.relations) == 2

@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from case_texts import of_block
 from models import supported
 from two_bodies import rings
 
 import fastcontact as fc
-from fastcontact.cases.case import read_case
 
 pytestmark = pytest.mark.pairwise
 
@@ -189,15 +187,3 @@ def test_an_expansion_that_shears_out_of_the_plane_is_refused():
     model.add_temperature(1.0)
     with pytest.raises(fc.ModelError, match="causes out-of-plane shear"):
         model.check()
-
-
-def test_a_temperature_in_a_case_file(tmp_path):
-    fc.write_mesh(tmp_path / "block.med", fc.generate.block(divisions=(2, 2)))
-    text = of_block(
-        "[[temperature]]\nvalue = 120.0\nreference = 20.0",
-        material="E = 1000.0\nnu = 0.0\nexpansion = 1e-5",
-        LEFT="x", BOTTOM="y", TOP="y",
-    )  # fmt: skip
-    (tmp_path / "case.toml").write_text(text)
-    step = solved(read_case(tmp_path / "case.toml").model)
-    np.testing.assert_allclose(step.stress[:, 1], -1.0, rtol=1e-9)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.cases.case import read_case
 from fastcontact.contact.obstacles.rigid_side import Rotation
 
 CENTRE, AXIS = (0.3, -1.0, 2.0), (1.0, 2.0, -0.5)
@@ -182,29 +181,3 @@ def test_an_analysis_of_a_turning_support_goes_on_from_its_file(tmp_path) -> Non
         fc.solve(model, [1.0 / 3.0, 2.0 / 3.0], on_step=out.write)
     again = list(fc.solve_steps(model, 3, resume=list(fc.open_results(tmp_path / "turn.vtkhdf"))))
     assert again[-1].displacement == pytest.approx(whole[-1].displacement, abs=1e-12)
-
-
-def test_a_case_file_turns_a_support(tmp_path) -> None:
-    text = """
-title = "A turned bar"
-kinematics = "plane_strain"
-strain = "finite"
-mesh = { file = "block.med" }
-material = [{ law = "neo_hookean", E = 1.0, nu = 0.3 }]
-ramp = { instants = [0.5, 1.0], table = [[0.0, 0.0], [1.0, 1.0]] }
-[[support]]
-group = "LEFT"
-x = 0.25
-rotation = { angle = 1.5, centre = [0.3, -1.0], ramp = [[0.0, 0.0], [1.0, 1.0]] }
-"""
-    mesh = fc.generate.block((2.0, 1.0), (4, 2), element="quad4")
-    fc.write_mesh(tmp_path / "block.med", mesh)
-    path = tmp_path / "bar.toml"
-    path.write_text(text, encoding="utf-8")
-    case = read_case(path)
-    last = fc.solve(case.model, case.ramp, criteria=case.criteria)[-1]
-    places = case.model.mesh.points
-    assert last.displacement == pytest.approx(turned(places, 1.5) - places + [0.25, 0.0], abs=1e-10)
-    path.write_text(text.replace("angle = 1.5", "angel = 1.5"), encoding="utf-8")
-    with pytest.raises(fc.CaseError, match=r"did you mean 'support\[0\]\.rotation\.angle'"):
-        read_case(path)

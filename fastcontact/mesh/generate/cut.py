@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -14,7 +15,8 @@ from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import OPPOSITE, Mesh
 
-Facet = frozenset[int]
+# Largest number of nodes of a facet.
+MOST_NODES = 9
 
 
 @typed(MeshError)
@@ -54,13 +56,24 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
     facets = {name: block for name, block in mesh.cells_of(group).items() if elements.get(name).dim == mesh.dim - 1}
     if not facets:
         raise MeshError(f"group '{group}' contains no facets, so nothing can be cut along it")
-    section = _as_sets(facets)
     points = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
-    direction = _direction(mesh, group, points, normal)
-    beyond = _cells_beyond(mesh, group, section, points, direction)
     new_node = np.full(mesh.n_points, -1, np.int32)
     new_node[points] = mesh.n_points + np.arange(len(points), dtype=np.int32)
-    return _opened(mesh, group, facets, beyond, new_node)
+    sides = _sides_at(mesh, new_node >= 0)
+    moved = _moved(mesh, group, sides, new_node >= 0, _direction(mesh, group, points, normal))
+    cells = {}
+    for name, start in mesh.offsets.items():
+        block = mesh.cells[name]
+        new = moved[start : start + len(block), None] & (new_node[block] >= 0)
+        cells[name] = np.where(new, new_node[block], block)
+    point_groups = {
+        name: np.concatenate([members, new_node[members[new_node[members] >= 0]]])
+        for name, members in mesh.point_groups.items()
+    }
+    opened = mesh.replace(
+        points=np.concatenate([mesh.points, mesh.points[points]]), cells=cells, point_groups=point_groups
+    )
+    return opened.with_facets({group + OPPOSITE: {name: new_node[block] for name, block in facets.items()}})
 
 
 def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] | None) -> Array:
@@ -76,101 +89,72 @@ def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] 
     return np.asarray(vector / length)
 
 
-def _as_sets(facets: dict[str, Numbers]) -> set[Facet]:
-    """Return the sets of nodes of all facets."""
-    return {frozenset(facet) for block in facets.values() for facet in block.tolist()}
+class _Sides(NamedTuple):
+    """Facets of the mesh and sides of its solid cells, each with the number of its cell and the row of its nodes."""
+
+    cell: Indices
+    is_facet: Mask
+    row: Indices
+    nodes: Indices  # distinct sets of nodes in ascending order, filled with -1 (n_rows, MOST_NODES)
 
 
-def _facets_at(mesh: Mesh, touched: Mask) -> Iterator[tuple[str, int, Facet]]:
-    """Yield the element type, the row of the cell and the nodes of all facets of solid cells with a marked point."""
-    for name, block in mesh.solids.items():
-        rows = np.flatnonzero(touched[block].any(axis=1))
-        for facet in elements.get(name).facets:
-            for row, nodes in zip(rows.tolist(), block[rows][:, list(facet)].tolist(), strict=True):
-                yield name, row, frozenset(nodes)
+def _sides_at(mesh: Mesh, touched: Mask) -> _Sides:
+    """Return the facets and the sides of solid cells that have a marked point, or whose cell has one."""
+    nodes, cell, is_facet = [], [], []
+    for name, block in {**mesh.solids, **mesh.facets}.items():
+        element, near = elements.get(name), np.flatnonzero(touched[block].any(axis=1))
+        for side in element.facets if element.dim == mesh.dim else [range(element.n_nodes)]:
+            sets = np.sort(block[near][:, list(side)], axis=1)
+            nodes.append(np.pad(sets, ((0, 0), (0, MOST_NODES - len(side))), constant_values=-1))
+            cell.append(mesh.offsets[name] + near)
+            is_facet.append(np.full(len(near), element.dim < mesh.dim))
+    distinct, row = np.unique(np.concatenate(nodes), axis=0, return_inverse=True)
+    return _Sides(np.concatenate(cell), np.concatenate(is_facet), row.ravel(), distinct.astype(np.intp))
 
 
-def _cells_beyond(
-    mesh: Mesh, group: str, section: set[Facet], points: Numbers, direction: Array
-) -> dict[str, list[int]]:
-    """Return the rows of the solid cells at a section on the side to which `direction` points, by element type."""
-    touched = np.zeros(mesh.n_points, bool)
-    touched[points] = True
-    number: dict[tuple[str, int], int] = {}
-    owners: dict[Facet, list[int]] = {}
-    for name, row, facet in _facets_at(mesh, touched):
-        owners.setdefault(facet, []).append(number.setdefault((name, row), len(number)))
-    n_invalid = sum(len(owners.get(facet, ())) != 2 for facet in section)
+def _moved(mesh: Mesh, group: str, sides: _Sides, touched: Mask, direction: Array) -> Mask:
+    """Return whether each cell (n_cells,) gets new nodes: solids beyond a section, and their other facets."""
+    solid, row = sides.cell[~sides.is_facet], sides.row[~sides.is_facet]
+    section = np.unique(sides.row[sides.is_facet & np.isin(sides.cell, mesh.cell_groups[group])])
+    order, count = np.argsort(row, kind="stable"), np.bincount(row, minlength=len(sides.nodes))
+    n_invalid = int((count[section] != 2).sum())
     if n_invalid:
         raise MeshError(
             f"{n_invalid} of {len(section)} facets of '{group}' do not lie between two solids that share their nodes: a cut "
             "needs facets inside a body"
         )
-    pairs = np.array([pair for facet, pair in owners.items() if len(pair) == 2 and facet not in section], int)
-    pairs = pairs.reshape(-1, 2)
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(number), len(number)))
-    component = connected_components(graph, directed=False)[1]
-    centres = np.array([mesh.points[mesh.cells[name][row]].mean(axis=0) for name, row in number])
-    beyond = _parts_beyond(mesh, group, {facet: owners[facet] for facet in section}, component, centres, direction)
-    cells: dict[str, list[int]] = {}
-    for (name, row), part, centre in zip(number, component, centres, strict=True):
-        nodes = mesh.cells[name][row]
-        # A part without a facet in the section touches it only at edges or nodes.
-        touching = mesh.points[nodes[touched[nodes]]].mean(axis=0)
-        if beyond.get(int(part), bool((centre - touching) @ direction > 0)):
-            cells.setdefault(name, []).append(row)
-    return cells
+    pairs = solid[order[(np.cumsum(count) - count)[count == 2][:, None] + [0, 1]]]
+    divided = np.isin(np.flatnonzero(count == 2), section)
+    graph = coo_array((np.ones((~divided).sum()), tuple(pairs[~divided].T)), shape=(mesh.n_cells, mesh.n_cells))
+    part = connected_components(graph, directed=False)[1]
+    height, above = _heights(mesh, touched, direction)
+    ends = np.take_along_axis(pairs[divided], np.argsort(height[pairs[divided]], axis=1, kind="stable"), axis=1)
+    below, beyond = part[ends].T
+    mixed = np.flatnonzero(np.isin(below, beyond) | np.isin(beyond, below))
+    if len(mixed):
+        nodes = sides.nodes[section[mixed[0]]]
+        raise MeshError(
+            f"the facets of '{group}' do not divide the body: the cells on both sides are still connected (near "
+            f"{mesh.points[nodes[nodes >= 0]].mean(axis=0)}); extend the group to the surface of the body, with a normal "
+            f"across it (now {direction})"
+        )
+    # A part without a facet in the section touches it only at edges or nodes.
+    moved = np.isin(part, beyond) | (~np.isin(part, below) & (above > 0.0))
+    outer = sides.is_facet & np.isin(sides.row, row[moved[solid]]) & ~np.isin(sides.row, section)
+    moved[sides.cell[outer]] = True
+    return moved
 
 
-def _parts_beyond(
-    mesh: Mesh, group: str, owners: dict[Facet, list[int]], component: Numbers, centres: Array, direction: Array
-) -> dict[int, bool]:
-    """Return for each connected part of the cells with facets in a section whether it lies on the side of `direction`.
+def _heights(mesh: Mesh, touched: Mask, direction: Array) -> Array:
+    """Return the positions along `direction` [length] of the centres of solid cells, absolute and over their marked points.
 
-    `owners` are the two cells of each facet of the section. Raises MeshError if a part lies on both sides.
+    The shape is (2, n_cells), with zero for other cells and, in the second row, for those without a marked point.
     """
-    is_beyond: dict[int, bool] = {}
-    for facet, pair in owners.items():
-        lower, upper = sorted(pair, key=lambda cell: float(centres[cell] @ direction))
-        for part, beyond in ((int(component[lower]), False), (int(component[upper]), True)):
-            if is_beyond.setdefault(part, beyond) != beyond:
-                position = mesh.points[list(facet)].mean(axis=0)
-                raise MeshError(
-                    f"the facets of '{group}' do not divide the body: the cells on both sides are still connected (near "
-                    f"{position}); extend the group to the surface of the body, with a normal across it (now {direction})"
-                )
-    return is_beyond
-
-
-def _opened(
-    mesh: Mesh, group: str, facets: dict[str, Numbers], beyond: dict[str, list[int]], new_node: Numbers
-) -> Mesh:
-    """Return the mesh in which the cells `beyond` the section, given by their rows, have new nodes.
-
-    `new_node` (n_points,) is the number of the new node of each point, and -1 for points that do not lie in the section.
-    """
-    cells = {name: np.array(block) for name, block in mesh.cells.items()}
-    moved = [_with_nodes(cells, name, np.array(rows), new_node) for name, rows in beyond.items()]
-    outer = {facet for sides in moved for facet in sides} - _as_sets(facets)
-    for name, block in mesh.facets.items():
-        rows = np.flatnonzero((new_node[block] >= 0).any(axis=1))
-        of_moved = [row for row in rows.tolist() if frozenset(block[row].tolist()) in outer]
-        _with_nodes(cells, name, np.array(of_moved, int), new_node)
-    old = np.flatnonzero(new_node >= 0)
-    point_groups = {
-        name: np.concatenate([members, new_node[members[new_node[members] >= 0]]])
-        for name, members in mesh.point_groups.items()
-    }
-    points = np.concatenate([mesh.points, mesh.points[old]])
-    opened = mesh.replace(points=points, cells=cells, point_groups=point_groups)
-    return opened.with_facets({group + OPPOSITE: {name: new_node[block] for name, block in facets.items()}})
-
-
-def _with_nodes(cells: dict[str, Numbers], name: str, rows: Indices, new_node: Numbers) -> list[Facet]:
-    """Replace the nodes of some cells by new nodes, in place, and return the facets that the cells had before."""
-    if not len(rows):
-        return []
-    block = cells[name][rows]
-    sides = [frozenset(block[i, list(f)].tolist()) for f in elements.get(name).facets for i in range(len(rows))]
-    cells[name][rows] = np.where(new_node[block] >= 0, new_node[block], block)
-    return sides
+    heights = np.zeros((2, mesh.n_cells))
+    for name, block in mesh.solids.items():
+        along, near = mesh.points[block] @ direction, touched[block]
+        cells = slice(mesh.offsets[name], mesh.offsets[name] + len(block))
+        heights[0, cells] = along.mean(axis=1)
+        of_touched = (along * near).sum(axis=1) / np.maximum(near.sum(axis=1), 1)
+        heights[1, cells] = np.where(near.any(axis=1), heights[0, cells] - of_touched, 0.0)
+    return heights

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, plates
 from pairwise import first_of
 
 import fastcontact as fc
@@ -83,29 +83,6 @@ def test_what_nothing_holds_is_not_slack():
     assert not found.slack
     assert found.positions == MAX_NEWTON_ITERATIONS
     np.testing.assert_array_equal(found.spring_force, [1.0])
-
-
-def plates(friction):
-    """Three plates that do not match, pressed and sheared."""
-    sizes, divisions = ((8.0, 2.0), (6.0, 2.0), (7.0, 2.0)), ((6, 2), (5, 2), (7, 2))
-    plates, z = [], 0.0
-    for i, ((width, height), (n, k)) in enumerate(zip(sizes, divisions, strict=True)):
-        plate = fc.generate.box((width, width, height), (n, n, k), origin=(-width / 2, -width / 2, z))
-        plates.append(fc.generate.renamed(plate, {name: f"{name}{i}" for name in plate.group_names}))
-        z += height
-    model = fc.Model(fc.generate.union(*plates), "3d")
-    for i, E in enumerate((2e5, 1e4, 7e4)):
-        model.add_material(fc.LinearElastic(E, 0.3), groups=[f"BOX{i}"])
-    model.fix("ZMIN0", "xyz")
-    model.add_pressure("ZMAX2", 10.0)
-    for i in (1, 2):
-        model.add_contact(f"c{i}", secondary=f"ZMIN{i}", primary=f"ZMAX{i - 1}", friction=friction)
-        if not friction:
-            model.fix(f"XMIN{i}", "x")
-            model.fix(f"YMIN{i}", "y")
-    if friction:
-        model.add_traction("ZMAX2", x=1.0)
-    return model
 
 
 def wedge(friction):

@@ -4,13 +4,14 @@ import tomllib
 
 import numpy as np
 import pytest
+from matplotlib_pictures import contact_of
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case, described
 from fastcontact.cases.checks import Check, evaluated, measured, read_check
 from fastcontact.cases.summary import lines, of_step, summarise
 from fastcontact.errors import CaseError
-from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.step import StepResult
 
 HERTZ = fc.analytic.hertz_point(E1=1000.0, nu1=0.3, R1=10.0, force=4.0)
 SLIP = fc.analytic.cattaneo_mindlin_line(
@@ -24,25 +25,16 @@ PAIRS = {"hertz": {}, "slip": {}}
 def step():
     """Four points on the secondary side: two stick, one slips, one is open."""
     m = 4
-    contact = ContactResult(
-        name="hertz", formulation="continuous", points=np.arange(m), coordinates=np.outer(np.arange(m), [1.0, 0.0]),
-        abscissa=np.arange(m, dtype=float), gap=np.zeros(m), pressure=np.array([5.0, 4.0, 2.0, 0.0]),
-        multiplier=np.zeros(m), force_vectors=np.zeros((m, 2)), normal=np.zeros((m, 2)),
+    contact = contact_of(
+        np.arange(m), np.outer(np.arange(m), [1.0, 0.0]), name="hertz", formulation="continuous",
+        abscissa=np.arange(m, dtype=float), pressure=np.array([5.0, 4.0, 2.0, 0.0]),
         active=np.array([True, True, True, False]), force=np.array([0.0, 1.1]), radius=(2.0, 3.0),
         shear=np.array([[0.3, 0.4], [0, 0], [0, 0], [0, 0]]), sticking=np.array([True, True, False, False]),
     )  # fmt: skip
     stress = np.tile([-1.0, -2.0, -3.0, 0.5], (m + 1, 1))
     displacement = np.tile([0.1, -0.2], (m + 1, 1))
-    return StepResult(
-        1,
-        1.0,
-        displacement,
-        stress,
-        np.full(m + 1, 7.0),
-        np.full(m + 1, -7.0),
-        np.zeros((m + 1, 2)),
-        {"hertz": contact},
-    )
+    von_mises = np.full(m + 1, 7.0)
+    return StepResult(1, 1.0, displacement, stress, von_mises, -von_mises, np.zeros((m + 1, 2)), {"hertz": contact})
 
 
 def check(**entry):

@@ -85,43 +85,6 @@ def test_a_mesh_is_made_and_described(tmp_path, capsys):
     assert all(group in printed for group in ("SPHHAU", "CONT1", "C1", "quad4"))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["run", "missing.toml"], "does not exist"),
-        (["runn"], "unknown command"),
-        (["info", "missing.vtkhdf"], "missing.vtkhdf"),
-        (["info", "missing.med"], "missing.med"),
-        (["mesh", "half-spheres", "--size", "-1", "-o", "x.med"], "size"),
-        (["mesh", "half-spheres", "--size", "two", "-o", "x.med"], "invalid float"),
-        (["mesh", "half-spheres", "--size", "2", "-o", "nowhere/x.med"], "nowhere"),
-    ],
-)
-def test_wrong_input_is_one_line_and_exit_code_one(arguments, message, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main(arguments) == 1
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.startswith("error: ")
-    assert captured.err.count("\n") == 1
-    assert message in captured.err
-
-
-@pytest.mark.parametrize(
-    ("extra", "message"),
-    [
-        (["--linear", "amgg"], "'amgg'"),
-        (["--threads", "0"], "--threads 0"),
-        (["--json", "nowhere/s.json"], "nowhere"),
-        (["-o", "nowhere/s.vtkhdf"], "nowhere"),
-    ],
-)
-def test_wrong_options_of_run(extra, message, solved, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert main(["run", str(solved / "small.toml"), *extra]) == 1
-    assert message in capsys.readouterr().err
-
-
 def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_path, capsys):
     text = CASE.replace("[probes]", "[solve]\nmax_halvings = 1\nmax_geometry_updates = 2\ngeometry = 1e-9\n[probes]")
     case = tmp_path / "hard.toml"

@@ -178,11 +178,6 @@ def test_functions_that_return_no_axes_are_refused(axes, words):
         model.check()
 
 
-def test_what_is_no_material_is_refused():
-    with pytest.raises(fc.ModelError, match="must be a Material, not the float"):
-        fc.Model(fc.generate.block(divisions=(2, 2)), "plane_strain").add_material(210.0)
-
-
 @pytest.mark.parametrize(
     ("nu", "kinematics", "expected"),
     [(0.3, "3d", 1.0), (0.4999, "3d", 2499.5), (0.49, "axisymmetric", 24.5), (0.4999, "plane_stress", 1.0)],

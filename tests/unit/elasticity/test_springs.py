@@ -1,7 +1,6 @@
 """Springs and supports: exact solutions, reactions, elimination from the matrix, messages."""
 
 import contextlib
-import tomllib
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from models import elastic_model
 from scipy.sparse import bsr_array
 
 import fastcontact as fc
-from fastcontact.cases.case import build_case
 from fastcontact.elasticity.constrained_system import supports_apart
 
 E, WIDTH, HEIGHT, PRESSURE = 1000.0, 2.0, 3.0, 10.0
@@ -148,25 +146,6 @@ def test_springs_of_equal_stiffness_in_all_directions_need_no_direction():
     np.testing.assert_allclose(own, axes, atol=1e-13)
 
 
-def test_a_case_file_takes_directions():
-    text = """
-kinematics = "plane_strain"
-[mesh]
-generator = "block-on-block"
-[[material]]
-E = 1000.0
-nu = 0.0
-[[spring]]
-group = "UPPER_TOP_RIGHT"
-axial = 20.0
-transverse = 2.0
-direction = [1.0, 1.0]
-"""
-    (spring,) = build_case(tomllib.loads(text), name="case").model.springs
-    np.testing.assert_allclose(sorted(spring.stiffness), [2.0, 20.0])
-    np.testing.assert_allclose(np.abs(spring.rows.data), np.sqrt(0.5))
-
-
 def test_a_far_end_without_a_body_may_be_fixed_or_is_told():
     mesh = fc.generate.block((WIDTH, HEIGHT), (1, 1))
     points = np.vstack([mesh.points, [[-1.0, 0.0]]])
@@ -220,23 +199,6 @@ def test_springs_that_cannot_be(groups, stiffness, words):
     model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (1, 1)), "plane_strain")
     with pytest.raises(fc.ModelError, match=words):
         model.add_spring(*groups, **stiffness)
-
-
-def test_case_files_know_springs():
-    data = {
-        "kinematics": "plane_strain",
-        "mesh": {"generator": "block-on-block"},
-        "material": [{"E": E, "nu": 0.0}],
-        "support": [{"group": "LEFT", "x": 0.0}],
-        "pressure": [{"group": "TOP", "value": PRESSURE}],
-        "spring": [{"group": "BOTTOM", "y": 50.0}, {"group": "TOP_LEFT", "to": "BOTTOM_RIGHT", "axial": 1e-9}],
-    }
-    mesh = fc.generate.block((WIDTH, HEIGHT), (1, 3))
-    case = build_case(data, name="springs", mesh=mesh)
-    step = last(case.model)
-    np.testing.assert_allclose(step.displacement[case.mesh.points_of("BOTTOM"), 1], -0.2, rtol=1e-9)
-    with pytest.raises(fc.CaseError, match=r"spring\[0\]\.stiffness"):
-        build_case({**data, "spring": [{"group": "BOTTOM", "stiffness": 1.0}]}, name="springs", mesh=mesh)
 
 
 @pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric"])

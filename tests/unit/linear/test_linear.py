@@ -104,11 +104,6 @@ def test_auto_looks_at_what_the_contact_asks_of_a_solver(options, solver, monkey
     assert Stepping(model, "auto", 1e-10, Criteria()).solver.name == solver
 
 
-def test_an_unknown_solver_is_refused():
-    with pytest.raises(ModelError, match=r"'amgg'.*'amg'"):
-        linear.make("amgg", dim=2, n_dofs=10)
-
-
 def test_auto_says_why(caplog):
     with caplog.at_level(logging.INFO, logger="fastcontact"):
         linear.make("auto", dim=3, n_dofs=60_000)

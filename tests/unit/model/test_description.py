@@ -191,13 +191,6 @@ def test_nodes_of_single_precision_are_on_the_axis_and_others_not():
     assert not len(plane.axis_nodes)
 
 
-def test_a_support_that_moves_the_axis_is_refused():
-    model = cylinder()
-    model.prescribe("TOP", x=0.1)
-    with pytest.raises(fc.ModelError, match=r"x = 0.1 is prescribed at point 2 on the axis of symmetry"):
-        model.check()
-
-
 def test_a_function_of_the_radius_that_vanishes_on_the_axis_is_not():
     model = cylinder()
     model.prescribe("TOP", x=lambda points: 0.1 * (points[:, 0] + 1e-12))

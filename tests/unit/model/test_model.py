@@ -26,44 +26,6 @@ def model(spheres):
 
 
 @pytest.mark.parametrize(
-    ("constants", "message"),
-    [({"nu": nu}, "Poisson") for nu in (0.7, -1.0, float("nan"))]
-    + [({"E": E}, "Young") for E in (-5.0, float("inf"), float("nan"))],
-)
-def test_constants_out_of_range(constants, message):
-    with pytest.raises(fc.ModelError, match=message):
-        fc.LinearElastic(**{"E": 1.0, "nu": 0.3, **constants})
-
-
-def test_groups_without_material_are_named(spheres):
-    model = fc.Model(spheres, "axisymmetric")
-    model.add_material(fc.LinearElastic(1.0, 0.3), ["SPHBAS"])
-    with pytest.raises(fc.ModelError, match=r"solid cells have no material, in 'SPHHAU'"):
-        model.check()
-
-
-def test_one_free_rigid_motion_a_body_is_counted_and_named(model):
-    with pytest.raises(fc.ModelError, match=r"2 rigid-body motions .*'SPHBAS': translation along y.*'SPHHAU'"):
-        model.check()
-    model.prescribe("A2B2", y=-1.0)
-    with pytest.raises(fc.ModelError, match=r"1 rigid-body motion is not supported: body 'SPHBAS'"):
-        model.check()
-    model.fix("A1B1", "y")
-    model.check()
-
-
-def test_bodies_that_overlap_without_contact_are_refused(spheres):
-    moved = spheres.points.copy()
-    upper = spheres.points_of("SPHHAU")
-    moved[upper, 1] -= 3.0
-    model = elastic_model(spheres.replace(points=moved), "axisymmetric", E=1.0, A1A2="x", A1B1="y", A2B2="y")
-    with pytest.raises(fc.ModelError, match=r"overlaps body .* by 2.99"):
-        model.check()
-    model.add_contact("pair", secondary="CONT1", primary="CONT2")
-    model.check()
-
-
-@pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"projektion_tolerance": 1.0}, "did you mean 'projection_tolerance'"),

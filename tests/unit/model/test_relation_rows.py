@@ -1,7 +1,6 @@
 """Constraints along normals and between groups, and pretension sections: rotated results, refusals."""
 
 import json
-import tomllib
 
 import numpy as np
 import pytest
@@ -200,38 +199,6 @@ def test_a_support_that_contradicts_a_normal_one_is_told():
         last(model)
 
 
-def test_a_case_file_takes_normals_and_groups():
-    text = """
-kinematics = "plane_strain"
-[mesh]
-generator = "block-on-block"
-[[material]]
-E = 1000.0
-nu = 0.3
-[[support]]
-group = "LOWER_BOTTOM"
-normal = 0.1
-[[couple]]
-group = "UPPER_TOP"
-component = "normal"
-[[group_relation]]
-first = "LOWER_LEFT"
-second = "LOWER_RIGHT"
-component = "x"
-coefficients = [2.0, -1.0]
-value = 0.02
-translation = [10.0, 0.0]
-"""
-    case = build_case(tomllib.loads(text), name="case")
-    model = model_of(case.model.mesh)
-    model.prescribe("LOWER_BOTTOM", normal=0.1)
-    model.couple("UPPER_TOP", "normal")
-    model.relate_groups("LOWER_LEFT", "LOWER_RIGHT", "x", coefficients=(2.0, -1.0), value=0.02)
-    for found, expected in zip(case.model.relations, model.relations, strict=True):
-        assert (found.rows != expected.rows).nnz == 0
-        np.testing.assert_array_equal(found.value, expected.value)
-
-
 # ----------------------------------------------------------------------------- supports along axes
 @pytest.mark.parametrize("element", ["tri3", "quad8", "tet10", "hex8"])
 def test_supports_along_axes_turn_with_the_body(element):
@@ -287,29 +254,6 @@ def test_a_ring_held_round_about_is_lames():
 def test_axes_that_cannot_be(call, said):
     with pytest.raises(fc.FastcontactError, match=said):
         call(model_of(block(2)))
-
-
-def test_axes_in_a_case_file():
-    data = """
-kinematics = "plane_stress"
-[[material]]
-E = 1000.0
-nu = 0.3
-[[support]]
-group = "LEFT"
-x = 0.0
-axes = [1.0, 1.0]
-[[support]]
-group = "RIGHT"
-y = 0.1
-axes = {origin = [-1.0, -1.0, 0.0]}
-"""
-    case = build_case({**tomllib.loads(data), "mesh": {"generator": "block"}}, name="axes", folder=".", text=data)
-    names = [relation.name for relation in case.model.relations]
-    assert names == [
-        "the displacement x prescribed on 'LEFT' along axes",
-        "the displacement y prescribed on 'RIGHT' along axes",
-    ]
 
 
 def bar(cut=True):

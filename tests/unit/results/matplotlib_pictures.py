@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 
-from fastcontact.results.step import StepResult
+from fastcontact.results.step import ContactResult, StepResult
 
 
 def step_of(mesh, values=None, displacement=None, stress=None, load_factor=1.0):
@@ -14,6 +14,16 @@ def step_of(mesh, values=None, displacement=None, stress=None, load_factor=1.0):
     stress = np.zeros((n, 4 if dim == 2 else 6)) if stress is None else stress
     values = np.zeros(n) if values is None else values
     return StepResult(1, load_factor, u, stress, values, values, np.zeros((n, dim)))
+
+
+def contact_of(points, coordinates, **given):
+    """Return a contact of nodes at `coordinates` (m, dim), all of whose values that are not `given` are zero."""
+    zero, vector = np.zeros(len(points)), np.zeros_like(coordinates, float)
+    fields = dict.fromkeys(("abscissa", "gap", "pressure", "multiplier"), zero) | {"active": zero > 0}
+    fields |= {"force_vectors": vector, "normal": vector, "force": np.zeros(vector.shape[1]), "radius": (0.0, 1.0)}
+    return ContactResult(
+        **{"name": "c", "formulation": "mortar", **fields, **given}, points=points, coordinates=coordinates
+    )
 
 
 def polygons_of(monkeypatch):

@@ -26,7 +26,6 @@ import fastcontact as fc
 from fastcontact import FileError, ResultWriter, open_results
 from fastcontact.results import committed_file, journal, layout, write_arrays
 from fastcontact.results.committed_file import uninterrupted
-from fastcontact.results.file_lock import PathLock, is_being_written
 
 
 @pytest.fixture
@@ -341,14 +340,6 @@ def test_masks_are_not_lost_without_a_word(path: Path) -> None:
     masked = np.ma.masked_less(step.von_mises, 0.5)
     with ResultWriter(path, MESH) as out, pytest.raises(FileError, match="von_mises is a masked array"):
         out.write(dataclasses.replace(step, von_mises=masked))
-
-
-def test_a_lock_goes_with_its_last_reference(path: Path) -> None:
-    """A signal may come before the writer is in the hands of whoever closes it."""
-    lock = PathLock(path)
-    assert is_being_written(path)
-    del lock
-    assert os.listdir(path.parent) == []
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs links")

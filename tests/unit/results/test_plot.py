@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from matplotlib_pictures import polygons_of, step_of
+from matplotlib_pictures import contact_of, polygons_of, step_of
 from models import elastic_model
 from pairwise import first_of
 
@@ -98,11 +98,7 @@ def test_the_stress_along_normals_in_space_is_that_of_the_tensor():
     stress = np.zeros((9, 6))
     points = np.array([8, 1, 3, 5, 7, 0])
     stress[points] = tensor[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
-    zeros, vectors = np.zeros(6), np.zeros((6, 3))
-    contact = fc.ContactResult(
-        "c", "mortar", points, vectors, zeros, zeros, zeros, zeros, vectors, normal, zeros > 0, vectors[0], (0.0, 0.0)
-    )
-    moved = np.zeros((9, 3))
+    contact, moved = contact_of(points, np.zeros((6, 3)), normal=normal), np.zeros((9, 3))
     step = fc.StepResult(1, 1.0, moved, stress, np.zeros(9), np.zeros(9), moved)
     np.testing.assert_allclose(normal_stress(contact, step), -np.arange(6.0), atol=1e-14)
 

@@ -10,7 +10,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from matplotlib_pictures import polygons_of, step_of
+from matplotlib_pictures import contact_of, polygons_of, step_of
 from models import elastic_model
 from pairwise import first_of
 
@@ -542,23 +542,8 @@ def test_ffmpeg_reads_as_many_pictures_as_there_are_steps(suffix, tmp_path):
 def made_contact(mesh, group, pressure):
     """A contact result on the nodes of a group, with a given pressure (m,)."""
     points = mesh.points_of(group)
-    n, at = len(points), mesh.points[points]
-    values, zero = pressure(at), np.zeros((n, 3))
-    return fc.ContactResult(
-        "made",
-        "mortar",
-        points,
-        at,
-        np.zeros(n),
-        np.zeros(n),
-        values,
-        values,
-        zero,
-        zero,
-        values > 0,
-        np.zeros(3),
-        (1.0, 2.0),
-    )
+    values = pressure(mesh.points[points])
+    return contact_of(points, mesh.points[points], name="made", pressure=values, active=values > 0, radius=(1.0, 2.0))
 
 
 def test_a_contact_map_is_seen_along_what_carries():

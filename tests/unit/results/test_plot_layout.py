@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from matplotlib_pictures import frames_of, overlaps, step_of, texts
+from matplotlib_pictures import contact_of, frames_of, overlaps, step_of, texts
 from models import elastic_model
 from pairwise import first_of
 
@@ -131,10 +131,9 @@ def conforming(closed_to):
     normal = np.column_stack([np.sin(angle), np.cos(angle)])
     across = 10.0 * np.sin(angle)
     ends = float(across[closed].max()), float(across[closed.sum()])
-    zero = np.zeros(51)
-    return fc.ContactResult(
-        "pin", "mortar", np.arange(51), 10.0 * normal, place, zero, 1.0 * closed, zero, zero[:, None] * normal, normal,
-        closed, np.zeros(2), ends, middle=np.array([0.0, 10.0]), place=place, tangent=np.array([1.0, 0.0]),
+    return contact_of(
+        np.arange(51), 10.0 * normal, abscissa=place, pressure=1.0 * closed, normal=normal, active=closed, radius=ends,
+        middle=np.array([0.0, 10.0]), place=place, tangent=np.array([1.0, 0.0]), name="pin",
     )  # fmt: skip
 
 

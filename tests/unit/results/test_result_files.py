@@ -17,7 +17,6 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import topology
 from fastcontact.errors import FileError, ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
@@ -399,15 +398,6 @@ def test_pyvista_shows_what_vtk_shows(path: Path) -> None:
     assert pyvista.read(path).n_cells == 5
     deformed = results.to_pyvista(0).warp_by_vector("displacement")
     np.testing.assert_allclose(deformed.points[:, :2], MESH.points + step_result(0).displacement, atol=1e-6)
-
-
-def test_bodies_are_those_of_the_topology(path: Path) -> None:
-    write(path)
-    body_of_point = topology.bodies(MESH)[1]
-    with h5py.File(path) as file:
-        body, cells = file["VTKHDF/CellData/body"][()], file["VTKHDF/Connectivity"][()]
-        first = file["VTKHDF/Offsets"][:-1]
-    np.testing.assert_array_equal(body, body_of_point[cells[first]])
 
 
 # ----------------------------------------------------------------------------------------------- accidents

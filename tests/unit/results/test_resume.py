@@ -312,14 +312,6 @@ def test_steps_without_their_state_are_refused(path: Path) -> None:
         fc.solve(model, resume=out.done)
 
 
-def test_a_second_writer_cannot_resume_either(path: Path) -> None:
-    begun(path, (0.5,))
-    refused = pytest.raises(FileError, match=f"is being written by process {os.getpid()}")
-    with ResultWriter(path, spheres(), resume=True), refused:
-        ResultWriter(path, spheres(), resume=True)
-    assert len(resumed(path, fc.linear_ramp(2))) == 2
-
-
 def test_what_is_no_result_is_not_resumed(path: Path) -> None:
     path.write_text("mine")
     with pytest.raises(FileError, match="is not an HDF5 file"):

@@ -19,6 +19,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from matplotlib_pictures import contact_of
 from models import elastic_model
 
 import fastcontact as fc
@@ -128,15 +129,6 @@ def test_a_force_with_friction_shows_its_parts():
     assert [total, normal, tangential] == pytest.approx(np.abs([np.linalg.norm(contact.force), *contact.force[::-1]]))
     assert tangential == pytest.approx(0.25 * normal)
     assert f"force {total:.6g} (normal {normal:.6g}, tangential {tangential:.6g})" in repr(contact)
-
-
-def test_principal_stresses(steps):
-    step = steps[-1]
-    low, middle, high = step.principal_stress.T
-    assert np.allclose(low + middle + high, step.stress[:, :3].sum(axis=1))
-    equivalent = np.sqrt(0.5 * ((low - middle) ** 2 + (middle - high) ** 2 + (high - low) ** 2))
-    assert np.allclose(equivalent, step.von_mises)
-    assert np.array_equal(step.tresca, high - low)
 
 
 def test_the_table_of_steps_has_a_row_a_pair(steps):
@@ -320,35 +312,19 @@ RANDOM = np.random.default_rng(3)
 def step_result(number: int, names: tuple[str, ...] = ("c",), mesh: Mesh = MESH) -> StepResult:
     n, dim = mesh.n_points, mesh.dim
     stress = RANDOM.normal(size=(n, 4 if dim == 2 else 6))
-    return StepResult(
-        index=number + 1,
-        load_factor=(number + 1) / 4,
-        displacement=RANDOM.normal(size=(n, dim)),
-        stress=stress,
-        von_mises=np.abs(stress[:, 0]),
-        von_mises_signed=stress[:, 0],
-        reaction=np.zeros((n, dim)),
-        contact={name: contact_result(name, number + 1, mesh) for name in names},
-    )
+    contact = {name: contact_result(name, number + 1, mesh) for name in names}
+    found = RANDOM.normal(size=(n, dim)), stress, np.abs(stress[:, 0]), stress[:, 0], np.zeros((n, dim)), contact
+    return StepResult(number + 1, (number + 1) / 4, *found)
 
 
 def contact_result(name: str, m: int, mesh: Mesh = MESH) -> ContactResult:
     points = np.array([0, 4, 1, 2], np.int32)[:m]
-    return ContactResult(
-        name=name,
-        formulation="node_to_segment",
-        points=points,
-        coordinates=mesh.points[points],
-        abscissa=2.5 * np.arange(m),
-        gap=RANDOM.normal(size=m),
-        pressure=np.arange(m) * 100.0,
-        multiplier=RANDOM.normal(size=m),
-        force_vectors=RANDOM.normal(size=(m, mesh.dim)),
-        normal=np.zeros((m, mesh.dim)),
-        active=np.arange(m) % 2 == 0,
-        force=np.arange(mesh.dim) + 10.0 * m,
-        radius=(float(m), m + 0.5),
-    )
+    return contact_of(
+        points, mesh.points[points], name=name, formulation="node_to_segment", abscissa=2.5 * np.arange(m),
+        gap=RANDOM.normal(size=m), pressure=np.arange(m) * 100.0, multiplier=RANDOM.normal(size=m),
+        force_vectors=RANDOM.normal(size=(m, mesh.dim)), active=np.arange(m) % 2 == 0,
+        force=np.arange(mesh.dim) + 10.0 * m, radius=(float(m), m + 0.5),
+    )  # fmt: skip
 
 
 def test_contact_table() -> None:

@@ -345,20 +345,6 @@ def test_axes_are_round_and_hold_all_values(values: list[float], scale: float) -
     assert 3.5 < intervals < 10.5
 
 
-@pytest.mark.parametrize(
-    ("values", "axis"),
-    [
-        ([0.0, 0.3], (0.0, 0.30000000000000004, 0.05)),
-        ([0.3, 9.6], (0.0, 10.0, 2.0)),
-        ([-2773.5, 0.0], (-3000.0, 0.0, 500.0)),
-        ([5.0], (2.0, 8.0, 1.0)),
-        ([0.0], (-1.0, 1.0, 0.5)),
-    ],
-)
-def test_axes_by_example(values: list[float], axis: tuple[float, float, float]) -> None:
-    assert round_axis(values) == pytest.approx(axis, rel=1e-12)
-
-
 def test_without_names_there_is_no_legend(tmp_path: Path) -> None:
     write_agr(tmp_path / "none.agr", [Curve(X, X)], **LABELS)
     assert "@    legend off" in (tmp_path / "none.agr").read_text()

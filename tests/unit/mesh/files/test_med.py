@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from matplotlib_pictures import contact_of
 from models import members
 
 from fastcontact.errors import FastcontactWarning, FileError, MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.files import med
 from fastcontact.mesh.files.med import read_med, read_med_field, write_med_mesh
 from fastcontact.mesh.files.mesh_files import read_mesh_report
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.med import write_med_results
-from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.step import StepResult
 
 CASES = Path(__file__).resolve().parents[5] / "shared" / "cases"
 FLAT = {name: element for name, element in elements.ELEMENTS.items() if element.dim <= 2}
@@ -67,12 +67,7 @@ def some_steps(mesh, count=3):
 
 
 def contact(points, pressure):
-    m, zero = len(points), np.zeros(len(points))
-    vectors = np.zeros((m, 2))
-    return ContactResult(
-        "contact", "node_to_segment", points.astype(np.int32), vectors, zero, zero, pressure, zero, vectors,
-        vectors, zero.astype(bool), np.zeros(2), (0.0, 1.0),
-    )  # fmt: skip
+    return contact_of(points.astype(np.int32), np.zeros((len(points), 2)), name="contact", pressure=pressure)
 
 
 def run(*command):
@@ -142,21 +137,6 @@ def test_medcoupling_reads_our_fields_at_all_instants(tmp_path):
         for step in steps:
             array = field.getTimeStep(step.index, -1).getUndergroundDataArray().toNumPyArray()
             np.testing.assert_array_equal(array, values(step))
-
-
-def test_meshio_reads_our_mesh(tmp_path):
-    import meshio
-
-    mesh, path = all_elements(), tmp_path / "mesh.med"
-    # meshio's table has no nine-node quadrangle.
-    mesh = Mesh(mesh.points, {name: block for name, block in mesh.cells.items() if name != "quad9"}, {"first": [0]})
-    write_med_mesh(path, mesh)
-    found = meshio.read(path)
-    np.testing.assert_array_equal(found.points, mesh.points)
-    assert {block.type: block.data.tolist() for block in found.cells} == {
-        elements.get(name).meshio: block.tolist() for name, block in mesh.cells.items()
-    }
-    assert ["first"] in found.cell_tags.values()
 
 
 def written_by_medcoupling(mc, path, write="write"):
@@ -330,18 +310,6 @@ def test_any_mesh_comes_back_the_same(tmp_path, mesh):
 def test_every_flat_element_comes_back_the_same(tmp_path):
     write_med_mesh(tmp_path / "all.med", all_elements())
     assert_same(read_med(tmp_path / "all.med").mesh, all_elements())
-
-
-def test_other_node_order_is_undone_on_reading(tmp_path, monkeypatch):
-    order = (0, 3, 2, 1, 7, 6, 5, 4)
-    monkeypatch.setitem(med.NODE_ORDER, "QU8", order)
-    write_med_mesh(tmp_path / "order.med", all_elements())
-    assert_same(read_med(tmp_path / "order.med").mesh, all_elements())
-    ours = all_elements().cells["quad8"]
-    with h5py.File(tmp_path / "order.med") as file:
-        theirs = next(iter(file["ENS_MAA/mesh"].values()))["MAI/QU8/NOD"][()].reshape(8, 2).T - 1
-    np.testing.assert_array_equal(theirs[:, order], ours)
-    assert not np.array_equal(theirs, ours)
 
 
 def test_fields_come_back_in_code_aster_component_order(tmp_path):
