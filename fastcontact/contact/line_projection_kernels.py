@@ -2,8 +2,8 @@
 """Projection of points onto a curve in 2D along normals interpolated between its nodes."""
 
 from fastcontact._jit.decorators import interpretable_kernel, kernel
-from fastcontact.contact.search.limits import BEYOND, MAX_ITERATIONS, STEP
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.contact.search.limits import BEYOND, MAX_ITERATIONS
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 
 @kernel
@@ -41,7 +41,7 @@ def _newton(x, y, corners, normals, f, count, s, values, slopes):
         s += step
         if 0.5 * (abs(s) - 1.0) > 2.0 * BEYOND:
             return s, False
-        if abs(step) <= STEP * (1.0 + abs(s)):
+        if abs(step) <= ROUND_OFF * (1.0 + abs(s)):
             return s, True
     return s, abs(step) <= 1e-10
 
