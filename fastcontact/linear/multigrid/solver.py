@@ -14,8 +14,7 @@ from typing import Self
 import numpy as np
 from scipy.sparse import bsr_array
 
-from fastcontact._jit.norms_kernels import largest
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, largest
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.delassus import InverseColumns, inverse_entries
 from fastcontact.linear.elimination.elimination import Elimination
