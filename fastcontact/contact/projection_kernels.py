@@ -8,7 +8,7 @@ in `search.facet_tables`; facets with fewer than m nodes have zeros at the end.
 import numpy as np
 
 from fastcontact._jit.decorators import innermost_kernel, interpretable_kernel, kernel
-from fastcontact.contact.search.limits import BEYOND, MAX_ITERATIONS
+from fastcontact.contact.search.limits import BEYOND, MAX_ITERATIONS, STEP
 from fastcontact.contact.search.projection_3d_kernels import component, vector
 from fastcontact.contact.search.straight_3d_kernels import along, cross, dot, minus, unit
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
@@ -91,7 +91,7 @@ def _newton(point, terms, directions, f, s, t, height):
         # Far from the solution, a full step may leave the region where the interpolated normals are meaningful.
         damping = 1.0 if size <= 1.0 else 1.0 / size
         s, t, height = s + damping * ds, t + damping * dt, height + damping * dh
-        if damping * size <= ROUND_OFF * (1.0 + max(abs(s), abs(t))):
+        if damping * size <= STEP * (1.0 + max(abs(s), abs(t))):
             return s, t, True
     return s, t, False
 

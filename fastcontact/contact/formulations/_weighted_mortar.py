@@ -211,8 +211,10 @@ class WeightedMortar(Formulation):
         positions = candidates.positions(deformed)
         direction: PolygonNormals | bool = True
         if opposite and isinstance(self.primary, Surface):
-            direction = across = PolygonNormals(filled_up(corners), deformed)
-            pairing = onto(positions, self.primary, np.concatenate(opposite), deformed, across.normal)
+            polygons = filled_up(corners)
+            across = PolygonNormals(polygons, deformed).normal
+            pairing = onto(positions, self.primary, np.concatenate(opposite), deformed, across)
+            direction = PolygonNormals(polygons[pairing.paired], deformed)
         else:
             pairing = pair(positions, self.primary, deformed, BEYOND, "facet", at.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), first)

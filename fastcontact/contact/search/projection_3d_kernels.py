@@ -11,13 +11,13 @@ import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, kernel
 from fastcontact.arrays import Array, Indices
-from fastcontact.contact.search.limits import MAX_ITERATIONS
+from fastcontact.contact.search.limits import MAX_ITERATIONS, STEP
 from fastcontact.contact.search.straight_3d_kernels import cross, dot, minus, on_flat, residual, unit
 from fastcontact.round_off import ROUND_OFF
 
 
 class Facets(NamedTuple):
-    """Facets of one kind, relative to their centre, since round-off far from the origin would exceed ROUND_OFF.
+    """Facets of one kind, relative to their centre, since round-off far from the origin would exceed STEP.
 
     `convex` bounds the distance up to which a local minimum is unique: with four nodes by
     `straight_3d_kernels.uniqueness_bound`, with more nodes by the square of a distance below which half the squared distance
@@ -195,12 +195,12 @@ def descend(terms, f, s, t, sides, point):
         value, gs, gt, hss, hst, htt = _expansion(terms, f, s, t, point)
         ps, pt = _newton_step(sides, s, t, gs, gt, hss, hst, htt)
         size = max(abs(ps), abs(pt))
-        if not size > ROUND_OFF:
+        if not size > STEP:
             ps, pt = _downhill(terms, f, s, t, sides, point, value, hss, hst, htt)
-            if size <= ROUND_OFF and (ps != 0.0 or pt != 0.0):
+            if size <= STEP and (ps != 0.0 or pt != 0.0):
                 s, t = s + ps, t + pt
                 continue
-            return s, t, size <= ROUND_OFF
+            return s, t, size <= STEP
         length = 1.0
         for k in range(sides.shape[0]):
             rate = sides[k, 0] * ps + sides[k, 1] * pt

@@ -8,7 +8,7 @@ import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, open_box, square_to_box
-from fastcontact.contact.search.limits import BEYOND, MAX_ITERATIONS
+from fastcontact.contact.search.limits import BEYOND, MAX_ITERATIONS, STEP
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 
@@ -169,7 +169,7 @@ def _newton(x, y, corners, normals, f, count, s, values, slopes):
         s += step
         if 0.5 * (abs(s) - 1.0) > 2.0 * BEYOND:
             return s, False
-        if abs(step) <= ROUND_OFF * (1.0 + abs(s)):
+        if abs(step) <= STEP * (1.0 + abs(s)):
             return s, True
     return s, abs(step) <= 1e-10
 
