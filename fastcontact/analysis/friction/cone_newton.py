@@ -10,10 +10,10 @@ and slips then have the same unit, and ``n - g`` is meaningful. The solution is 
 search ensures that their norm decreases. Newton's method does not depend on how gaps and slips are computed from the contact
 forces, see `Linearised`.
 
-To implement another law, begin with `Law`. The tangential force of the law is also used in `eliminated.Eliminated`, which
-linearises sliding constraints. Parameters of the law come from `PairOptions` through `Constraints`; parameters that are
-forces must be scaled by the caller that creates the `Law`. `Law.state` and the formulations assume that a constraint without
-friction needs no tangents.
+To implement another law, begin with `Law`. The tangential force of the law is also used in `eliminated.Eliminated`,
+which linearises sliding constraints, and in the fallback `dense._on_edges`. Parameters of the law
+come from `PairOptions` through `Constraints`; parameters that are forces must be scaled by the caller that creates the
+`Law`. `Law.state` and the formulations assume that a constraint without friction needs no tangents.
 """
 
 from __future__ import annotations

@@ -1,11 +1,16 @@
 """Contact with Coulomb friction on a dense Delassus operator.
 
-The gaps g and the slips s depend on the normal forces n and the tangential forces t as ``(g, s) = free + F (n, t)``. They
-are solved for by Newton's method, see `cone_newton`, from several initial forces, the last of them with a compliance that
-decreases to zero. In 2D it is an active set method, in which the state of a constraint is open, stick, or slip in one of two
-directions.
+The gaps g and the slips s depend on the normal forces n and the tangential forces t as ``(g, s) = free + F (n, t)``. Three
+methods are tried in turn:
 
-With large coefficients of friction the solution may not be unique. One solution is computed.
+1. Newton's method, see `cone_newton`, from several initial forces. In 2D it is an active set method, in which the state of a
+   constraint is open, stick, or slip in one of two directions.
+2. Newton's method with a compliance that decreases to zero.
+3. Newton's method from the solution for a polyhedral friction cone with few edges. With such a cone the problem is a linear
+   complementarity problem, which Lemke's method solves for every positive definite F and every coefficient of friction mu
+   (Klarbring, 1986; Stewart and Trinkle, 1996; Klarbring and Pang, 1998).
+
+With large coefficients of friction the solution may not be unique. The methods compute one solution.
 """
 
 from __future__ import annotations
@@ -21,6 +26,8 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.linear.delassus import lu_factors
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION, SUM_ROUND_OFF
 
+# Numbers of edges of the polyhedral cones that are tried in 3D, and largest size of a linear complementarity problem.
+EDGES, LARGEST = (8, 32), 2500
 # If slips are linearly dependent, tangential forces are not unique. Examples are nodes that belong to several surfaces, and
 # nodes that supports hold on one side of the contact. F counts as singular if a squared pivot of its scaled Cholesky factor
 # is below LENGTH_ROUND_OFF. A compliance, relative to that of the gaps, is then added to slips and equations: the first value
@@ -138,6 +145,10 @@ class _Problem:
         if guess is not None:
             yield guess, False
         yield stick_forces, False
+        for edges in EDGES if len(self.free) == 3 else (2,):
+            edge_forces = _on_edges(self, edges)
+            if edge_forces is not None:
+                yield edge_forces, True
 
     def _softened(self, y: Array) -> Array:
         """Return forces (1 + k, m) near a solution, from `y` with a compliance that decreases to round-off.
@@ -211,3 +222,101 @@ def _solved(A: Array, right: Array) -> Array:
     except np.linalg.LinAlgError:
         pass
     return np.asarray(np.linalg.lstsq(A, right, rcond=None)[0])
+
+
+def _on_edges(problem: _Problem, edges: int) -> Array | None:
+    """Return the forces (1 + k, m) for a friction cone of `edges` edges; None if it is too large or Lemke's method fails.
+
+    The unknowns of the linear complementarity problem are the normal forces, the tangential forces along each edge, the
+    tensile forces of equations, and the largest slip along an edge (Stewart and Trinkle, 1996).
+    """
+    k, m = len(problem.free) - 1, problem.free.shape[1]
+    equations = np.flatnonzero(problem.law.equality)
+    along_edges, last = (1 + edges) * m, (1 + edges) * m + len(equations)
+    size = last + m
+    if size > LARGEST:
+        return None
+    angle = 2 * np.pi * np.arange(edges) / edges
+    edge_directions = np.column_stack([np.cos(angle), np.sin(angle)])[:, :k]
+    X = np.kron(np.block([[np.ones((1, 1)), np.zeros((1, edges))], [np.zeros((k, 1)), edge_directions.T]]), np.eye(m))
+    X = np.hstack([X, -np.eye(len(X))[:, equations]])
+    M = np.zeros((size, size))
+    M[:last, :last] = X.T @ problem.F @ X
+    M[last:, :m] = np.diag(problem.law.mu)
+    M[last:, m:along_edges] = -np.tile(np.eye(m), edges)
+    M[m:along_edges, last:] = np.tile(np.eye(m), edges).T
+    # The problem of a polyhedral cone is degenerate. Its right-hand side is therefore perturbed by the fractional parts of
+    # multiples of the golden ratio, which are distinct.
+    q = SINGLE_PRECISION * (0.5 + np.arange(size) * 0.6180339887498949 % 1.0)
+    q[:last] += X.T @ problem.free.ravel()
+    z, _ = lemke(M, q, 5 * size)
+    return None if z is None else (X @ z[:last]).reshape(1 + k, m)
+
+
+def lemke(M: Array, q: Array, max_pivots: int) -> tuple[Array | None, int]:
+    """Return z (n,) by Lemke's pivoting method (Lemke, 1965), with ``w = M z + q``, ``w >= 0``, ``z >= 0`` and ``w.T z = 0``.
+
+    The method finds a solution if M is copositive, if ``q.T v >= 0`` for all solutions v of the homogeneous problem
+    (q = 0), and if no basis is degenerate (Cottle, Pang and Stone, 1992, theorem 4.4.13).
+
+    Parameters
+    ----------
+    M : ndarray (n, n)
+    q : ndarray (n,)
+    max_pivots : int
+        Largest number of pivots.
+
+    Returns
+    -------
+    z : ndarray (n,) or None
+        The solution; None if the method terminates on a secondary ray, or if more than `max_pivots` pivots are needed.
+    count : int
+        Number of pivots.
+    """
+    n, z = len(q), np.zeros(len(q))
+    if not (q < 0.0).any():
+        return z, 0
+    # Rows: basic variables as affine functions of the nonbasic ones. The variable w_i has the number i, z_i the number n + i,
+    # and the artificial variable the number 2 n.
+    table = np.column_stack([M, np.ones(n), q])
+    basic, nonbasic = np.arange(n), np.arange(n, 2 * n + 1)
+    row, column = int(q.argmin()), n
+    for count in range(1, max_pivots + 1):
+        _exchange(table, row, column)
+        leaving = int(basic[row])
+        basic[row], nonbasic[column] = nonbasic[column], leaving
+        if leaving == 2 * n:
+            in_basis = basic >= n
+            z[basic[in_basis] - n] = np.maximum(table[in_basis, -1], 0.0)
+            return z, count
+        column = int(np.flatnonzero(nonbasic == (leaving + n if leaving < n else leaving - n))[0])
+        blocking = _blocking(table, basic, column)
+        if blocking is None:
+            return None, count
+        row = blocking
+    return None, max_pivots
+
+
+def _exchange(table: Array, row: int, column: int) -> None:
+    """Pivot in place: exchange the basic variable of `row` with the nonbasic variable of `column`."""
+    pivot, factors = table[row, column], table[:, column].copy()
+    table[:, column], factors[row] = 0.0, 0.0
+    table[row] /= -pivot
+    table[row, column] = 1.0 / pivot
+    table += factors[:, None] * table[row]
+
+
+def _blocking(table: Array, basic: Indices, column: int) -> int | None:
+    """Return the row whose basic variable vanishes first as the nonbasic variable of `column` grows (ratio test).
+
+    None if no basic variable decreases. Among rows with the same ratio, the row of the artificial variable has priority, then
+    the row with the largest pivot.
+    """
+    slope = -table[:, column]
+    falling = np.flatnonzero(slope > ROUND_OFF * np.abs(slope).max())
+    if not len(falling):
+        return None
+    ratio = np.maximum(table[falling, -1], 0.0) / slope[falling]
+    first = falling[ratio <= ratio.min() * (1.0 + ROUND_OFF)]
+    artificial = first[basic[first] == 2 * len(basic)]
+    return int(artificial[0] if len(artificial) else first[slope[first].argmax()])

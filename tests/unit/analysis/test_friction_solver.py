@@ -1,4 +1,6 @@
-"""The friction solver: rotating frames, undetermined tractions, steps near full sliding."""
+"""The friction solver: Lemke's method, rotating frames, undetermined tractions, steps near full sliding."""
+
+import itertools
 
 import numpy as np
 import pytest
@@ -103,6 +105,7 @@ def test_frames_of_eliminated_slips_do_not_depend_on_the_choice_of_tangents():
 
 def test_what_does_not_settle_is_told_with_its_numbers(monkeypatch):
     monkeypatch.setattr(cone_newton, "MAX_NEWTON_ITERATIONS", 0)
+    monkeypatch.setattr(dense, "LARGEST", 0)
     mesh = fc.generate.block_on_block(divisions_lower=(6, 2), divisions_upper=(3, 3))
     model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy", UPPER_TOP={"x": 1e-3, "y": -1e-4})
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.3)
@@ -160,6 +163,38 @@ def test_a_guess_does_not_leave_the_gap_of_a_soft_constraint_open():
     forces = dense.solve(F, free, np.array([0.3, 0.3]), np.ones(2, bool), guess)
     assert forces.settled
     np.testing.assert_allclose(forces.gaps[0], 0.0, atol=1e-14)
+
+
+def test_pivots_against_all_bases():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        n = 5
+        A = rng.normal(size=(n, n))
+        M, q = A @ A.T + 0.1 * np.eye(n) + (A - A.T), rng.normal(size=n)
+        z, _ = dense.lemke(M, q, 100)
+        wanted = None
+        for basis in itertools.product([False, True], repeat=n):
+            on, x = np.flatnonzero(basis), np.zeros(n)
+            x[on] = np.linalg.solve(M[np.ix_(on, on)], -q[on])
+            if (x >= 0).all() and (M @ x + q >= -1e-12).all():
+                wanted = x
+        np.testing.assert_allclose(z, wanted, atol=1e-10)
+
+
+def test_pivots_tell_a_problem_without_a_solution():
+    assert dense.lemke(np.array([[-1.0]]), np.array([-1.0]), 10)[0] is None
+    z, count = dense.lemke(np.array([[1.0]]), np.array([2.0]), 10)
+    assert (z.tolist(), count) == ([0.0], 0)
+
+
+def test_pivots_are_counted():
+    n = 6
+    A = np.random.default_rng(1).normal(size=(n, n))
+    problem = A @ A.T + np.eye(n), -np.ones(n)
+    z, needed = dense.lemke(*problem, 1000)
+    assert z is not None
+    assert needed > 1
+    assert dense.lemke(*problem, needed - 1)[0] is None
 
 
 def test_compliance_of_rows_against_dense_products():
