@@ -1,4 +1,4 @@
-"""Types of arrays, and a test for masked entries, which most functions of NumPy would treat as valid numbers."""
+"""Types of arrays, their norm, and a test for masked entries, which most functions of NumPy would treat as valid numbers."""
 
 from __future__ import annotations
 
@@ -17,6 +17,11 @@ AnyArray: TypeAlias = NDArray[Any]
 
 # End of the error message about an argument with masked entries.
 REFUSAL = "has entries that are masked, and masks are not kept: fill them first, or leave them out"
+
+
+def largest(x: Array) -> float:
+    """Return the largest ``|x|``, 0 for an empty array; NaN if an entry is NaN."""
+    return float(max(x.max(initial=0.0), -x.min(initial=0.0)))
 
 
 def is_masked(value: Any) -> bool:

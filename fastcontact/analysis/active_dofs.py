@@ -12,8 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
-from fastcontact._jit.norms_kernels import largest
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.linear.sparse_rows import without_remnants

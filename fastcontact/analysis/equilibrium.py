@@ -19,12 +19,11 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
-from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, largest
 from fastcontact.elasticity.constrained_system import Stiffness
 from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies
 from fastcontact.elasticity.springs import Springs, ground_force, spring_force, spring_stiffness

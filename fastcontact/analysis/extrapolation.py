@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact._jit.norms_kernels import largest_difference
 from fastcontact.analysis.tolerances import DECLINE
-from fastcontact.arrays import Array, Mask
+from fastcontact.arrays import Array, Mask, largest
 
 # Gaps (m,) [length] and multipliers (m,) [force] of a pair.
 GapsAndForces = tuple[Array, Array]
@@ -65,7 +64,7 @@ class Extrapolation:
         degrees did so, the degree is higher by one. It is at least 1.
         """
         degree, highest = 0, self._highest
-        distances = [largest_difference(u, self._continued(k)) for k in range(highest + 1)] if curve else []
+        distances = [largest(u - self._continued(k)) for k in range(highest + 1)] if curve else []
         while degree < len(distances) - 1 and distances[degree + 1] < DECLINE * distances[degree]:
             degree += 1  # if any improvement sufficed, indentations past yield would take 5 % more iterations
         degree = max(1, degree + (degree == highest))

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.linalg import LinAlgError
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_moves, nearest_nodes
 from fastcontact.analysis.criteria import NOTABLE
@@ -30,7 +29,7 @@ from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.tolerances import Scatter, Tolerances, Watch
 from fastcontact.analysis.touching import Touching
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, largest
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.linearised_geometry import Linearised
 from fastcontact.errors import ConvergenceError
@@ -223,7 +222,7 @@ def _move(
     iterate.u = step.dofs.put(iterate.u, displacement)
     # The unknowns of the solution do not include rigid-body motions of floating bodies, which may be much larger.
     size = max(step.dofs.size(solution.u), largest(step.load.lift))
-    change = largest_difference(displacement, before)
+    change = largest(displacement - before)
     significant = size and change > step.state.gap_round_off
     moved = _Moved(before, change, size, change / size if significant else 0.0)
     iterate.remember(constraints, solution)
@@ -347,7 +346,7 @@ def newton_step(
     largest_change = largest(changed) or 1.0
     # With the tolerance `accuracy` itself, load steps of plastic bodies take 10 % more pairings.
     v, _ = gmres(system, changed / largest_change, rtol=max(SINGLE_PRECISION, NOTABLE * accuracy), atol=0.0, maxiter=1)
-    response_size = largest_difference(largest_change * v, changed)
+    response_size = largest(largest_change * v - changed)
     # Far from the solution, a step in which the response exceeds the change itself is unreliable.
     if not response_size <= largest_change:
         return None

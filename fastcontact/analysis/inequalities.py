@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis import active_set
 from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.convergence_messages import friction_exceeded, not_balanced
@@ -21,7 +20,7 @@ from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Accuracy, Path, Slid, Solution
 from fastcontact.analysis.state import State
-from fastcontact.arrays import AnyArray, Array, Mask
+from fastcontact.arrays import AnyArray, Array, Mask, largest
 from fastcontact.contact.constraints import Constraints, StackedConstraints, stacked
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError

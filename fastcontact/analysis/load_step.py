@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from fastcontact._jit import parallel
-from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.contact_result import approach, contact_results, sliding_load
 from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact
@@ -26,7 +25,7 @@ from fastcontact.analysis.state import State
 from fastcontact.analysis.thermal_coupling import Heated, expanded, expansion_as_force, first_rise, settle_heat
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import contact_work
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, largest
 from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 
-from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.criteria import HALVINGS, MAX_NEWTON_ITERATIONS, NOTABLE
 from fastcontact.analysis.equilibrium import (
@@ -32,7 +31,7 @@ from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import Iterate, StepContext
 from fastcontact.analysis.problem import Problem, StepLoad, linearised
 from fastcontact.analysis.tolerances import DECLINE, WINDOW
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, largest
 from fastcontact.elasticity.nonlinear_bodies import WHOLE
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.protocol import TOLERANCE, Loaded
@@ -145,7 +144,7 @@ class _Newton:
             if history and fraction == 1.0 and balanced.excess > 1.0:
                 u, fraction = self._line_search(before, u, contact_force)
                 balanced = self._balanced(u, contact_force, before) if fraction < 1.0 else balanced
-            change = largest_difference(u, before)
+            change = largest(u - before)
             changes.append(self._relative(change, u))
             history.append(_history_entry(self._iterate, changes[-1], balanced, fraction))
             small = self._has_converged(changes) or change <= self._start.gap_round_off
@@ -388,7 +387,7 @@ class _Newton:
         fraction, bodies = 1.0, self._terms.bodies
         if bodies is None:
             return target, fraction
-        changes = [*changes, self._relative(largest_difference(target, u), target)]
+        changes = [*changes, self._relative(largest(target - u), target)]
         last = self._has_converged(changes) or (self._reusable is not None and self._tangent_suffices(changes))
         for _ in range(HALVINGS):
             reached = target if fraction == 1.0 else u + fraction * (target - u)

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.contact_result import areas
 from fastcontact.analysis.equilibrium import StepEquilibrium
@@ -21,7 +20,7 @@ from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.heat import Heat, Temperatures
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, largest
 from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.contact.conductance import crossing
 from fastcontact.contact.configuration import Configuration
@@ -100,7 +99,7 @@ def settle_heat(
     change, limit = np.inf, max(problem.criteria.max_geometry_updates, 1)
     for exchange in range(1, limit + 1):
         heated = _conducted(problem, start, load, instant, equilibrium)
-        change = largest_difference(heated.rise, rise)
+        change = largest(heated.rise - rise)
         settled = change <= tolerance * largest(heated.rise) or not problem.model.expands
         negligible = max(tolerance * equilibrium.balance.largest, equilibrium.balance.noise)
         if settled or largest(problem.model.expansion_forces(problem.field, heated.rise - rise).ravel()) <= negligible:

@@ -17,10 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.criteria import NOTABLE, Criteria
 from fastcontact.analysis.solution import Accuracy
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, largest
 from fastcontact.linear.protocol import LinearSolver
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
@@ -170,4 +169,4 @@ class Watch:
 
 def _last_change(vectors: tuple[Array, ...]) -> float:
     """Return the largest difference, in any component, between the last vector and the others."""
-    return max(float(largest_difference(vectors[-1], other)) for other in vectors[:-1])
+    return max(float(largest(vectors[-1] - other)) for other in vectors[:-1])

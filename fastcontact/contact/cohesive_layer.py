@@ -13,13 +13,13 @@ import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.arrays import Array
-from fastcontact.contact.cohesion import Bond, CohesiveLaw
+from fastcontact.contact.cohesion import ELASTIC, Bond, CohesiveLaw
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 
-# Ratio of the stiffness of the linearised layer where it softens to that of the intact layer. With a smaller ratio, the
-# iteration for a beam glued by nodes does not converge.
-LEVEL = 1e-2
+# Ratio of the stiffness of the linearised layer where it softens to that of the intact layer: the magnitude of the ratio of
+# both slopes of the default law. With a smaller ratio, the iteration for a beam glued by nodes does not converge.
+LEVEL = ELASTIC
 
 
 @dataclass(frozen=True, eq=False)

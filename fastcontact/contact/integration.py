@@ -12,6 +12,9 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.round_off import SINGLE_PRECISION
 
+# Nodal areas below this fraction of the mean count as zero, because the pressures of such nodes would be nearly arbitrary.
+NO_AREA = 1e-3
+
 
 def facet_measure(facets: Numbers, element: str, points: Array, xi: Array, axisymmetric: bool) -> Array:
     """Return the length or area (n_facets, n_q) per unit of the reference coordinates [length] or [area].

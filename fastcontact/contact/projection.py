@@ -16,7 +16,7 @@ from scipy.sparse import coo_array, csr_array
 
 from fastcontact._jit.parallel import portions, shared
 from fastcontact.arrays import Array, Indices, Mask, Numbers
-from fastcontact.contact import line_projection_kernels
+from fastcontact.contact.search import search_2d_kernels
 from fastcontact.contact.search.closest import Closest
 from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
@@ -307,7 +307,7 @@ def along_line_normals(
     facet, xi, overhang = start.facet.astype(np.intp), start.xi[:, 0].copy(), start.overhang.copy()
     work = np.empty(3), np.empty(3)
     neighbour = np.where(smooth_ends(side, normals), line_neighbours(ends), -1)
-    line_projection_kernels.along_normals(
+    search_2d_kernels.along_normals(
         np.ascontiguousarray(points), corners, at_nodes, counts, neighbour, facet, xi, overhang, *work
     )
     xi = xi[:, None]

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import bsr_array, csr_array, diags_array
 
-from fastcontact._jit.norms_kernels import largest
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.elasticity.multipoint_constraints import Elimination, MultiPointConstraint, eliminate
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import entry_rows, stacked_rows

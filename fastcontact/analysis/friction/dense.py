@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from scipy.linalg import lu_solve
 
+from fastcontact.analysis.criteria import HALVINGS, NOTABLE
 from fastcontact.analysis.friction.cone_newton import Forces, Law, newton
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.linear.delassus import lu_factors
@@ -32,11 +33,7 @@ EDGES, LARGEST = (8, 32), 2500
 # is below LENGTH_ROUND_OFF. A compliance, relative to that of the gaps, is then added to slips and equations: the first value
 # of REGULARISATION and, if it does not suffice, the second. If the elastic slip due to this compliance exceeds
 # SINGLE_PRECISION, relative to the gaps and slips without forces, the forces are not in equilibrium: the bodies jam.
-REGULARISATION = 10 * ROUND_OFF, LENGTH_ROUND_OFF
-# Where constraints are nearly dependent, such as those of two pairs on one facet, Newton's method may alternate between
-# contact states. It does not with a compliance SOFT, relative to that of the gaps, which is then reduced by the factor FALL,
-# or by less where the method fails, until the factor is SMALLEST_STEP.
-SOFT, FALL, SMALLEST_STEP = 1e-2, 0.1, 0.8
+REGULARISATION = ROUND_OFF, LENGTH_ROUND_OFF
 
 
 def solve(
@@ -154,15 +151,20 @@ class _Problem:
                 yield edge_forces, True
 
     def _softened(self, y: Array) -> Array:
-        """Return forces (1 + k, m) near a solution, from `y` with a compliance that decreases to round-off."""
-        compliance, last = SOFT, 1.0
-        while ROUND_OFF < compliance < SMALLEST_STEP * last:
+        """Return forces (1 + k, m) near a solution, from `y` with a compliance that decreases to round-off.
+
+        Where constraints are nearly dependent, such as those of two pairs on one facet, Newton's method may alternate between
+        contact states. It does not with a compliance, which is reduced by the factor NOTABLE relative to that of the gaps, or
+        by less where the method fails.
+        """
+        compliance, last, halvings = NOTABLE, 1.0, 0
+        while compliance > ROUND_OFF and halvings <= HALVINGS:
             softened = _Problem(self.F + compliance * np.eye(len(self.F)), self.free, self.law)
             forces = newton(softened, y, softened.gaps(y), least=1)
             if forces.settled:
-                y, last, compliance = forces.y, compliance, FALL * compliance
+                y, last, compliance, halvings = forces.y, compliance, NOTABLE * compliance, 0
             else:
-                compliance = float(np.sqrt(compliance * last))
+                compliance, halvings = float(np.sqrt(compliance * last)), halvings + 1
         return y
 
 

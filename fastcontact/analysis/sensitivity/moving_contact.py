@@ -16,12 +16,12 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array, eye_array
 
+from fastcontact.analysis.contact_result import carried
 from fastcontact.analysis.inequalities import Iterate, pair_surfaces
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.closed_nodes import carried
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ModelError

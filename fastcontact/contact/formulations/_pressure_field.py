@@ -32,10 +32,10 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.closed_nodes import NO_AREA
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
+from fastcontact.contact.integration import NO_AREA
 from fastcontact.contact.linearised_geometry import Geometry, Linearised
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals

@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Mask
-from fastcontact.contact.closed_nodes import NO_AREA
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._cut_faces import face_overlap
@@ -33,7 +32,7 @@ from fastcontact.contact.formulations._cut_lines import line_overlap
 from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions, positive
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, OverlapPoints, obstacle_overlap
-from fastcontact.contact.integration import areas_of_rule, nodal_areas
+from fastcontact.contact.integration import NO_AREA, areas_of_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import Closing, Linearised, NodalNormals, Points, PolygonNormals, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import FACING, Candidates, Normals, filled_up, onto, pair, tangents
@@ -212,8 +211,10 @@ class WeightedMortar(Formulation):
         positions = candidates.positions(deformed)
         direction: PolygonNormals | bool = True
         if opposite and isinstance(self.primary, Surface):
-            direction = across = PolygonNormals(filled_up(corners), deformed)
-            pairing = onto(positions, self.primary, np.concatenate(opposite), deformed, across.normal)
+            polygons = filled_up(corners)
+            across = PolygonNormals(polygons, deformed).normal
+            pairing = onto(positions, self.primary, np.concatenate(opposite), deformed, across)
+            direction = PolygonNormals(polygons[pairing.paired], deformed)
         else:
             pairing = pair(positions, self.primary, deformed, BEYOND, "facet", at.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), first)

@@ -29,14 +29,13 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array, lil_array
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.closed_nodes import NO_AREA
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._cut_lines import line_points
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.formulations._weighted_mortar import WeightedMortar
-from fastcontact.contact.integration import areas_of_rule, facet_measure
+from fastcontact.contact.integration import NO_AREA, areas_of_rule, facet_measure
 from fastcontact.contact.pair_options import spread
 from fastcontact.contact.pairing import Candidates, Normals
 from fastcontact.contact.surface import FacetBlock, Surface

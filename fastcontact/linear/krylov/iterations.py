@@ -11,9 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fastcontact._jit.norms_kernels import largest
 from fastcontact._jit.parallel import spread
-from fastcontact.arrays import AnyArray, Array
+from fastcontact.arrays import AnyArray, Array, largest
 from fastcontact.linear.krylov import krylov_kernels
 from fastcontact.linear.krylov.krylov_kernels import CHUNK, WORK_OF_NUMBER
 

@@ -14,8 +14,7 @@ from typing import Self
 import numpy as np
 from scipy.sparse import bsr_array
 
-from fastcontact._jit.norms_kernels import largest
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, largest
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.delassus import InverseColumns, inverse_entries
 from fastcontact.linear.elimination.elimination import Elimination
@@ -183,7 +182,7 @@ class Multigrid:
             sparse = elimination and elimination.with_sparse_weights()
             old_springs = self._hierarchy_springs
             springs_alike = old_springs is None if springs is None else springs.alike(old_springs)
-            if not (springs_alike and _alike(sparse, self._hierarchy_equations)):
+            if not (springs_alike and _alike(sparse, self._hierarchy_equations, self._constrained.stiffening)):
                 self._change_hierarchy(sparse, springs)
                 self._worked(CHANGE)
             compliant = elimination is not None and elimination.compliance is not None
@@ -466,8 +465,13 @@ class Multigrid:
         return multiplier(self.K, elimination, springs, u, f)
 
 
-def _alike(new: Elimination | None, old: Elimination | None) -> bool:
-    """Return whether two eliminations have the same pivots and nearly the same weights."""
+def _alike(new: Elimination | None, old: Elimination | None, stiffening: float) -> bool:
+    """Return whether two eliminations have the same pivots and nearly the same weights.
+
+    If the pivots belong to a body that is stiffer by the factor `stiffening`, a difference d of the weights increases the
+    energy of displacements of the softer body by the factor ``stiffening d^2``.
+    """
     if new is None or old is None or not np.array_equal(new.pivots, old.pivots):
         return new is old
-    return bool(np.abs((new.weights - old.weights).data).max(initial=0.0) <= ALIKE)
+    difference = float(np.abs((new.weights - old.weights).data).max(initial=0.0))
+    return difference <= ALIKE / np.sqrt(max(1.0, stiffening))

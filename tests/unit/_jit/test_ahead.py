@@ -50,9 +50,7 @@ def test_types_are_those_of_arguments():
 @jitted
 def test_a_helper_leaves_kernels_on_disk_and_tells_each(tmp_path):
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    number = next(
-        number for number, (_, name, _) in enumerate(ahead.table()["kernels"]) if name == "largest_difference"
-    )
+    number = next(number for number, (_, name, _) in enumerate(ahead.table()["kernels"]) if name == "work_sizes")
     code = (
         "import sys; from fastcontact._jit import ahead\n"
         f"ahead.kernels_of = lambda runs: [{number}]\n"
@@ -60,7 +58,7 @@ def test_a_helper_leaves_kernels_on_disk_and_tells_each(tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert done.stdout == f"{number}\n"
-    assert [path.name.split(".")[1] for path in tmp_path.rglob("*.nbc")] == ["largest_difference"]
+    assert [path.name.split(".")[1] for path in tmp_path.rglob("*.nbc")] == ["work_sizes"]
 
 
 @pytest.fixture

@@ -132,12 +132,12 @@ def test_runs_have_the_same_bits(make, element, formulation, least, monkeypatch)
 ASK = """
 import numpy as np
 from fastcontact._jit import compiling, interpreting
-from fastcontact._jit.norms_kernels import largest_difference as kernel
+from fastcontact.linear.cholesky.factorisation_kernels import work_sizes as kernel
 
-x, y = np.array([1.0, 2.0, 4.0]), np.array([1.0, 1.0, 6.0])
-answers = [kernel(x, y), len(kernel.compiled.signatures), compiling.count]
+front = np.array([-1], np.int32), np.array([0, 3]), np.array([0, 0])  # one supernode of three columns
+answers = [*kernel(*front), len(kernel.compiled.signatures), compiling.count]
 interpreting.SECONDS = -1.0
-answers += [kernel(x, y), len(kernel.compiled.signatures), type(answers[0]).__name__]
+answers += [*kernel(*front), len(kernel.compiled.signatures), type(answers[0]).__name__]
 print(*answers)
 """
 
@@ -148,7 +148,7 @@ def test_python_runs_a_kernel_until_it_has_taken_its_time_and_never_one_that_is_
         subprocess.run([sys.executable, "-c", ASK], env=environment, capture_output=True, text=True, check=True).stdout
         for _ in range(2)
     ]
-    assert answers == ["2.0 0 1 2.0 1 float\n", "2.0 1 0 2.0 1 float\n"]
+    assert answers == ["9 0 0 1 9 0 1 int\n", "9 0 1 0 9 0 1 int\n"]
 
 
 def test_the_time_of_earlier_runs_counts(tmp_path):
@@ -158,12 +158,12 @@ def test_the_time_of_earlier_runs_counts(tmp_path):
 
     def ask():
         run = subprocess.run([sys.executable, "-c", short], env=environment, capture_output=True, text=True, check=True)
-        return run.stdout.split()[1]
+        return run.stdout.split()[2]
 
     assert ask() == "0"
     (path,) = tmp_path.rglob(interpreting.SPENT)
     ((version, seconds),) = json.loads(path.read_text()).items()
-    assert version.startswith("norms_kernels.largest_difference.")
+    assert version.startswith("factorisation_kernels.work_sizes.")
     assert 0.0 < seconds < 1.0
     for kept in tmp_path.rglob("*.nbc"):
         kept.unlink()
