@@ -52,10 +52,10 @@ def typed(error: type[FastcontactError]) -> Callable[[F], F]:
 
 def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError]) -> Callable[..., Any]:
     """Return a function that calls `call` after a check of the arguments; errors call it `name`."""
-    signature = inspect.signature(call)
 
     @functools.wraps(call)
     def checking(*args: Any, **kwargs: Any) -> Any:
+        signature = _signature(call)
         try:
             values, annotations = signature.bind(*args, **kwargs).arguments, types_of(call)
         except TypeError:
@@ -77,12 +77,18 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
                     check_type(f"the argument {argument} of {_called(call, name, args)}", member, annotation, error)
         return call(*args, **kwargs)
 
-    checking.__signature__ = _named(signature, call)  # type: ignore[attr-defined]
+    if any(str(annotation).startswith("Unpack[") for annotation in call.__annotations__.values()):
+        checking.__signature__ = _named(_signature(call), call)  # type: ignore[attr-defined]
     return checking
 
 
+_signature = functools.cache(inspect.signature)
+
+
 # First components of a load, a support or an initial state, by the name of the parameter that collects them.
-COMPONENTS = {"components": ["x", "y"], "tensor_components": ["xx", "yy"]}
+COMPONENTS = {"components": ["x", "y"], "tensor_components": ["xx", "yy"], "moments": ["z"]}
+# Beginnings of messages on arguments with components by axis.
+VECTORS = ("the argument motion ", "the argument force ")
 
 
 def _refusal(
@@ -121,8 +127,6 @@ def _refusal(
 def _named(signature: inspect.Signature, call: Callable[..., Any]) -> inspect.Signature:
     """Return the signature for `help`, in which the keys of an unpacked `TypedDict` are keyword arguments."""
     parameters = list(signature.parameters.values())
-    if not parameters or not str(parameters[-1].annotation).startswith("Unpack["):
-        return signature
     (keys,) = typing.get_args(types_of(call)[parameters[-1].name])
     kind = inspect.Parameter.KEYWORD_ONLY
     named = [
@@ -180,6 +184,8 @@ def check_type(name_shown: str, value: Any, annotation: Any, error: type[Fastcon
     remedy = ""
     if isinstance(value, str) and _is_number(value) and fits(1, annotation):
         remedy = f": write {value.strip()} without quotation marks"
+    elif isinstance(value, list | tuple) and name_shown.startswith(VECTORS):
+        remedy = f": write {dict(zip('xyz', value, strict=False))}"
     raise error(f"{name_shown} must be {words(annotation)}, not {description}{remedy}")
 
 

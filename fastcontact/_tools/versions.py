@@ -18,5 +18,6 @@ def versions() -> dict[str, str]:
     by_name = {"fastcontact": __version__, "python": platform.python_version()}
     for name in LIBRARIES:
         with contextlib.suppress(metadata.PackageNotFoundError):
-            by_name[name] = metadata.version(name)
+            text = metadata.distribution(name).read_text("METADATA") or ""  # `metadata.version` would import `email`
+            by_name[name] = text.partition("\nVersion: ")[2].partition("\n")[0]
     return by_name

@@ -321,8 +321,12 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
 def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
     """Return the rigid shape that a table describes by its kind and its arguments; `mesh` is the mesh of the model."""
     kind = shape.get("kind", "") if isinstance(shape, dict) else shape if isinstance(shape, str) else ""
-    if not isinstance(shape, dict) or kind not in (*SHAPES, "mesh"):
+    if kind not in (*SHAPES, "mesh"):
         raise CaseError(unknown(f"{where}.kind", str(kind), (*SHAPES, "mesh")))
+    if not isinstance(shape, dict):
+        needed = [key for key, p in inspect.signature(SHAPES[kind]).parameters.items() if p.default is p.empty]
+        others = "".join(f", {key} = ..." for key in needed)
+        raise CaseError(f"'{where}' is a table: write {{ kind = \"{kind}\"{others} }}")
     arguments: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in shape.items() if k != "kind"}
     if kind == "mesh":
         check_keys(where, arguments, SURFACE)

@@ -45,6 +45,7 @@ OTHERWISE = {
         "E is a string", "support value is a string", "load steps as a string", "broken load steps", "ramp is not a table",
         "threads as a word", "a function that returns the wrong shape", "coordinates in one dimension",
         "cells with a node too few", "theory lacks a radius", "code instead of data",
+        "a motion without names of axes", "hardening as a number", "shape of an obstacle is a word",
     ),
     "no message: the default is used, or nothing happens": (
         "E is missing", "kinematics missing", "pressure without value", "force without component",

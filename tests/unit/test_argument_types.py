@@ -235,6 +235,10 @@ def test_imaginary_parts_are_not_lost_without_a_word(what):
             "Model.add_force takes group by position and all other arguments by keyword: write x=..., y=...",
         ),
         (
+            lambda model: model.add_moment("TOP", 3.0),
+            "Model.add_moment takes group by position and all other arguments by keyword: write z=...",
+        ),
+        (
             lambda model: model.fix("TOP", "x", "y"),
             "Model.fix takes group, components by position and all other arguments by keyword: write axes=...",
         ),

@@ -274,7 +274,7 @@ class ModelLoads(ModelHeat):
         kind: type[loads.TotalForce] | type[loads.NodalForce] = loads.TotalForce if distribute else loads.NodalForce
         self._add(kind(group, axes, table))
 
-    def add_moment(self, group: str, *, ramp: History = None, **components: float | None) -> None:
+    def add_moment(self, group: str, *, ramp: History = None, **moments: float | None) -> None:
         """Apply a moment to a reference point or to a group.
 
         Parameters
@@ -284,7 +284,7 @@ class ModelLoads(ModelHeat):
             tributary area and distance from the centroid, whose resultant is zero.
         ramp : Ramp or iterable of (float, float), optional
             History of the moment; by default that of the analysis.
-        **components : float
+        **moments : float
             Components ``x``, ``y`` and ``z`` of the moment at multiplier 1 [force times length]; in 2D only ``z``.
 
         Examples
@@ -294,7 +294,7 @@ class ModelLoads(ModelHeat):
         >>> model.add_moment("TOP", z=20.0)
         """
         name = f"the moment on '{group}'"
-        axes = axes_of(name, components, 3)
+        axes = axes_of(name, moments, 3)
         if self.mesh.dim == 2 and set(axes) != {2}:
             raise ModelError(f"{name}: in two dimensions a moment has the component z only")
         self._add(Moment(group, axes, table_of(ramp, f"the ramp of {name}")))

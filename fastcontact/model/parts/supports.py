@@ -150,7 +150,7 @@ class ModelSupports(ModelContact):
             frame = frames(checked_axes(axes), positions, self.kinematics)
         except ModelError as error:
             raise ModelError(str(error).replace("a material", name).replace("a point of a cell", "a node")) from None
-        for axis, value in axes_of(f"prescribe('{group}')", components, dim).items():
+        for axis, value in axes_of(name, components, dim).items():
             caption = displacement_name("xyz"[axis], group)
             check_value(caption, value)
             direction = frame[:, axis]
@@ -170,7 +170,7 @@ class ModelSupports(ModelContact):
         rotation_ramp: Table | None = None,
     ) -> None:  # fmt: skip
         check_points(self.mesh, group, "no displacement can be prescribed on it")
-        for axis, value in axes_of(f"prescribe('{group}')", components, self.mesh.dim).items():
+        for axis, value in axes_of(f"the support of '{group}'", components, self.mesh.dim).items():
             table = table_of(ramp, f"the ramp of the displacement prescribed on '{group}'")
             support = Support(group, axis, value, table, rotation, rotation_ramp)
             check_value(support.name, value)

@@ -114,7 +114,18 @@ def outer_legend(ax: Any, columns: int) -> None:
 
 
 def laid_out(axes: Any) -> Any:
-    """Draw axes in space once, so that the layout of the figure includes the size of their labels, and return them."""
+    """Enlarge the box of axes in space with its labels to the size of the axes, lay out the figure and return the axes."""
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+    limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
+    size = np.ptp(limits, axis=1)
+    axes.set_box_aspect(size)
+    axes.figure.draw_without_rendering()
+    corners = np.transpose(proj_transform(*map(np.ravel, np.meshgrid(*limits)), axes.get_proj()))[:, :2]
+    labels = [axis.get_tightbbox(axes.figure.canvas.get_renderer()) for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
+    ends = np.concatenate([axes.transData.transform(corners), *(box.get_points() for box in labels)])
+    first, last = axes.get_window_extent().get_points()  # whose centre is that of the box
+    axes.set_box_aspect(size, zoom=((last - first) / 2.0 / np.abs(ends - (first + last) / 2.0).max(axis=0)).min())
     axes.figure.draw_without_rendering()
     return axes
 
@@ -147,7 +158,7 @@ def labelled_axes(
     `artist` has the colour scale of the field `shown`. `points` (n, 2) are those of a body in the plane, and None for axes in
     space [length]. `alone` states whether the figure has no other axes.
     """
-    caption, length, below = labelled(shown.caption, units, shown.quantity), 0.6, 0.02
+    caption, length, below = labelled(shown.caption, units, shown.quantity), 0.6, -0.02
     if points is not None:
         width, height = np.ptp(points, axis=0)
         caption = textwrap.fill(caption, int(size_around(points)[1] / LETTER))

@@ -135,7 +135,7 @@ def deformed_shape(
     points = scaled(shown.mesh.points, scale, step.displacement[shown.node])
     heading = title or f"Deformed shape (displacements x {scale:g}), {step.instant}"
     if mesh.dim == 3:
-        axes = new_axes(ax, (6.4, 6.9), "3d")
+        axes = new_axes(ax, (6.4, 6.6), "3d")
         view = view or view_of_extreme(shown, points)
         artist = draw_solid(axes, shown, points, edges, view, limits or shown.range)
         _mark(axes, shown, points, mesh, units, hidden=not is_seen(shown, points, view))
