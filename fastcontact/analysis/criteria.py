@@ -61,9 +61,9 @@ class Criteria:
         at the end of the step. Slip is then counted from the instant at which a node closes, otherwise from the beginning of
         the step. By default 0.001 in plane and axisymmetric models of linear bodies, at obstacles and between bodies with
         dual mortar multipliers, unless `geometry_updates` is given or only contact restrains a body; elsewhere 1, which
-        means that no step is divided. A step takes up to twice the time with the direct solver, and many times the
-        iterations with multigrid. With nonlinear bodies, steps are halved instead, at most `max_halvings` times, as long as
-        such nodes do more than this fraction of the frictional work so far [-].
+        means that no step is divided. A step takes up to twice the time with the direct solver, more if some dozens of nodes
+        close in it, and many times the iterations with multigrid. With nonlinear bodies, steps are halved instead, at most
+        `max_halvings` times, as long as such nodes do more than this fraction of the frictional work so far [-].
 
     Examples
     --------

@@ -160,7 +160,8 @@ def _settle(
         if not problem.until_settled:
             continue
         if not tolerances.inexact:
-            touching.check(step, constraints, solution, moved.change - tolerances.enough(moved.size), moved.size)
+            excess = moved.change - tolerances.enough(moved.size)
+            touching.check(step, constraints, solution, excess, moved.size, iterate.u)
         paired_at = moved.before[step.dofs.compared]
         settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=paired_at)
         if not solution.settled or tolerances.inexact:
@@ -184,7 +185,7 @@ def _settle(
     if problem.until_settled:
         change = step.dofs.put(np.zeros_like(iterate.u), displacement - moved.before)
         raise ConvergenceError(geometry_moves(problem, iterate.history, change, limit), iterate.history)
-    touching.check(step, constraints, solution, 0.0, 0.0)
+    touching.check(step, constraints, solution, 0.0, 0.0, iterate.u)
     if touching.due or touching.unfinished:
         del iterate.history[-limit - 1 :]
         return _settle(step, iterate, touching)

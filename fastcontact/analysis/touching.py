@@ -1,7 +1,7 @@
 """Load steps in which constraints close and slide: friction is solved in increments, see `friction.path`.
 
-Once the geometry has nearly converged, one pairing is solved in increments. In later pairings only the last increment is
-solved again, with the slips of the earlier ones.
+Once the geometry has nearly converged, a pairing is solved in increments. In later pairings only the last increment is solved
+again, with the slips of the earlier ones, unless the geometry changes gaps and slips noticeably.
 """
 
 from __future__ import annotations
@@ -10,15 +10,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from fastcontact._jit.norms_kernels import largest_difference
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.inequalities import Iterate, StepContext, pair_surfaces
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Path, Solution
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Shear of nodes that close and slide, relative to the friction capacity, that is neglected by default.
 NEGLIGIBLE = 1e-3
@@ -38,38 +39,79 @@ class Touching:
     ----------
     due : bool
         Whether the next pairing is solved in increments.
-    done : bool
-        Whether increments have been solved.
     unfinished : bool
         Whether the last pairing was solved in increments, so that its last increment is to be solved again.
     """
 
     def __init__(self, step: StepContext, newton: bool) -> None:
         self._allowed, self._near = _allowed(step.problem), NOTABLE if newton else 0.0
-        self.due = self.done = self.unfinished = False
+        self.due = self.unfinished = self._settled = False
+        self._paired, self._shift = None, np.inf
+
+    # Constraints of the last pairing that was solved in increments.
+    _paired: StackedConstraints | None
 
     def step(
         self, step: StepContext, constraints: StackedConstraints, iterate: Iterate, nodes: SharedNodes | None
     ) -> StepContext:
         """Return the step in which a pairing is solved: with a `Path` if increments are due, otherwise unchanged."""
         self.unfinished = False
-        if not self.due:
+        if not (self.due or self._outdated(step, constraints, iterate.u)):
             return step
         path = _path(step, constraints, iterate, nodes)
-        self.due, self.done, self.unfinished = False, True, path is not None
+        self.due, self.unfinished, self._paired = False, path is not None, constraints
         return step if path is None else replace(step, path=path)
 
     def check(
-        self, step: StepContext, constraints: StackedConstraints, solution: Solution, excess: float, size: float
+        self,
+        step: StepContext,
+        constraints: StackedConstraints,
+        solution: Solution,
+        excess: float,
+        size: float,
+        u: Array,
     ) -> None:
-        """Set `due`, given the solution of a pairing.
+        """Set `due`, given the solution of a pairing with the displacements `u` (n_dofs,) [length].
 
         `excess` is the change of the displacements beyond the tolerance, and `size` the largest displacement [length].
         """
-        settled = solution.settled and excess <= self._near * size
-        self.due = (
-            settled and not self.done and self._allowed < 1.0 and _slides(step, constraints, solution, self._allowed)
+        self._settled = self._allowed < 1.0 and solution.settled and excess <= self._near * size
+        self._active, self._size = solution.active, size
+        self.due = self._settled and (
+            _slides(step, constraints, solution, self._allowed)
+            if self._paired is None
+            else self._outdated(step, constraints, u)
         )
+
+    def _outdated(self, step: StepContext, constraints: StackedConstraints, u: Array) -> bool:
+        """Return whether the geometry has changed since the increments were solved, and changes less than at the last time.
+
+        Slips of earlier increments are those of the pairing in which they were solved.
+        """
+        before = self._paired
+        if before is None or not (self._settled and step.problem.until_settled):
+            return False
+        if not len(before) == len(constraints) == len(self._active):  # slips of other constraints are of no use
+            return True
+        shift = _shift(before, constraints, self._active, u, step.state.u)
+        outdated = SINGLE_PRECISION * self._size < shift < self._shift
+        self._shift = shift if outdated else self._shift
+        return outdated
+
+
+def _shift(before: StackedConstraints, now: StackedConstraints, active: Mask, u: Array, start: Array) -> float:
+    """Return the largest difference of gaps and slips of `active` constraints (m,) between two pairings [length].
+
+    Displacements are `u` (n_dofs,), and at the beginning of the step `start` (n_dofs,) [length].
+    """
+
+    def relative(part: StackedConstraints) -> Array:
+        """Return the gaps, and the slip vectors (dim,) (m, 1 + dim)."""
+        slips = zip(part.tangents, part.slip0, part.directions, strict=True)
+        vectors = [(T @ (u - start) + slip)[:, None] * along for T, slip, along in slips]
+        return np.column_stack([part.gap0 + part.B @ u, np.sum(vectors, axis=0)])[active]
+
+    return largest_difference(relative(before).ravel(), relative(now).ravel())
 
 
 def _slides(step: StepContext, constraints: StackedConstraints, solution: Solution, allowed: float) -> bool:

@@ -104,19 +104,6 @@ def beyond(triangle, s, t):
 
 
 @innermost_kernel
-def _rank(triangle, s, t):
-    """Return `beyond` plus a small fraction of the sum of all overhangs, by which neighbouring facets are compared.
-
-    Beyond the end of a surface, a facet and the next one along it have the same largest overhang; the sum breaks the tie.
-    """
-    if triangle:
-        total = max(-s, 0.0) + max(-t, 0.0) + max(s + t - 1.0, 0.0)
-    else:
-        total = 0.5 * (max(abs(s) - 1.0, 0.0) + max(abs(t) - 1.0, 0.0))
-    return beyond(triangle, s, t) + 1e-3 * total
-
-
-@innermost_kernel
 def inside(triangle, s, t):
     """Return reference coordinates moved into a facet, independently of the choice of its first corner."""
     if triangle:
@@ -127,7 +114,23 @@ def inside(triangle, s, t):
 
 
 @innermost_kernel
-def _beside(point, terms, directions, triangular, neighbours, f, height):
+def _rank(terms, triangle, f, s, t, length):
+    """Return the distance of a projection on the extended facet `f` from the facet, by which neighbours are compared.
+
+    It is relative to `length`. Overhangs are no measure of it, since they depend on the shapes of facets. If both facets are
+    closest at a common node, a small fraction of the sum of all overhangs breaks the tie.
+    """
+    if triangle:
+        total = max(-s, 0.0) + max(-t, 0.0) + max(s + t - 1.0, 0.0)
+    else:
+        total = 0.5 * (max(abs(s) - 1.0, 0.0) + max(abs(t) - 1.0, 0.0))
+    a, b = inside(triangle, s, t)
+    apart = minus(_interpolated(terms, f, s, t)[0], _interpolated(terms, f, a, b)[0])
+    return np.sqrt(dot(apart, apart)) / length + 1e-3 * total
+
+
+@innermost_kernel
+def _beside(point, terms, directions, triangular, neighbours, f, height, length):
     """Return the facet next to `f` with the smallest `_rank` of the projection, (s, t), and this value or infinity."""
     start, numbers = neighbours
     best, best_s, best_t, least = f, 0.0, 0.0, np.inf
@@ -135,7 +138,7 @@ def _beside(point, terms, directions, triangular, neighbours, f, height):
         g = numbers[k]
         middle = 1.0 / 3.0 if triangular[g] else 0.0
         s, t, converged = _newton(point, terms, directions, g, middle, middle, height)
-        rank = _rank(triangular[g], s, t) if converged else np.inf
+        rank = _rank(terms, triangular[g], g, s, t, length) if converged else np.inf
         # Of equivalent facets, the first one is taken.
         if converged and max(rank, LENGTH_ROUND_OFF) < max(least, LENGTH_ROUND_OFF) - ROUND_OFF:
             best, best_s, best_t, least = g, s, t, rank
@@ -170,8 +173,12 @@ def along_normals(begin, end, points, heights, terms, directions, triangular, ne
         if converged and excess <= BEYOND:
             s, t, over = a, b, excess
             if excess > LENGTH_ROUND_OFF:
-                next_facet, a, b, rank = _beside(point, terms, directions, triangular, neighbours, f, heights[i])
-                if rank < _rank(triangular[f], s, t):
+                edge = _interpolated(terms, f, s, t)[1]
+                length = np.sqrt(dot(edge, edge))
+                next_facet, a, b, rank = _beside(
+                    point, terms, directions, triangular, neighbours, f, heights[i], length
+                )
+                if rank < _rank(terms, triangular[f], f, s, t, length):
                     f, s, t, over = next_facet, a, b, beyond(triangular[next_facet], a, b)
         s, t = inside(triangular[f], s, t)
         facet[i], xi[i, 0], xi[i, 1], overhang[i] = f, s, t, over if over > LENGTH_ROUND_OFF else 0.0

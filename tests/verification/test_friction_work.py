@@ -6,6 +6,7 @@ from models import elastic_model, supported
 from stepping import Stepping
 
 import fastcontact as fc
+from fastcontact.analysis import touching
 from fastcontact.analysis.result_warnings import _slipping_before
 from fastcontact.analysis.state import State
 from fastcontact.analysis.work import Work
@@ -273,6 +274,25 @@ def test_a_ball_that_a_force_drives_has_the_work_of_friction_of_many_steps():
     options = {"formulation": "mortar", "motion": None, "force": {"y": -60.0}}
     fine, few = (pressed_ball(steps=n, **options)[-1] for n in (12, 4))
     assert few.work["friction_work"] == pytest.approx(fine.work["friction_work"], rel=0.05)
+
+
+@pytest.mark.filterwarnings("ignore:the largest equivalent strain", "ignore:the energy of these load steps")
+@pytest.mark.parametrize("formulation", ["mortar", "continuous", "node_to_segment"])
+def test_increments_of_friction_are_those_of_the_converged_geometry(formulation, monkeypatch):
+    """In one step on a drum, increments on the geometry of the step as a whole leave displacements wrong by 2e-4."""
+    model = elastic_model(fc.generate.block((2.0, 1.0), (8, 4)), "plane_strain", TOP={"x": 0.15, "y": -0.2})
+    drum = fc.obstacles.Sphere((0.7, -3.0), 3.0)
+    model.add_obstacle("drum", secondary="BOTTOM", obstacle=drum, friction=0.3, formulation=formulation)
+
+    def solved(tolerance):
+        monkeypatch.setattr(touching, "SINGLE_PRECISION", tolerance)
+        return fc.solve(model, 1)[-1]
+
+    step, exact, rough = solved(touching.SINGLE_PRECISION), solved(1e-10), solved(1.0)
+    size = np.abs(exact.displacement).max()
+    assert np.abs(step.displacement - exact.displacement).max() < 1e-6 * size
+    assert np.abs(rough.displacement - exact.displacement).max() > 1e-4 * size
+    assert step.work["friction_work"] == pytest.approx(exact.work["friction_work"], rel=1e-5)
 
 
 @pytest.mark.parametrize("friction", [0.5, 0.0, -0.5])
