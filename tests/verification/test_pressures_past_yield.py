@@ -88,3 +88,37 @@ def test_exchanged_sides_differ_by_the_error_of_the_mesh() -> None:
         held = last.reaction[dome_on_block(2, exchanged).mesh.points_of("A_ZMIN"), 2].sum()
         assert abs(held) == pytest.approx(forces[-1], rel=1e-8)
     assert forces[1] == pytest.approx(forces[0], rel=0.2)
+
+
+@pytest.mark.parametrize("exchanged", [False, True])
+@pytest.mark.parametrize(
+    ("element", "strain", "bound"), [("quad8", "small", 1e-3), ("quad4", "small", 2e-3), ("quad8", "finite", 1e-3)]
+)
+def test_a_press_fit_past_yield(element: str, strain: str, bound: float, exchanged: bool) -> None:
+    r"""An elastic ring of radii 20 and 50 in one of 50 and 100 that yields up to the radius c = 70, in plane strain.
+
+    With :math:`k = Y / \sqrt 3`, the pressure is :math:`p = k (1 - c^2 / 100^2 + 2 \ln(c / 50))` (Hill, 1950, chapter 5). As
+    plastic flow keeps the volume, and nothing flows along the axis, the displacement in the plastic zone is
+    :math:`(1 + \nu) (1 - 2 \nu) r \sigma_r / E + 2 (1 - \nu^2) k c^2 / (E r)`. The inner ring is Lame's.
+    """
+    a, b, outer, c, E, nu, k = 20.0, 50.0, 100.0, 70.0, 200e3, 0.3, 200.0 / np.sqrt(3.0)
+    pressure = k * (1.0 - (c / outer) ** 2 + 2.0 * np.log(c / b))
+    bore = -(1.0 + nu) * (1.0 - 2.0 * nu) * b * pressure / E + 2.0 * (1.0 - nu**2) * k * c**2 / (E * b)
+    shaft = (1.0 + nu) / E * b * pressure * ((1.0 - 2.0 * nu) * b**2 + a**2) / (b**2 - a**2)
+    mesh = fc.generate.rings(element, divisions_inner=(4, 12), divisions_outer=(8, 14))
+    model = fc.Model(mesh, "plane_strain", strain=strain)
+    model.add_material(fc.LinearElastic(E, nu) if strain == "small" else fc.NeoHookean(E=E, nu=nu), "INNER")
+    model.add_material(fc.ElasticPlastic(E, nu, yield_stress=200.0), "OUTER")
+    model.fix("SYMMETRY_Y", "y")
+    model.fix("SYMMETRY_X", "x")
+    sides = ("CONT_OUTER", "CONT_INNER") if exchanged else ("CONT_INNER", "CONT_OUTER")
+    interference = {"clearance": -bore - shaft, "clearance_ramp": [(0.0, 0.0), (1.0, 1.0)]}
+    model.add_contact("fit", secondary=sides[0], primary=sides[1], **interference)
+    last = fc.solve(model, 5)[-1]
+    contact = last.contact["fit"]
+    mean = np.linalg.norm(contact.force_vectors, axis=1).sum() / (0.5 * np.pi * b)
+    assert mean == pytest.approx(pressure, rel=bound)
+    assert contact.pressure == pytest.approx(pressure, rel=0.015)
+    middle = np.concatenate([mesh.points[cells].mean(axis=1) for cells in mesh.solids.values()])
+    yielded = last.cell_fields["plastic_strain"] > 1e-6
+    assert np.linalg.norm(middle[yielded], axis=1).max() == pytest.approx(c, abs=outer / 16.0)
