@@ -22,7 +22,6 @@ from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import too_fast
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.energy import gradients_at
@@ -337,10 +336,15 @@ def _without_force(problem: Problem, name: str, last: StepResult, touched: bool,
             f"contact '{name}' carries nothing although its sides penetrate by {-smallest:.4g}: supports or relations "
             "hold its nodes there; leave these nodes free, or out of the contact as 'excluded'"
         )
-    elif not touched and (depth := _depth_of_primary(problem.model, pair, last.displacement)) > 0.0:
+    elif (
+        not touched
+        and isinstance(pair.primary, Surface)
+        and (depth := _depth_of_primary(problem.model, pair, last)) > 0.0
+    ):
         yield (
-            f"contact '{name}' carries nothing although nodes of '{pair.primary.group}' are up to {depth:.4g} deep between "
-            f"the nodes of '{pair.secondary.group}', whose facets are too large: refine them, or exchange the sides"
+            f"contact '{name}' carries nothing although nodes of '{pair.primary.group}' are up to {depth:.4g} deep in the body "
+            f"of '{pair.secondary.group}': refine '{pair.secondary.group}' if they lie between its nodes, or exchange the "
+            "sides; otherwise check whether the sides face each other"
         )
     elif not touched:
         yield f"contact '{name}' never closed: {gap}. Check its sides and the direction of the loads"
@@ -348,11 +352,9 @@ def _without_force(problem: Problem, name: str, last: StepResult, touched: bool,
         yield f"contact '{name}' has opened again at the end: {gap}"
 
 
-def _depth_of_primary(model: Model, pair: Formulation, displacement: Array) -> float:
-    """Return the largest depth of primary nodes inside bodies of the secondary side; zero against obstacles [length]."""
-    if isinstance(pair.primary, RigidSide):
-        return 0.0
-    body, overlaps = bodies(model.mesh)[1], depths(model.mesh, model.kinematics, model.mesh.points + displacement)
+def _depth_of_primary(model: Model, pair: Formulation, last: StepResult) -> float:
+    """Return the largest depth of primary nodes inside bodies of the secondary side [length]."""
+    body, overlaps = bodies(model.mesh)[1], depths(model.mesh, model.kinematics, model.mesh.points + last.displacement)
     return max(
         (
             float(depth[np.isin(points, pair.primary.points)].max(initial=0.0))
@@ -448,7 +450,7 @@ def _peak_at_edge(pair: Formulation, last: StepResult, contact: ContactResult) -
     near_open = pair.secondary.near @ (~contact.active & ~pair.options.excluded_nodes(pair.secondary)) > 0
     inside = float(contact.pressure[contact.active & ~near_open].max(initial=0.0))
     if contact.pressure_max > (1.0 + NEGLECTED) * inside > 0.0:
-        remedy = ", or formulation mortar" if isinstance(pair.primary, RigidSide) and pair.name != "mortar" else ""
+        remedy = ", or formulation mortar" if pair.name != "mortar" and not isinstance(pair.primary, Surface) else ""
         yield (
             f"contact '{contact.name}': the largest nodal pressure, {contact.pressure_max:.4g}, is within two facets of open "
             f"nodes, and pressures inside are at most {inside:.4g}. Where bodies yield, nodal pressures overshoot on facets "

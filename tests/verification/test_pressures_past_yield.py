@@ -52,7 +52,7 @@ def test_pressures_overshoot_at_the_edge_past_yield() -> None:
     assert not any(re.match(EDGE, text) for text in texts)
 
 
-def dome_on_block(divisions: int, exchanged: bool) -> fc.Model:
+def dome_on_block(divisions: int, exchanged: bool, **options) -> fc.Model:
     """Return a model of a dome and a block that yield, with cells of 1 / 2 and 2 / 3 over the `divisions`."""
     block = fc.generate.box((2.0, 2.0, 1.0), (3 * divisions, 3 * divisions, 2 * divisions), name="A")
     dome = fc.generate.box((1.0, 1.0, 0.6), (2 * divisions, 2 * divisions, divisions), origin=(0.5, 0.5, 1.0), name="B")
@@ -69,25 +69,32 @@ def dome_on_block(divisions: int, exchanged: bool) -> fc.Model:
     model.fix("B_ZMAX", "xy")
     model.prescribe("B_ZMAX", z=-0.05)
     sides = ("A_ZMAX", "B_ZMIN") if exchanged else ("B_ZMIN", "A_ZMAX")
-    model.add_contact("joint", secondary=sides[0], primary=sides[1])
+    model.add_contact("joint", secondary=sides[0], primary=sides[1], **options)
     return model
 
 
 def test_exchanged_sides_differ_by_the_error_of_the_mesh() -> None:
-    """The force differs by 15 % with cells of 1/4, 3 % with cells of 1/12; there are warnings as long as it matters."""
+    """Weighted gaps of coarse facets do not see nodes between theirs; there are warnings as long as it matters.
+
+    With cells of 1/4, 1/6 and 1/12 the forces differ by 15, 5 and 3 %, those of continuous contact by 0.8 and 0.6 %. On the
+    coarsest of these meshes CalculiX 2.20 (C3D8R, contact from surface to surface) has 293.7 and 293.4.
+    """
     _, texts = told(dome_on_block(1, True), 3)
     assert texts == [
-        "contact 'joint' carries nothing although nodes of 'B_ZMIN' are up to 0.05 deep between the nodes of 'A_ZMAX', whose "
-        "facets are too large: refine them, or exchange the sides"
+        "contact 'joint' carries nothing although nodes of 'B_ZMIN' are up to 0.05 deep in the body of 'A_ZMAX': refine "
+        "'A_ZMAX' if they lie between its nodes, or exchange the sides; otherwise check whether the sides face each other"
     ]
-    forces = []
-    for exchanged in (False, True):
-        last, texts = told(dome_on_block(2, exchanged), 3)
-        assert any("across its radius: its pressure needs 4 or more" in text for text in texts)
-        forces.append(abs(last.contact["joint"].force[2]))
-        held = last.reaction[dome_on_block(2, exchanged).mesh.points_of("A_ZMIN"), 2].sum()
-        assert abs(held) == pytest.approx(forces[-1], rel=1e-8)
-    assert forces[1] == pytest.approx(forces[0], rel=0.2)
+    for options, apart, error in (({}, 0.18, 0.18), ({"formulation": "continuous"}, 0.015, 0.06)):
+        forces = []
+        for exchanged in (False, True):
+            model = dome_on_block(2, exchanged, **options)
+            last, texts = told(model, 6)
+            assert any("across its radius: its pressure needs 4 or more" in text for text in texts)
+            forces.append(abs(last.contact["joint"].force[2]))
+            held = last.reaction[model.mesh.points_of("A_ZMIN"), 2].sum()
+            assert abs(held) == pytest.approx(forces[-1], rel=1e-8)
+        assert forces[1] == pytest.approx(forces[0], rel=apart)
+        assert forces == pytest.approx([293.7, 293.4], rel=error)
 
 
 @pytest.mark.parametrize("exchanged", [False, True])
