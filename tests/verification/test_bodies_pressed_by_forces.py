@@ -44,7 +44,9 @@ def round_body_on_block(kinematics: str, element: str, laws, contact) -> tuple[f
 
 
 @pytest.mark.filterwarnings("ignore:nothing determines the position of bodies")  # the last step has no force
-@pytest.mark.filterwarnings("ignore:.*element.* across its radius", "ignore:.*plastic strain")
+@pytest.mark.filterwarnings(
+    "ignore:.*element.* across its radius", "ignore:.*plastic strain", "ignore:.*nodal pressure"
+)
 @pytest.mark.parametrize("contact", [{}, {"formulation": "continuous"}, {"formulation": "node_to_segment"}], ids=str)
 @pytest.mark.parametrize(
     ("kinematics", "element", "laws", "depth"),
