@@ -215,7 +215,7 @@ def multiplier(table: PartHistory, ramp: Ramp, instant: float) -> float:
     """Return the multiplier [-] at `instant` of an item with the history `table`, or that of the ramp if `table` is None."""
     if isinstance(table, Harmonic):
         return table.value(multiplier(table.ramp, ramp, instant))
-    return ramp.value(instant) if table is None else table_value(table, instant)
+    return table_value(ramp.table if table is None else table, instant)
 
 
 def combined(by_ramp: Mapping[Any, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:

@@ -151,6 +151,11 @@ def test_iterations_under_whole_interfaces_are_a_few_times_those_without_contact
 
 
 @pytest.mark.filterwarnings("ignore:Young's moduli")
+def test_the_hierarchy_of_a_much_stiffer_secondary_side_follows_small_changes_of_the_weights():
+    checked("blocks", 6, ratio=1e-4, most=3)
+
+
+@pytest.mark.filterwarnings("ignore:Young's moduli")
 @pytest.mark.parametrize("given", first_of(1, [{"curvature": 0.02}, {"nu": 0.499}]))
 def test_iterations_beside_a_stiff_secondary_side_that_touches_in_part_or_is_nearly_incompressible(given):
     checked("blocks", 16, ratio=1e-3, **given, most=4)
