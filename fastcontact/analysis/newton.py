@@ -298,6 +298,8 @@ class _Newton:
         self._reused = problem is not None
         if problem is not None:
             problem = replace(problem, linearised_at=None if problem.linearised_at is None else u)
+        elif regularisation == Regularisation() and self._is_at_rest(u):
+            problem = replace(self._problem, linearised_at=u if self._problem.bodies.finite else None)
         else:
             K = terms.tangent(u, regularisation.geometric)
             contact = self._stiffness_of_contact(K, u, regularisation) if regularisation.geometric == WHOLE else None
@@ -315,6 +317,11 @@ class _Newton:
         solution = self._contact(inner_problem, load, with_loads(problem, load), u, Extrapolation())
         self._reusable = problem if regularisation.geometric == WHOLE else None
         return solution
+
+    def _is_at_rest(self, u: Array) -> bool:
+        """Return whether the tangent at u (n_dofs,) is the stiffness of the problem, whose linear solver is prepared."""
+        loaded = self._load.rise is not None or self._problem.following or self._settled is not None
+        return not (loaded or self._start.history or u.any())
 
     def _forcing(self, problem: Problem, load: StepLoad, u: Array, unbalanced: Array) -> float | None:
         """Return the tolerance of the linear solution from u (n_dofs,), None for that of the solver (inexact Newton method).
