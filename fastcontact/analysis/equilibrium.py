@@ -108,7 +108,7 @@ class Bodies(Term):
 
     def residual(self, u: Array) -> tuple[Array, Energies]:
         """See `Term`."""
-        bodies, force = self.at(u), np.zeros_like(u)
+        bodies, force = self.at(u, tangent=False), np.zeros_like(u)
         force[: bodies.force.size] = bodies.force.ravel()
         return force, (bodies.energy, bodies.plastic_work)
 

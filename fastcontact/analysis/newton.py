@@ -297,6 +297,9 @@ class _Newton:
         self._reused = problem is not None
         if problem is not None:
             problem = replace(problem, linearised_at=None if problem.linearised_at is None else u)
+        elif regularisation == Regularisation() and self._is_at_rest(u):
+            bodies = self._problem.bodies
+            problem = replace(self._problem, linearised_at=u if bodies and bodies.finite else None)
         else:
             K = terms.tangent(u, regularisation.geometric)
             contact = self._stiffness_of_contact(K, u, regularisation) if regularisation.geometric == WHOLE else None
@@ -315,14 +318,19 @@ class _Newton:
         self._reusable = problem if regularisation.geometric == WHOLE else None
         return solution
 
+    def _is_at_rest(self, u: Array) -> bool:
+        """Return whether the tangent at u (n_dofs,) is the stiffness of the problem, whose linear solver is prepared."""
+        loaded = self._load.rise is not None or self._problem.following or self._settled is not None
+        return not (loaded or self._start.history or u.any())
+
     def _forcing(self, problem: Problem, load: StepLoad, u: Array, unbalanced: Array) -> float | None:
         """Return the tolerance of the linear solution from u (n_dofs,), None for that of the solver (inexact Newton method).
 
-        `unbalanced` (n_dofs,) are the residual forces of the terms at u. If their ratio to the forces of the linear problem
-        is small, the next ratio, which is about the square of this one, may be that of the last iteration.
+        `unbalanced` (n_dofs,) are the residual forces of the terms at u. If their ratio to the forces of this step or of
+        earlier ones is small, the next ratio, which is about the square of this one, may be that of the last iteration.
         """
         system, lift = problem.system, load.lift
-        scale = largest(system.right(load.force, lift))
+        scale = max(largest(system.right(load.force, lift)), self._start.largest_force)
         if problem.pairs or not problem.solver.iterative or scale == 0.0:
             return None
         missing = largest_difference(system.displacement(system.unknowns(u, lift), lift), u)  # prescribed displacements

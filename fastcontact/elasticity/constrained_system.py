@@ -171,9 +171,7 @@ class System(ConstrainedMotion):
         """Set the stiffness K (n, n) and what follows from it, given its diagonal (n,)."""
         self.free = self._independent.copy()
         if self.T is None:
-            self.K = Stiffness(
-                (K, self._entries.removed_from(K)) if self._entries else supports_apart(K, self.fixed)
-            )
+            self.K = Stiffness((K, self._entries.removed_from(K)) if self._entries else supports_apart(K, self.fixed))
             self.matrix = self.K.parts[0]
             self.weightless: Mask = self.free & (diagonal_of_K == 0.0)
         else:
