@@ -19,11 +19,9 @@ from fastcontact._tools.argument_types import check_type, fits, words
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cli import _outputs, main
 from fastcontact.cli._study import _failing_threads_interrupt
-from fastcontact.results import file_lock
 from fastcontact.round_off import SUM_ROUND_OFF
 from fastcontact.studies import checks as affordable
 from fastcontact.studies import execute
-from fastcontact.studies.settings import _default_element
 
 SQUARE = fc.generate.block()
 GROUP = SQUARE.group_names[0]
@@ -144,11 +142,6 @@ def test_folders_of_file_systems_that_cannot_wait(tmp_path, monkeypatch):
                 paths._synchronise(tmp_path)
 
 
-def test_a_lock_in_a_folder_that_is_not_there(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        file_lock._open_lock_file(tmp_path / "none" / "x.lock")
-
-
 def test_a_picture_that_cannot_be_drawn(tmp_path):
     def too_large(path, **options):
         raise ValueError("Image size of 1e9x1e9 pixels is too large.")
@@ -183,12 +176,6 @@ def test_memory_that_cannot_be_asked(monkeypatch):
 
     monkeypatch.setattr(os, "sysconf", unknown)
     assert affordable._memory() == float("inf")
-
-
-def test_the_element_that_a_generator_makes_by_itself():
-    assert _default_element("none of them") == "tri3"
-    assert _default_element("half-spheres") == "tri3"
-    assert _default_element("box") == "hex8"
 
 
 def test_an_interruption_of_a_run_alone_ends_its_process(monkeypatch):

@@ -513,19 +513,6 @@ def test_a_writer_that_is_forgotten_frees_the_path(path: Path) -> None:
 # -------------------------------------------------------------------------------------- messages on writing
 
 
-def test_paths_that_cannot_be_written(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"folder '.*nowhere' does not exist: create it"):
-        ResultWriter(tmp_path / "nowhere" / "a.vtkhdf", MESH)
-    with pytest.raises(FileError, match="is a folder: name a file in it"):
-        ResultWriter(tmp_path, MESH)
-    assert os.listdir(tmp_path) == []
-    if os.name == "posix":  # a pipe of our own: a writer that went wrong could replace what it names
-        pipe = tmp_path / "pipe"
-        os.mkfifo(pipe)
-        with pytest.raises(FileError, match="is a device or a pipe"):
-            ResultWriter(pipe, MESH)
-
-
 @contextlib.contextmanager
 def no_rights_of_root():
     """Run as nobody where the tests run as root, who may write everywhere."""
@@ -605,20 +592,6 @@ def test_steps_that_do_not_fit(path: Path) -> None:
 
 
 # -------------------------------------------------------------------------------------- messages on reading
-
-
-def test_files_that_are_no_results(tmp_path: Path, path: Path) -> None:
-    with pytest.raises(FileError, match=r"no file '.*missing.vtkhdf': check"):
-        open_results(tmp_path / "missing.vtkhdf")
-    with pytest.raises(FileError, match="is a folder"):
-        open_results(tmp_path)
-    path.write_text("hello")
-    with pytest.raises(FileError, match="is not an HDF5 file: name a result file"):
-        open_results(path)
-    with h5py.File(path, "w") as file:
-        file.create_group("VTKHDF")
-    with pytest.raises(FileError, match="has no fastcontact results"):
-        open_results(path)
 
 
 def test_a_file_from_the_future(path: Path) -> None:
