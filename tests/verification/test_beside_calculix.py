@@ -190,7 +190,7 @@ def test_a_sector_whose_ends_have_other_meshes(element, differ, tmp_path):
     sectors, mesh = 12, box((1.0, 1.0, 0.4), (4, 3, 2), element)
     s, t, _ = mesh.points.T
     radius, angle = 20.0 + 20.0 * (t + 0.3 * s * t * (1.0 - t)), (0.5 - s) * 2.0 * np.pi / sectors
-    mesh, held, text = sector(mesh, radius, angle, sectors)
+    mesh, _, text = sector(mesh, radius, angle, sectors)
     text += f"*NSET, NSET=ALL, GENERATE\n1, {mesh.n_points}\n"
     steps = "*STEP\n*STATIC\n*DSLOAD\nS_YMIN, P, 50.\n*END STEP\n"
     ((step, U, _),) = both(text + steps, tmp_path)
