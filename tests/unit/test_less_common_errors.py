@@ -418,14 +418,6 @@ def test_stresses_along_the_normal_of_a_contact_in_the_plane():
     assert depths.max() > 0.1
 
 
-def test_a_slice_of_steps_by_no_whole_numbers(tmp_path):
-    block = fc.Model(fc.generate.block((1.0, 1.0), (1, 1), "quad4"), "plane_strain")
-    with fc.ResultWriter(tmp_path / "a.vtkhdf", block):
-        pass
-    with pytest.raises(fc.FileError, match="needs integers and a nonzero increment"):
-        fc.open_results(tmp_path / "a.vtkhdf")[0.5:2]
-
-
 def test_axes_that_are_no_numbers():
     block = fc.Model(fc.generate.block((1.0, 1.0), (1, 1), "quad4"), "plane_strain")
     with pytest.raises(fc.ModelError, match="returned 'text', not numbers"):
