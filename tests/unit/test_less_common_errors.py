@@ -19,6 +19,7 @@ from fastcontact._tools.argument_types import check_type, fits, words
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cli import _outputs, main
 from fastcontact.cli._study import _failing_threads_interrupt
+from fastcontact.results import file_lock
 from fastcontact.round_off import SUM_ROUND_OFF
 from fastcontact.studies import checks as affordable
 from fastcontact.studies import execute
@@ -140,6 +141,11 @@ def test_folders_of_file_systems_that_cannot_wait(tmp_path, monkeypatch):
         else:
             with pytest.raises(OSError, match="Input/output error"):
                 paths._synchronise(tmp_path)
+
+
+def test_a_lock_in_a_folder_that_is_not_there(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        file_lock._open_lock_file(tmp_path / "none" / "x.lock")
 
 
 def test_a_picture_that_cannot_be_drawn(tmp_path):

@@ -13,7 +13,6 @@ BASE = {
     "mesh": {"generator": "block"},
     "material": [{"E": 1e3, "nu": 0.3, "density": 2.0}],
 }
-PLACE = (3.0, 0.5)
 RAMP = [[0.0, 0.0], [1.0, 1.0], [3.0, 2.0]]
 TURN = {"angle": -0.5, "centre": [0.0, 5.0], "ramp": RAMP}
 ALONG_X = {"along": "x", "table": [[0, 0], [2, 1e-3]]}
@@ -117,7 +116,7 @@ def test_cyclic_symmetry():
 
 
 def block():
-    return fc.generate.with_reference_points(fc.generate.block((2.0, 1.0), (4, 2), "quad4"), {"REF": PLACE})
+    return fc.generate.with_reference_points(fc.generate.block((2.0, 1.0), (4, 2), "quad4"), {"REF": (3.0, 0.5)})
 
 
 def assert_equal(entries, call, mesh=None):
