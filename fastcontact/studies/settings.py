@@ -12,7 +12,7 @@ from fastcontact.cases.case import Case
 from fastcontact.cases.keys import check_keys
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import CaseError, FastcontactError, check_known
-from fastcontact.mesh import elements, generate
+from fastcontact.mesh import elements
 from fastcontact.mesh.generate import GENERATORS, Circle, circles, linearised, refined, to_quadratic
 from fastcontact.mesh.mesh import Mesh
 
@@ -279,7 +279,7 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
     if settings.generator is None:
         curves = settings.curves and [[list(c.centre), c.radius, c.group] for c in settings.curves]
         return {"refinements": level, "element": element, "curves": curves}
-    element = element or str(_default_element(settings.generator))
+    element = element or str(inspect.signature(GENERATORS[settings.generator]).parameters["element"].default)
     shape = shape_of(element)
     # Arguments on level 0 by shape are those of quadratic cells. Linear cells of half the size have the same nodes.
     n_halvings = level + int(settings.by_shape and elements.get(element).order == 1)
@@ -288,12 +288,6 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
     halvings, refinements = (0, n_halvings) if shape == "triangles" else (n_halvings, 0)
     arguments = _refined_arguments(settings, element, level_0, halvings)
     return {"generator": settings.generator, "arguments": arguments, "refinements": refinements}
-
-
-def _default_element(generator: str) -> Any:
-    """Return the default element of a generator, or tri3 if the generator is unknown."""
-    function = generate.GENERATORS.get(generator)
-    return inspect.signature(function).parameters["element"].default if function is not None else "tri3"
 
 
 def _not_makeable(settings: Settings, element: str) -> str:
@@ -314,8 +308,7 @@ def _refined_arguments(settings: Settings, element: str, level_0: Mapping[str, A
     Raises CaseError if an argument is unknown, or if it is not known which arguments make the mesh finer.
     """
     name = str(settings.generator)
-    check_known("study.generator", name, generate.GENERATORS, CaseError)
-    signature = inspect.signature(generate.GENERATORS[name]).parameters
+    signature = inspect.signature(GENERATORS[name]).parameters
     for key in (*level_0, *settings.halve, *settings.double):
         check_known(f"argument of the generator {name} in [study]", key, signature, CaseError)
     rule = RULES[name](element, level_0) if name in RULES else Rule()
@@ -346,7 +339,7 @@ def make_mesh(recipe: Recipe, base: Mesh | None) -> Mesh:
     """Return the mesh of a recipe; a recipe without a generator refines the mesh `base`."""
     if "generator" in recipe:
         arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in recipe["arguments"].items()}
-        mesh = generate.GENERATORS[recipe["generator"]](**arguments)
+        mesh = GENERATORS[recipe["generator"]](**arguments)
         return _refined(mesh, recipe["refinements"], circles(mesh) if recipe["refinements"] else [])
     if base is None:
         raise FastcontactError("a mesh that is refined needs the mesh to start from")

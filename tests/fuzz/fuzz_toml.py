@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.toml_text import written
+
 WILD = [
     0, -1, 2**31, 2**63 - 1, 10**18, True, False, float("nan"), float("inf"), 1e308, 5e-324, -0.0, 1e-12, 1.5,
     "", "x", "../..", "/etc/hostname", "\x00", "é" * 50, "a" * 5000, "../outside/bait.h5", [], [1], [[]], [[1, 2], [3]],
@@ -36,7 +38,7 @@ def damaged(text: str, random: np.random.Generator) -> str:
             holder[key] = json.loads(json.dumps(other[name])) if name in range(10**6) or name in other else 0
         elif isinstance(holder, dict):
             holder[KEYS[int(random.integers(len(KEYS)))]] = _wild(random)
-    return "".join(f"{json.dumps(key)} = {_value(value)}\n" for key, value in data.items())
+    return written(data)
 
 
 def _wild(random: np.random.Generator) -> Any:
@@ -48,18 +50,3 @@ def _places(data: Any) -> Any:
     for key, value in list(items):
         yield data, key
         yield from _places(value)
-
-
-def _value(value: Any) -> str:
-    """Write a value as TOML: tables go in line."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float):
-        return repr(value)  # nan and inf are words of TOML too
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, str):
-        return json.dumps(value)
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_value, value)) + "]"
-    return "{" + ", ".join(f"{json.dumps(key)} = {_value(entry)}" for key, entry in value.items()) + "}"

@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fastcontact._tools.packing import packed, unpacked
+from fastcontact._tools.toml_text import written
 
 GOOD = ("read", "refused")
 few = settings(
@@ -62,7 +63,7 @@ def case(tmp_path_factory):
 @given(place=st.integers(0, 200), key=st.none() | st.text(max_size=8), value=VALUES)
 def test_any_value_at_any_place_of_a_case(case, place, key, value):
     folder, data = case
-    data = tomllib.loads("".join(f"{name} = {fuzz_toml._value(entry)}\n" for name, entry in data.items()))
+    data = tomllib.loads(written(data))
     places = list(fuzz_toml._places(data))
     holder, name = places[place % len(places)]
     if key is None or isinstance(holder, list):
@@ -70,7 +71,7 @@ def test_any_value_at_any_place_of_a_case(case, place, key, value):
     else:
         holder[key] = value
     path = folder / "changed.toml"
-    text = "".join(f"{fuzz_toml._value(name)} = {fuzz_toml._value(entry)}\n" for name, entry in data.items())
+    text = written(data)
     path.write_text(text, encoding="utf-8", errors="replace")
     kind, message = outcome(path)
     assert kind in GOOD, message

@@ -62,21 +62,12 @@ def changed_settings(**study):
     return settings(case, data)
 
 
-def without_dask(patch):
+def without(patch, package, module, name):
     import sys
 
-    patch.setitem(sys.modules, "dask", None)
-    patch.setitem(sys.modules, "dask.distributed", None)
-    with _study.executor("tcp://localhost:1"):
-        pass
-
-
-def without_mpi(patch):
-    import sys
-
-    patch.setitem(sys.modules, "mpi4py", None)
-    patch.setitem(sys.modules, "mpi4py.futures", None)
-    with _study.executor("mpi"):
+    for missing in (package, f"{package}.{module}"):
+        patch.setitem(sys.modules, missing, None)
+    with _study.executor(name):
         pass
 
 
@@ -149,8 +140,8 @@ CALLS = [
     ("one size twice", lambda: fit.fit_limit([1.0, 0.5, 0.5], [1.0, 2.0, 3.0]), fc.errors.CaseError, r"the mesh sizes must be positive and all different, not \[1\.0, 0\.5, 0\.5\]"),
     ("refining nothing", lambda: make_mesh({"refinements": 1, "element": None, "curves": None}, None), fc.errors.FastcontactError, r"a mesh that is refined needs the mesh to start from"),
     ("a maker without sizes", lambda: changed_settings(generator="block"), fc.errors.CaseError, r"'study\.generator' needs the arguments of level 0 in \[study\.triangles\] or \[study\.quadrangles\]"),
-    ("Dask is not installed", without_dask, fc.errors.CaseError, r"--executor tcp://localhost:1 needs Dask .*: pip install distributed"),
-    ("mpi4py is not installed", without_mpi, fc.errors.CaseError, r"--executor mpi needs mpi4py .*: pip install mpi4py"),
+    ("Dask is not installed", lambda patch: without(patch, "dask", "distributed", "tcp://localhost:1"), fc.errors.CaseError, r"--executor tcp://localhost:1 needs Dask .*: pip install distributed"),
+    ("mpi4py is not installed", lambda patch: without(patch, "mpi4py", "futures", "mpi"), fc.errors.CaseError, r"--executor mpi needs mpi4py .*: pip install mpi4py"),
     ("no worker starts", no_worker_starts, fc.errors.FastcontactError, r"no worker process could start: in a script, put the call of the study under if __name__ == '__main__':"),
     ("a text on a read-only disk", protected_text, fc.errors.FileError, r"'a\.json' cannot be written \(Read-only file system\)"),
     ("a file where the store should be", file_for_a_store, fc.errors.FileError, r"the folder 'runs' cannot be created: File exists; name another store"),

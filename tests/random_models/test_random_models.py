@@ -8,7 +8,7 @@ import nonlinear
 import numpy as np
 import pytest
 from drawing import drawn
-from models import supported
+from models import elastic_model
 from outcome import BOUNDS, SAME, figures, outcome, told, unfit
 from stepping import watching
 from wording import WORDS
@@ -129,17 +129,19 @@ def test_a_seed_is_a_model():
     assert one.labels == other.labels
 
 
-@pytest.fixture(scope="module")
-def rubbing():
-    """Two blocks that do not match, one drawn over the other."""
-    mesh = fc.generate.block_on_block(divisions_lower=(6, 3), divisions_upper=(5, 3))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(1000.0, 0.3))
-    supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.05, "y": -0.05})
-    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.2)
+def moved(by, lower, upper, **options):
+    mesh = fc.generate.block_on_block(divisions_lower=lower, divisions_upper=upper)
+    model = elastic_model(mesh, LOWER_BOTTOM="xy", UPPER_TOP=by)
+    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
     with watching() as watched:
         step = fc.solve(model, 1)[-1]
     return model, step, watched.settled
+
+
+@pytest.fixture(scope="module")
+def rubbing():
+    """Two blocks that do not match, one drawn over the other."""
+    return moved({"x": 0.05, "y": -0.05}, (6, 3), (5, 3), friction=0.2)
 
 
 def spoilt(found, **changes):
@@ -224,11 +226,5 @@ def test_forces_that_are_round_off_are_none():
 
 
 def moved_freely():
-    mesh = fc.generate.block_on_block(divisions_lower=(3, 2), divisions_upper=(2, 2))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(1000.0, 0.3))
-    supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.1, "y": 0.3})
-    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")
-    with watching() as watched, pytest.warns(fc.FastcontactWarning):
-        step = fc.solve(model, 1)[-1]
-    return model, step, watched.settled
+    with pytest.warns(fc.FastcontactWarning):
+        return moved({"x": 0.1, "y": 0.3}, (3, 2), (2, 2))

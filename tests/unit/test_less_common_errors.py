@@ -23,7 +23,6 @@ from fastcontact.results import file_lock
 from fastcontact.round_off import SUM_ROUND_OFF
 from fastcontact.studies import checks as affordable
 from fastcontact.studies import execute
-from fastcontact.studies.settings import _default_element
 
 SQUARE = fc.generate.block()
 GROUP = SQUARE.group_names[0]
@@ -183,12 +182,6 @@ def test_memory_that_cannot_be_asked(monkeypatch):
 
     monkeypatch.setattr(os, "sysconf", unknown)
     assert affordable._memory() == float("inf")
-
-
-def test_the_element_that_a_generator_makes_by_itself():
-    assert _default_element("none of them") == "tri3"
-    assert _default_element("half-spheres") == "tri3"
-    assert _default_element("box") == "hex8"
 
 
 def test_an_interruption_of_a_run_alone_ends_its_process(monkeypatch):
@@ -423,14 +416,6 @@ def test_stresses_along_the_normal_of_a_contact_in_the_plane():
     depths = np.concatenate([line.get_xdata() for line in ax.get_lines()])
     assert depths.max() <= 1.0 + 1e-9
     assert depths.max() > 0.1
-
-
-def test_a_slice_of_steps_by_no_whole_numbers(tmp_path):
-    block = fc.Model(fc.generate.block((1.0, 1.0), (1, 1), "quad4"), "plane_strain")
-    with fc.ResultWriter(tmp_path / "a.vtkhdf", block):
-        pass
-    with pytest.raises(fc.FileError, match="needs integers and a nonzero increment"):
-        fc.open_results(tmp_path / "a.vtkhdf")[0.5:2]
 
 
 def test_axes_that_are_no_numbers():

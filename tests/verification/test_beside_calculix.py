@@ -142,16 +142,11 @@ def test_tied_blocks_of_one_mesh(element, tmp_path):
     assert reaction_differs(step, RF, np.setdiff1d(mesh.points_of("L_XMIN"), mesh.points_of("L_ZMAX")), 0) < DIGITS
 
 
-@pytest.mark.parametrize("element", ["tet4", "hex20"])
-def test_a_sector_of_a_wheel(element, tmp_path):
-    """A twelfth of a wheel with ends that wind, pressed inside, turned round by a force, and spinning.
-
-    On tetrahedra CalculiX integrates the centrifugal force less exactly.
-    """
-    sectors, mesh = 12, box((1.0, 1.0, 0.4), (4, 3, 1), element)
-    s, t, z = mesh.points.T
-    radius, angle = 20.0 + 20.0 * t, (0.5 - s) * 2.0 * np.pi / sectors + 0.3 * t
-    mesh = mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 10.0 * z]))
+def sector(mesh, radius, angle, sectors):
+    """Return a sector with nodes at these places, a node held the way round, and a deck with both and the ends tied."""
+    mesh = mesh.replace(
+        points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 10.0 * mesh.points[:, 2]])
+    )
     inside = mesh.points_of("YMIN")
     held = int(inside[np.abs(mesh.points[inside, 1]).argmin()])  # at the angle 0: the way round is y
     text = deck_of(mesh, ["BOX"], ["ZMIN"], ["XMIN", "XMAX", "YMIN"]) + MATERIAL + BLOCK.format("BOX")
@@ -159,6 +154,19 @@ def test_a_sector_of_a_wheel(element, tmp_path):
     text += f"*CYCLIC SYMMETRY MODEL, N={sectors}, NGRAPH=1, TIE=ROUND\n0., 0., 0., 0., 0., 1.\n"
     free = np.setdiff1d(mesh.points_of("ZMIN"), [*mesh.points_of("XMIN"), *mesh.points_of("XMAX")])
     text += "*BOUNDARY\n" + "".join(f"{node + 1}, 3\n" for node in free) + f"{held + 1}, 2\n"
+    return mesh, held, text
+
+
+@pytest.mark.parametrize("element", ["tet4", "hex20"])
+def test_a_sector_of_a_wheel(element, tmp_path):
+    """A twelfth of a wheel with ends that wind, pressed inside, turned round by a force, and spinning.
+
+    On tetrahedra CalculiX integrates the centrifugal force less exactly.
+    """
+    sectors, mesh = 12, box((1.0, 1.0, 0.4), (4, 3, 1), element)
+    s, t, _ = mesh.points.T
+    radius, angle = 20.0 + 20.0 * t, (0.5 - s) * 2.0 * np.pi / sectors + 0.3 * t
+    mesh, held, text = sector(mesh, radius, angle, sectors)
     rim = np.setdiff1d(
         mesh.points_of("YMAX"), [*mesh.points_of("XMIN"), *mesh.points_of("XMAX"), *mesh.points_of("ZMAX")]
     )
@@ -180,16 +188,9 @@ def test_a_sector_whose_ends_have_other_meshes(element, differ, tmp_path):
     Free expansion, linear in space, is exact here; what the pressure does differs by the interpolation.
     """
     sectors, mesh = 12, box((1.0, 1.0, 0.4), (4, 3, 2), element)
-    s, t, z = mesh.points.T
+    s, t, _ = mesh.points.T
     radius, angle = 20.0 + 20.0 * (t + 0.3 * s * t * (1.0 - t)), (0.5 - s) * 2.0 * np.pi / sectors
-    mesh = mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 10.0 * z]))
-    inside = mesh.points_of("YMIN")
-    held = int(inside[np.abs(mesh.points[inside, 1]).argmin()])
-    text = deck_of(mesh, ["BOX"], ["ZMIN"], ["XMIN", "XMAX", "YMIN"]) + MATERIAL + BLOCK.format("BOX")
-    text += "*TIE, NAME=ROUND, CYCLIC SYMMETRY, POSITION TOLERANCE=0.1\nS_XMIN, S_XMAX\n"
-    text += f"*CYCLIC SYMMETRY MODEL, N={sectors}, NGRAPH=1, TIE=ROUND\n0., 0., 0., 0., 0., 1.\n"
-    free = np.setdiff1d(mesh.points_of("ZMIN"), [*mesh.points_of("XMIN"), *mesh.points_of("XMAX")])
-    text += "*BOUNDARY\n" + "".join(f"{node + 1}, 3\n" for node in free) + f"{held + 1}, 2\n"
+    mesh, _, text = sector(mesh, radius, angle, sectors)
     text += f"*NSET, NSET=ALL, GENERATE\n1, {mesh.n_points}\n"
     steps = "*STEP\n*STATIC\n*DSLOAD\nS_YMIN, P, 50.\n*END STEP\n"
     ((step, U, _),) = both(text + steps, tmp_path)

@@ -268,11 +268,13 @@ def ball_on_ball(element, **options):
     return model
 
 
-def blocks(mesh, **options):
+def blocks(mesh, drawn=None, **options):
     """A block drawn over a wider one."""
     sizes = {"size_lower": (14.0, 4.0), "size_upper": (6.0, 3.0), "shift": 4.0}
     mesh = fc.generate.block_on_block(mesh, **sizes, divisions_lower=(14, 4), divisions_upper=(9, 4))
-    model = elastic_model(mesh, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.05, "y": -0.05})
+    model = elastic_model(
+        mesh, LOWER_BOTTOM="xy", **({"UPPER_TOP": {"x": 0.05, "y": -0.05}} if drawn is None else drawn)
+    )
     model.add_contact("hertz", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
     return model
 
@@ -310,11 +312,8 @@ def pressed_ball(element, **options):
 
 def loose_blocks(mesh, **options):
     """A block that lies on a wider one without supports, pressed and pushed."""
-    sizes = {"size_lower": (14.0, 4.0), "size_upper": (6.0, 3.0), "shift": 4.0}
-    mesh = fc.generate.block_on_block(mesh, **sizes, divisions_lower=(14, 4), divisions_upper=(9, 4))
-    model = elastic_model(mesh, LOWER_BOTTOM="xy")
+    model = blocks(mesh, {}, **options)
     model.add_traction("UPPER_TOP", x=0.1, y=-1.0)
-    model.add_contact("hertz", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
     return model
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
@@ -100,17 +101,17 @@ def test_every_formulation_between_bodies(formulation, element):
     assert 1 < found.solutions < 20  # the geometry moves
 
 
+def spheres(mesh, E=20_000.0, nu=0.3, moved=1.0, **options):
+    model = fc.Model(mesh, kinematics="axisymmetric")
+    model.add_material(fc.LinearElastic(E=E, nu=nu), "SPHHAU")
+    model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
+    supported(model, A1A2="x", A2B2={"y": -moved}, A1B1={"y": 1.0})
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
+    return model
+
+
 def test_axisymmetric_spheres():
-    mesh = fc.generate.half_spheres(size=10.0)
-
-    def make(E=20_000.0, nu=0.3, moved=1.0):
-        model = fc.Model(mesh, kinematics="axisymmetric")
-        model.add_material(fc.LinearElastic(E=E, nu=nu), "SPHHAU")
-        model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
-        supported(model, A1A2="x", A2B2={"y": -moved}, A1B1={"y": 1.0})
-        model.add_contact("hertz", secondary="CONT1", primary="CONT2")
-        return model
-
+    make = functools.partial(spheres, fc.generate.half_spheres(size=10.0))
     changes = {
         "E": (("E", "SPHHAU"), 20_000.0, 2.0),
         "nu": (("nu", "SPHHAU"), 0.3, 3e-5),
@@ -394,12 +395,7 @@ def test_a_constraint_about_to_change_is_named():
 
 
 def test_nodes_between_two_facets_are_named():
-    mesh = fc.generate.half_spheres(size=6.0)
-    model = fc.Model(mesh, kinematics="axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3), "SPHHAU")
-    model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
-    supported(model, A1A2="x", A2B2={"y": -1.0}, A1B1={"y": 1.0})
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="mortar")
+    model = spheres(fc.generate.half_spheres(size=6.0), formulation="mortar")
     with pytest.raises(fc.ModelError, match=r"lie opposite nodes of the other side|if nodes move"):
         asked(model, ("pressure_max", "hertz"))
 

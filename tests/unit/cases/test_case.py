@@ -106,20 +106,6 @@ steps = 2
 )
 
 
-def test_loads_and_relations_reach_the_model(write):
-    model = read_case(write(LOADED)).model
-    model.check()
-    assert [load.name for load in model.loads] == [
-        "the pressure on 'D2B2'",
-        "the traction on 'A2B2'",
-        "the body force on 'SPHHAU'",
-        "the total force on 'A2B2'",
-    ]
-    assert model.loads[1].ramp == ((0.0, 0.0), (1.0, 1.0))
-    assert [relation.name[:12] for relation in model.relations] == ["couple('A2B2", "the relation"]
-    assert model.supports[-1].ramp == ((0.0, 1.0), (1.0, 1.0))
-
-
 def test_a_case_driven_by_loads_runs(write):
     case = read_case(write(LOADED))
     last = fc.solve(case.model, case.ramp)[-1]
@@ -148,15 +134,6 @@ motion = { y = -2.0 }
 ramp = [[0.0, 0.0], [1.0, 1.0]]
 friction = 0.1
 """
-
-
-def test_a_rigid_obstacle_is_read(write):
-    case = read_case(write(OBSTACLE))
-    pair = case.model.contact[0]
-    assert pair.motion == (0.0, -2.0)
-    assert pair.obstacle == fc.obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
-    assert pair.options == {"friction": 0.1}
-    case.model.check()
 
 
 SURFACE_KEYS = 'shape = "mesh"\nfile = "tool.med"\ngroup = "TOOL"'

@@ -13,12 +13,18 @@ BASE = {
     "mesh": {"generator": "block"},
     "material": [{"E": 1e3, "nu": 0.3, "density": 2.0}],
 }
-PLACE = (3.0, 0.5)
 RAMP = [[0.0, 0.0], [1.0, 1.0], [3.0, 2.0]]
 TURN = {"angle": -0.5, "centre": [0.0, 5.0], "ramp": RAMP}
 ALONG_X = {"along": "x", "table": [[0, 0], [2, 1e-3]]}
 BALL = {"kind": "sphere", "centre": [1.0, 6.0], "R": 5.0}
-OF_CONTACT = {"secondary": "TOP", "motion": {"y": -0.02}, "ramp": RAMP, "friction": 0.3, "wear": 2e-5}
+OF_CONTACT = {
+    "secondary": "TOP",
+    "motion": {"y": -0.02},
+    "ramp": RAMP,
+    "friction": 0.3,
+    "wear": 2e-5,
+    "clearance": 0.003,
+}
 AXES = {"origin": [-1.0, -1.0, 0.0]}
 CENTRE = fc.CylindricalAxes(**AXES)
 OF_SPRING = {"axial": 20.0, "transverse": 2.0}
@@ -33,6 +39,11 @@ FORCE = {"at": [0.5, 2.5], "weighting": "quadratic", "radius": 2.0}
         ("support", {"group": "LEFT", "normal": 0.1}, lambda m: m.prescribe("LEFT", normal=0.1)),
         ("support", {"group": "LEFT", "x": 0, "axes": [1.0, 1.0]}, lambda m: m.prescribe("LEFT", x=0.0, axes=(1.0, 1.0))),
         ("support", {"group": "LEFT", "y": 0.1, "axes": AXES}, lambda m: m.prescribe("LEFT", y=0.1, axes=CENTRE)),
+        ("pressure", {"group": "TOP", "value": 1}, lambda m: m.add_pressure("TOP", 1.0)),
+        ("traction", {"group": "TOP", "y": -1.0, "ramp": RAMP}, lambda m: m.add_traction("TOP", y=-1.0, ramp=RAMP)),
+        ("body_force", {"groups": "BLOCK", "y": -1e-3}, lambda m: m.add_body_force("BLOCK", y=-1e-3)),
+        ("relation", {"terms": [["TOP_LEFT", "y", 1.0], ["TOP_RIGHT", "y", -1.0]]},
+         lambda m: m.relate([("TOP_LEFT", "y", 1.0), ("TOP_RIGHT", "y", -1.0)])),
         ("gravity", {"y": -3.0}, lambda m: m.add_gravity(y=-3.0)),
         ("centrifugal", {"speed": 2.0, "origin": [-1.0, 0.5], "ramp": RAMP},
          lambda m: m.add_centrifugal(2.0, origin=(-1.0, 0.5), ramp=RAMP)),
@@ -74,6 +85,25 @@ def test_an_obstacle():
     )
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"clearance": 0.005},
+        {"clearance": -0.01, "clearance_ramp": RAMP},
+        {"clearance_primary": 1e-3},
+        {"excluded": "UPPER_LEFT", "normals": "averaged"},
+        {"friction": 0.2, "frictionless": ["UPPER_LEFT"]},
+        {"kind": "tied"},
+        {"kind": "bilateral", "formulation": "mortar"},
+        {"penalty": 1e5},
+    ],
+    ids=str,
+)
+def test_a_contact_pair(options):
+    sides, mesh = {"secondary": "CONT_UPPER", "primary": "CONT_LOWER"}, fc.generate.block_on_block("quad4")
+    assert_equal({"contact": {"pair": sides | options}}, lambda m: m.add_contact("pair", **sides, **options), mesh)
+
+
 def test_cyclic_symmetry():
     angle = 2 * math.pi / 5
     sector = fc.generate.block((1.0, 1.0), (2, 4))
@@ -86,7 +116,7 @@ def test_cyclic_symmetry():
 
 
 def block():
-    return fc.generate.with_reference_points(fc.generate.block((2.0, 1.0), (4, 2), "quad4"), {"REF": PLACE})
+    return fc.generate.with_reference_points(fc.generate.block((2.0, 1.0), (4, 2), "quad4"), {"REF": (3.0, 0.5)})
 
 
 def assert_equal(entries, call, mesh=None):

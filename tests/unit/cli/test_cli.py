@@ -375,11 +375,8 @@ def test_a_failure_without_history_shows_none():
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        (["rum", "case.toml"], "unknown command 'rum': did you mean 'run'?"),
         (["profil", "x.vtkhdf"], "unknown command 'profil': did you mean 'profile'?"),
         (["run", "case.toml", "--resme"], "unknown option '--resme': did you mean '--resume'"),
-        (["run", "case.toml", "--jsn=a.json"], "unknown option '--jsn': did you mean '--json'"),
-        (["mesh", "half-sphere", "-o", "a.med"], "unknown generator 'half-sphere': did you mean 'half-spheres'"),
         (["mesh", "box", "-o", "a.med", "--elment", "hex8"], "unknown option '--elment': did you mean '--element'"),
         (["plot", "a.vtkhdf", "--histroy"], "unknown option '--histroy': did you mean '--history'"),
         (["study", "forma04a"], "unknown command 'study': did you mean 'converge' or 'sweep'?"),

@@ -1,11 +1,8 @@
 """Options and formulations of contact pairs, from Python and from case files, and their messages."""
 
-import copy
 import tomllib
 
-import numpy as np
 import pytest
-from pairwise import first_of
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
@@ -48,35 +45,6 @@ def case_with(options):
 
 def solved(case):
     return fc.solve(case.model, case.ramp)[-1]
-
-
-@pytest.mark.parametrize(("text", "options"), first_of(4, [
-    ("clearance = 0.005", {"clearance": 0.005}),
-    ("clearance = -0.01\\nclearance_ramp = [[0, 0], [1, 1]]", {"clearance": -0.01, "clearance_ramp": fc.linear_ramp(2)}),
-    ("clearance_primary = 1e-3", {"clearance_primary": 1e-3}),
-    ('excluded = "UPPER_LEFT"\\nnormals = "averaged"', {"excluded": ["UPPER_LEFT"], "normals": "averaged"}),
-    ('friction = 0.2\\nfrictionless = ["UPPER_LEFT"]', {"friction": 0.2, "frictionless": "UPPER_LEFT"}),
-    ('kind = "tied"', {"kind": "tied"}),
-    ('kind = "bilateral"\\nformulation = "mortar"', {"kind": "bilateral", "formulation": "mortar"}),
-    ("penalty = 1e5", {"penalty": 1e5}),
-]))  # fmt: skip
-def test_case_files_take_what_python_takes(text, options):
-    case = case_with(text.replace("\\n", "\n"))
-    model = copy.copy(case.model)
-    model.contact = []
-    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
-    one, other = solved(case), fc.solve(model, case.ramp)[-1]
-    assert np.array_equal(one.displacement, other.displacement)
-    assert one.contact["pair"].formulation == options.get("formulation", "mortar")
-
-
-def test_an_obstacle_takes_them_from_a_case_file():
-    text = CASE.split("[contact.pair]")[0] + (
-        '[obstacle.plate]\nsecondary = "LOWER_BOTTOM"\nclearance = 0.003\npenalty = 1e5\nkind = "bilateral"\n'
-        'shape = { kind = "half_space", point = [0.0, -6.0], normal = [0.0, 1.0] }\n'
-    )
-    pair = build_case(tomllib.loads(text), name="case").model.contact[0]
-    assert pair.options == {"clearance": 0.003, "penalty": 1e5, "kind": "bilateral"}
 
 
 @pytest.mark.parametrize(("options", "words"), [

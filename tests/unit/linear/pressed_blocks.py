@@ -25,10 +25,10 @@ def pressed(element="hex8", friction=0.0, ratio=1.0, curvature=0.0, n=10, along=
     return model
 
 
-def box():
-    """Return a stiffness (n, n) with entries near one, its modes, and which unknowns are fixed."""
-    mesh = fc.generate.box((1.0, 1.1, 0.9), (7, 6, 5))
-    moduli = np.asarray([fc.LinearElastic(E=10.0, nu=0.3).moduli("3d")])
+def box(divisions=(7, 6, 5), E=10.0):
+    """Return the stiffness (n, n) of a box held at one side, its modes, and which unknowns are fixed."""
+    mesh = fc.generate.box((1.0, 1.1, 0.9), divisions)
+    moduli = np.asarray([fc.LinearElastic(E=E, nu=0.3).moduli("3d")])
     K = stiffness(mesh, "3d", moduli, {"hex8": np.zeros(len(mesh.cells["hex8"]), np.int64)})
     fixed = np.repeat(mesh.points[:, 1] == 0, 3)
     return supports_apart(K, fixed)[0], np.where(fixed[:, None], 0.0, rigid_modes(mesh.points, "3d")), fixed

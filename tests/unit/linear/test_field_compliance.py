@@ -48,10 +48,7 @@ def test_the_equations_of_the_field_are_those_of_the_points(closed):
     projection = along_a_line()
     m = projection.P.shape[0]
     rows = {"all": np.arange(m), "some": np.arange(5, 20), "few": np.array([3, 12, 13]), "one": np.array([7])}[closed]
-    K, modes, fixed = box()
-    B, c = rows_at_points(projection, fixed)
-    B, c = csr_array(B[rows]), c[rows]
-    f = np.where(fixed, 0.0, np.random.default_rng(5).normal(size=len(fixed)))
+    K, modes, B, c, f = loaded(projection, rows)
     C = projection.block(rows)
     whole = np.block([[K.toarray(), -B.toarray().T], [B.toarray(), C]])
     expected = np.linalg.lstsq(whole, np.concatenate([f, c]), rcond=None)[0]
@@ -61,8 +58,8 @@ def test_the_equations_of_the_field_are_those_of_the_points(closed):
     assert isinstance(among, FieldCompliance)
     u, forces = solver.load(f).solve(B, c, among)
     assert not solver.columns.asked
-    assert u == pytest.approx(expected[: len(f)], abs=1e-8 * np.abs(u).max())
-    assert forces == pytest.approx(expected[len(f) :], abs=1e-8 * np.abs(forces).max())
+    for found, exact in ((u, expected[: len(f)]), (forces, expected[len(f) :])):
+        assert found == pytest.approx(exact, abs=1e-8 * np.abs(found).max())
     # As factors and columns take it.
     direct = choice.make("direct", dim=3, n_dofs=len(f))
     direct.prepare(K, modes)
@@ -72,10 +69,7 @@ def test_the_equations_of_the_field_are_those_of_the_points(closed):
 def test_softer_points_have_the_compliance_of_both():
     projection = along_a_line()
     rows = np.arange(5, 20)
-    K, modes, fixed = box()
-    B, c = rows_at_points(projection, fixed)
-    B, c = csr_array(B[rows]), c[rows]
-    f = np.where(fixed, 0.0, np.random.default_rng(5).normal(size=len(fixed)))
+    K, modes, B, c, f = loaded(projection, rows)
     softness = np.random.default_rng(6).random(len(rows)) * np.logspace(-4, 2, len(rows))
     dense = np.diag(softness) + projection.block(rows)
     whole = np.block([[K.toarray(), -B.toarray().T], [B.toarray(), dense]])
@@ -84,8 +78,8 @@ def test_softer_points_have_the_compliance_of_both():
     solver.prepare(K, modes)
     u, forces = solver.load(f).solve(B, c, projection.among(rows).softened(softness, lambda: dense))
     assert not solver.columns.asked
-    assert u == pytest.approx(expected[: len(f)], abs=1e-8 * np.abs(u).max())
-    assert forces == pytest.approx(expected[len(f) :], abs=1e-8 * np.abs(forces).max())
+    for found, exact in ((u, expected[: len(f)]), (forces, expected[len(f) :])):
+        assert found == pytest.approx(exact, abs=1e-8 * np.abs(found).max())
 
 
 def test_points_beside_equations_that_do_not_give_way():
@@ -117,6 +111,13 @@ def on_obstacle(obstacle, element="hex8"):
     model = elastic_model(mesh, "3d", E=1.0, ZMAX={"x": 0.0, "y": 0.0, "z": -0.01})
     model.add_obstacle("c", secondary="ZMIN", obstacle=obstacle, formulation="continuous")
     return model
+
+
+def loaded(projection, rows):
+    """Return stiffness and modes of a box, those rows of a field with their right-hand side, and a load."""
+    K, modes, fixed = box()
+    B, c = rows_at_points(projection, fixed)
+    return K, modes, csr_array(B[rows]), c[rows], np.where(fixed, 0.0, np.random.default_rng(5).normal(size=len(fixed)))
 
 
 def beside_another(**options):

@@ -32,13 +32,6 @@ def block(dim, element=None):
     return fc.generate.block((2.0, 3.0), (2, 3), element or "quad4")
 
 
-def sides(dim):
-    """Groups and their axes: three planes of symmetry, or two, and one face that is moved."""
-    if dim == 3:
-        return {"XMIN": "x", "YMIN": "y", "ZMIN": "z"}, "ZMAX"
-    return {"LEFT": "x", "BOTTOM": "y"}, "TOP"
-
-
 def model_of(mesh):
     return elastic_model(mesh, E=E, nu=NU)
 
@@ -47,12 +40,17 @@ def last(model, **options):
     return fc.solve(model, fc.linear_ramp(2), **options)[-1]
 
 
+def pair_of(element):
+    """Return dimensions, a rotation, planes of symmetry with their axes, a face to move, and a body before and after it."""
+    dim = 2 if element.startswith(("tri", "quad")) else 3
+    held = {"XMIN": "x", "YMIN": "y", "ZMIN": "z"} if dim == 3 else {"LEFT": "x", "BOTTOM": "y"}
+    mesh, Q = block(dim, element), turn(dim)
+    return dim, Q, held, "ZMAX" if dim == 3 else "TOP", model_of(mesh), model_of(mesh.replace(points=mesh.points @ Q.T))
+
+
 @pytest.mark.parametrize("element", ["tri3", "tri6", "quad4", "quad8", "tet4", "tet10", "hex8", "hex20", "wedge6"])
 def test_supports_along_normals_turn_with_the_body(element):
-    dim = 2 if element.startswith(("tri", "quad")) else 3
-    mesh, Q = block(dim, element), turn(dim)
-    held, moved = sides(dim)
-    axes, turned = model_of(mesh), model_of(mesh.replace(points=mesh.points @ Q.T))
+    dim, Q, held, moved, axes, turned = pair_of(element)
     for group, axis in held.items():
         axes.fix(group, axis)
         turned.fix(group, "normal")
@@ -202,10 +200,7 @@ def test_a_support_that_contradicts_a_normal_one_is_told():
 # ----------------------------------------------------------------------------- supports along axes
 @pytest.mark.parametrize("element", ["tri3", "quad8", "tet10", "hex8"])
 def test_supports_along_axes_turn_with_the_body(element):
-    dim = 2 if element.startswith(("tri", "quad")) else 3
-    mesh, Q = block(dim, element), turn(dim)
-    held, moved = sides(dim)
-    straight, turned = model_of(mesh), model_of(mesh.replace(points=mesh.points @ Q.T))
+    dim, Q, held, moved, straight, turned = pair_of(element)
     axes = tuple(Q[:, 0].tolist()) if dim == 2 else tuple(tuple(row) for row in Q.T.tolist())
     for group, axis in held.items():
         straight.fix(group, axis)

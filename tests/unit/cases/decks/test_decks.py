@@ -243,9 +243,13 @@ def test_reactions_are_those_of_supports_alone(tmp_path):
     assert step.reaction[deck.points_of("bottom"), 2].sum() == pytest.approx(100.0)
 
 
-def test_a_rigid_body_turns_by_a_moment_at_its_reference_node(tmp_path):
-    rigid = "*Node, nset=ref\n90, 0.5, 0.5, 2.5\n*Rigid Body, elset=up, ref node=90\n"
-    load = "*Boundary\nref, 1, 2\nref, 4\nref, 6\n*Cload\nref, 3, -1.\nref, 5, 0.1\n"
+@pytest.mark.parametrize("own", [False, True])
+def test_a_rigid_body_turns_by_a_moment_at_its_reference_node_or_rotation_node(tmp_path, own):
+    """The displacement components of a ROT NODE of its own are rotations."""
+    rigid = "*Node, nset=ref\n90, 0.5, 0.5, 2.5\n*Node, nset=rot\n91, 0.5, 0.5, 2.5\n*Rigid Body, elset=up, ref node=90"
+    rigid += ", rot node=91\n" if own else "\n"
+    turning = [f"rot, {axis}" if own else f"ref, {3 + axis}" for axis in (1, 3, 2)]
+    load = "*Boundary\nref, 1, 2\n{}\n{}\n*Cload\nref, 3, -1.\n{}, 0.1\n".format(*turning)
     text = (NODES + rigid + MATERIAL + CONTACT + "*Boundary\nbottom, 1, 3\n" + STEP).replace(
         "*Dsload\nroof, P, 100.\n", load
     )

@@ -101,19 +101,6 @@ def test_supports_along_skew_axes(tmp_path):
 RIGID = "*Node, nset=ref\n90, 0.5, 0.5, 2.5\n*Rigid Body, elset=up, ref node=90\n"
 
 
-def test_a_rotation_node_of_a_rigid_body_in_its_own_place(tmp_path):
-    """ROT NODE: its displacement components are rotations."""
-    rigid = RIGID.replace("*Rigid", "*Node, nset=rot\n91, 0.5, 0.5, 2.5\n*Rigid").replace("=90\n", "=90, rot node=91\n")
-    load = "*Boundary\nref, 1, 2\nrot, 1\nrot, 3\n*Cload\nref, 3, -1.\nrot, 2, 0.1\n"
-    text = NODES + rigid + MATERIAL + CONTACT + "*Boundary\nbottom, 1, 3\n" + STEP
-    deck = deck_of(tmp_path, text.replace("*Dsload\nroof, P, 100.\n", load))
-    (step,) = deck.solve()
-    contact = step.contact["ss/sm"]
-    assert contact.force[2] == pytest.approx(1.0)
-    moment = (contact.force_vectors[:, 2] * (contact.coordinates[:, 0] - 0.5)).sum()
-    assert moment == pytest.approx(0.1, rel=1e-3)
-
-
 def test_two_couplings_share_the_rotation_of_a_node(tmp_path):
     """Both sides of a plane strip follow one node: a moment turns the strip as a whole."""
     links = (

@@ -307,11 +307,6 @@ def test_any_mesh_comes_back_the_same(tmp_path, mesh):
     assert_same(read_med(tmp_path / "any.med").mesh, mesh)
 
 
-def test_every_flat_element_comes_back_the_same(tmp_path):
-    write_med_mesh(tmp_path / "all.med", all_elements())
-    assert_same(read_med(tmp_path / "all.med").mesh, all_elements())
-
-
 def test_fields_come_back_in_code_aster_component_order(tmp_path):
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0], [2.0, 2.0, 2.0]])
     mesh, path = Mesh(points, {"quad4": [[0, 1, 2, 3]]}), tmp_path / "solid.med"
@@ -436,12 +431,6 @@ def test_numbers_and_families_may_be_absent(tmp_path):
     mesh = read_med(path).mesh
     assert mesh.group_names == []
     np.testing.assert_array_equal(mesh.cells["tri6"], all_elements().cells["tri6"])
-
-
-def test_flat_mesh_in_space_becomes_a_plane_one(tmp_path):
-    mesh = all_elements()
-    write_med_mesh(tmp_path / "flat.med", mesh.replace(points=np.pad(mesh.points, [(0, 0), (0, 1)])))
-    assert_same(read_med(tmp_path / "flat.med").mesh, mesh)
 
 
 def add_vertices(path, points, family):
