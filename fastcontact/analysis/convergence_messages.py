@@ -41,20 +41,18 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
     changes = [entry["displacement_change"] for entry in history]
     declining = len(changes) <= WINDOW or min(changes[-WINDOW:]) <= DECLINE * min(changes[:-WINDOW])
     size = changes[-1] if declining else max(changes[-WINDOW:])
-    remedies = {
-        "more updates (Criteria.max_geometry_updates)": declining,
-        "a finer mesh on the primary side": any(len(pair.primary.points) for pair in problem.pairs.values()),
-        **dict.fromkeys(_bilateral_advice(problem) + _smoothing_advice(problem), True),
-        "a fixed number of updates (Criteria.geometry_updates)": True,
-        f"accept changes of that size (Criteria.geometry, which is {problem.criteria.geometry:g}, above {size:.0e})": size
-        < NOTABLE,
-    }
-    *others, final = [remedy for remedy, helps in remedies.items() if helps]
+    more = ["more updates (Criteria.max_geometry_updates)"] if declining else []
+    advice = [*more, *_bilateral_advice(problem), *_smoothing_advice(problem)]
+    advice.append("a fixed number of updates (Criteria.geometry_updates)")
+    if size < NOTABLE:  # otherwise `Criteria` refuses it
+        criterion = f"Criteria.geometry, which is {problem.criteria.geometry:g}, above {size:.0e}"
+        advice.append(f"accept changes of that size ({criterion})")
+    use = " or ".join(filter(None, [", ".join(advice[:-1]), advice[-1]]))
     return (
         f"the contact geometry did not converge in {limit} updates: the displacement still changes by "
         f"{changes[-1]:.1e} of its largest component, most at "
         f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. "
-        f"{'' if declining else 'These changes do not decline. '}Use {', '.join(others)}{' or ' if others else ''}{final}"
+        f"{'' if declining else 'These changes do not decline. '}Use {use}"
     )
 
 
