@@ -12,7 +12,7 @@ from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
-from fastcontact.analysis.tolerances import WINDOW
+from fastcontact.analysis.tolerances import DECLINE, WINDOW
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import StackedConstraints
@@ -39,30 +39,32 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
         name: points[np.argsort(-magnitude[points], kind="stable")[:3]].tolist() for name, points in sides.items()
     }
     changes = [entry["displacement_change"] for entry in history]
-    cycles = len(changes) > WINDOW and min(changes[-WINDOW:]) > 0.5 * max(changes[-WINDOW:])
-    updates = "More updates do not help, since they repeat in a cycle: use" if cycles else (
-        "Allow more (Criteria.max_geometry_updates), use"
-    )  # fmt: skip
-    advice = _bilateral_advice(problem) + _smoothing_advice(problem)
+    declining = len(changes) <= WINDOW or min(changes[-WINDOW:]) <= DECLINE * min(changes[:-WINDOW])
+    size = changes[-1] if declining else max(changes[-WINDOW:])
+    more = ["more updates (Criteria.max_geometry_updates)"] if declining else []
+    advice = [*more, *_bilateral_advice(problem), *_smoothing_advice(problem)]
+    advice.append("a fixed number of updates (Criteria.geometry_updates)")
+    if size < NOTABLE:  # otherwise `Criteria` refuses it
+        criterion = f"Criteria.geometry, which is {problem.criteria.geometry:g}, above {size:.0e}"
+        advice.append(f"accept changes of that size ({criterion})")
+    use = " or ".join(filter(None, [", ".join(advice[:-1]), advice[-1]]))
     return (
         f"the contact geometry did not converge in {limit} updates: the displacement still changes by "
         f"{changes[-1]:.1e} of its largest component, most at "
-        f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. {updates} more load steps, a "
-        f"finer mesh on the primary side, {advice}a fixed number of updates (Criteria.geometry_updates), or "
-        f"accept changes of that size (Criteria.geometry, which is {problem.criteria.geometry:g}, above "
-        f"{max(changes[-WINDOW:]) if cycles else changes[-1]:.0e})"
+        f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. "
+        f"{'' if declining else 'These changes do not decline. '}Use {use}"
     )
 
 
-def _bilateral_advice(problem: Problem) -> str:
-    """Return advice for a bilateral pair, whose constraints close gaps of any width; empty if gaps are round-off."""
+def _bilateral_advice(problem: Problem) -> list[str]:
+    """Return the remedy for a bilateral pair, whose constraints close gaps of any width; empty if gaps are round-off."""
     for name, pair in problem.pairs.items():
         if pair.options.kind == "bilateral":
             gap = pair.nodal_gap(Configuration.undeformed(pair.points))[0]
             widest = float(gap.max(where=np.isfinite(gap), initial=0.0))
             if widest > SINGLE_PRECISION * np.ptp(pair.points, axis=0).max():
-                return f"kind=\"bilateral_once_closed\" for contact '{name}', whose gaps of up to {widest:.3g} close, "
-    return ""
+                return [f"kind=\"bilateral_once_closed\" for contact '{name}', whose gaps of up to {widest:.3g} close"]
+    return []
 
 
 def active_set_cycles(problem: Problem, constraints: StackedConstraints, solution: Solution, nodes: Nodes) -> str:
@@ -71,14 +73,14 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
         return (
             f"contact with friction did not converge in {solution.iterations} Newton iterations from several starts: the "
             f"residual of its equations is {solution.residual:.1e} of the largest force. With the coefficient of friction "
-            f"{constraints.friction.max():g} there may be no solution: use more load steps or less friction"
+            f"{constraints.friction.max():g} there may be no solution: use less friction"
         )
     count = int((solution.active != solution.wanted).sum())
     constraints_text = "1 constraint still changes" if count == 1 else f"{count} constraints still change"
     cause = f"{constraints_text}, at {named_nodes(problem, nodes)}" if count else "directions of slip still change"
-    remedy = ", the direct linear solver" if problem.solver.iterative else ""
+    remedy = "the direct linear solver or " if problem.solver.iterative else ""
     return (
-        f"the active set did not converge in {solution.iterations} iterations: {cause}. Use more load steps{remedy} or more "
+        f"the active set did not converge in {solution.iterations} iterations: {cause}. Use {remedy}more "
         "iterations (max_active_set_iterations)"
     )
 
@@ -110,11 +112,11 @@ def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, fric
                 f"contact hardly resists one motion, {weakest}, which changes the gaps {ratio:.1g} times as much as others "
                 "do: fix or prescribe a displacement component that stops it"
             )
-    remedy = "Add a support or more friction, for which the loads may be too large," if friction else "Add a support,"
+    remedy = "Add a support or more friction, for which the loads may be too large" if friction else "Add a support"
     return (
         f"contact does not hold {grouped(bodies.moving(rigid))}: after {rigid.positions} positions "
         f"tried, a force of {np.abs(rigid.spring_force).max():.3g} is still missing for equilibrium under a load of "
-        f"{load:.3g}. {remedy} or use more load steps"
+        f"{load:.3g}. {remedy}"
     )
 
 
@@ -175,8 +177,8 @@ def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
     return "; ".join(texts)
 
 
-def _smoothing_advice(problem: Problem) -> str:
-    """Return advice for pairs that alternate between facets at a node, supports of dual functions, or branches of a law."""
+def _smoothing_advice(problem: Problem) -> list[str]:
+    """Return remedies for pairs that alternate between facets at a node, supports of dual functions, or branches of a law."""
     faceted = [name for name, pair in problem.pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
     laws = {name: pair.options.cohesion for name, pair in problem.pairs.items() if pair.options.cohesion is not None}
     reach = {name: 2.0 * law.energy / law.strength for name, law in laws.items() if law.reversible}
@@ -186,4 +188,4 @@ def _smoothing_advice(problem: Problem) -> str:
         f"facets no longer than the reach of adhesion, {min(reach.values(), default=0.0):.3g},": list(reach),
         "facets shorter than the cohesive zone": [name for name in laws if name not in reach],
     }  # fmt: skip
-    return "".join(f"{option} for contact {names[0]!r}, " for option, names in options.items() if names)
+    return [f"{option} for contact {names[0]!r}" for option, names in options.items() if names]

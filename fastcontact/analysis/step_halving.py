@@ -65,11 +65,11 @@ def _substeps(
             if last or not error.smaller_steps_help:
                 where = f"from {begin:.6g} to {end:.6g}"
                 times = "once" if halved == 1 else f"{halved} times"
-                location = (
-                    f"step {index} was cut in halves {times}, the part {where} fails"
-                    if halved
-                    else f"step {index} {where}"
-                )
+                if halved:
+                    location = f"step {index} was cut in halves {times}, the part {where} fails"
+                else:  # only a step that has not been halved may converge in smaller ones
+                    more = "; more load steps may help" if error.smaller_steps_help else ""
+                    location = f"step {index} {where}{more}"
                 cause = limit_load(problem, state) or friction_used(problem, state)
                 final = ConvergenceError(f"{error} ({location}{cause})", error.history, smaller_steps_help=False)
                 # Keep the traceback of the original error, but do not chain it: its message is part of the new one.

@@ -59,9 +59,11 @@ class NodeToSegment(Formulation):
         for block in self.secondary.blocks:
             # A uniform pressure on a facet must have compressive forces at all nodes.
             if not all_nodes_carry(block.element):
+                other = self.primary.blocks if isinstance(self.primary, Surface) else ()
+                swap = ", or swap the sides" if other and all(all_nodes_carry(one.element) for one in other) else ""
                 raise ContactError(
                     f"node_to_segment cannot have facets of {block.element} on its secondary side '{self.secondary.group}', "
-                    "whose corner nodes carry no pressure: use formulation 'continuous' or 'mortar', or swap the sides"
+                    f"whose corner nodes carry no pressure: use formulation 'continuous' or 'mortar'{swap}"
                 )
         self._candidates = Candidates.nodes_of(self.secondary)
 

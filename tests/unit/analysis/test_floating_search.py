@@ -78,6 +78,30 @@ def test_newton_steps_that_overshoot_are_halved(start):
     np.testing.assert_allclose(found.position, [0.1], rtol=1e-12)
 
 
+def test_a_body_moves_on_to_the_gap_that_stops_it():
+    """A gap of a thousand times the elongation of a spring under the load; a gap behind the body does not stop it."""
+    gap, stiffness, calls = 1000.0, 10.0, []
+
+    def solve_at(position):
+        calls.append(position[0])
+        pressed = (
+            position[0] + 1.0 > gap
+        )  # a spring of stiffness 1 bears the load 1, with contact of `stiffness` beside it
+        elongation = (1.0 - stiffness * (position[0] - gap) * pressed) / (1.0 + stiffness * pressed)
+        gaps = np.array([max(gap - position[0] - elongation, 0.0), 5.0])
+        return dataclasses.replace(solution(elongation), gap=gaps, response=lambda: None)
+
+    def freed(held):
+        closed = calls[-1] + 1.0 > gap
+        stretched = np.array([[-stiffness / (1.0 + stiffness) if closed else 0.0]])
+        return Freed(held, np.eye(1), stretched, DOFS, np.array([[-1.0], [1.0]]))
+
+    found = bodies_at(DOFS).settle(solve_at, freed, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
+    assert found.slack
+    assert found.positions <= 4
+    np.testing.assert_allclose(found.position, [gap + 1.0 / stiffness], rtol=1e-12)
+
+
 def test_what_nothing_holds_is_not_slack():
     found = bodies_at(DOFS).settle(lambda position: solution(1.0), None, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
     assert not found.slack

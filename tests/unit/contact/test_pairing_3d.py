@@ -154,17 +154,20 @@ def test_points_that_cannot_be_projected_are_not_paired():
     assert np.isfinite(pairing.normal).all()
 
 
-def bound(kind, element="hex8", group="CONT_SPHERE", **options):
+def bound(kind, element="hex8", group="CONT_SPHERE", primary="hex8", **options):
     mesh = sphere_octant(element, R=2.0, size=1.0, contact_size=0.5, contact_radius=0.5)
-    plate = box((2.0, 1.0, 2.0), (2, 1, 2), "hex8", (0.0, -1.0, 0.0))
+    plate = box((2.0, 1.0, 2.0), (2, 1, 2), primary, (0.0, -1.0, 0.0))
     both = union(mesh, plate)
     return kind(surface(both, group), surface(both, "YMAX"), both.points, False, 1.0, **options)
 
 
 @pytest.mark.parametrize("element", ["tet10", "hex20"])
 def test_rules_that_make_no_sense_are_refused(element):
-    with pytest.raises(fc.ContactError, match=r"node_to_segment cannot have facets of (tri6|quad8) .*'continuous'"):
+    refused = r"node_to_segment cannot have facets of (tri6|quad8) .*'continuous' or 'mortar'"
+    with pytest.raises(fc.ContactError, match=f"{refused}, or swap the sides$"):
         bound(NodeToSegment, element)
+    with pytest.raises(fc.ContactError, match=f"{refused}$"):  # the other side is quadratic, too
+        bound(NodeToSegment, element, primary=element)
     with pytest.raises(
         fc.ContactError, match=r"'node' makes no sense on facets of (tri6|quad8): .*'gauss' or 'simpson'"
     ):
