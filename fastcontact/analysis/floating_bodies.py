@@ -27,12 +27,11 @@ from numpy.linalg import LinAlgError
 from scipy.linalg import qr
 from scipy.sparse import bsr_array
 
-from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.anderson import Anderson
 from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS
 from fastcontact.analysis.solution import Response, Solution
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions

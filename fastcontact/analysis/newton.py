@@ -333,7 +333,7 @@ class _Newton:
         scale = max(largest(system.right(load.force, lift)), self._start.largest_force)
         if problem.pairs or not problem.solver.iterative or scale == 0.0:
             return None
-        missing = largest_difference(system.displacement(system.unknowns(u, lift), lift), u)  # prescribed displacements
+        missing = largest(system.displacement(system.unknowns(u, lift), lift) - u)  # prescribed displacements
         ratio = max(largest(system.reduced(unbalanced)) / scale, missing and missing / max(largest(u), largest(lift)))
         return FORCING * ratio if ratio**2 > self._tolerance else None
 

@@ -342,8 +342,8 @@ def _without_force(problem: Problem, name: str, last: StepResult, touched: bool,
         and (depth := _depth_of_primary(problem.model, pair, last)) > 0.0
     ):
         yield (
-            f"contact '{name}' carries nothing although nodes of '{pair.primary.group}' are up to {depth:.4g} deep in the body "
-            f"of '{pair.secondary.group}': refine '{pair.secondary.group}' if they lie between its nodes, or exchange the "
+            f"contact '{name}' carries nothing although nodes of '{pair.primary.group}' are up to {depth:.4g} deep in the "
+            f"body of '{pair.secondary.group}': refine '{pair.secondary.group}' if they lie between its nodes, or exchange the "
             "sides; otherwise check whether the sides face each other"
         )
     elif not touched:

@@ -10,13 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from fastcontact._jit.norms_kernels import largest_difference
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.inequalities import Iterate, StepContext, pair_surfaces
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Path, Solution
-from fastcontact.arrays import Array, Mask
+from fastcontact.arrays import Array, Mask, largest
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
@@ -111,7 +110,7 @@ def _shift(before: StackedConstraints, now: StackedConstraints, active: Mask, u:
         vectors = [(T @ (u - start) + slip)[:, None] * along for T, slip, along in slips]
         return np.column_stack([part.gap0 + part.B @ u, np.sum(vectors, axis=0)])[active]
 
-    return largest_difference(relative(before).ravel(), relative(now).ravel())
+    return largest(relative(before) - relative(now))
 
 
 def _slides(step: StepContext, constraints: StackedConstraints, solution: Solution, allowed: float) -> bool:
