@@ -336,15 +336,12 @@ def _without_force(problem: Problem, name: str, last: StepResult, touched: bool,
             f"contact '{name}' carries nothing although its sides penetrate by {-smallest:.4g}: supports or relations "
             "hold its nodes there; leave these nodes free, or out of the contact as 'excluded'"
         )
-    elif (
-        not touched
-        and isinstance(pair.primary, Surface)
-        and (depth := _depth_of_primary(problem.model, pair, last)) > 0.0
-    ):
+    elif not touched and (depth := _depth_of_primary(problem.model, pair, last)) > 0.0:
+        assert isinstance(pair.primary, Surface)
         yield (
             f"contact '{name}' carries nothing although nodes of '{pair.primary.group}' are up to {depth:.4g} deep in the "
-            f"body of '{pair.secondary.group}': refine '{pair.secondary.group}' if they lie between its nodes, or exchange the "
-            "sides; otherwise check whether the sides face each other"
+            f"body of '{pair.secondary.group}': refine '{pair.secondary.group}' if they lie between its nodes, or exchange "
+            "the sides; otherwise check whether the sides face each other"
         )
     elif not touched:
         yield f"contact '{name}' never closed: {gap}. Check its sides and the direction of the loads"
@@ -353,16 +350,12 @@ def _without_force(problem: Problem, name: str, last: StepResult, touched: bool,
 
 
 def _depth_of_primary(model: Model, pair: Formulation, last: StepResult) -> float:
-    """Return the largest depth of primary nodes inside bodies of the secondary side [length]."""
-    body, overlaps = bodies(model.mesh)[1], depths(model.mesh, model.kinematics, model.mesh.points + last.displacement)
-    return max(
-        (
-            float(depth[np.isin(points, pair.primary.points)].max(initial=0.0))
-            for _, other, points, depth in overlaps
-            if other in body[pair.secondary.points]
-        ),
-        default=0.0,
-    )
+    """Return the largest depth of primary nodes inside bodies of the secondary side; zero against obstacles [length]."""
+    of_secondary, deepest = bodies(model.mesh)[1][pair.secondary.points], 0.0
+    for _, body, points, depth in depths(model.mesh, model.kinematics, model.mesh.points + last.displacement):
+        if body in of_secondary and isinstance(pair.primary, Surface):
+            deepest = max(deepest, float(depth[np.isin(points, pair.primary.points)].max(initial=0.0)))
+    return deepest
 
 
 def _unresolved(name: str, pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:
