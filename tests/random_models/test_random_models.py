@@ -75,8 +75,8 @@ def test_a_model_in_other_words_has_the_same_answer(words):
 # with an offset. A node, and the middle of a facet, opposite the node where two facets of a line meet. Points beyond the
 # edge of triangles, along averaged normals. A body that rolls on a corner, whose position alternated. Dependent equations of
 # a tie; two pairs on one facet, with friction; increments of friction on a geometry that had not converged; layers that
-# part between two updates; forces on a stiff secondary side that scatter. Points
-# beyond the edge of a side of triangles, which alternated between two of them.
+# part between two updates; forces on a stiff secondary side that scatter. Points beyond the edge of a side of triangles,
+# which alternated between two of them.
 @pytest.mark.parametrize(
     "seed",
     [
