@@ -213,6 +213,7 @@ def pressed_ball(solver="auto", steps=5, friction_while_touching=0.01, **changes
     return fc.solve(ball_on_block(**changes), steps, criteria=criteria, linear_solver=solver)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("kinematics", ["axisymmetric", "plane_strain"])
 @pytest.mark.parametrize(
     ("formulation", "element"),
