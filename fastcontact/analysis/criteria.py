@@ -67,7 +67,7 @@ class Criteria:
 
     Examples
     --------
-    Pair the surfaces three times per load step, as code_aster does by default:
+    Pair the surfaces three times per load step, as code_aster does with REAC_GEOM = 'CONTROLE':
 
     >>> import fastcontact as fc
     >>> criteria = fc.Criteria(geometry_updates=2)

@@ -61,10 +61,10 @@ def _formulations(saved: dict[str, str], current: dict[str, str], model: Model) 
     changed = [pair.name for pair in model.contact if saved.get(key := f"contact '{pair.name}'") != current[key]]
     formulations = {name: formulation_behind(model, name, saved.get(f"contact '{name}'")) for name in changed}
     named = [f"contact '{name}' had {text}" for name, text in formulations.items() if text]
-    return f" ({'; '.join(named)}: name that)" if named else ""
+    return f" ({'; '.join(named)}: specify this formulation)" if named else ""
 
 
-def taken(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any]:
+def restart_data(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any]:
     """Return the restart data after a step; `case` is the value of `identity`."""
     data = state.to_dict(problem.model.n_dofs)
     extrapolation, memory = data.pop("extrapolation"), data.pop("solver")
@@ -78,7 +78,7 @@ def taken(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any
 def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> State:
     """Return the state after `step`, which `check` has accepted; the linear solver continues from its snapshot.
 
-    `touched` are the contact pairs that were closed at the end of a step so far.
+    `touched` contains the contact pairs that were closed at the end of at least one step.
     """
     data = step.restart
     assert data is not None

@@ -200,6 +200,6 @@ def _solved_steps(
         for text in warnings:
             warn(text)
         warned = (*doubtful * (index == 1), *warnings)
-        yield replace(step, warnings=warned, restart=restart.taken(problem, state, case))
+        yield replace(step, warnings=warned, restart=restart.restart_data(problem, state, case))
         del step  # to free its memory before the next step is computed
         begin = instant

@@ -92,8 +92,8 @@ class HertzPoint:
     def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
         """Return the largest von Mises stress on the axis and its depth.
 
-        It is the stationary value of ``|rr - zz|`` in eq. 3.45 of Johnson (1985), computed to round-off. For nu >= -0.3 it
-        is the maximum in the entire body; for a smaller Poisson's ratio the stress at the edge of the contact is larger.
+        It is the stationary value of ``|rr - zz|`` in eq. 3.45 of Johnson (1985), computed to round-off. It is
+        the maximum in the entire body except for nu < -0.342, where the stress at the edge of the contact is larger.
         """
         from scipy.optimize import brentq
 
@@ -157,7 +157,7 @@ def hertz_point(
     Raises
     ------
     ModelError
-        If a number is out of range, or not exactly one quantity of the load is given.
+        If a number is out of range, or not exactly one of `force`, `approach`, `radius` and `pressure_max` is given.
 
     Examples
     --------

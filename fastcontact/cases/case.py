@@ -407,7 +407,7 @@ def _theories(
     approach = {}
     for pair, entry in data.get("theory", {}).items():
         if pairs is not None and pair not in pairs:
-            raise CaseError(unknown("contact pair in 'theory'", pair, pairs))
+            raise CaseError("'theory': " + unknown("contact pair", pair, pairs))
         if not isinstance(entry, dict):
             raise CaseError(f"'theory.{pair}' must be a table with the key 'kind', not {entry!r:.80}")
         constants = {key: value for key, value in entry.items() if key not in ("mesh_converged", "share")}

@@ -40,7 +40,7 @@ def check_outputs(
             continue
         identity = _identity(checked_target(path))
         if identity in inputs:
-            raise FileError(f"'{path}' is what this command reads: name another file to write")
+            raise FileError(f"'{path}' is an input of this command: name another output file")
         if identity in outputs:
             raise FileError(f"two outputs are to be written to '{path}': name another file for one of them")
         outputs.add(identity)
@@ -68,7 +68,7 @@ def _check_formats(paths: list[str]) -> None:
     formats = FigureCanvasBase.get_supported_filetypes()
     for path in paths:
         if Path(path).suffix[1:].lower() not in formats:
-            raise FileError(f"'{path}' has a suffix that no kind of picture has: use .png, .svg or .pdf")
+            raise FileError(f"'{path}' has a suffix that is not an image format: use .png, .svg or .pdf")
 
 
 def write_text(path: str, content: str) -> None:

@@ -1,17 +1,19 @@
-"""Default formulation of a contact pair, between bodies mortar with dual Lagrange multipliers.
+"""Choice of the default formulation of a contact pair.
 
-This formulation is the only one that is accurate on any two surfaces (``bench/defaults.py``, docs/reference/accuracy.md).
-Where two nodes face each other, node-to-segment contact uses the normal of one of two facets, and initially coincident nodes
-separate when the bodies slide. Even with averaged normals it does not transmit a uniform pressure between
-non-matching meshes. Quadrature over whole facets is inaccurate where the other side ends or bends. Standard multipliers are
-more accurate by one digit on smooth quadratic facets in 2D, but each of their gaps involves the neighbouring nodes, so that
-with multigrid every closed constraint costs a linear solution.
+Between bodies the default is mortar with dual Lagrange multipliers, the only formulation that is accurate on any two surfaces
+(``bench/defaults.py``, docs/reference/accuracy.md). Node-to-segment contact does not transmit a uniform pressure between
+non-matching meshes, even with averaged normals. Without these, the normal at a primary node is that of one of its facets.
+Matching meshes cease to match when the bodies slide. Continuous contact integrates over whole facets, which is inaccurate
+where the other side ends or bends. Mortar with standard multipliers is more accurate by one digit on smooth quadratic
+facets in 2D, but each of its gaps involves the neighbouring nodes, so that with multigrid every closed constraint costs a
+linear solution.
 
 Against rigid obstacles the default is the continuous formulation, which also enforces contact between nodes, with two
 exceptions. Node-to-segment is used on linear triangles and tetrahedra, and in 3D on facets whose nodes, including corners,
-all carry pressure. Triangles and tetrahedra cannot satisfy all conditions of the continuous formulation, and its
+all carry pressure. Triangles and tetrahedra cannot satisfy all constraints of the continuous formulation, and its
 pressures oscillate by up to 40 %; in 3D each of its integration points costs a linear solution. On the other facets in 3D,
 which are quadratic, mortar is used with friction, because integration points with friction cannot be eliminated.
+The option `integration` always selects the continuous formulation; `n_gauss` and `augmentation` select it instead of mortar.
 """
 
 from __future__ import annotations
@@ -27,9 +29,9 @@ OF_STANDARD = ("n_gauss", "augmentation")
 
 
 def default_formulation(dim: int, options: Mapping[str, Any]) -> tuple[str, dict[str, Any], str]:
-    """Return the formulation of a pair in 2 or 3 dimensions, its options, and the reason, as the end of a sentence.
+    """Return the formulation of a pair in `dim` dimensions, its options, and the reason, as the end of a sentence.
 
-    The options are the user's, `options`, and those that the choice adds.
+    The returned options are those of the user, `options`, and those that the choice adds.
     """
     standard_options = [name for name in OF_STANDARD if name in options] if dim == 2 else []
     if "multipliers" in options:

@@ -32,7 +32,7 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
         shared = shared[~excluded[shared]]
     if len(shared):
         raise ContactError(
-            f"the two sides of contact '{name}' share {len(shared)} nodes (first: point {shared[0]}): "
+            f"the two sides of contact '{name}' share nodes (number: {len(shared)}, first: point {shared[0]}): "
             "duplicate the nodes of the interface, one set for each side, or name the nodes where two surfaces of one body "
             "meet in `excluded`"
         )

@@ -1,7 +1,7 @@
 """Heat loads of solid cells: prescribed temperatures, fluxes, films, sources and nodal heat.
 
-Nodal powers are integrals with the shape functions, in axisymmetry over the full circle, in the plane per unit thickness.
-They use areas and volumes of the `deformed` mesh, and values at positions in the reference mesh.
+Fluxes, films and sources are multiplied by the shape functions and integrated, in axisymmetry over the full circle and in the
+plane per unit thickness. Areas and volumes are those of the `deformed` mesh; values are functions of reference positions.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ class TemporaryHeat(Load):
 class FixedTemperature(TemporaryHeat):
     """A prescribed temperature [temperature] of the nodes of a group; ramps multiply its rise above the reference.
 
-    A temperature that begins later starts from the current rise, which is `reached` (n_points,), and proceeds to the next
-    point of its ramp.
+    If `begins` is finite, the rise starts from its value at this instant, `reached` (n_points,), and proceeds to the next
+    point of the ramp.
     """
 
     KIND = "the temperature"
@@ -82,7 +82,7 @@ class FixedTemperature(TemporaryHeat):
             )
 
     def history(self) -> tuple[Table | None, Table]:
-        """Return the ramp of the value, and that of the initial rise, which falls to zero at the next point of the ramp."""
+        """Return the ramps of the rise of `value` and of `reached`; the latter falls to zero at the next point of `ramp`."""
         later = [point for point in self.ramp or () if point[0] > self.begins]
         if self.reached is None or not later:
             return self.ramp, ()
@@ -117,7 +117,7 @@ class HeatFlux(Heating):
 
 @dataclass(frozen=True)
 class HeatSource(VolumeLoad, Heating):
-    """Heat per volume [power / length^3] in groups of solid cells, or in all solid cells."""
+    """Heat generation rate per volume [power / length^3] in groups of solid cells, or in all solid cells."""
 
     KIND = "the heat source"
     groups: tuple[str, ...] | None

@@ -95,7 +95,8 @@ class Mesh(Suggesting):
         invalid = np.flatnonzero(~np.isfinite(points).all(axis=1))
         if len(invalid):
             raise MeshError(
-                f"point {invalid[0]} has coordinates {points[invalid[0]]}: {len(invalid)} points are not finite numbers"
+                f"point {invalid[0]} has coordinates {points[invalid[0]]}, which are not finite (number of such points: "
+                f"{len(invalid)})"
             )
         cells = {name: self._checked_cells(name, block, len(points)) for name, block in self.cells.items()}
         cells = {name: block for name, block in cells.items() if len(block)}

@@ -121,7 +121,7 @@ def check_cells(mesh: Mesh) -> None:
             if bad.any():
                 row = int(np.flatnonzero(bad)[0])
                 cell = _described(mesh, name, row, measure[row])
-                raise MeshError(f"{cell} is {fault}, one of {int(bad.sum())} such cells: {REMEDIES[fault]}")
+                raise MeshError(f"{cell} is {fault} (number of such cells: {int(bad.sum())}): {REMEDIES[fault]}")
 
 
 def poorest_cell(mesh: Mesh) -> str:
@@ -159,8 +159,8 @@ def _check_nodes(mesh: Mesh, name: str) -> None:
     if len(rows):
         node = int(nodes[rows[0], :-1][repeated[rows[0]]][0])
         raise MeshError(
-            f"{_described(mesh, name, int(rows[0]))} has point {node} twice, one of {len(rows)} such cells: write it as the "
-            "element that it collapses to, a triangle, wedge, pyramid or tetrahedron"
+            f"{_described(mesh, name, int(rows[0]))} has point {node} twice (number of such cells: {len(rows)}): "
+            "write it as the element that it collapses to, a triangle, wedge, pyramid or tetrahedron"
         )
 
 
@@ -176,8 +176,8 @@ def _check_duplicates(mesh: Mesh, name: str) -> None:
     if (count > 1).any():
         row = int(rows[first[count > 1].min()])
         raise MeshError(
-            f"{_described(mesh, name, row)} occurs in the mesh {int(count.max())} times, one of "
-            f"{int((count > 1).sum())} such cells: remove the copies"
+            f"{_described(mesh, name, row)} occurs in the mesh {int(count.max())} times (number of such cells: "
+            f"{int((count > 1).sum())}): remove the copies"
         )
 
 

@@ -38,8 +38,9 @@ def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[in
 
     `points` are those outer nodes of the first body that lie in the bounding box of the second. Depths are their distances to
     the outer surface of the second body, and zero for points outside that body [length]. The axis of an axisymmetric body is
-    not part of its surface. Facets are treated as curved. The mesh of a smooth curved surface deviates from it by less than
-    r^2 / h, where r is the rise of a facet and h its length. Within the sum of these tolerances bodies touch without overlap.
+    not part of its surface. Facets are treated as curved. Facets of second order deviate from a smooth curved surface by
+    less than r^2 / h, where r is the rise of a facet and h its length. Smaller depths than the sum of these bounds of both
+    bodies are set to zero.
     """
     count, body_of = bodies(mesh)
     if count < 2:
@@ -66,7 +67,7 @@ def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[in
         yield body, other, near, np.where(depth <= tolerance + nodal_tolerance[near], 0.0, depth)
 
 
-def _curvature_tolerance(name: str, corners: Array) -> Array:
+def _curvature_tolerance(name: str, nodes: Array) -> Array:
     """Return bounds (n,) of the deviation of facets (n, k, dim) from a smooth surface through their nodes [length].
 
     A parabola of rise r over a chord of length h deviates from its circle by about r^3 / h^2. The bound r^2 / h leaves a
@@ -74,32 +75,32 @@ def _curvature_tolerance(name: str, corners: Array) -> Array:
     """
     element = elements.get(name)
     if element.order == 1:
-        return np.zeros(len(corners))
+        return np.zeros(len(nodes))
     edges = np.array(element.edges)
-    middle = corners[:, element.n_corners : element.n_corners + len(edges)]
-    chord = corners[:, edges[:, 1]] - corners[:, edges[:, 0]]
+    middle = nodes[:, element.n_corners : element.n_corners + len(edges)]
+    chord = nodes[:, edges[:, 1]] - nodes[:, edges[:, 0]]
     length = np.linalg.norm(chord, axis=2)
-    rise = np.linalg.norm(middle - 0.5 * (corners[:, edges[:, 0]] + corners[:, edges[:, 1]]), axis=2)
+    rise = np.linalg.norm(middle - 0.5 * (nodes[:, edges[:, 0]] + nodes[:, edges[:, 1]]), axis=2)
     return np.asarray((rise**2 / length).max(axis=1))
 
 
-def _depths(points: Array, kinds: list[Array], selected: list[Mask] | None = None) -> tuple[Array, Indices]:
+def _depths(points: Array, facets: list[Array], selected: list[Mask] | None = None) -> tuple[Array, Indices]:
     """Return the depths (n,) [length] of `points` (n, dim) below a closed surface, zero outside, and the closest facets (n,).
 
-    `kinds` are the nodes (m, n_nodes, dim) of the facets by element type; the closest facets are numbered through all types.
-    Distances are those to the facets `selected`, by default all. If the closest point lies in the interior of a facet, the
-    normal of the facet decides whether the point is inside the surface. On edges and corners the normals of adjacent facets
-    may disagree, and the winding number of the surface decides.
+    `facets` contains the node coordinates (m, n_nodes, dim) of the facets of each element type. The closest facets are
+    numbered consecutively over all types. Distances are those to the facets `selected`, by default all. If the closest
+    point lies in the interior of a facet, the normal of the facet decides whether the point is inside the surface. On edges
+    and corners the normals of adjacent facets may disagree, and the winding number of the surface decides.
     """
-    selected = [np.ones(len(corners), bool) for corners in kinds] if selected is None else selected
-    targets = [corners[mask] for corners, mask in zip(kinds, selected, strict=True)]
-    closest = closest_of_kinds(points, [corners for corners in targets if len(corners)])
-    size = max(float(np.abs(corners).max()) for corners in kinds)
+    selected = [np.ones(len(nodes), bool) for nodes in facets] if selected is None else selected
+    targets = [nodes[mask] for nodes, mask in zip(facets, selected, strict=True)]
+    closest = closest_of_kinds(points, [nodes for nodes in targets if len(nodes)])
+    size = max(float(np.abs(nodes).max()) for nodes in facets)
     height = np.einsum("nd,nd->n", points - closest.position, closest.normal)  # above the tangent planes
     inside = height < 0
     undecided = np.flatnonzero((np.abs(height) < 0.999 * closest.distance) & (closest.distance > ON_SURFACE * size))
     if len(undecided):
-        pieces = [corners[:, _flat_pieces(corners)].reshape(-1, *2 * corners.shape[2:]) for corners in kinds]
+        pieces = [nodes[:, _flat_pieces(nodes)].reshape(-1, *2 * nodes.shape[2:]) for nodes in facets]
         inside[undecided] = winding_numbers(points[undecided], np.concatenate(pieces)) > 0.5
     depth = np.where(inside & (closest.distance > ON_SURFACE * size), closest.distance, 0.0)
     return depth, np.flatnonzero(np.concatenate(selected))[closest.facet]
@@ -124,9 +125,9 @@ def winding_numbers(points: Array, pieces: Array) -> Array:
     return numbers
 
 
-def _flat_pieces(corners: Array) -> Indices:
-    """Return the local node numbers of the lines (n, 2) or triangles (n, 3) that approximate a facet of these `corners`."""
-    n_nodes, dim = corners.shape[1:]
+def _flat_pieces(nodes: Array) -> Indices:
+    """Return the local node numbers of the lines (n, 2) or triangles (n, 3) that approximate a facet with these `nodes`."""
+    n_nodes, dim = nodes.shape[1:]
     if dim == 2:
         return np.array([[0, 1]] if n_nodes == 2 else [[0, 2], [2, 1]])
     return flat_triangles(n_nodes)

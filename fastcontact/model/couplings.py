@@ -24,7 +24,7 @@ from fastcontact.round_off import ROUND_OFF, TINY
 
 Term = tuple[int, int, float]  # point, component, coefficient
 KINDS = ("rigid", "distributing")
-# Weights as functions of the distance over the radius, from 1 at the centre to 0 at the radius.
+# Weights as functions of the ratio of distance and radius. All but the uniform one decrease from 1 to 0.
 WEIGHTINGS: dict[str, Callable[[Array], Array]] = {
     "uniform": np.ones_like,
     "linear": lambda s: 1.0 - s,
@@ -98,11 +98,11 @@ def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = N
 
 
 def mean_rotation(weight: Array, arms: Array, caption: str = "") -> Array:
-    """Return the coefficients (n_rotations, n, dim) of the displacements of n points in their mean rotation [1 / length].
+    """Return the matrix (n_rotations, n, dim) that maps displacements of n points to their mean rotation [1 / length].
 
-    The points have `weight` (n,) [-] and `arms` (n, dim) from their weighted centroid [length]. The coefficients times a
-    moment are forces at the points that have this moment and a zero resultant. Raises ModelError, with a message that
-    begins with `caption`, if the points coincide or, in 3D, are collinear.
+    The points have `weight` (n,) [-] and `arms` (n, dim) from their weighted centroid [length]. The transposed matrix
+    times a moment yields forces at the points that have this moment and a zero resultant. Raises ModelError, with a message
+    that begins with `caption`, if the points coincide or, in 3D, are collinear.
     """
     motion = by_rotation(arms)
     inertia = np.einsum("n,ndk,ndl->kl", weight, motion, motion)

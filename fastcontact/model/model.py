@@ -1,7 +1,4 @@
-"""The model of a contact problem: a mesh with kinematics, materials, supports, loads and contact pairs.
-
-A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
-"""
+"""The model of a contact problem: a mesh with kinematics, materials, supports, loads and contact pairs."""
 
 from __future__ import annotations
 
@@ -63,9 +60,9 @@ class Model(ModelSupports):
         Text that result files store, usually the case file.
     strain : {"small", "finite"}
         With ``"finite"`` strains and rotations are finite (total Lagrangian formulation). Materials are then hyperelastic,
-        such as `NeoHookean`, or `LinearElastic`, which is interpreted as the Saint Venant-Kirchhoff law for small strains
-        and large rotations. Pressures follow the deformed surface; other loads keep their directions and reference areas.
-        Stresses are Cauchy stresses.
+        such as `NeoHookean`, or `ElasticPlastic`, or `LinearElastic`, which is interpreted as the Saint Venant-Kirchhoff
+        law for small strains and large rotations. Pressures follow the deformed surface; other loads keep their directions
+        and reference areas. Stresses are Cauchy stresses.
     reference_temperature : float
         Initial temperature of the bodies, at which the thermal strain is zero, unless `add_temperature` is given another
         one [temperature].
@@ -123,7 +120,7 @@ class Model(ModelSupports):
         Parameters
         ----------
         ramp : Ramp, optional
-            Load steps of the analysis; by default 20 equal steps.
+            Load steps of the analysis. By default the histories are not checked.
 
         Raises
         ------
@@ -177,7 +174,7 @@ class Model(ModelSupports):
         self._check_changes(lambda acting: acting._check_motions(fixed, driving))
 
     def _check_changes(self, check: Callable[[Model], None]) -> None:
-        """Call `check` once for every set of temporary items that act together, with the model that contains only these."""
+        """Call `check` once for every set of temporary items that act together, with the model without the others."""
         temporary = [item for item in (*self.relations, *self.heat_loads) if isinstance(item, TEMPORARY)]
         changes = {0.0, *(t for item in temporary for t in (item.begins, item.ends) if 0.0 < t < np.inf)}
         for begin in sorted(changes):
@@ -189,7 +186,7 @@ class Model(ModelSupports):
     def _check_heat_of(self, acting: Model) -> None:
         acting.check_heat()
         if self.conducts and not acting.conducts:
-            raise ModelError("no load of heat acts, so that nothing determines temperatures: add a film")
+            raise ModelError("no heat load acts, so that temperatures are undetermined: add a film")
 
     def _acting(self, begin: float) -> Model:
         """Return the model with only those items that act in the load step that begins at the load factor `begin`."""
@@ -210,7 +207,8 @@ class Model(ModelSupports):
     def _check_motions(self, fixed: Mask, forces: Sequence[Array]) -> None:
         """Raise ModelError if a rigid-body motion is possible.
 
-        Supports, constraints and springs prevent rigid-body motions, and so does contact if a load acts on the motion.
+        Supports, constraints and springs prevent rigid-body motions. Contact prevents motions that close a gap, and also the
+        opposite motions if a load does work on them, since this load may press the body against the contact.
         """
         motions = self.force_driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))
         if not len(motions):
@@ -224,8 +222,8 @@ class Model(ModelSupports):
 def gaps_at_rest(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:
     """Return the changes (m, k) of the m gaps of the undeformed bodies for each of k rigid-body motions.
 
-    With friction these include the edges of the friction cones, see `resisting`; `factor` multiplies all coefficients of
-    friction.
+    A constraint with friction is represented by the edges of its friction cone, see `resisting`; `factor` multiplies all
+    coefficients of friction.
     """
     obstacles, at_rest, zero = model.force_driven, Configuration.undeformed(model.mesh.points), np.zeros(model.mesh.dim)
     contact = [obstacles.constraints(pair.name, model.bind(pair).constraints(at_rest), zero) for pair in model.contact]

@@ -8,7 +8,7 @@ OTHERWISE = {
     "an error, often a traceback or pages of messages from the file library": (
         "mesh file missing", "mesh is a text file", "mesh file is empty", "mesh file is truncated",
         "suffix of no known format", "case file missing", "case is a folder", "result file missing", "profile of a mesh",
-        "information on nothing", "export of a case file", "mesh into a suffix of no format", "broken TOML",
+        "information on a missing file", "export of a case file", "mesh written with an unknown suffix", "broken TOML",
     ),
     "an error that names the wrong group, without the intended one": (
         "group of the material misspelled", "group of a support misspelled", "side of the contact misspelled",
@@ -42,9 +42,9 @@ OTHERWISE = {
         "E is not a number", "support value is not finite", "a pressure that is NaN", "a table with NaN",
     ),
     "an error of the programming language, far from the mistake": (
-        "E is a string", "support value is a string", "load steps as a string", "broken load steps", "ramp is not a table",
+        "E is a string", "support value is a string", "load steps as a string", "fractional number of load steps", "ramp is not a table",
         "threads as a word", "a function that returns the wrong shape", "coordinates in one dimension",
-        "cells with a node too few", "theory lacks a radius", "code instead of data",
+        "cells with a node too few", "theory lacks a radius", "an expression as a value",
         "a motion without names of axes", "hardening as a number", "shape of an obstacle is a word",
     ),
     "no message: the default is used, or nothing happens": (
@@ -52,7 +52,8 @@ OTHERWISE = {
         "support without component", "a support without a component", "check without tolerance", "primary side missing",
         "primary side called master",
     ),
-    "the word is ignored, and the default is used": (
+    "the input is ignored, and the default is used": (
+        "no threads",
         "friction called mu", "support called fix", "probe by coordinates",
         "key misspelled", "key of a material misspelled", "key of a support misspelled", "contact option misspelled",
         "key of the convergence criteria misspelled", "unknown normals", "option misspelled",
@@ -89,9 +90,9 @@ OTHERWISE = {
         "a negative limit of updates", "a negative number of halvings", "a negative number of updates",
         "tied with a penalty",
     ),
-    "no step is computed, and the job ends successfully": (
+    "nothing is computed, and the job ends successfully": (
         "no load step", "negative load steps", "no load step asked for", "a ramp without instants", "no level asked for",
-        "no threads", "a ramp that ends at zero",
+        "a ramp that ends at zero",
     ),
     "no message: the last value is kept, or the curve is extrapolated": (
         "history that ends too early", "an instant beyond the table", "a history shorter than the analysis",
@@ -159,7 +160,7 @@ OTHERWISE = {
     "no message: wear depths exceed the bodies": ("a coefficient of wear in another unit",),
     "the analysis runs to its end, and then cannot be written": (
         "folder of the result missing", "result is a folder", "folder of the summary missing",
-        "picture of no known kind", "report of a study into a missing folder", "the folder is write-protected",
+        "unknown image format", "report of a study into a missing folder", "the folder is write-protected",
         "the result file is write-protected", "the result file is a pipe",
     ),
     "no message: the file is overwritten": (

@@ -13,17 +13,17 @@ from spoilt import MESHES
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "mistakes.md"
 HEAD = """# Mistakes and their messages
 
-Every mistake in an input is reported at once, before any computation, in one line that names the culprit and the remedy.
-The command line then ends with exit code 1; the library raises one of its [errors](errors.md) with the same text. A
-doubtful but solvable model is solved, with a warning that states a number: on screen, in the log, in `--json`, in the
-result file (`open_results(path).warnings`), and in Python as `FastcontactWarning`.
+The following mistakes are reported before any computation, in one line that states the cause and the remedy. The
+command line then ends with exit code 1; the library raises one of its [errors](errors.md) with the same text. A doubtful but
+solvable model is solved, with a warning that states the size of the effect. The warning is shown on screen and stored
+in the log, in `--json` and in the result file (`open_results(path).warnings`); in Python it is a `FastcontactWarning`.
 
-The tables are generated from tests, which make each mistake and compare the message. The last column describes what
-finite-element programs commonly do with the same mistake; no program does all of it.
+The tables are generated from tests, which make each mistake and compare the message. The last column describes a common
+response of finite-element programs to the same mistake; programs differ.
 """
 SECTIONS = (
     ("In a case file", "`fastcontact run` with the ready-made case FORMA04 A and one change:", CASES),
-    ("In a mesh file", "The same with a damaged mesh:", MESHES),
+    ("In a mesh file", "`fastcontact run` with the same case and a damaged copy of its mesh:", MESHES),
     ("On the command line", "", COMMANDS),
     ("Where results are written", "", ACCIDENTS),
     ("In calls: meshes", "", library.MESH),

@@ -74,20 +74,20 @@ def in_space(source, target):
 # fmt: off
 MESHES = [
     ("a coordinate in the file is NaN", moved(not_a_number),
-     r"mesh 'mesh' of 'spoilt\.med': point 100 has coordinates \[.*nan\]: 1 points are not finite numbers"),
+     r"mesh 'mesh' of 'spoilt\.med': point 100 has coordinates \[.*nan\], which are not finite \(number of such points: 1\)"),
     ("a coordinate in the file is infinite", moved(infinite),
-     r"mesh 'mesh' of 'spoilt\.med': point 7 has coordinates \[ *inf .*\]: 1 points are not finite numbers"),
+     r"mesh 'mesh' of 'spoilt\.med': point 7 has coordinates \[ *inf .*\], which are not finite \(number of such points: 1\)"),
     ("the mesh in the file lies at r < 0", moved(beyond_the_axis),
      r"point \d+ has the radius x = -1 < 0: an axisymmetric model lies at x >= 0, with y along the axis"),
     ("a cell in the file is flat", moved(flat),
-     r"cell \d+ \(tri3 at \(.*\), area 0\) is degenerate, one of 2 such cells: remove it or merge its points differently"),
+     r"cell \d+ \(tri3 at \(.*\), area 0\) is degenerate \(number of such cells: 2\): remove it or merge its points differently"),
     ("the mesh in the file is folded", moved(folded),
      r"cells \d+ and \d+ lie on the same side of the facet between them, near \(.*\), one of 3 such pairs: the mesh is folded there; move its nodes or remesh"),
     ("the file has no groups", rewritten(without_groups),
      r"the mesh has no groups, and thus no 'SPHHAU': add groups in the mesher, or with Mesh\.with_groups"),
     ("the file has lines only", rewritten(lines_only), r"the mesh has no solid cells, only line2"),
     ("a duplicate cell in the file", rewritten(with_a_copy),
-     r"cell \d+ \(tri3 at \(.*\)\) occurs in the mesh 2 times, one of 1 such cells: remove the copies"),
+     r"cell \d+ \(tri3 at \(.*\)\) occurs in the mesh 2 times \(number of such cells: 1\): remove the copies"),
     ("the file has a 3D mesh", in_space, r"kinematics 'axisymmetric' do not fit a mesh in 3 dimensions: use '3d'"),
 ]
 # fmt: on

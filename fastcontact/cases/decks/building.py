@@ -14,7 +14,7 @@ from fastcontact.arrays import Array
 from fastcontact.cases.decks import interactions
 from fastcontact.cases.decks.assembled import Element, Target
 from fastcontact.cases.decks.blocks import defined, folded, refusing
-from fastcontact.cases.decks.conditions import Acting, Component, Conditions
+from fastcontact.cases.decks.conditions import Component, Conditions, Period
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
 from fastcontact.cases.decks.fields import add_initial_stresses, add_temperatures
 from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
@@ -241,18 +241,18 @@ class Building:
         if mesh.dim == 2 and self.assembly.rotations:
             self.model.fix(self._point_group("rotation", self.assembly.rotations.values()), "y")
 
-    def _temporary_supports(self, conditions: Conditions, temporary: Sequence[tuple[Component, Acting]]) -> None:
+    def _temporary_supports(self, conditions: Conditions, temporary: Sequence[tuple[Component, Period]]) -> None:
         """Add the supports that do not act in all steps; those with the same period and history share a constraint."""
-        alike: dict[tuple[Acting, Table], list[Component]] = {}
-        for name, acting in (entry for entry in temporary if entry[1].begins < entry[1].ends):
-            alike.setdefault((acting, conditions.supports.table(name)), []).append(name)
-        for (acting, table), names in alike.items():
-            ends = "" if acting.ends == np.inf else f" to {acting.ends:g}"
-            line = f", line {acting.location.line}" if acting.location else ""
-            label = f"the support of {conditions.named(names[0])}{line}, from {acting.begins:g}{ends}"
+        alike: dict[tuple[Period, Table], list[Component]] = {}
+        for name, period in (entry for entry in temporary if entry[1].begins < entry[1].ends):
+            alike.setdefault((period, conditions.supports.table(name)), []).append(name)
+        for (period, table), names in alike.items():
+            ends = "" if period.ends == np.inf else f" to {period.ends:g}"
+            line = f", line {period.location.line}" if period.location else ""
+            label = f"the support of {conditions.named(names[0])}{line}, from {period.begins:g}{ends}"
             rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
-            period = (acting.begins, acting.ends)
-            self.local_supports.append(TemporaryConstraint(label, rows, 1.0, table, *period, keeps=acting.keeps))
+            limits = (period.begins, period.ends)
+            self.local_supports.append(TemporaryConstraint(label, rows, 1.0, table, *limits, keeps=period.keeps))
 
     def _support_row(self, conditions: Conditions, name: Component) -> csr_array:
         """Return the constraint row (1, n_dofs) [-] of the displacement component that a support prescribes."""

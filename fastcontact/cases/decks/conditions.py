@@ -17,14 +17,14 @@ from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.sections import Locks
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Components that the named supports of *BOUNDARY prescribe.
+# Components that the named supports of *BOUNDARY prescribe. In Abaqus XSYMM, YSYMM and ZSYMM also fix rotations.
 NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}
 # Point, component counted from 0, and whether the component is along a local axis.
 Component = tuple[int, int, bool]
 
 
 @dataclass(frozen=True, slots=True)
-class Acting:
+class Period:
     """Period of a support.
 
     Attributes
@@ -34,7 +34,7 @@ class Acting:
     begins, ends : float
         Load factors [-] between which the support acts.
     keeps : bool
-        True if the support holds the displacement at the start of the period (FIXED).
+        True if the displacement remains equal to its value at the start of the period (FIXED).
     """
 
     location: Location | None
@@ -43,7 +43,7 @@ class Acting:
     keeps: bool = False
 
 
-ALWAYS = Acting(None, 0.0)
+ALWAYS = Period(None, 0.0)
 
 
 class Conditions:
@@ -56,8 +56,8 @@ class Conditions:
         self.loads: Histories[Target] = Histories(content)
         initial = initial_temperatures(assembly, content.initial_temperatures)
         self.temperatures: Histories[int] = Histories(content, rest=initial)
-        self.periods: dict[Component, Acting] = {}  # latest periods; supports without an entry act from the start
-        self.ended: list[tuple[Component, Acting]] = []  # earlier periods
+        self.periods: dict[Component, Period] = {}  # latest periods; supports without an entry act from the start
+        self.ended: list[tuple[Component, Period]] = []  # earlier periods
         self.fixed_now: set[Component] = set()  # supports with FIXED in the current step
         self.heat = HeatConditions(assembly, initial)
         self.locks = Locks(assembly)
@@ -102,11 +102,11 @@ class Conditions:
         released = dict.fromkeys(name for name in valued if self._acts(name) and self.periods[name].keeps)
         for name in (*self.supports.dying, *released):
             self.ended.append((name, replace(self.periods.pop(name, ALWAYS), ends=begin)))
-        begun: dict[tuple[Location | None, bool], Acting] = {}
+        begun: dict[tuple[Location | None, bool], Period] = {}
         for name in changing:
             if name in released or not self._acts(name):
                 key = changing.get(name)[2] if begin else None, name in self.fixed_now
-                self.periods[name] = begun.setdefault(key, Acting(key[0], begin, keeps=key[1]))
+                self.periods[name] = begun.setdefault(key, Period(key[0], begin, keeps=key[1]))
         self.fixed_now.clear()
 
     def _acts(self, name: Component) -> bool:
@@ -114,9 +114,9 @@ class Conditions:
         track = self.supports.tracks.get(name)
         return track is not None and track.alive
 
-    def temporary(self) -> list[tuple[Component, Acting]]:
+    def temporary(self) -> list[tuple[Component, Period]]:
         """Return the supports that do not act in all steps, with their periods."""
-        return [*self.ended, *((name, acting) for name, acting in self.periods.items() if acting.begins > 0.0)]
+        return [*self.ended, *((name, period) for name, period in self.periods.items() if period.begins > 0.0)]
 
     def named(self, component: Component) -> str:
         """Return the description of a displacement component in terms of the deck, for messages."""
@@ -154,7 +154,7 @@ class Conditions:
                 for component in components:
                     self._support(condition, row, point, component, value)
         if driven:
-            self.assembly.content.note(block, "a displacement before the first step is reached in that step")
+            self.assembly.content.note(block, "a displacement prescribed before all steps is reached in the first step")
 
     def _support(self, condition: Condition, row: Row, point: int, component: int, value: float) -> None:
         """Record a support of a point; CaseError if the component does not exist and the value is not zero."""
@@ -186,7 +186,7 @@ class Conditions:
         return None
 
     def _local(self, point: int, component: int) -> tuple[Component, float]:
-        """Return the component along a local axis and 1.0, or a parallel global component and the sign between both."""
+        """Return the component along a local axis and 1.0, or the parallel global component and 1.0 or -1.0, its sign."""
         direction = self.directions[point][component - 1]
         axis = int(np.argmax(np.abs(direction)))
         if abs(abs(direction[axis]) - 1.0) < LENGTH_ROUND_OFF and axis < self.assembly.dim:

@@ -125,8 +125,8 @@ def check_steps(content: Content) -> None:
     for number, step in enumerate(content.steps):
         if first and step.heat != first.heat and (first.heat == "alone" or number > content.steps.index(first)):
             raise step.refuse(
-                "heat transfer steps, coupled temperature-displacement steps, and static steps after them cannot be in one "
-                "deck: use *HEAT TRANSFER for all steps, or *COUPLED TEMPERATURE-DISPLACEMENT for all"
+                "*HEAT TRANSFER cannot be combined with other procedures, and *COUPLED TEMPERATURE-DISPLACEMENT cannot "
+                "precede them: use *HEAT TRANSFER for all steps, or *COUPLED TEMPERATURE-DISPLACEMENT for all"
             )
         for block in (condition.block for condition in step.conditions):
             if block.keyword in OF_HEAT and not step.heat:
@@ -171,7 +171,7 @@ class HeatConditions:
     def __init__(self, assembly: DeckMesh, initial: Mapping[int, float]) -> None:
         self.assembly, content = assembly, assembly.content
         self.reference = _reference(assembly, initial) if content.heat else 0.0
-        self.rest: dict[Target, float] = {}
+        self.rest: dict[Target, float] = {}  # ambient temperatures of absent films
         uniform = dict.fromkeys(range(len(assembly.points)), self.reference) if content.heat else {}
         self.temperatures: Histories[int] = Histories(content, rest=uniform)
         self.powers: Histories[int] = Histories(content)
@@ -229,7 +229,7 @@ class HeatConditions:
                 history.give(target, row.number(2), condition.amplitude, row.location)
 
     def _replace_film(self, film: Target, row: Row) -> None:
-        """Remove an earlier film with another coefficient from the face of a film; CaseError if both are in this step."""
+        """Remove an earlier film of the same face with another coefficient; CaseError if the current step defines both."""
         self.rest[film] = self.reference
         earlier = self.film_of.get((film.keyword, film.face))
         if earlier is not None and earlier != film:

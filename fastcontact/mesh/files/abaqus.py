@@ -35,8 +35,8 @@ def check_readable(path: Path) -> None:
     with_set = [bool(options.get("ELSET")) for keyword, options in sections if keyword == "ELEMENT"]
     if sorted(with_set, reverse=True) != with_set:
         raise FileError(
-            f"'{path}' names an ELSET only in a later *ELEMENT section, which meshio assigns to wrong cells: "
-            "name one in each section, or define them by *ELSET"
+            f"'{path}' has an *ELEMENT section with ELSET after one without, and meshio assigns this set to wrong cells: "
+            "name a set in each section, or define the sets by *ELSET"
         )
 
 
@@ -48,7 +48,7 @@ def _keyword(line: str) -> tuple[str, dict[str, str]]:
 
 
 def append_cell_sets(path: Path, mesh: Mesh) -> None:
-    """Append the groups of cells to a file, because meshio would write one *ELSET for each element of a group."""
+    """Append the groups of cells to a file, because meshio would divide them by element type."""
     for name in mesh.group_names:
         if any(character in name for character in ",=*\n") or name != name.strip():
             raise FileError(f"group name '{name}' contains a character that Abaqus files do not permit: rename it")

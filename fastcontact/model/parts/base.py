@@ -302,8 +302,8 @@ class ModelBase(Suggesting):
             if old != new and (groups is not None or group is None):
                 raise ModelError(
                     f"{int((numbers == number).sum())} cells of {'the mesh' if group is None else repr(group)} have two "
-                    f"materials, {old.described} and {new.described}: give each group one; "
-                    "one for all other cells comes first, without groups"
+                    f"materials, {old.described} and {new.described}: assign one to each group; "
+                    "a material of all other cells must come first, without groups"
                 )
 
     def _check_all_have_material(self, numbers: dict[str, Numbers]) -> None:

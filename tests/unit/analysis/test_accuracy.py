@@ -181,9 +181,9 @@ def test_a_lowered_tolerance_is_remembered():
     assert analysis.problem.solver.improve(100.0)
     analysis.state = replace(analysis.state, solver=analysis.problem.solver.snapshot())
     analysis.step(1, 0.5)
-    kept = restart.taken(analysis.problem, analysis.state, {})
+    kept = restart.restart_data(analysis.problem, analysis.state, {})
     other = Stepping(model, "pyamg", 1e-6, None, fc.linear_ramp(2))
-    assert kept["solver"]["kind"] == restart.taken(other.problem, other.state, {})["solver"]["kind"]
+    assert kept["solver"]["kind"] == restart.restart_data(other.problem, other.state, {})["solver"]["kind"]
     other.problem.solver.put_back(kept["solver"]["memory"])
     assert other.problem.solver.tolerance == analysis.problem.solver.tolerance == pytest.approx(1e-9)
 

@@ -82,7 +82,7 @@ def test_the_same_step_from_the_same_state_gives_the_same_bits_and_counts(case, 
     for index in (2, 1):
         assert_same(load_step(problem, states[index - 1], index, RAMP.instants[index - 1])[1], results[index - 1])
     other = prepare(model, RAMP, fc.Criteria(), linear_solver=linear_solver)
-    saved = replace(results[0], restart=restart.taken(problem, states[1], {}))
+    saved = replace(results[0], restart=restart.restart_data(problem, states[1], {}))
     state = restart.put_back(other, saved, frozenset(name for name, pair in saved.contact.items() if pair.active.any()))
     assert_same(load_step(other, state, 2, RAMP.instants[1])[1], results[1])
 

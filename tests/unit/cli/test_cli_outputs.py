@@ -65,7 +65,7 @@ def test_no_command_replaces_what_it_reads(command, option, source, by, files, m
         os.link(source, target)
     before = {path: path.read_bytes() for path in files.iterdir()}
     assert main([*command, option, target]) == 1
-    assert f"'{target}' is what this command reads" in capsys.readouterr().err
+    assert f"'{target}' is an input of this command" in capsys.readouterr().err
     assert {path: path.read_bytes() for path in files.iterdir()} == before
 
 
@@ -97,7 +97,7 @@ def test_a_folder_that_is_mounted_twice_is_one(files):
     for outputs in (["files/a.csv", "--agr", "other/a.csv"], ["other/old.vtkhdf"]):
         done = subprocess.run([*profile, *outputs], cwd=files.parent, capture_output=True, text=True)
         assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-        assert "two outputs" in done.stderr or "is what this command reads" in done.stderr
+        assert "two outputs" in done.stderr or "is an input of this command" in done.stderr
     assert not (files / "a.csv").exists()
 
 
@@ -169,7 +169,7 @@ def test_files_of_fields_are_what_a_command_reads(text, option, files, monkeypat
     table = f'\n[[temperature]]\nfile = {text.format("heat.vtu")}\nfield = "T"\n'
     Path("case.toml").write_text(Path("case.toml").read_text() + table)
     assert main(["run", "case.toml", option, "heat.vtu"]) == 1
-    assert "'heat.vtu' is what this command reads" in capsys.readouterr().err
+    assert "'heat.vtu' is an input of this command" in capsys.readouterr().err
     assert Path("heat.vtu").read_text() == "<VTKFile>"
 
 
@@ -180,7 +180,7 @@ def test_the_data_file_of_an_xdmf_mesh_is_read_too(option, files, monkeypatch, c
     Path("points.h5").write_bytes(b"points")
     Path("case.toml").write_text(Path("case.toml").read_text().replace("coarse.med", "mesh.xdmf"))
     assert main(["run", "case.toml", option, "points.h5"]) == 1
-    assert "'points.h5' is what this command reads" in capsys.readouterr().err
+    assert "'points.h5' is an input of this command" in capsys.readouterr().err
     assert Path("points.h5").read_bytes() == b"points"
 
 

@@ -269,7 +269,7 @@ def test_another_case_is_refused_and_changes_nothing(name: str, path: Path) -> N
 def test_a_pair_that_named_no_formulation_is_told_which_one_it_had(options: dict, message: str, path: Path) -> None:
     """Defaults change from version to version; the steps so far are those of another one."""
     begun(path, (0.5,), formulated(**options))
-    told = rf"changed since: contact 'hertz'\. .* \(contact 'hertz' had {message}: name that\)"
+    told = rf"changed since: contact 'hertz'\. .* \(contact 'hertz' had {message}: specify this formulation\)"
     with pytest.raises(ModelError, match=told):
         resumed(path, fc.linear_ramp(2), formulated())
     assert len(resumed(path, fc.linear_ramp(2), formulated(**options))) == 2

@@ -326,7 +326,7 @@ def test_no_run_replaces_a_part_of_its_deck(option, source, tmp_path, monkeypatc
     assert files_of_case(tmp_path / "deck.inp") == [tmp_path / "deck.inp", parts / "nodes.inp", parts / "more.inp"]
     before = (tmp_path / source).read_bytes()
     assert main(["run", "deck.inp", option, source]) == 1
-    assert f"'{source}' is what this command reads" in capsys.readouterr().err
+    assert f"'{source}' is an input of this command" in capsys.readouterr().err
     assert (tmp_path / source).read_bytes() == before
 
 

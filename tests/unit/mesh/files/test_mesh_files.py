@@ -303,7 +303,7 @@ def test_abaqus_files_that_meshio_reads_wrongly(tmp_path, old, new, message):
 def test_abaqus_set_of_a_later_section_only(tmp_path):
     text = ABAQUS.replace(", ELSET=square", "").replace("CPS3", "CPS3, ELSET=triangle")
     (tmp_path / "plate.inp").write_text(text)
-    with pytest.raises(FileError, match=r"names an ELSET only in a later \*ELEMENT section"):
+    with pytest.raises(FileError, match=r"has an \*ELEMENT section with ELSET after one without"):
         read_mesh(tmp_path / "plate.inp")
 
 
