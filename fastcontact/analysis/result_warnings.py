@@ -260,8 +260,8 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     if plastic is not None and (largest := float(plastic.max())) > LARGEST_PLASTIC_STRAIN:
         yield (
             f"the largest plastic strain is {largest:.2f}, beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics "
-            "are valid: contact pressures there are too low, under a ball by 10 % at 0.2 and 20 % at 0.5; strain='finite' is "
-            "right"
+            "are valid: contact pressures there are too low, under a ball by 10 % at 0.2 and 20 % at 0.5; "
+            "strain='finite' has no such limit"
         )
 
 
