@@ -39,7 +39,7 @@ from fastcontact.studies.settings import (
     recipe,
     settings,
 )
-from fastcontact.studies.sweep_report import Sweep, label_of
+from fastcontact.studies.sweep_report import Sweep, drawn_over, label_of
 
 
 @typed(CaseError)
@@ -399,11 +399,12 @@ def _points(
 
 
 def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: str | None) -> tuple[TheoryCurve, ...]:
-    """Return curves of the theory of a contact pair over the first parameter, one for each choice of the other parameters.
+    """Return curves of the theory of a contact pair over the parameter drawn, one for each choice of the other parameters.
 
-    There are none if the values of the first parameter are not numbers or are all equal.
+    There are none if the values of this parameter are not numbers or are all equal.
     """
-    (first, values), *others = parameters.items()
+    first, varied = drawn_over(parameters)
+    values, others = parameters[first], [(name, parameters[name]) for name in parameters if name != first]
     numbers = [float(value) for value in values if not isinstance(value, (str, bool))]
     if len(numbers) < len(values) or min(numbers) == max(numbers):
         return ()
@@ -416,7 +417,9 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
         choice = dict(zip((name for name, _ in others), combination, strict=True))
         rows = [_theory_at(data, {first: float(value), **choice}, linked, pair) for value in x]
         names = [name for name in rows[0] if all(name in row for row in rows)]
-        curves.append(TheoryCurve(label_of(choice), x, {name: np.array([row[name] for row in rows]) for name in names}))
+        curves.append(
+            TheoryCurve(label_of(choice, varied), x, {name: np.array([row[name] for row in rows]) for name in names})
+        )
     return tuple(curves)
 
 

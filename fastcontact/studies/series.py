@@ -274,14 +274,14 @@ class Point(Measured):
 
 @dataclass(frozen=True, eq=False)
 class TheoryCurve:
-    """Theory of a case as a function of the first parameter of a sweep.
+    """Theory of a case as a function of the parameter over which a sweep is drawn.
 
     Attributes
     ----------
     label : str
         Text with the values of the other parameters.
     x : ndarray (n,)
-        Values of the first parameter, in its unit.
+        Values of this parameter, in its unit.
     values : dict of str to ndarray (n,)
         Values of the theory by quantity, in the units of the case.
     """

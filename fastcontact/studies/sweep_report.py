@@ -56,11 +56,22 @@ def parameter_label(parameter: str, units: Mapping[str, str]) -> str:
     return f"{label} [{unit}]" if unit else label
 
 
+def drawn_over(parameters: Mapping[str, Sequence[Value]]) -> tuple[str, list[str]]:
+    """Return the parameter over which a sweep is drawn, and the others with several values, which distinguish its curves.
+
+    It is the first one that takes several numbers, or several values, or the first one.
+    """
+    several = [name for name, values in parameters.items() if len(set(values)) > 1]
+    numeric = [name for name in several if not any(isinstance(value, (str, bool)) for value in parameters[name])]
+    first = (numeric or several or list(parameters))[0]
+    return first, [name for name in several if name != first]
+
+
 class Drawing:
-    """Plots of a sweep over its first parameter, with a curve for each choice of the other parameters."""
+    """Plots of a sweep over one parameter, with a curve for each choice of the others, see `drawn_over`."""
 
     def __init__(self, sweep: Sweep) -> None:
-        self.first, *self.others = sweep.parameters
+        self.first, self.others = drawn_over(sweep.parameters)
         self.points, self.theories, self.units = sweep.points, sweep.theories, sweep.units
         self.theory = f"theory {sweep.compared}".strip()
         values = sweep.parameters[self.first]
@@ -69,7 +80,7 @@ class Drawing:
         self.scale = "plain log" if wide else "linear"
 
     def draw_values(self, ax: Any, quantity: str) -> None:
-        """Draw a quantity and its theory over the first parameter; both axes are logarithmic if all values are positive."""
+        """Draw a quantity and its theory over the parameter; both axes are logarithmic if all values are positive."""
         for k, (label, x, points) in enumerate(self._curves()):
             y = [point.values.get(quantity, math.nan) for point in points]
             ax.plot(x, y, marker(k), ms=5, label=label or "computed", color=f"C{k}")
@@ -93,14 +104,14 @@ class Drawing:
             ax.plot(x, exact, "_", ms=9, label=name, color=color)
 
     def _unmoved(self, quantity: str) -> str:
-        """Return a note if the theory does not depend on the first parameter, and otherwise an empty string."""
+        """Return a note if the theory does not depend on the parameter, and otherwise an empty string."""
         curves = [points for _, _, points in self._curves()]
         values = [{point.theory[quantity] for point in points if quantity in point.theory} for points in curves]
         constant = all(len(of_curve) == 1 for of_curve in values) and any(len(points) > 1 for points in curves)
         return f"\n(the same for every {self.first})" if constant else ""
 
     def draw_ratios(self, ax: Any, quantity: str) -> None:
-        """Draw the ratios of a quantity to theory, at equal approach and at equal force, over the first parameter."""
+        """Draw the ratios of a quantity to theory, at equal approach and at equal force, over the parameter."""
         styles = {"theory": ("-", self.theory), "equal_force": ("--", "theory at equal force")}
         n_lines = 0
         for k, (label, x, points) in enumerate(self._curves()):
@@ -124,7 +135,7 @@ class Drawing:
             ax.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
     def _curves(self) -> list[tuple[str, Sequence[Any], list[Point]]]:
-        """Return, for each choice of the other parameters, the label, the values of the first parameter and the points."""
+        """Return, for each choice of the other parameters, the label, the values of the parameter and the points."""
         by_label: dict[str, list[Point]] = {}
         for point in self.points:
             by_label.setdefault(label_of(point.parameters, self.others), []).append(point)
@@ -163,8 +174,7 @@ class Sweep(Report):
     failed : list of (dict, str)
         Parameters of each point that could not be solved, and the reason.
     theories : tuple of TheoryCurve
-        Theory over the first parameter for each choice of the other parameters; empty if the first parameter is not a
-        number.
+        Theory over the first parameter with several numbers, for each choice of the other parameters; empty without one.
     compared : str
         Condition of the comparison with theory: ``"at equal approach"``, or empty if the case prescribes another load.
     asked : tuple of str
@@ -242,15 +252,20 @@ class Sweep(Report):
         return ["the theory is the same for all points: a parameter in [study.parameters] can change its keys, too"]
 
     def figure(self) -> Any:
-        """Return a Matplotlib figure with the values over the first parameter and their ratios to theory.
+        """Return a Matplotlib figure with the values over a parameter and their ratios to theory.
 
-        There is a curve for each choice of the other parameters.
+        The parameter is the first with several numbers. There is a curve for each choice of the others; the title states
+        those with a single value.
         """
         names, drawing = self._main_quantities(), Drawing(self)
         with_theory = any(name in point.theory for point in self.points for name in names)
-        legend_width = 1.7 * (1 + with_theory) * (len(self.parameters) > 1)  # [inch]
+        legend_width = 1.7 * (1 + with_theory) * bool(drawing.others)  # [inch]
         size = ((8.8 if with_theory else 5.2) + legend_width, 0.5 + 3.1 * len(names))
+        fixed = {
+            name: values[0] for name, values in self.parameters.items() if name not in (drawing.first, *drawing.others)
+        }
         heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # for a function both may be its name
+        heading += f"\n{label_of(fixed)}" if fixed else ""
         axes = panels(len(names), 1 + with_theory, size, heading, fontsize=11)
         for row, name in zip(axes, names, strict=True):
             drawing.draw_values(row[0], name)

@@ -124,14 +124,16 @@ def test_a_block_within_the_cone_is_held_whatever_the_direction_of_its_load(azim
     assert force == pytest.approx(0.25 * np.array([*-along, 1.0]), abs=1e-8)
 
 
-def test_a_push_beyond_friction_is_told_as_such():
+@pytest.mark.parametrize(
+    ("push", "needed"), [(0.5, r"0\.\d+ where the largest is 0\.3"), (0.3003, r"0\.3003 where the largest is 0\.3")]
+)
+def test_a_push_beyond_friction_is_told_as_such(push, needed):
     model = elastic_model(fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), "hex8"), "3d")
     model.add_pressure("ZMAX", 1.0, ramp=[(0, 0), (1, 1), (2, 1)])
-    model.add_traction("XMIN", x=0.5, ramp=[(0, 0), (1, 0), (2, 1)])
+    model.add_traction("XMIN", x=push, ramp=[(0, 0), (1, 0), (2, 1)])
     floor = fc.obstacles.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
     model.add_obstacle("floor", secondary="ZMIN", obstacle=floor, friction=0.3)
-    message = r"friction cannot hold body .* coefficient of about 0\.\d+ where the largest is 0\.3"
-    with pytest.raises(fc.ConvergenceError, match=message):
+    with pytest.raises(fc.ConvergenceError, match=f"friction cannot hold body .* coefficient of about {needed}"):
         fc.solve(model, [1.0, 2.0])
 
 

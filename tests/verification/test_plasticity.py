@@ -120,6 +120,7 @@ def indented(element: str, formulation: str, **options):
     return fc.solve(model, 5), model
 
 
+@pytest.mark.filterwarnings("ignore:the largest plastic strain")
 @pytest.mark.parametrize(
     ("formulation", "friction"), first_of(1, [("node_to_segment", None), ("continuous", None), ("continuous", 0.3)])
 )
@@ -135,6 +136,7 @@ def test_an_indentation_past_yield(formulation: str, friction: float | None) -> 
     assert last.work["plastic_work"] > 3.0 * last.work["strain_energy"]
 
 
+@pytest.mark.filterwarnings("ignore:the largest plastic strain")
 def test_unloading_is_elastic_and_leaves_a_dent() -> None:
     mesh = fc.generate.block((2.0, 2.0), (12, 12))
     model = fc.Model(mesh, "axisymmetric")

@@ -79,7 +79,7 @@ def test_indentation_with_friction(formulation):
 LAME = 31.63190504403362
 
 
-def fitted(element, inner, outer):
+def fitted(element, inner, outer, **options):
     """Return the contact of a bush in a hub (Lame), and what was warned of wavering pressures."""
     mesh = fc.generate.rings(
         element,
@@ -94,7 +94,7 @@ def fitted(element, inner, outer):
     model.add_material(fc.LinearElastic(70_000.0, 0.33), groups=["OUTER"])
     model.fix("SYMMETRY_X", "x")
     model.fix("SYMMETRY_Y", "y")
-    model.add_contact("fit", secondary="CONT_INNER", primary="CONT_OUTER", clearance=-0.05)
+    model.add_contact("fit", secondary="CONT_INNER", primary="CONT_OUTER", clearance=-0.05, **options)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         contact = fc.solve(model, 1)[-1].contact["fit"]
@@ -116,3 +116,24 @@ def test_cells_as_deep_as_wide_and_quadrangles_waver_less(element, inner, outer)
     contact, told = fitted(element, inner, outer)
     assert not told
     assert np.abs(contact.pressure / LAME - 1).max() < 0.13
+
+
+@pytest.mark.parametrize(("element", "inner", "outer", "formulation"), [
+    ("quad8", (3, 11), (4, 8), "continuous"), ("quad8", (3, 12), (4, 16), "continuous"),
+    ("tri6", (3, 8), (4, 11), "continuous"), ("quad8", (3, 9), (4, 8), "node_to_segment"),
+    ("tri6", (2, 30), (2, 41), "mortar"),
+])  # fmt: skip
+def test_alternating_corners_and_middles_of_quadratic_facets_are_told(element, inner, outer, formulation):
+    contact, told = fitted(element, inner, outer, formulation=formulation)
+    assert np.abs(contact.pressure / LAME - 1).max() > 0.13
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize(("element", "inner", "outer", "formulation"), [
+    ("quad8", (3, 8), (4, 11), "mortar"), ("tri6", (3, 16), (4, 8), "mortar"), ("quad8", (2, 30), (2, 41), "continuous"),
+    ("quad8", (3, 8), (4, 8), "node_to_segment"),
+])  # fmt: skip
+def test_quadratic_facets_with_accurate_pressures_are_not_told(element, inner, outer, formulation):
+    contact, told = fitted(element, inner, outer, formulation=formulation)
+    assert not told
+    assert np.abs(contact.pressure / LAME - 1).max() < 0.1

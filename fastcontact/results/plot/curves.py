@@ -158,12 +158,16 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mappin
     inside, outside = half_width(contact.place, contact.active)
     if not (np.isfinite(inside) and np.isfinite(outside)):
         return
-    centre = 0.0
-    if position.min(initial=0.0) < 0:
-        closed = contact.place[contact.active]
-        centre = 0.5 * float(closed.min() + closed.max()) if len(closed) else 0.0
+    closed, one_sided = contact.place[contact.active], position.min(initial=0.0) >= 0.0
+    centre = 0.0 if one_sided else 0.5 * float(closed.min() + closed.max())
+    before = contact.place[contact.place < closed.min()]
     label = f"edges: {centre - inside:.4g} and {valued(centre + inside, units, 'length')}"
-    if abs(centre) <= 0.01 * outside:
+    if one_sided and before.size:  # the contact is a ring around an open middle
+        ax.axvspan(before.max(), closed.min(), color=colour, alpha=0.15, lw=0)
+        label = (
+            f"edges: {before.max():.4g} to {closed.min():.4g}, and {inside:.4g} to {valued(outside, units, 'length')}"
+        )
+    elif abs(centre) <= 0.01 * outside:
         # The difference of the bounds may be smaller than the distance of two nodes, because constraints may lie between
         # nodes. Nodes beyond the contact are excluded, because on a curved surface their distance from the middle along the
         # tangent may be the same as that of nodes in contact.
@@ -172,7 +176,7 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mappin
         inside, outside = np.interp(contact.radius, np.abs(contact.across)[near], place[near])
         label = f"edge: {inside:.4g} to {valued(outside, units, 'length')}"
     label += "" if contact.tangent is None else " (arc length)"
-    for side in (-1.0, 1.0) if position.min(initial=0.0) < 0 else (1.0,):
+    for side in (1.0,) if one_sided else (-1.0, 1.0):
         ends = centre + side * inside, centre + side * outside
         ax.axvspan(min(ends), max(ends), color=colour, alpha=0.15, lw=0, label=label if side > 0.0 else None)
 

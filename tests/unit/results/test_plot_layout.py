@@ -1,5 +1,7 @@
 """Layout of pictures of any proportions: nothing is cut off, and no texts overlap."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib_pictures import contact_of, frames_of, overlaps, step_of, texts
@@ -144,6 +146,16 @@ def test_the_edge_on_a_circle_lies_between_the_last_closed_node_and_the_first_op
     (label,) = [line for line in fc.plot.pressure_profile(pin).get_legend_handles_labels()[1] if "edge" in line]
     nodes = pin.place[pin.active.sum() - 1 :][:2]
     assert label == f"edge: {nodes[0]:.4g} to {nodes[1]:.4g} (arc length)"
+
+
+def test_both_edges_of_a_ring_of_contact_are_marked():
+    """As under an O-ring: nodes nearer to the axis than the contact are open."""
+    pin = conforming(0.9)
+    ring = replace(pin, active=pin.active & (pin.place > 3.0))
+    (label,) = [line for line in fc.plot.pressure_profile(ring).get_legend_handles_labels()[1] if "edge" in line]
+    first, last = np.flatnonzero(ring.active)[[0, -1]]
+    bounds = [f"{pin.place[k]:.4g}" for k in (first - 1, first, last, last + 1)]
+    assert label == f"edges: {bounds[0]} to {bounds[1]}, and {bounds[2]} to {bounds[3]} (arc length)"
 
 
 def test_profiles_on_the_same_axes_differ_in_colour_and_are_whole():

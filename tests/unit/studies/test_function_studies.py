@@ -114,6 +114,18 @@ def test_a_sweep_calls_the_function_with_all_choices():
     assert any("von_mises_max" in line for line in case.lines())
 
 
+@pytest.mark.parametrize(("values", "over", "curves", "heading"), [
+    ({"size": [0.5], "solved": [True], "element": ["quad4", "quad8"]}, "element", 1, "tube\nsize = 0.5, solved = True"),
+    ({"element": ["quad4", "quad8"], "size": [0.5, 0.25]}, "element size", 2, "tube"),
+])  # fmt: skip
+def test_a_sweep_is_drawn_over_the_first_parameter_with_several_numbers(values, over, curves, heading):
+    pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+    figure = fc.parameter_sweep(tube, values, quantities={"bore": bore}).figure()
+    assert figure.get_suptitle().endswith(heading)
+    assert figure.axes[0].get_xlabel().startswith(over)
+    assert len(figure.axes[0].lines) == curves
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [
