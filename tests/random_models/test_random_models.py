@@ -38,6 +38,14 @@ def test_once_wrong_models_end_right():
     check([100358, 101568, 102727, 102979])
 
 
+def test_layers_without_force_have_no_determined_position():
+    """Between them and what pushes them are gaps; contact forces are less than what multigrid leaves out of balance."""
+    given = drawn(310377)
+    with pytest.warns(fc.FastcontactWarning, match="nothing determines the position of bodies in load step 1"):
+        fc.solve(given.model, given.ramp, **given.options)
+    check([310377])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(1000, 1300, 50))
 def test_more_random_models_end_right(first):
