@@ -38,11 +38,12 @@ def test_once_wrong_models_end_right():
     check([100358, 101568, 102727, 102979])
 
 
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
 def test_layers_without_force_have_no_determined_position():
     """Between them and what pushes them are gaps; contact forces are less than what multigrid leaves out of balance."""
     given = drawn(310377)
-    with pytest.warns(fc.FastcontactWarning, match="nothing determines the position of bodies in load step 1"):
-        fc.solve(given.model, given.ramp, **given.options)
+    last = fc.solve(given.model, given.ramp, **given.options)[-1]
+    assert any("nothing determines the position of bodies in load step 1" in text for text in last.warnings)
     check([310377])
 
 
