@@ -212,12 +212,15 @@ class FloatingBodies:
             "positions": rigid.positions,
         }
 
-    def undetermined(self, constraints: Constraints, multiplier: Array, u: Array, load: float) -> dict[str, list[str]]:
+    def undetermined(
+        self, constraints: Constraints, multiplier: Array, u: Array, load: float, residual: float
+    ) -> dict[str, list[str]]:
         """Return the motions that neither contact forces nor bilateral contact restrain at the end of a step, by body.
 
         Any position without contact forces is then a solution. Contact forces of sides that just touch are round-off and are
         ignored: they are negligible compared with the loads, or with the force of a spring that is elongated by the largest
-        displacement, whichever is smaller. Without loads, only the latter applies.
+        displacement, whichever is smaller. Without loads, only the latter applies. So are contact forces that the
+        out-of-balance forces exceed, as those of an iterative solver may.
 
         Parameters
         ----------
@@ -229,9 +232,11 @@ class FloatingBodies:
             Displacements [length].
         load : float
             Scale of the loads, as in `settle` [force].
+        residual : float
+            Largest out-of-balance force [force].
         """
         elastic = self.stiffness * float(np.abs(u).max())
-        significant = LENGTH_ROUND_OFF * (min(load, elastic) if load else elastic)
+        significant = max(LENGTH_ROUND_OFF * (min(load, elastic) if load else elastic), residual)
         loaded = (np.abs(multiplier) > significant) | constraints.equality
         frictional = loaded & (constraints.friction > 0.0)
         restraints = [constraints.B[loaded], *(tangent[frictional] for tangent in constraints.tangents)]

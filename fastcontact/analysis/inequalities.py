@@ -279,13 +279,9 @@ def _with_floating_bodies(
     model_size = float(np.ptp(problem.model.mesh.points, axis=0).max())
     # Work of the loads on each free rigid-body motion, and the size of the model.
     loads = generalised(bodies.motions, step.load.force, state.largest_rigid_force), model_size
-
-    def stopping_shift(u: Array) -> Array | None:
-        rows, gap0 = resisting(constraints)
-        return stopped_at(rows @ modes, gap0 + rows @ u, *loads)
-
     if not iterate.history:
-        shift = stopping_shift(iterate.u)
+        rows, gap0 = resisting(constraints)
+        shift = stopped_at(rows @ modes, gap0 + rows @ iterate.u, *loads)
         if shift is None:
             names = grouped(bodies.names)
             text = f"the loads pull bodies away, and no contact stops them ({names}): reverse the loads or add supports"
@@ -299,16 +295,15 @@ def _with_floating_bodies(
     relative_accuracy = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
     # The response requires many linear solutions, which are cheap only if the matrix is factorised.
     freed = None if problem.solver.iterative else partial(bodies.freed, constraints, dofs)
-
-    def settle(start: Array) -> RigidPosition:
-        springs, load = dofs.numbers(bodies.dofs), state.largest_rigid_force
-        return bodies.settle(solve_at, freed, springs, start, load, relative_accuracy, state.gap_round_off)
-
-    rigid = settle(start)
-    if rigid.state.settled and not rigid.slack:
-        # Springs move bodies that have lost contact by small steps only: start again where contact stops them.
-        shift = stopping_shift(guess)
-        rigid = rigid if shift is None or not shift.any() else settle(rigid.position + shift)
+    rigid = bodies.settle(
+        solve_at,
+        freed,
+        dofs.numbers(bodies.dofs),
+        start,
+        state.largest_rigid_force,
+        relative_accuracy,
+        state.gap_round_off,
+    )
     if rigid.state.settled and not rigid.slack:
         gaps = gaps_at_rest(problem.model, bodies.motions)
         raise failure(not_balanced(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))

@@ -113,7 +113,7 @@ def _end_of_step(
         iterations["regularised"] = problem.floating_bodies.report(end.rigid, end.largest_rigid_force)
         if settled is not None:
             forces = settled.constraints, settled.solution.multiplier
-            free = problem.floating_bodies.undetermined(*forces, u, end.largest_rigid_force)
+            free = problem.floating_bodies.undetermined(*forces, u, end.largest_rigid_force, balance.residual)
             iterations["regularised"]["undetermined"] = free
     end = replace(end, solver=problem.solver.snapshot())
     result = recover(problem, end, contact, balance.reaction, iterations, instant, solution.bodies)

@@ -65,12 +65,14 @@ def solved(given: Drawn) -> dict[str, Any]:
         steps = fc.solve(given.model, given.ramp, **given.options)
     last, factor = steps[-1], float(np.interp(given.ramp.instants[-1], *zip(*given.ramp.table, strict=True)))
     iterative = given.options.get("linear_solver") == "amg"
-    found = figures(given.model, last, watched.settled, factor, 1e-10 * iterative)
+    tolerance = 1e-10 * iterative
+    found = figures(given.model, last, watched.settled, factor, tolerance)
     bounds = BOUNDS | (ITERATIVE if iterative else {})
     wrong = [name for name, bound in bounds.items() if not found[name] <= bound]
     wrong += unfit(last)
     closed = sum(int(contact.active.sum()) for contact in last.contact.values())
-    found |= said_again(given, last, wrong, _wandering(given, steps[:-1]))
+    largest_force = mechanics.out_of_balance(given.model, last, factor, tolerance)[1].force
+    found |= said_again(given, last, wrong, _wandering(given, steps[:-1]), largest_force)
     found |= {"closed": closed, "updates": last.iterations["geometry_updates"], "warnings": len(last.warnings)}
     if wrong:
         text = ", ".join(f"{name} {found[name]:.2g}" if name in found else name for name in wrong)
@@ -84,10 +86,13 @@ def _wandering(given: Drawn, before: list[fc.StepResult]) -> bool:
     return free and any(pair.options.get("friction") for pair in given.model.contact)
 
 
-def said_again(given: Drawn, last: fc.StepResult, wrong: list[str], wandering: bool) -> dict[str, Any]:
+def said_again(
+    given: Drawn, last: fc.StepResult, wrong: list[str], wandering: bool, largest_force: float
+) -> dict[str, Any]:
     """Solve the model in other words; what differs by more than rounding joins what is `wrong`.
 
     After steps in which bodies had no determined position, results with friction are not unique, and only solved again.
+    `largest_force` is infinite where all forces are round-off.
     """
     other = reworded(given.model, np.random.default_rng([given.seed, 7]))
     if other is None:
@@ -106,7 +111,7 @@ def said_again(given: Drawn, last: fc.StepResult, wrong: list[str], wandering: b
     size = np.ptp(given.model.mesh.points, axis=0).max()
     least = NOTHING * np.abs(last.displacement).max() + ROUND_OFF / SAME * size
     stiffness = modulus * (1.0 if given.model.kinematics in ("plane_strain", "plane_stress") else size)
-    scale = max(*sums, np.linalg.norm(last.reaction, axis=1).sum(), least * stiffness) or 1.0
+    scale = max(*sums, np.linalg.norm(last.reaction, axis=1).sum(), least * stiffness, largest_force) or 1.0
     changes = [np.linalg.norm(again.contact[name].force @ other.Q - one.force) for name, one in last.contact.items()]
     found["force said again"] = float(max(changes) / scale)
     # Both results may be as far from the exact one as their warnings about scatter tell.

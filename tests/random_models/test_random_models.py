@@ -38,6 +38,15 @@ def test_once_wrong_models_end_right():
     check([100358, 101568, 102727, 102979])
 
 
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
+def test_layers_without_force_have_no_determined_position():
+    """Between them and what pushes them are gaps; contact forces are less than what multigrid leaves out of balance."""
+    given = drawn(310377)
+    last = fc.solve(given.model, given.ramp, **given.options)[-1]
+    assert any("nothing determines the position of bodies in load step 1" in text for text in last.warnings)
+    check([310377])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(1000, 1300, 50))
 def test_more_random_models_end_right(first):
@@ -74,14 +83,13 @@ def test_a_model_in_other_words_has_the_same_answer(words):
 # rounding error, or cannot be told from three facets. Held nodes where nothing is driven; points of tiny areas; tied sides
 # with an offset. A node, and the middle of a facet, opposite the node where two facets of a line meet. Points beyond the
 # edge of triangles, along averaged normals. A body that rolls on a corner, whose position alternated. Dependent equations of
-# a tie; two pairs on one facet, with friction; increments of friction on a geometry that had not converged; layers that
-# part between two updates; forces on a stiff secondary side that scatter. Points beyond the edge of a side of triangles,
-# which alternated between two of them.
+# a tie; two pairs on one facet, with friction; increments of friction on a geometry that had not converged; forces on a stiff
+# secondary side that scatter. Points beyond the edge of a side of triangles, which alternated between two of them.
 @pytest.mark.parametrize(
     "seed",
     [
         *(1107, 1514, 30224, 1474, 30004, 40215, 43177, 43777, 50153, 42089, 44132, 90019, 90330, 90792, 103260),
-        *(102414, 103109, 320048, 320421, 320459),
+        *(102414, 103109, 320048, 320459),
         pytest.param(102525, marks=pytest.mark.slow),
     ],
 )
