@@ -347,9 +347,7 @@ def _result_of_pair(pair: Formulation, step: StepResult, name: str) -> ContactRe
         or len(step.displacement) != len(pair.points)
         or len(contact.points) != len(pair.secondary.points)
     ):
-        raise ContactError(
-            f"load step {step.index} is of another model: it has no such contact pair '{name}' on this mesh"
-        )
+        raise ContactError(f"load step {step.index} is of another model: it has no contact pair '{name}' on this mesh")
     return contact
 
 

@@ -204,9 +204,7 @@ def nothing_found(mesh: Mesh, distance: float | None, angle: float, groups: Sequ
     size = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
     distant = find_contacts(mesh, distance=size, angle=angle, groups=groups)
     if not distant.pairs:
-        return (
-            f"no surfaces of different bodies face each other within {angle:g} degrees: name both sides of each contact"
-        )
+        return f"no surfaces of different bodies face each other within {angle:g} degrees: name the sides of contacts"
     nearest = min((pair.gap for pair in distant), key=lambda gap: abs(gap[0]))[0]
     within = "the size of their facets" if distance is None else f"{distance:.4g}"
     return (

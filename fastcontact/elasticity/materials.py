@@ -282,9 +282,7 @@ class Material:
         """Return the material axes (n, 3, 3) [-] at `points` (n, dim) [length]; `constants` contains axes given by cell."""
         axes = constants.axes if constants and varying(self.axes) else self.axes
         if varying(axes):
-            raise ModelError(
-                "axes given by cell need `constants`: pass the result of `constants_at` of a model's material"
-            )
+            raise ModelError("axes given by cell need `constants`: pass `constants_at` of a model's material")
         return frames(axes, points, kinematics)
 
     def _compliance6(self, points: Array, kinematics: str, constants: Any) -> Array:

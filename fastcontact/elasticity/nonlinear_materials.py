@@ -121,9 +121,7 @@ class ElasticPlastic(NonlinearElastic):
         if not len(rows) or rows[0, 0] > 0.0:
             rows = np.vstack([[0.0, float(self.yield_stress)], rows])
         if not (np.isfinite(rows).all() and (np.diff(rows[:, 0]) > 0.0).all() and (rows[:, 1] > 0.0).all()):
-            raise ModelError(
-                "hardening must have ascending plastic strains that are not negative, and positive yield stresses"
-            )
+            raise ModelError("hardening needs ascending, non-negative plastic strains and positive yield stresses")
         if rows[0, 0] < 0.0 or not math.isclose(rows[0, 1], self.yield_stress):
             raise ModelError(
                 f"hardening begins with the yield stress {rows[0, 1]:g} at the plastic strain {rows[0, 0]:g}, where "

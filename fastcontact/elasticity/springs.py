@@ -87,9 +87,7 @@ def joined(
     rows, values = [], []
     for first, second in np.transpose(ends).tolist():
         if first == second:
-            raise ModelError(
-                f"{name}: both ends are point {first}; without a second node a spring is attached to the ground"
-            )
+            raise ModelError(f"{name}: both ends are point {first}; a spring to the ground has no second node")
         axial = _line(name, points, first, second) if along and direction is None else direction
         directions, k = _directions(stiffness, along, axial, points.shape[1])
         rows.append(

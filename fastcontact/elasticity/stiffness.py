@@ -150,9 +150,7 @@ def stiffness(
         bad = min((number for number in bad_cells if number >= 0), default=-1)
         if bad >= 0:
             where = mesh.points[block[bad]].mean(axis=0)
-            raise MeshError(
-                f"cell {bad} of {name} near {where} is degenerate or inverted: its Jacobian is not positive"
-            )
+            raise MeshError(f"cell {bad} of {name} near {where} is degenerate or inverted (Jacobian not positive)")
     size = mesh.n_points * mesh.dim
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
 

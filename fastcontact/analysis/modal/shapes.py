@@ -126,9 +126,7 @@ class Modes(Shapes):
     def whole_ring(self) -> RingModes:
         """Return the same modes on the mesh of the whole ring; ModelError if no nodal diameters were requested."""
         if self._sectors is None:
-            raise ModelError(
-                "shapes of the whole ring need modes with nodal_diameters, of a model with cyclic symmetry"
-            )
+            raise ModelError("shapes of the whole ring need modes with nodal_diameters of a model with cyclic symmetry")
         return RingModes(self, self._sectors)
 
     def __repr__(self) -> str:

@@ -42,13 +42,7 @@ from fastcontact.contact.pairing import (
     rows_along,
     tangents,
 )
-from fastcontact.contact.projection import (
-    at_nodes_of_facets,
-    interpolated,
-    nodal_normals,
-    places,
-    smooth_normals,
-)
+from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
 from fastcontact.contact.search.closest import BESIDE
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
@@ -139,9 +133,7 @@ class Formulation(ABC):
         if not self.projection_tolerance >= 0:
             raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
         if self.surface_smoothing and not isinstance(self.primary, Surface):
-            raise ContactError(
-                "surface_smoothing corrects two meshed sides against each other: leave it out at an obstacle"
-            )
+            raise ContactError("surface_smoothing needs two meshed sides: leave it out at an obstacle")
         if self.friction:
             self.secondary = self._mirrored(self.secondary)
             self.primary = self._mirrored(self.primary) if isinstance(self.primary, Surface) else self.primary

@@ -375,7 +375,7 @@ class ModelContact(ModelConnections):
                 )
             if axis == 0 and self.kinematics == "axisymmetric":
                 raise ModelError(
-                    f"a force cannot move obstacle '{name}' along x, the radius: in axisymmetry give y only"
+                    f"a force cannot move obstacle '{name}' along the radius x: in axisymmetry give y only"
                 )
         return tuple(float(forces[k]) if k in forces else None for k in range(self.mesh.dim))  # type: ignore[arg-type]
 
@@ -404,10 +404,7 @@ class ModelContact(ModelConnections):
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
         given = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
-        available = [
-            *SHARED_OPTIONS,
-            *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given),
-        ]
+        available = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given)]
         available += ["motion", "rotation", "force"] * (pair.obstacle is not None)  # arguments of `add_obstacle`
         for option in pair.options:
             check_known(f"option of {pair.formulation}", option, available, ContactError)
@@ -424,9 +421,7 @@ class ModelContact(ModelConnections):
         primary: Surface | RigidSide
         if pair.obstacle is not None:
             if not kind.against_obstacles:
-                raise ContactError(
-                    f"contact '{pair.name}': mortar in two dimensions needs multipliers='dual' at an obstacle"
-                )
+                raise ContactError(f"contact '{pair.name}': mortar in 2D needs multipliers='dual' at an obstacle")
             primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
             specific.setdefault("surface_smoothing", False)
         else:

@@ -241,6 +241,4 @@ class ModelSupports(ModelContact):
         supported = [self.mesh.points_of(support.group) for support in self.supports if support.component == 0]
         nodes = np.setdiff1d(self.axis_nodes, np.concatenate(supported)) if supported else self.axis_nodes
         if len(nodes):
-            log.info(
-                "axis of symmetry: x is held at zero at %d nodes with x = 0 (first: point %d)", len(nodes), nodes[0]
-            )
+            log.info("axis of symmetry: x is held at %d nodes with x = 0 (first: point %d)", len(nodes), nodes[0])
