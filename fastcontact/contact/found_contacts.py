@@ -118,9 +118,7 @@ class FoundContacts(Sequence[FoundContact]):
         def shown(value: float) -> Any:
             return value if numbers is None else numbers.format(value)
 
-        return [
-            (p.name, *p.bodies, *p.facets, *map(shown, p.spacing), *map(shown, p.gap), p.reason) for p in self.pairs
-        ]
+        return [(p.name, *p.bodies, *p.facets, *map(shown, (*p.spacing, *p.gap)), p.reason) for p in self.pairs]
 
 
 @typed(ContactError)

@@ -341,9 +341,7 @@ class Ogden(OwnConstants):
 
     def __post_init__(self) -> None:
         try:
-            terms = [
-                tuple(float(v) for v in np.atleast_1d(np.asarray(value, float))) for value in (self.mu, self.alpha)
-            ]
+            terms = [tuple(map(float, np.atleast_1d(np.asarray(value, float)))) for value in (self.mu, self.alpha)]
         except (TypeError, ValueError, OverflowError):
             raise ModelError("mu and alpha of Ogden must be numbers, or lists with a number for each term") from None
         if len(terms[0]) != len(terms[1]) or not terms[0]:

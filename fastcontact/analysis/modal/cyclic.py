@@ -57,9 +57,8 @@ class Sectors:
                 raise ModelError("nodal diameters need one axis and number of sectors: the cyclic symmetries differ")
         points = model.mesh.points
         offset = points[first.second].mean(axis=0) - first.turn @ points[first.first].mean(axis=0)
-        return cls(
-            first.sectors, first.turn, periodic_interfaces, np.linalg.lstsq(np.eye(len(offset)) - first.turn, offset)[0]
-        )
+        centre = np.linalg.lstsq(np.eye(len(offset)) - first.turn, offset)[0]
+        return cls(first.sectors, first.turn, periodic_interfaces, centre)
 
     def diameters(self, chosen: int | str | Sequence[int]) -> list[int]:
         """Return the requested nodal diameters, ascending; ModelError if the ring cannot have one of them."""

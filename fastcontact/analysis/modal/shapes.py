@@ -52,9 +52,7 @@ class Shapes(StepSequence):
 def _as_step(number: int, frequency: float, u: Array, stress: Array, model: Model) -> StepResult:
     equivalent = recovery.von_mises(stress)
     signed = recovery.von_mises_signed(stress, equivalent)
-    lengths = {
-        key: name for key, name in model.units.items() if key == "length"
-    }  # only of the mesh, since shapes have no scale
+    lengths = {key: name for key, name in model.units.items() if key == "length"}  # shapes have no scale
     return StepResult(
         number + 1, float(frequency), u, stress, equivalent, signed, np.zeros_like(u),
         iterations={"parameter": "frequency"}, units=lengths,
@@ -201,9 +199,7 @@ class RingModes(Shapes):
     def mesh(self) -> Mesh:
         """Mesh of all sectors, see `RingModes`."""
         sector, centre = self.modes._model.mesh, self._sectors.centre
-        return union(
-            *(sector.replace(points=(sector.points - centre) @ rotation.T + centre) for rotation in self._rotations)
-        )
+        return union(*(sector.replace(points=(sector.points - centre) @ R.T + centre) for R in self._rotations))
 
     def _step(self, number: int) -> StepResult:
         modes = self.modes

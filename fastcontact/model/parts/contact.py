@@ -415,9 +415,8 @@ class ModelContact(ModelConnections):
             for interface in self.periodic_interfaces
         ]
         secondary = surface(self.mesh, pair.secondary).with_periodic_ends(ends)
-        options = pair_options(
-            pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None
-        )
+        against = pair.obstacle is not None
+        options = pair_options(pair.name, pair.options, self.mesh, secondary, against_obstacle=against)
         primary: Surface | RigidSide
         if pair.obstacle is not None:
             if not kind.against_obstacles:
@@ -430,9 +429,8 @@ class ModelContact(ModelConnections):
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
         axisymmetric = self.kinematics == "axisymmetric"
         interfaces = [interface for interface in self.periodic_interfaces if interface.turn is None or sectors_alike]
-        turning = next(
-            (e.rotation for e in interfaces if e.rotation and np.isin(e.second, secondary.points).any()), None
-        )
+        points = secondary.points
+        turning = next((e.rotation for e in interfaces if e.rotation and np.isin(e.second, points).any()), None)
         options = dataclasses.replace(
             options, same_place=same_place(interfaces, self.mesh.n_points), turning=turning,
             source=self._source(pair, secondary, options),

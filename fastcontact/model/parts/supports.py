@@ -134,9 +134,8 @@ class ModelSupports(ModelContact):
             nodes, directions = normals_of(self.mesh, group)
             values = evaluated(normal, self.mesh.points[nodes], name)
             table = table_of(ramp, f"the ramp of {name}")
-            self._related_support(
-                group, MultiPointConstraint(name, along(nodes, directions, self.n_dofs), values, table)
-            )
+            rows = along(nodes, directions, self.n_dofs)
+            self._related_support(group, MultiPointConstraint(name, rows, values, table))
         if components or normal is None:
             self._support(group, components, ramp)
 
