@@ -196,9 +196,8 @@ def _closed(
         closed = np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
     else:
         # Nodes of a cohesive layer are closed under tension as well.
-        closed = field.closed_nodes(
-            active, gap, side_pressure if pair.options.cohesion is None else np.abs(side_pressure)
-        )
+        pressing = side_pressure if pair.options.cohesion is None else np.abs(side_pressure)
+        closed = field.closed_nodes(active, gap, pressing)
         never_opening = pair.never_opening(pair.points[pair.secondary.points], configuration)
         closed = closed | (never_opening & np.isfinite(gap))
     closed, pressure = carried(constraints, forces, closed & ~excluded, pair.secondary)
@@ -373,9 +372,7 @@ def _stretch(contact: ContactResult, displacement: Array, before: Array, after: 
         stretch = float(np.sqrt(after[contact.active].sum() / before[contact.active].sum()))
         return stretch, stretch
     tangential = displacement[:, 0] if contact.tangent is None else displacement @ contact.tangent
-    widths = (
-        half_width(contact.place, contact.active, contact.across + fraction * tangential) for fraction in (0.0, 1.0)
-    )
+    widths = (half_width(contact.place, contact.active, contact.across + k * tangential) for k in (0.0, 1.0))
     ratios = [
         deformed / undeformed if undeformed > 0.0 and np.isfinite(undeformed) else 1.0
         for undeformed, deformed in zip(*widths, strict=True)

@@ -13,7 +13,7 @@ from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
 from fastcontact.analysis.tolerances import DECLINE, WINDOW
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, largest
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.elasticity.nonlinear_bodies import PLASTIC_STRAIN
@@ -124,9 +124,7 @@ def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, fric
 
 def limit_load(problem: Problem, state: State) -> str:
     """Return an addition to the message of a failed load step after `state` if bodies yield; otherwise empty."""
-    strain = max(
-        (float(of_cells[..., PLASTIC_STRAIN].max(initial=0.0)) for of_cells in state.history.values()), default=0.0
-    )
+    strain = max((largest(values[..., PLASTIC_STRAIN]) for values in state.history.values()), default=0.0)
     if not strain:
         return ""
     validity = (

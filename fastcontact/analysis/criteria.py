@@ -101,10 +101,6 @@ class Criteria:
         if self.max_halvings < 0 or int(self.max_halvings) != self.max_halvings:
             raise ModelError(f"max_halvings = {self.max_halvings} must be a whole number >= 0")
         if self.friction_while_touching is not None and not 0 < self.friction_while_touching <= 1:
-            raise ModelError(
-                f"friction_while_touching = {self.friction_while_touching} must be a fraction, above 0, up to 1"
-            )
+            raise ModelError(f"friction_while_touching = {self.friction_while_touching} must be above 0 and at most 1")
         if self.keep_pairing and self.geometry_updates:
-            raise ModelError(
-                f"keep_pairing leaves no room for geometry_updates = {self.geometry_updates}: give one or the other"
-            )
+            raise ModelError(f"keep_pairing excludes geometry_updates = {self.geometry_updates}: give one or the other")

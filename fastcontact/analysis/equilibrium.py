@@ -345,9 +345,7 @@ def balance(
     )
 
 
-def _round_off(
-    problem: Problem, row_sums: Array, forces: tuple[Array, ...], largest_force: float
-) -> tuple[float, float]:
+def _round_off(problem: Problem, row_sums: Array, forces: tuple[Array, ...], scale: float) -> tuple[float, float]:
     """Return a bound of the residual that is due to round-off, and the level of round-off.
 
     A force is significant if it exceeds the level of round-off, and if the round-off of its row is below the criterion. If
@@ -361,7 +359,7 @@ def _round_off(
         ``abs(K) @ lengths`` with the lengths of `Problem.accurate_to` [force].
     forces : tuple of ndarray
         Reactions, contact forces and external forces [force].
-    largest_force : float
+    scale : float
         Largest force of all steps so far [force].
 
     Returns
@@ -369,7 +367,7 @@ def _round_off(
     bound, level : float
         [force].
     """
-    force_round_off = ROUND_OFF * largest_force
+    force_round_off = ROUND_OFF * scale
     noise = max(force_round_off, SIGNIFICANT * SUM_ROUND_OFF * largest(row_sums))
     for magnitudes in map(np.abs, forces):
         if ((magnitudes > noise) & (magnitudes * problem.criteria.relative > SUM_ROUND_OFF * row_sums)).any():

@@ -88,9 +88,7 @@ class Extrapolation:
         """Return the displacements (n,) of the polynomial through the last ``degree + 1`` states, at the current load."""
         states, extrapolated = [u for u, _ in self.states[-degree - 1 :][::-1]], self.states[-1][0]
         increments = 1.0 / np.cumprod([1.0, *self.ratios[len(self.ratios) - degree : -1][::-1]])
-        loads = np.concatenate(
-            [[0.0], -np.cumsum(increments)]
-        )  # relative to the last load, in units of the last increment
+        loads = np.append(0.0, -np.cumsum(increments))  # relative to the last load, in units of the last increment
         for k in range(1, degree + 1):  # Lagrange polynomials
             others = np.delete(loads[: degree + 1], k)
             extrapolated = extrapolated + np.prod((self.ratio - others) / (loads[k] - others)) * (states[k] - states[0])

@@ -105,9 +105,8 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
     sag[rows] = smoothing.overlap((points.facet[rows], points.xi[rows]), (facing.facet[rows], facing.xi[rows]), axes)
     sag_in_contact = sag[rows[in_contact]]
     spread, offset = float(np.ptp(sag_in_contact)), abs(float(sag_in_contact.mean())) / extent
-    return spread, spread / _facet_length(pair) if pair.secondary.order == 2 else max(
-        offset, _slope(pair, rules, sag, closed)
-    )
+    ratio = spread / _facet_length(pair) if pair.secondary.order == 2 else max(offset, _slope(pair, rules, sag, closed))
+    return spread, ratio
 
 
 def _slope(pair: Formulation, rules: list[quadrature.Rule], sag: Array, closed: Mask) -> float:

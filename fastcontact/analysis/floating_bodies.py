@@ -120,10 +120,8 @@ class Freed:
     @cached_property
     def _inverse(self) -> Array:
         """Pseudoinverse (k, k) of `stretched`, whose singular values are about 1, or 0 in motions without restraint."""
-        U, values, V = np.linalg.svd(self.stretched)
-        return np.asarray(
-            (V.T * np.divide(1.0, values, out=np.zeros_like(values), where=values > LENGTH_ROUND_OFF)) @ U.T
-        )
+        U, s, V = np.linalg.svd(self.stretched)
+        return np.asarray((V.T * np.divide(1.0, s, out=np.zeros_like(s), where=s > LENGTH_ROUND_OFF)) @ U.T)
 
 
 class FloatingBodies:
@@ -163,9 +161,7 @@ class FloatingBodies:
         modes = system.unknowns_of(motions.displacement)
         _, _, order = qr((modes * weights[:, None]).T, mode="economic", pivoting=True)
         self.dofs = np.sort(order[: modes.shape[1]]).astype(np.intp)
-        self._places = [
-            f"{'xyz'[dof % self._dim]} of {self._owner(motions, dof, weightless)}" for dof in self.dofs.tolist()
-        ]
+        self._places = [f"{'xyz'[k % self._dim]} of {self._owner(motions, k, weightless)}" for k in self.dofs.tolist()]
         self._at_springs = motions.displacement[self.dofs]
         self.motions = motions.combined(np.asarray(np.linalg.inv(self._at_springs), np.float64))
         self.stiffness = SOFT * typical if soft else typical
@@ -295,9 +291,7 @@ class FloatingBodies:
             # Springs are slack if their forces are round-off of the loads and of the contact forces (the only forces if
             # prescribed displacements move the bodies), as small as the accuracy of the linear solver allows, or round-off of
             # the elongation that a Newton step has `relaxed`.
-            slack = stretch <= max(
-                ROUND_OFF * load_stretch, noise * float(np.abs(state.u).max()), LENGTH_ROUND_OFF * relaxed
-            )
+            slack = stretch <= max(ROUND_OFF * load_stretch, noise * largest(state.u), LENGTH_ROUND_OFF * relaxed)
             # If the forces of the springs no longer decrease, a larger tolerance applies.
             if not slack and stretch >= 0.5 * last_stretch and positions > 3:
                 slack = stretch <= max(LENGTH_ROUND_OFF * load_stretch, round_off)

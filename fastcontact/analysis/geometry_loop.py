@@ -370,7 +370,6 @@ def _linearised(
             continue
         if part.geometry is None:
             return []
-        geometries.append(
-            (rows, part.geometry(multiplier, solution.tangential[rows, : len(part.tangents)], displacement))
-        )
+        tangential = solution.tangential[rows, : len(part.tangents)]
+        geometries.append((rows, part.geometry(multiplier, tangential, displacement)))
     return geometries

@@ -289,9 +289,8 @@ def _with_floating_bodies(
         if not (active & ~constraints.equality).any():
             start, u = start + shift, iterate.u + bodies.rigid(shift)
             # The linear program of `stopped_at` is solved to a relative accuracy of 1e-7, about that of single precision.
-            last_active = active | constraints.usable & (
-                constraints.gap0 + constraints.B @ u <= SINGLE_PRECISION * model_size
-            )
+            gap = constraints.gap0 + constraints.B @ u
+            last_active = active | constraints.usable & (gap <= SINGLE_PRECISION * model_size)
     relative_accuracy = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
     # The response requires many linear solutions, which are cheap only if the matrix is factorised.
     freed = None if problem.solver.iterative else partial(bodies.freed, constraints, dofs)

@@ -92,9 +92,8 @@ def _beside_contact(
         row = int(np.argmax(depth))
         if depth[row] > limit and depth[row] - _at_rest(problem, entries, int(points[row])) > limit:
             label = " and ".join(body_name(mesh, body, number) for number in sorted(body_pair))
-            texts.append(
-                _lacking_facets(problem, names[0], f"bodies {label} pass through each other", depth[row], points[row])
-            )
+            what = f"bodies {label} pass through each other"
+            texts.append(_lacking_facets(problem, names[0], what, depth[row], points[row]))
     return texts
 
 

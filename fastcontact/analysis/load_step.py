@@ -237,10 +237,8 @@ def accumulate_results(
     released = sum(entry.released for entry in end.bonds.values())
     work = None if start.work is None else start.work.after(energy, stored, works.tolist(), released)
     touched = start.touched.union(name for name, contact in results.items() if contact.active.any())
-    first_contact = {name: positions for name, positions in end.first_contact.items() if name in touched}
-    end = replace(
-        end, worn=worn, slipped=slipped, forces=forces, work=work, touched=touched, first_contact=first_contact
-    )
+    first = {name: positions for name, positions in end.first_contact.items() if name in touched}
+    end = replace(end, worn=worn, slipped=slipped, forces=forces, work=work, touched=touched, first_contact=first)
     return end, results_so_far
 
 

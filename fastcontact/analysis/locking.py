@@ -136,9 +136,7 @@ def nonlinear_scatter_warnings(problem: Problem, state: State, step: StepResult)
     for name in names:
         cells = mesh.cells[name][selected[problem.field.rows[name]]]
         mean = stress[name][selected[problem.field.rows[name]]][..., :3].mean(axis=(1, 2))
-        total, count = (
-            np.bincount(cells.ravel(), values, mesh.n_points) for values in (mean.repeat(cells.shape[1]), None)
-        )
+        total, count = (np.bincount(cells.ravel(), w, mesh.n_points) for w in (mean.repeat(cells.shape[1]), None))
         smooth = (total / np.maximum(count, 1))[cells].mean(axis=1)
         difference, norm = difference + float(((mean - smooth) ** 2).sum()), norm + float((mean**2).sum())
     if difference <= ALTERNATING**2 * norm:

@@ -186,9 +186,7 @@ class _Vibration:
     def lowest(self, n: int, linear_solver: str, wave: Wave | None = None) -> tuple[Array, Array]:
         """Return the n lowest eigenvalues (n,) and displacements (n_dofs, n), in the real form of a wave."""
         model, driven = self.model, self.model.force_driven
-        locks = [
-            bolt.locked(model.mesh.points.size, 0.0) for bolt in model.pretensions
-        ]  # sections keep their current length
+        locks = [bolt.locked(model.mesh.points.size, 0.0) for bolt in model.pretensions]  # at their current length
         relations = [*model.relations, *locks]
         K, M, near = driven.stiffness(self.K), driven.stiffness(self.M), driven.near_nullspace(near_nullspace(model))
         supported, massless = driven.supported(self.supported).ravel(), driven.without_stiffness

@@ -274,19 +274,16 @@ class _Newton:
         """Return the regularisations to try, in order."""
         floats, settled = self._problem.floating_bodies is not None, self._settled
         closed = settled is not None and settled.solution.active.any()
-        unmodified = [
-            Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + (floats and self._problem.solver.iterative)]
-        ]
+        iterative = self._problem.solver.iterative
+        unmodified = [Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + (floats and iterative)]]
         replaces = self._replaces or (settled is not None and settled.constraints.tangents != ())
         with_springs = [Regularisation(held=HELD, stiff=floats, replaces=replaces)] if closed else []
         if self._regularisation in with_springs:
             unmodified = []  # the unmodified tangent failed before
-        if self._regularisation.geometric < WHOLE:  # springs failed as well
-            return [
-                *unmodified,
-                *(Regularisation(part, stiff=floats) for part in range(self._regularisation.geometric + 1)[::-1]),
-            ]
-        return unmodified + with_springs + [Regularisation(part, stiff=floats) for part in range(WHOLE)[::-1]]
+        geometric = self._regularisation.geometric
+        tried = [] if geometric < WHOLE else with_springs  # otherwise springs failed as well
+        parts = range(min(geometric + 1, WHOLE))[::-1]
+        return [*unmodified, *tried, *(Regularisation(part, stiff=floats) for part in parts)]
 
     def _linearised_contact(
         self, u: Array, changes: list[float], regularisation: Regularisation
@@ -338,7 +335,7 @@ class _Newton:
         return FORCING * ratio if ratio**2 > self._tolerance else None
 
     def _contact(
-        self, problem: Problem, load: StepLoad, loaded: Loaded, u: Array, extrapolation: Extrapolation
+        self, problem: Problem, load: StepLoad, loaded: Loaded, u: Array, start: Extrapolation
     ) -> tuple[Array, Array]:
         """Return displacements and contact forces of a problem whose terms are linear, and store the contact."""
         settled = None
@@ -348,9 +345,7 @@ class _Newton:
             dofs = problem.dofs.for_step(u0, lift)
             reduced = loaded.condensed() if dofs.condensed else loaded
             assert reduced is not None  # a solver that condenses has chosen these degrees of freedom
-            step = replace(
-                self._begin, problem=problem, load=load, loaded=reduced, dofs=dofs, extrapolation=extrapolation
-            )
+            step = replace(self._begin, problem=problem, load=load, loaded=reduced, dofs=dofs, extrapolation=start)
             paired = self._settled if self._moved_fully and problem.linearised_at is None else None
             settled = settle_geometry(step, self._iterate, paired)
             self._iterate = settled.iterate

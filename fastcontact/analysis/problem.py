@@ -305,9 +305,8 @@ def prepare(
     pairs = {pair.name: model.bind(pair, held) for pair in model.contact}
     for name, pair in pairs.items():
         tabulated = isinstance(pair.options.penalty, OverclosureLaw)
-        if criteria.keep_pairing and (
-            tabulated or pair.options.cohesion is not None or pair.options.source is not None
-        ):
+        options = pair.options
+        if criteria.keep_pairing and (tabulated or options.cohesion is not None or options.source is not None):
             raise ContactError(
                 f"contact '{name}' has a table of penalties, a cohesive layer, adhesion, or a fluid, which require updates "
                 "of the geometry: omit keep_pairing"
@@ -381,10 +380,8 @@ def linearised(
         values = np.linalg.eigvalsh(modes.T @ (contact @ modes))
         floating = None if values[0] > SINGLE_PRECISION * values[-1] else floating
     dofs = _prepared_dofs(model, solver, system, floating, problem.contact_dofs, displacement)
-    linearised_at = u if finite else None
-    return replace(
-        problem, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=linearised_at
-    )
+    about = u if finite else None
+    return replace(problem, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=about)
 
 
 def _floating_motions(model: Model, supported: Mask, displacement: Array | float = 0.0) -> FreeMotions:

@@ -21,7 +21,7 @@ from fastcontact.analysis.locking import ALTERNATING, locking_warning, nonlinear
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import too_fast
-from fastcontact.arrays import Array, Mask
+from fastcontact.arrays import Array, Mask, largest
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import recovery
@@ -82,11 +82,8 @@ def result_warnings(
             continue
         without_force = [] if name in clearances else _without_force(problem, name, last, name in state.touched, loaded)
         configuration = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
-        warnings += [
-            *_deep_penetration(pair, contact, state.u),
-            *without_force,
-            *_undetermined_tractions(pair, contact, pair.undetermined(configuration)),
-        ]
+        undetermined = _undetermined_tractions(pair, contact, pair.undetermined(configuration))
+        warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
         warnings += [sag[name]] if name in sag else _unresolved(name, pair, contact, state)
         warnings += [*wavering(pair, contact), *_peak_at_edge(pair, last, contact), *_too_fast(name, pair, state)]
     return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state), *_slipping_before(state)]
@@ -326,9 +323,7 @@ def _without_force(problem: Problem, name: str, last: StepResult, touched: bool,
     search_distance, facing = pair.options.search_distance, contact.gap[np.isfinite(contact.gap)]
     smallest = float(facing.min(initial=np.inf))
     gap = f"the smallest gap is {smallest:.4g}" if len(facing) else "no node faces the other side"
-    if (
-        contact.active.any() or contact.damage is not None or contact.fluid_pressure is not None
-    ):  # visible in these results
+    if contact.active.any() or contact.damage is not None or contact.fluid_pressure is not None:  # visible in results
         return
     if search_distance is not None and smallest < -search_distance:
         yield (
@@ -354,20 +349,16 @@ def _without_force(problem: Problem, name: str, last: StepResult, touched: bool,
 
 
 def _depth_of_primary(model: Model, pair: Formulation, last: StepResult) -> float:
-    """Return the largest depth of primary nodes inside bodies of the secondary side; zero against obstacles [length]."""
-    of_secondary, deepest = bodies(model.mesh)[1][pair.secondary.points], 0.0
-    for _, body, points, depth in depths(model.mesh, model.kinematics, model.mesh.points + last.displacement):
-        if body in of_secondary and isinstance(pair.primary, Surface):
-            deepest = max(deepest, float(depth[np.isin(points, pair.primary.points)].max(initial=0.0)))
-    return deepest
+    """Return the largest depth of primary nodes inside bodies of the secondary side [length]."""
+    primary, of_secondary = pair.primary.points, bodies(model.mesh)[1][pair.secondary.points]
+    overlaps = depths(model.mesh, model.kinematics, model.mesh.points + last.displacement)
+    deepest = (largest(depth[np.isin(points, primary)]) for _, body, points, depth in overlaps if body in of_secondary)
+    return max(deepest, default=0.0)
 
 
 def _unresolved(name: str, pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:
     """Yield a warning where too few elements lie across the radius of a contact that carries a force."""
-    if (
-        pair.options.always_closed
-        or np.abs(contact.force_vectors).max(initial=0.0) <= SINGLE_PRECISION * state.largest_force
-    ):
+    if pair.options.always_closed or largest(contact.force_vectors) <= SINGLE_PRECISION * state.largest_force:
         return
     count = across(pair.secondary, contact.active, pair.options.excluded_nodes(pair.secondary))
     if count is not None and count < ACROSS:
@@ -509,10 +500,8 @@ def _works_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]
                     tensor[..., i, j] = tensor[..., j, i] = stress[..., column]
             strain_work = (tensor * slope).sum(axis=(2, 3))
             if axisymmetric:
-                radius, radial_displacement = (
-                    values[cells][..., 0] @ N.T for values in (mesh.points, last.displacement)
-                )
-                volume, strain_work = volume * radius, strain_work + stress[..., 2] * radial_displacement / radius
+                radius, radial_u = (values[cells][..., 0] @ N.T for values in (mesh.points, last.displacement))
+                volume, strain_work = volume * radius, strain_work + stress[..., 2] * radial_u / radius
             rotation = 0.5 * (slope - slope.transpose(0, 1, 3, 2))
             neglected_work = 0.5 * (tensor * (rotation.transpose(0, 1, 3, 2) @ rotation)).sum(axis=(2, 3))
             np.add.at(neglected, body[cells[:, 0]], (neglected_work * volume).sum(axis=1))

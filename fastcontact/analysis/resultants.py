@@ -188,11 +188,9 @@ def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: 
     normal = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
     normal_forces = np.einsum("nd,nd->n", contact.force_vectors, normal)
     total, area = float(normal_forces.sum()), float(areas[closed].sum())
-    in_compression = bool(total > 0.0)
+    in_compression, x = bool(total > 0.0), contact.coordinates
     moment = contact_moment(contact)
-    centre = (
-        normal_forces @ contact.coordinates / total if in_compression else np.full(contact.coordinates.shape[1], np.nan)
-    )
+    centre = normal_forces @ x / total if in_compression else np.full(x.shape[1], np.nan)
     if axisymmetric:
         centre[0] = np.nan
     return ContactResultants(
@@ -347,9 +345,7 @@ def _result_of_pair(pair: Formulation, step: StepResult, name: str) -> ContactRe
         or len(step.displacement) != len(pair.points)
         or len(contact.points) != len(pair.secondary.points)
     ):
-        raise ContactError(
-            f"load step {step.index} is of another model: it has no such contact pair '{name}' on this mesh"
-        )
+        raise ContactError(f"load step {step.index} is of another model: it has no contact pair '{name}' on this mesh")
     return contact
 
 

@@ -91,11 +91,9 @@ class SharedNodes:
         merged["softness"] = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
         if constraints.tangential_softness.any():
             stiffness = np.where(self.tangential_fraction > 0.0, _stiffness(constraints.tangential_softness), 0.0)
-            total = self.summed(stiffness)
+            total, finite = self.summed(stiffness), np.isfinite(stiffness)
             merged["tangential_softness"] = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
-            weight = np.divide(
-                stiffness, total[self.representative], out=np.ones_like(total), where=np.isfinite(stiffness)
-            )
+            weight = np.divide(stiffness, total[self.representative], out=np.ones_like(total), where=finite)
             merged["elastic_slip"] = self._mean(constraints.elastic_slip.T, weight).T
         return replace(constraints, **merged).without(self.idle)  # type: ignore[arg-type]
 
@@ -120,9 +118,8 @@ class SharedNodes:
 
     def merged_gaps(self, gaps: Array) -> Array:
         """Return the mean gaps and slips (1 + k, m) of representatives, given those of all constraints [length]."""
-        return np.vstack(
-            [self._summation(self.normal_fraction) @ gaps[0], self._mean(gaps[1:].T, self.tangential_fraction).T]
-        )
+        slips = self._mean(gaps[1:].T, self.tangential_fraction).T
+        return np.vstack([self._summation(self.normal_fraction) @ gaps[0], slips])
 
     def gathered(
         self, constraints: Constraints, gap: Array, normal: Array, traction: Array, closing: Array
@@ -222,9 +219,8 @@ def _fractions(constraints: StackedConstraints, representative: Indices) -> tupl
     weight = np.where(is_shared, _areas(constraints), 1.0)
     exact = constraints.softness == 0.0
     has_exact = np.bincount(representative, exact, minlength=m)[representative] > 0
-    weight = np.where(
-        is_shared & ~has_exact, _stiffness(constraints.softness), np.where(exact | ~is_shared, weight, 0.0)
-    )
+    by_area = np.where(exact | ~is_shared, weight, 0.0)
+    weight = np.where(is_shared & ~has_exact, _stiffness(constraints.softness), by_area)
     fraction = weight / np.bincount(representative, weight, minlength=m)[representative]
     if not constraints.tangents:
         return fraction, fraction
@@ -262,9 +258,8 @@ def _dependent(constraints: StackedConstraints) -> tuple[Indices, Indices, Indic
     dependent = difference <= LENGTH_ROUND_OFF
     dependent &= ~(constraints.equality[first] | constraints.equality[second])
     first, second = first[dependent], second[dependent]
-    equal_gap = (
-        constraints.gap0[second] - constraints.gap0[first] <= LENGTH_ROUND_OFF * np.abs(constraints.positions).max()
-    )
+    difference = constraints.gap0[second] - constraints.gap0[first]
+    equal_gap = difference <= LENGTH_ROUND_OFF * np.abs(constraints.positions).max()
     behind = np.setdiff1d(second[~equal_gap & (constraints.softness[first] == 0.0)], [])
     first, second = first[equal_gap], second[equal_gap]
     free = ~(np.isin(first, behind) | np.isin(second, behind))

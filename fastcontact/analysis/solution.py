@@ -201,7 +201,5 @@ class Solution:
         """
         if self.tangential.shape != (m, len(directions)):
             return None
-        vectors = sum(
-            component[:, None] * tangent for component, tangent in zip(self.tangential.T, self.directions, strict=True)
-        )
+        vectors = sum(t[:, None] * along for t, along in zip(self.tangential.T, self.directions, strict=True))
         return np.vstack([self.multiplier, *((vectors * tangent).sum(axis=1) for tangent in directions)])

@@ -57,9 +57,8 @@ def next_stage(
     if _names(stage) == _names(problem.model):
         return problem, state
     problem = prepare(stage)
-    return problem, replace(
-        state, solver=problem.solver.snapshot(), extrapolation=Extrapolation(), rigid=None, locked=values
-    )
+    solver = problem.solver.snapshot()
+    return problem, replace(state, solver=solver, extrapolation=Extrapolation(), rigid=None, locked=values)
 
 
 def _names(model: Model) -> list[str]:
@@ -93,9 +92,8 @@ def _stage(
         For each part, by its name, the value at the instant at which it became active; see `State.locked`.
     """
     lengths = locked_lengths(model.pretensions, begin, displacement, stored)
-    locks = [
-        item.locked(model.mesh.points.size, lengths[item.label]) for item in model.pretensions if item.label in lengths
-    ]
+    n = model.mesh.points.size
+    locks = [item.locked(n, lengths[item.label]) for item in model.pretensions if item.label in lengths]
     values: dict[str, float | Array] = {**lengths}
     relations: list[MultiPointConstraint] = []
     for item in model.relations:

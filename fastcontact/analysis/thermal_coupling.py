@@ -171,9 +171,7 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
             friction_power += link.shared(pair.options.friction_heat * work / (instant - start.instant))
     steady = heat.temperatures(instant, displacement, matrix, friction_power, (obstacles, obstacle_power))
-    powers = {
-        name: h * link.area * (link.jump @ steady.rise - rise) for name, (link, _, h, rise, _) in crossings.items()
-    }
+    powers = {name: h * link.area * (link.jump @ steady.rise - r) for name, (link, _, h, r, _) in crossings.items()}
     fluxes = {name: crossings[name][1].over_whole_side(power) / crossings[name][4] for name, power in powers.items()}
     balance = {**steady.balance, "contacts": {name: float(power.sum()) for name, power in powers.items()}}
     return Heated(steady.rise, steady.reaction, balance, fluxes)

@@ -76,11 +76,9 @@ class Touching:
         """
         self._settled = self._allowed < 1.0 and solution.settled and excess <= self._near * size
         self._active, self._size = solution.active, size
-        self.due = self._settled and (
-            _slides(step, constraints, solution, self._allowed)
-            if self._paired is None
-            else self._outdated(step, constraints, u)
-        )
+        self.due = self._outdated(step, constraints, u)
+        if self._paired is None:
+            self.due = self._settled and _slides(step, constraints, solution, self._allowed)
 
     def _outdated(self, step: StepContext, constraints: StackedConstraints, u: Array) -> bool:
         """Return whether the geometry has changed since the increments were solved, and changes less than at the last time.
@@ -149,9 +147,8 @@ def _allowed(problem: Problem) -> float:
         return 1.0
     if criteria.friction_while_touching is not None:
         return criteria.friction_while_touching
-    whole_steps = (
-        problem.model.mesh.dim == 3 or criteria.geometry_updates is not None or problem.floating_bodies is not None
-    )
+    floats = problem.floating_bodies is not None
+    whole_steps = problem.model.mesh.dim == 3 or criteria.geometry_updates is not None or floats
     pairs = [pair for pair in problem.pairs.values() if pair.friction and isinstance(pair.primary, Surface)]
     return NEGLIGIBLE if not whole_steps and all(pair.weighs_gaps for pair in pairs) else 1.0
 
@@ -197,8 +194,6 @@ def _gaps(step: StepContext, constraints: StackedConstraints, iterate: Iterate) 
     for name, part in initial.parts.items():
         current = constraints.parts[name]
         initial_part = part if np.array_equal(part.positions, current.positions) else current
-        determined = np.isfinite(initial_part.gap0) & initial_part.usable
-        gaps.append(
-            np.where(determined, initial_part.gap0 + initial_part.B @ state.u, current.gap0 + current.B @ state.u)
-        )
+        determined, u = np.isfinite(initial_part.gap0) & initial_part.usable, state.u
+        gaps.append(np.where(determined, initial_part.gap0 + initial_part.B @ u, current.gap0 + current.B @ u))
     return np.maximum(np.concatenate(gaps), 0.0)

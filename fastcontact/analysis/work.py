@@ -194,9 +194,7 @@ def contact_work(
     areas = constraints.finite_areas
     pressure, traction = before.at(constraints.positions)
     ratio = np.divide(pressure * areas, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
-    work_at_end, work_at_begin = (
-        -0.5 * np.einsum("md,md->m", vectors, slips) for vectors in (force, areas[:, None] * traction)
-    )
+    work_at_end, work_at_begin = (-0.5 * np.einsum("md,md->m", f, slips) for f in (force, areas[:, None] * traction))
     work = np.where(normal != 0.0, (1.0 + ratio) * work_at_end, np.maximum(work_at_begin, 0.0))
     closing = pressure == 0.0
     if work_at_end[closing].any():

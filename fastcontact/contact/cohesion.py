@@ -92,11 +92,8 @@ class CohesiveLaw:
 def cohesive_law(strength: float, energy: float, *, reversible: bool = False, **options: Any) -> CohesiveLaw:
     """Return a law; by default, sliding has the limits of opening, and damage begins at ELASTIC of the opening at break."""
     stiffness = options.pop("stiffness", strength**2 / (2.0 * ELASTIC * energy))
-    shear = {
-        "shear_strength": options.pop("shear_strength", strength),
-        "shear_energy": options.pop("shear_energy", energy),
-    }
-    return CohesiveLaw(strength, energy, stiffness, **shear, **options, reversible=reversible)
+    options = {"shear_strength": strength, "shear_energy": energy, **options}
+    return CohesiveLaw(strength, energy, stiffness, **options, reversible=reversible)
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,12 +59,8 @@ class Conductance:
             table = np.array([[float(value) for value in row] for row in rows]).reshape(-1, 2)
         except (TypeError, ValueError):
             raise self._no_table() from None
-        if (
-            not len(table)
-            or not np.isfinite(table).all()
-            or not (np.diff(table[:, 0]) > 0.0).all()
-            or table.min() < 0.0
-        ):
+        ascending = (np.diff(table[:, 0]) > 0.0).all()
+        if not (len(table) and np.isfinite(table).all() and ascending and table.min() >= 0.0):
             raise self._no_table()
         return table
 

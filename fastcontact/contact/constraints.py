@@ -257,11 +257,8 @@ class Constraints:
 
     def __post_init__(self) -> None:
         k, m = len(self.tangents), len(self.gap0)
-        shapes: dict[str, tuple[int, ...]] = {
-            "slip0": (k, m),
-            "elastic_slip": (k, m),
-            "low_rank_compliance": (1 + k, m, 0),
-        }
+        shapes: dict[str, tuple[int, ...]] = {"low_rank_compliance": (1 + k, m, 0)}
+        shapes |= dict.fromkeys(("slip0", "elastic_slip"), (k, m))
         shapes |= dict.fromkeys(("friction", "equality", "softness", "tangential_softness"), (m,))
         for name, shape in shapes.items():
             if not (values := getattr(self, name)).size:
@@ -485,9 +482,8 @@ class _BlockDiagonal:
         blocks = []
         for inner, first, end in zip(self._compliances, self._start[:-1], self._start[1:], strict=True):
             in_block = rows[(rows >= first) & (rows < end)] - first
-            compliance = (
-                FieldCompliance.none(len(in_block)) if inner is None or not len(in_block) else inner.among(in_block)
-            )
+            n = len(in_block)
+            compliance = FieldCompliance.none(n) if inner is None or not n else inner.among(in_block)
             if not isinstance(compliance, FieldCompliance):
                 return self.block(rows)
             blocks.append(compliance)

@@ -181,15 +181,12 @@ def _faced_by(
     (low, high), size = outside.boxes, outside.size
     of_body = outside.body == body
     reach = float(size.max()) if distance is None else distance
-    others = ~of_body & ((high >= low[of_body].min(axis=0) - reach) & (low <= high[of_body].max(axis=0) + reach)).all(
-        axis=1
-    )
+    begin, end = low[of_body].min(axis=0) - reach, high[of_body].max(axis=0) + reach
+    others = ~of_body & ((high >= begin) & (low <= end)).all(axis=1)
     candidates = np.flatnonzero((of_body & among)[facet_of_point])
     if others.any():
-        at = point[candidates]
-        candidates = candidates[
-            ((at >= low[others].min(axis=0) - reach) & (at <= high[others].max(axis=0) + reach)).all(axis=1)
-        ]
+        at, begin, end = point[candidates], low[others].min(axis=0) - reach, high[others].max(axis=0) + reach
+        candidates = candidates[((at >= begin) & (at <= end)).all(axis=1)]
     if not others.any() or not len(candidates):
         return np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0)
     kinds = [block[others[first : first + len(block)]] for block, first in zip(outside.blocks.values(), outside.first)]

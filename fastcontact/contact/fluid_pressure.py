@@ -133,11 +133,7 @@ def wetted(constraints: Constraints, at: Configuration, areas: AreaVectors, sour
         constraints,
         B=B,
         gap0=np.where(rows, -distance_to_zero - B @ at.displacement.ravel(), constraints.gap0),
-        softness=np.where(
-            rows,
-            distance_to_zero / (at.fluid_pressure * constraints.areas),
-            constraints.softness,
-        ),
+        softness=np.where(rows, distance_to_zero / (at.fluid_pressure * constraints.areas), constraints.softness),
         equality=constraints.equality | rows,
         friction=np.where(rows, 0.0, constraints.friction),
         wetted=Wetted(rows, np.where(nodes, at.fluid_pressure, 0.0), csr_array(weights.T @ at_nodes), areas),

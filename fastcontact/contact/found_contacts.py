@@ -118,9 +118,7 @@ class FoundContacts(Sequence[FoundContact]):
         def shown(value: float) -> Any:
             return value if numbers is None else numbers.format(value)
 
-        return [
-            (p.name, *p.bodies, *p.facets, *map(shown, p.spacing), *map(shown, p.gap), p.reason) for p in self.pairs
-        ]
+        return [(p.name, *p.bodies, *p.facets, *map(shown, (*p.spacing, *p.gap)), p.reason) for p in self.pairs]
 
 
 @typed(ContactError)
@@ -204,9 +202,7 @@ def nothing_found(mesh: Mesh, distance: float | None, angle: float, groups: Sequ
     size = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
     distant = find_contacts(mesh, distance=size, angle=angle, groups=groups)
     if not distant.pairs:
-        return (
-            f"no surfaces of different bodies face each other within {angle:g} degrees: name both sides of each contact"
-        )
+        return f"no surfaces of different bodies face each other within {angle:g} degrees: name the sides of contacts"
     nearest = min((pair.gap for pair in distant), key=lambda gap: abs(gap[0]))[0]
     within = "the size of their facets" if distance is None else f"{distance:.4g}"
     return (

@@ -68,9 +68,8 @@ class NodalNormals:
             normal, angle = facet_normals(block, coordinates), facet_angles(element, corners)
             dual_axes = np.linalg.solve(np.einsum("fqad,fqbd->fqab", axes, axes), axes)
             np.add.at(total, block.local, angle[:, :, None] * normal)
-            self._blocks.append(
-                (block, slope, normal, angle[:, :, None, None] * dual_axes, _angle_gradient(element, corners))
-            )
+            dual_axes *= angle[:, :, None, None]
+            self._blocks.append((block, slope, normal, dual_axes, _angle_gradient(element, corners)))
         side.add_across_ends(total)
         self._length = np.linalg.norm(total, axis=1, keepdims=True)
         self.normal = total / self._length
@@ -292,10 +291,9 @@ class _SurfacePoints:
         """Return the derivatives (n, dim - 1, dim) of facet normals along facets, and store the dual axes of the facets."""
         self._dual_axes = np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes)
         # Shape functions are at most quadratic along each axis, so that central differences of gradients are exact.
-        ends = [(xi + step, xi - step) for step in 0.5 * np.eye(xi.shape[1])]
-        second = np.stack(
-            [places(primary, facet, a).gradient - places(primary, facet, b).gradient for a, b in ends], axis=3
-        )
+        steps = 0.5 * np.eye(xi.shape[1])
+        above, below = ([places(primary, facet, xi + sign * h).gradient for h in steps] for sign in (1.0, -1.0))
+        second = np.stack(above, axis=3) - np.stack(below, axis=3)
         curvature = np.einsum("nkij,nkd,nd->nij", second, coordinates[at.nodes], self.normal)
         return -np.einsum("njd,nij->nid", self._dual_axes, curvature)
 
@@ -511,9 +509,8 @@ class Slips:
         if self.closing is not None:
             change += self.closing.along(du, (normal, turned), primary, by_sliding(self.start))
         leaning = np.einsum("nd,nd->n", normal, self.total)
-        return np.einsum("knd,nd->kn", self.tangents, change) - np.einsum(
-            "knd,nd,n->kn", self.tangents, turned, leaning
-        )
+        T = self.tangents
+        return np.einsum("knd,nd->kn", T, change) - np.einsum("knd,nd,n->kn", T, turned, leaning)
 
 
 def _weighted(weights: csr_array | None, values: Array) -> Array:

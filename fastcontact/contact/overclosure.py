@@ -60,10 +60,8 @@ class TabularLaw(OverclosureLaw):
 
     def energy(self, pressure: Array) -> Array:
         """See `OverclosureLaw.energy`."""
-        p = np.maximum(pressure, 0.0)
-        energies = np.concatenate(
-            [[0.0], np.cumsum(0.5 * (self.table[1:, 1] + self.table[:-1, 1]) * np.diff(self.table[:, 0]))]
-        )
+        p, (overclosures, pressures) = np.maximum(pressure, 0.0), self.table.T
+        energies = np.append(0.0, np.cumsum(0.5 * (pressures[1:] + pressures[:-1]) * np.diff(overclosures)))
         interval = np.clip(np.searchsorted(self.table[:, 1], p, side="right") - 1, 0, len(self._slopes) - 1)
         start = self.table[interval, 1]
         return np.asarray(energies[interval] + 0.5 * (p**2 - start**2) / self._slopes[interval])

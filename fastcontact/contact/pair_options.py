@@ -100,9 +100,8 @@ class PairOptions:
 
     def out(self, candidates: Candidates) -> Mask:
         """Return the candidates (n,) whose node with the largest weight is excluded from contact."""
-        return (
-            np.zeros(len(candidates.nodes), bool) if self.excluded is None else candidates.belonging_to(self.excluded)
-        )
+        n = len(candidates.nodes)
+        return np.zeros(n, bool) if self.excluded is None else candidates.belonging_to(self.excluded)
 
     def borders(self, side: Surface) -> tuple[Indices, Array]:
         """Return the boundaries of the excluded part of a line, as facets (n,) and reference coordinates xi (n,)."""
@@ -142,10 +141,8 @@ class PairOptions:
         rubbing : tuple of k ndarray (n, dim)
             The same tangents, set to zero in the direction without friction.
         """
-        along, is_frictionless = (
-            self.frictionless_along,
-            np.full(len(candidates.nodes), self.frictionless_along is not None),
-        )
+        along = self.frictionless_along
+        is_frictionless = np.full(len(candidates.nodes), along is not None)
         if self.frictionless is not None:
             is_frictionless = candidates.belonging_to(self.frictionless)
         if along is None:

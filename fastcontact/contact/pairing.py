@@ -356,9 +356,8 @@ def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(normal, first)
     if held is not None:
-        ff, fs, ss = (
-            np.einsum("nd,nde,ne->n", a, held, b) for a, b in ((first, first), (first, second), (second, second))
-        )
+        pairs = (first, first), (first, second), (second, second)
+        ff, fs, ss = (np.einsum("nd,nde,ne->n", a, held, b) for a, b in pairs)
         angle = 0.5 * np.arctan2(2 * fs, ff - ss)[:, None]
         first = np.cos(angle) * first + np.sin(angle) * second
         second = np.cross(normal, first)

@@ -105,9 +105,8 @@ def at_common_edges(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, 
     local = [block.local for block in side.blocks]
     ends = np.concatenate([[0], np.cumsum(np.concatenate([np.full(len(nodes), nodes.shape[1]) for nodes in local]))])
     nodes = np.concatenate([nodes.ravel() for nodes in local])
-    common = coo_array(
-        around @ csr_array((np.ones(len(nodes)), nodes, ends), shape=(len(ends) - 1, len(side.points))).T
-    )
+    of_facets = csr_array((np.ones(len(nodes)), nodes, ends), shape=(len(ends) - 1, len(side.points)))
+    common = coo_array(around @ of_facets.T)
     contains_all = common.data == np.diff(around.indptr)[common.row]
     point, common_facet = common.row[contains_all].astype(np.intp), common.col[contains_all].astype(np.intp)
     coordinates, first = np.empty((len(point), xi.shape[1])), 0
@@ -176,10 +175,9 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
         similar = normal[entries] @ normal[entries].T > np.cos(np.radians(CORNER))
         total = (similar * weight[entries]) @ normal[entries]
         joined[entries] = total / np.linalg.norm(total, axis=1, keepdims=True)
-    ends = np.cumsum([normals.shape[0] * normals.shape[1] for normals in facet_normals_of_blocks])[:-1]
-    return [
-        means.reshape(like.shape) for means, like in zip(np.split(joined, ends), facet_normals_of_blocks, strict=True)
-    ]
+    blocks = facet_normals_of_blocks
+    ends = np.cumsum([normals.shape[0] * normals.shape[1] for normals in blocks])[:-1]
+    return [means.reshape(like.shape) for means, like in zip(np.split(joined, ends), blocks, strict=True)]
 
 
 def at_nodes_of_facets(of_blocks: Sequence[Array]) -> Array:
@@ -214,9 +212,7 @@ def facet_angles(element: elements.Element, nodes: Array) -> Array:
     angle, n = np.empty(nodes.shape[:2]), element.n_corners
     around = np.arange(n)
     others = np.column_stack([(around + 1) % n, (around - 1) % n])
-    shared(
-        lambda portion: projection_kernels.angles(nodes, others, *portion, angle), portions(len(nodes), nodes.shape[1])
-    )
+    shared(lambda span: projection_kernels.angles(nodes, others, *span, angle), portions(len(nodes), nodes.shape[1]))
     return angle
 
 

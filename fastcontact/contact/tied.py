@@ -69,12 +69,11 @@ class TiedPair:
     def constraints(self) -> Constraints:
         """Return the equations."""
         B = csr_array(vstack(self.rows, format="csr"))
+        n = B.shape[0]
         positions = np.tile(self.positions, (len(self.rows), 1))
-        always = np.ones(B.shape[0], bool)
         nodes = None if self.nodes is None else np.tile(self.nodes, len(self.rows))
-        return Constraints(
-            B, np.zeros(B.shape[0]), positions, equality=always, nodes=nodes, nodal=self.nodal, tied=self
-        )
+        always = np.ones(n, bool)
+        return Constraints(B, np.zeros(n), positions, equality=always, nodes=nodes, nodal=self.nodal, tied=self)
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
         """Return normal (m,) and tangential (m, k) forces at the constraint points of the formulation."""

@@ -166,9 +166,8 @@ class Orthotropic(Material):
 
     def admissible(self, constants: Any) -> Any:
         """Return for each set of constants (n,) whether the strain energy is positive definite."""
-        E, nu, G = (
-            np.broadcast_arrays(*map(np.atleast_1d, values)) for values in (constants.E, constants.nu, constants.G)
-        )
+        given = constants.E, constants.nu, constants.G
+        E, nu, G = (np.broadcast_arrays(*map(np.atleast_1d, values)) for values in given)
         in_range = np.all([(v >= 1.0 / LARGEST) & (v <= LARGEST) for v in np.broadcast_arrays(*E, *G)], axis=0)
         with np.errstate(all="ignore"):  # inadmissible moduli are detected above
             nu21, nu31, nu32 = nu[0] * E[1] / E[0], nu[1] * E[2] / E[0], nu[2] * E[2] / E[1]

@@ -92,10 +92,9 @@ class CellStress:
                 self._fill_varying((name, xi, N, dN), nodes, numbers, moduli, stress)
             if split is not None:
                 shared = of_cells(numbers), self._axisymmetric, self._displacement
-                polynomials, basis = dilatation.basis(name, element.quadrature[0]), dilatation.basis(name, xi)
-                dilatation_kernels.add_pressure(
-                    points, nodes, *element.tables, polynomials, split.bulk, *shared, basis, stress
-                )
+                bases = dilatation.basis(name, element.quadrature[0]), dilatation.basis(name, xi)
+                element_tables = *element.tables, bases[0], split.bulk
+                dilatation_kernels.add_pressure(points, nodes, *element_tables, *shared, bases[1], stress)
             if self._averaged is not None:
                 self._add_modes((name, xi, dN), nodes, numbers, stress, rows[portion])
 
@@ -117,10 +116,8 @@ class CellStress:
         if xi is elements.get(name).quadrature[0]:
             at_point = np.empty((len(cells), 1, out.shape[2]))
             for q in range(len(xi)):
-                moduli_at_point = np.ascontiguousarray(material[:, q])
-                loops.stress(
-                    self._mesh.points, cells, N[q : q + 1], dN[q : q + 1], moduli, moduli_at_point, *shared, at_point
-                )
+                tables, of_moduli = (N[q : q + 1], dN[q : q + 1]), np.ascontiguousarray(material[:, q])
+                loops.stress(self._mesh.points, cells, *tables, moduli, of_moduli, *shared, at_point)
                 out[:, q] = at_point[:, 0]
             return
         unit_moduli, row_of_moduli = np.eye(self._moduli.shape[1])[None], np.zeros(len(cells), np.int32)

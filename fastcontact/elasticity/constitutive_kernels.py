@@ -394,10 +394,10 @@ def _add_isochoric(value, first, number, power, scale, J, G, slope, bend, everyw
 def first_invariant(constants, F, J, G, volumetric, everywhere, P, A):
     """Fill P, and A as factors, by a polynomial law of the isochoric first invariant and `volumetric` terms, see `respond`.
 
-    The energy is C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 (Yeoh, 1993). Except for second derivatives, A is a sum of
-    products of the rows of A from LEFT on and those from RIGHT on, which are G, F and, if there is another invariant, the
-    derivative of half of it. Returns the energy density, the factors of the second derivatives of I1 / 2 (the identity) and
-    J, I1 and ``J**(-2/3)``.
+    The energy is C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 (Yeoh, 1993); see `respond` for the other terms. Except
+    for second derivatives, the tangent is a sum of dyadic products of the row LEFT + k of A and its row RIGHT + k. The rows
+    from RIGHT on are G, F and, if there is another invariant, the derivative of half of it. Returns the energy density, the
+    factors of the second derivatives of I1 / 2 (the identity) and J, I1 and ``J**(-2/3)``.
     """
     C10, C20, C30 = constants[3], constants[5], constants[6]
     pressure, bulk, d2J_factor = volumetric

@@ -134,9 +134,7 @@ class Centrifugal(InertiaLoad):
         if kinematics == "axisymmetric" and (direction[[0, 2]].any() or origin[[0, 2]].any()):
             raise ModelError(f"the axis of {self.name} must be the axis of symmetry: its direction is (0, 1, 0)")
         if mesh.dim == 2 and direction[2] and direction[:2].any():
-            raise ModelError(
-                f"the axis of {self.name} is oblique to the plane: it must lie in the plane or be normal to it"
-            )
+            raise ModelError(f"the axis of {self.name} must lie in the plane or be normal to it")
         if mesh.dim == 2 and origin[2]:
             raise ModelError(f"the axis of {self.name} has the origin z = {origin[2]:g} outside the plane of the mesh")
 

@@ -261,9 +261,8 @@ def solid_rows(mesh: Mesh, groups: Sequence[str] | None) -> dict[str, Indices]:
 
 def solid_points(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
     """Return the points (n,) of int of the solid cells of groups, or of all solid cells, in ascending order."""
-    return np.unique(
-        np.concatenate([mesh.cells[name][rows].ravel() for name, rows in solid_rows(mesh, groups).items()])
-    )
+    rows = solid_rows(mesh, groups)
+    return np.unique(np.concatenate([mesh.cells[name][rows[name]].ravel() for name in rows]))
 
 
 def check_solids(mesh: Mesh, groups: Sequence[str] | None, otherwise: str) -> None:

@@ -54,9 +54,7 @@ class CylindricalAxes:
             check_type(f"{name} of CylindricalAxes", getattr(self, name), Any, ModelError)
             vector = _vectors(getattr(self, name), f"the {name} of cylindrical axes")
             if vector.shape != (3,):
-                raise ModelError(
-                    f"the {name} of cylindrical axes must have three components, not {getattr(self, name)}"
-                )
+                raise ModelError(f"the {name} of cylindrical axes needs three components, not {getattr(self, name)}")
             object.__setattr__(self, name, tuple(vector.tolist()))
         if not any(self.direction):
             raise ModelError("the direction of cylindrical axes has no length")

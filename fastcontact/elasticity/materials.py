@@ -71,10 +71,8 @@ class Material:
     def contact_modulus(self) -> float:
         """Smallest plane-strain modulus along the axes, a measure of the contact stiffness [pressure]."""
         D = np.moveaxis(np.linalg.inv(self._all_compliances()), 0, -1)
-        plane_strain = [
-            D[i, i] - D[i, j] * D[j, i] / D[j, j] for i, j in ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))
-        ]
-        return float(np.min(plane_strain))
+        pairs = (0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)
+        return float(np.min([D[i, i] - D[i, j] * D[j, i] / D[j, j] for i, j in pairs]))
 
     def _all_compliances(self) -> Array:
         """Return the compliances (n, 6, 6) [1 / pressure] in material axes, at all points of `Cells.samples` if they vary."""
@@ -135,10 +133,8 @@ class Material:
             return self
 
         def with_cells(name: str) -> Any:
-            label = f"the constant {name} of the material"
-            return mapped(
-                getattr(self, name), lambda v: type(v)(v.given, cells, label) if isinstance(v, Varying) else v
-            )
+            given, label = getattr(self, name), f"the constant {name} of the material"
+            return mapped(given, lambda v: type(v)(v.given, cells, label) if isinstance(v, Varying) else v)
 
         bound_material = copy.copy(self)
         for name in names:
@@ -282,9 +278,7 @@ class Material:
         """Return the material axes (n, 3, 3) [-] at `points` (n, dim) [length]; `constants` contains axes given by cell."""
         axes = constants.axes if constants and varying(self.axes) else self.axes
         if varying(axes):
-            raise ModelError(
-                "axes given by cell need `constants`: pass the result of `constants_at` of a model's material"
-            )
+            raise ModelError("axes given by cell need `constants`: pass `constants_at` of a model's material")
         return frames(axes, points, kinematics)
 
     def _compliance6(self, points: Array, kinematics: str, constants: Any) -> Array:

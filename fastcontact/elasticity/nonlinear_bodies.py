@@ -316,9 +316,7 @@ def check_law(law: Material, strain: str) -> None:
         raise ModelError("incompatible modes are available only for linear bodies: omit incompatible_modes")
     if strain == "finite" and not isinstance(law, NonlinearElastic) and law.averaged:
         example = "NeoHookean(E=..., nu=...)" if isinstance(law, LinearElastic) else "a hyperelastic law"
-        raise ModelError(
-            f"a nearly incompressible material ({law.described}) locks in elements of finite strains: use {example}"
-        )
+        raise ModelError(f"a nearly incompressible material ({law.described}) locks at finite strains: use {example}")
 
 
 def _at_points(numbers: Numbers, name: str) -> Numbers:

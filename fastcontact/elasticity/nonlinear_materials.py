@@ -121,9 +121,7 @@ class ElasticPlastic(NonlinearElastic):
         if not len(rows) or rows[0, 0] > 0.0:
             rows = np.vstack([[0.0, float(self.yield_stress)], rows])
         if not (np.isfinite(rows).all() and (np.diff(rows[:, 0]) > 0.0).all() and (rows[:, 1] > 0.0).all()):
-            raise ModelError(
-                "hardening must have ascending plastic strains that are not negative, and positive yield stresses"
-            )
+            raise ModelError("hardening needs ascending, non-negative plastic strains and positive yield stresses")
         if rows[0, 0] < 0.0 or not math.isclose(rows[0, 1], self.yield_stress):
             raise ModelError(
                 f"hardening begins with the yield stress {rows[0, 1]:g} at the plastic strain {rows[0, 0]:g}, where "
@@ -343,9 +341,7 @@ class Ogden(OwnConstants):
 
     def __post_init__(self) -> None:
         try:
-            terms = [
-                tuple(float(v) for v in np.atleast_1d(np.asarray(value, float))) for value in (self.mu, self.alpha)
-            ]
+            terms = [tuple(map(float, np.atleast_1d(np.asarray(value, float)))) for value in (self.mu, self.alpha)]
         except (TypeError, ValueError, OverflowError):
             raise ModelError("mu and alpha of Ogden must be numbers, or lists with a number for each term") from None
         if len(terms[0]) != len(terms[1]) or not terms[0]:

@@ -134,9 +134,7 @@ def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
     It is extrapolated by `Element.extrapolation` from `at_points` (n_cells, n_q, n_components) [pressure], like SIEF_ELNO of
     code_aster.
     """
-    return {
-        name: np.einsum("aq,cqi->cai", elements.get(name).extrapolation, values) for name, values in at_points.items()
-    }
+    return {name: np.einsum("aq,cqi->cai", elements.get(name).extrapolation, at_points[name]) for name in at_points}
 
 
 @typed(ModelError)

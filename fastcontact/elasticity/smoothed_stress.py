@@ -27,11 +27,7 @@ SIMPLEX_FRACTION = {3: 0.5, 4: 1.0 / math.sqrt(5.0)}
 
 
 def smoothed_stress(
-    mesh: Mesh,
-    kinematics: str,
-    field: MaterialField,
-    displacement: Array,
-    offset: StressOffset | None = None,
+    mesh: Mesh, kinematics: str, field: MaterialField, displacement: Array, offset: StressOffset | None = None
 ) -> dict[str, Array]:
     """Return the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each solid cell, by element type.
 

@@ -87,14 +87,11 @@ def joined(
     rows, values = [], []
     for first, second in np.transpose(ends).tolist():
         if first == second:
-            raise ModelError(
-                f"{name}: both ends are point {first}; without a second node a spring is attached to the ground"
-            )
+            raise ModelError(f"{name}: both ends are point {first}; a spring to the ground has no second node")
         axial = _line(name, points, first, second) if along and direction is None else direction
         directions, k = _directions(stiffness, along, axial, points.shape[1])
-        rows.append(
-            nodal_rows(np.tile([first, second], (len(k), 1)), np.stack([-directions, directions], axis=1), points.size)
-        )
+        ends_of_rows = np.tile([first, second], (len(k), 1))
+        rows.append(nodal_rows(ends_of_rows, np.stack([-directions, directions], axis=1), points.size))
         values.append(k)
     return Springs(name, csr_array(vstack(rows, format="csr")), np.concatenate(values), False)
 
@@ -118,9 +115,7 @@ def _directions(
     directions = [np.eye(dim)[axis] for axis in stiffness]
     values = list(stiffness.values())
     if direction is not None:
-        basis = np.vstack(
-            [direction, np.linalg.svd(direction[None])[2][1:]]
-        )  # the unit vector and vectors normal to it
+        basis = np.vstack([direction, np.linalg.svd(direction[None])[2][1:]])  # the unit vector and its normals
         kinds = ["axial", *["transverse"] * (dim - 1)]
         directions += [vector for vector, kind in zip(basis, kinds, strict=True) if kind in along]
         values += [along[kind] for kind in kinds if kind in along]

@@ -76,9 +76,8 @@ def sparsity(mesh: Mesh) -> Sparsity:
     blocks = mesh.solids
     nodes = np.concatenate([np.empty(0, np.int32), *(block.ravel() for block in blocks.values())])
     isolated = np.flatnonzero(np.bincount(nodes, minlength=mesh.n_points) == 0)
-    sizes = np.concatenate(
-        [[0], *(np.full(len(block), block.shape[1]) for block in blocks.values()), np.ones_like(isolated)]
-    )
+    of_blocks = (np.full(len(block), block.shape[1]) for block in blocks.values())
+    sizes = np.concatenate([[0], *of_blocks, np.ones_like(isolated)])
     # SciPy preserves the type of index arrays, so that the indices of all matrices are 32-bit integers like the nodes.
     nodes, first = np.concatenate([nodes, isolated.astype(np.int32)]), np.cumsum(sizes, dtype=np.int32)
     of_cells = csr_array((np.ones(len(nodes), bool), nodes, first), shape=(len(sizes) - 1, mesh.n_points))
@@ -150,9 +149,7 @@ def stiffness(
         bad = min((number for number in bad_cells if number >= 0), default=-1)
         if bad >= 0:
             where = mesh.points[block[bad]].mean(axis=0)
-            raise MeshError(
-                f"cell {bad} of {name} near {where} is degenerate or inverted: its Jacobian is not positive"
-            )
+            raise MeshError(f"cell {bad} of {name} near {where} is degenerate or inverted (Jacobian not positive)")
     size = mesh.n_points * mesh.dim
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
 

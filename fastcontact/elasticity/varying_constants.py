@@ -60,9 +60,7 @@ class Tabulated:
         for number in (number for row in rows for number in row):
             check_number(f"a number of the table along {self.along}", number)
         if not rows or any(b[0] <= a[0] for a, b in itertools.pairwise(rows)):
-            raise ModelError(
-                f"the coordinates of the table along {self.along} must ascend, and there must be at least one"
-            )
+            raise ModelError(f"the table along {self.along} must have ascending coordinates, at least one")
         object.__setattr__(self, "table", rows)
 
     def __call__(self, points: Array) -> Array:

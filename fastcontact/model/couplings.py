@@ -54,9 +54,7 @@ class Spread:
     def check(self, name: str, dim: int) -> None:
         """Raise ModelError, with the `name` of the load, if the weighting is not admissible."""
         if len(self.place) != dim:
-            raise ModelError(
-                f"{name}: the point {self.place} from which distances are measured must have {dim} coordinates"
-            )
+            raise ModelError(f"{name}: the point {self.place} from which distances are taken needs {dim} coordinates")
         for number in self.place:
             check_number(f"a coordinate of the point of {name}", number)
         check_known("weighting", self.weighting, WEIGHTINGS, ModelError, f"{name}: ")

@@ -85,9 +85,7 @@ def pair_options(
     the pair.
     """
     if against_obstacle and "clearance_primary" in options:
-        raise ContactError(
-            f"a rigid obstacle has no nodes to measure from: give contact '{name}' the option 'clearance'"
-        )
+        raise ContactError(f"a rigid obstacle has no nodes to measure from: give contact '{name}' a 'clearance'")
     _check_obstacle_temperature(name, options, against_obstacle)
     if "clearance_ramp" in options and not {"clearance", "clearance_primary"} & set(options):
         raise ContactError(f"contact '{name}' has a clearance_ramp, but no clearance that it could multiply")
@@ -202,9 +200,7 @@ def _friction_heat(name: str, options: Mapping[str, Any]) -> float:
     fraction = options.get("friction_heat", 0.0)
     check_number(f"the friction_heat of contact '{name}'", fraction)
     if not 0.0 <= fraction <= 1.0:
-        raise ContactError(
-            f"friction_heat = {fraction} of contact '{name}' must be a fraction of the work, between 0 and 1"
-        )
+        raise ContactError(f"friction_heat = {fraction} of contact '{name}' must be a fraction of the work, 0 to 1")
     if fraction and not options.get("friction"):
         raise ContactError(f"contact '{name}' has a friction_heat, but no friction that could generate it")
     return float(fraction)
@@ -282,9 +278,7 @@ def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side:
                 "only that side carries constraints; swap the sides or name other nodes"
             )
     if option == "excluded" and mask[side.points].all():
-        raise ContactError(
-            f"contact '{name}' excludes all nodes of '{side.group}': no node remains that could be in contact"
-        )
+        raise ContactError(f"contact '{name}' excludes all nodes of '{side.group}': no node remains for contact")
     return mask
 
 

@@ -128,10 +128,8 @@ def _overlap_at(
         depth, paired = _depths(formulation, candidates, gap0, configuration, supports.fixed)
     size = np.ptp(formulation.points, axis=0).max()
     admissible = max(ADMISSIBLE_DEPTH * np.abs(displacement).max(), LENGTH_ROUND_OFF * size)
-    row = int(np.argmax(depth))
-    return Overlap(
-        int((depth > admissible).sum()), int(paired.sum()), float(depth[row]), int(candidates.nodes[row, 0]), instant
-    )
+    row, count = int(np.argmax(depth)), int((depth > admissible).sum())
+    return Overlap(count, int(paired.sum()), float(depth[row]), int(candidates.nodes[row, 0]), instant)
 
 
 def _depths(

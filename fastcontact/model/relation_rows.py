@@ -72,9 +72,7 @@ def matched(
     """
     (name, nodes), (other, opposite) = first, second
     if len(nodes) != len(opposite):
-        raise ModelError(
-            f"groups '{name}' and '{other}' have {len(nodes)} and {len(opposite)} nodes: they are joined one by one"
-        )
+        raise ModelError(f"groups '{name}' and '{other}' have {len(nodes)} and {len(opposite)} nodes: they must match")
     x, target = mesh.points[nodes], mesh.points[opposite]
     shift: Array | None = 0.5 * (target.min(axis=0) + target.max(axis=0) - x.min(axis=0) - x.max(axis=0))
     if translation is not None:

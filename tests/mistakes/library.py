@@ -419,7 +419,7 @@ CONTACT = [
     Mistake("a penalty of zero", lambda: pair_of("CONT_UPPER", "CONT_LOWER", penalty=0.0), fc.ContactError,
             r"penalty = 0\.0 of contact 'pair' must be positive; leave it out for no penetration"),
     Mistake("all nodes excluded", lambda: pair_of("CONT_UPPER", "CONT_LOWER", excluded="CONT_UPPER"), fc.ContactError,
-            r"contact 'pair' excludes all nodes of 'CONT_UPPER': no node remains that could be in contact"),
+            r"contact 'pair' excludes all nodes of 'CONT_UPPER': no node remains for contact"),
     Mistake("bodies pulled apart by a force", lambda: solved(lifted()), fc.ConvergenceError,
             r"the loads pull bodies away, and no contact stops them \(.*\): reverse the loads or add supports \(step 1 from 0 to 1\)"),
 ]
@@ -518,7 +518,7 @@ OPTIONS = [
     Mistake("a linear solver that is not there", lambda: solved(blocks(), linear_solver="direkt"), fc.ModelError,
             r"unknown linear solver 'direkt': did you mean 'direct'"),
     Mistake("a tolerance that accepts everything", lambda: solved(blocks(), linear_tolerance=10.0), fc.ModelError,
-            r"the tolerance 10\.0 of the linear solver must be positive and at most 0\.001, such as 1e-10"),
+            r"the linear tolerance 10\.0 must be positive and at most 0\.001, such as 1e-10"),
     Mistake("a criterion of zero", lambda: fc.Criteria(relative=0.0), fc.ModelError,
             r"the convergence criterion relative = 0\.0 must be positive and at most 0\.01: beyond that nothing has converged"),
     Mistake("a criterion that accepts everything", lambda: fc.Criteria(geometry=1e3), fc.ModelError,

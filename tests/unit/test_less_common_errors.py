@@ -114,7 +114,7 @@ def test_a_rotation_about_no_place(centre):
 
 
 def test_a_displacement_of_another_mesh():
-    with pytest.raises(fc.ModelError, match=r"the displacement has the shape \(3,\), but the mesh"):
+    with pytest.raises(fc.ModelError, match=r"the displacement has shape \(3,\), but the mesh"):
         model().internal_forces(np.zeros(3))
 
 

@@ -196,9 +196,7 @@ def newton(
             > (1 - DECREASE * damping) * norm
         ):
             damping *= 0.5
-            if (
-                damping < 0.5**HALVINGS
-            ):  # at a kink there may be no step that decreases the residual: take the full step
+            if damping < 0.5**HALVINGS:  # at a kink no step may decrease the residual: take the full step
                 damping = 1.0
                 break
         y, gaps = (trial, trial_gaps) if damping == 1.0 else (y + damping * step, gaps + damping * change)

@@ -19,14 +19,14 @@ from fastcontact.analysis.friction.cone_newton import Forces, Law, newton
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, compliance_of_rows, idle
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.analysis.tolerances import RESIDUAL
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.choice import LOOSEST
 from fastcontact.linear.protocol import MILD, FrictionTerms, LoadedNonsymmetric
 from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
-from fastcontact.round_off import ROUND_OFF, TINY
+from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF, TINY
 
 # Bound of the stiffness of the spring perpendicular to the slip, relative to the stiffness of the constraint. Without a bound
 # it tends to infinity as the slip vanishes. The solution does not depend on it, because its slip is parallel to d.
@@ -137,15 +137,11 @@ class Eliminated:
         self._rows = (rows[0], *slip_rows)
         self._free = np.vstack([free[0], np.where(idle_slips & ~prescribed, 0.0, free[1:])])
         self._slips = ~idle_slips | prescribed
-        softer = SOFTER / np.sqrt(max(1.0, loaded.contrast / MILD))
-        self._unit = np.sqrt(
-            1.0 / (np.where(compliance[0, 0] > 0.0, compliance[0, 0], 1.0) / softer + self._compliance[0])
-        )
+        normal, softer = compliance[0, 0], SOFTER / np.sqrt(max(1.0, loaded.contrast / MILD))
+        self._unit = np.sqrt(1.0 / (np.where(normal > 0.0, normal, 1.0) / softer + self._compliance[0]))
         self.law = Law(np.where(usable, mu, 0.0), constraints.equality & usable)
         self.u = u
-        self.round_off = float(
-            16 * np.finfo(float).eps * np.abs(self._unit * self._gaps(u))[:, usable].max(initial=0.0)
-        )
+        self.round_off = SUM_ROUND_OFF * largest((self._unit * self._gaps(u))[:, usable])
 
     def _compliance_of_rows(self, rows: tuple[csr_array, ...], unknown_compliance: Array) -> Array:
         """Return the sum of `compliance_of_rows` and the tangential compliance of the constraints themselves.
@@ -235,9 +231,8 @@ class Eliminated:
         rows = sum(scaled(taken(T, at), factor) for factor, T in zip(across, self._rows[1:], strict=True))
         spring = np.minimum(turning / np.maximum(1.0 - turning, TINY), STIFFEST) * self._unit[at] ** 2
         spring = spring / (1.0 + spring * self._compliance[1, at])  # in series with the compliance of the constraint
-        return _Sliding(
-            at, pull, _Across(across, Springs(csr_array(rows), spring), (across * self._free[1:, at]).sum(axis=0))
-        )
+        free = (across * self._free[1:, at]).sum(axis=0)
+        return _Sliding(at, pull, _Across(across, Springs(csr_array(rows), spring), free))
 
     def _friction_terms(self, B: csr_array, closed_rows: Indices, sliding: _Sliding) -> FrictionTerms:
         """Return the friction terms of the linear system, whose equations `B` begin with the gaps of `closed_rows`."""

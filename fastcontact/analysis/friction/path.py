@@ -90,9 +90,8 @@ def along(
             instants, touching = _touching(last_gap, forces.gaps[0], waiting, together)
             fraction = min(float(instants[touching].max()), 1.0)
             end = begin + fraction * (1.0 - begin)
-            slip = np.where(
-                touching, slip_after(np.where(touching, instants, 0.0) * forces.gaps[1:], np.zeros_like(gap)), slip
-            )
+            since = np.where(touching, instants, 0.0) * forces.gaps[1:]
+            slip = np.where(touching, slip_after(since, np.zeros_like(gap)), slip)
             approach = np.where(touching, slip, approach)
             waiting = waiting & ~touching
             forces = increment(end)

@@ -102,9 +102,8 @@ def _eliminated(
     def increment(offset: Array, carrying: Mask, closed: Mask, forces: Array | None) -> dense.Forces:
         gaps = constraints.gaps_at_rest() + offset
         gaps[0, ~carrying] += distance
-        result = solved(
-            replace(constraints, gap0=gaps[0], slip0=gaps[1:], elastic_slip=np.empty(0)), closed, accuracy, forces
-        )
+        moved = replace(constraints, gap0=gaps[0], slip0=gaps[1:], elastic_slip=np.empty(0))
+        result = solved(moved, closed, accuracy, forces)
         result.gaps[0, ~carrying] -= distance
         return result
 

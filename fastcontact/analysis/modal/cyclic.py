@@ -54,14 +54,11 @@ class Sectors:
         assert first.turn is not None
         for interface in periodic_interfaces:
             if interface.sectors != first.sectors or _sense(interface, first.turn) == 0:
-                raise ModelError(
-                    "nodal diameters need one axis and one number of sectors: the cyclic symmetries differ"
-                )
+                raise ModelError("nodal diameters need one axis and number of sectors: the cyclic symmetries differ")
         points = model.mesh.points
         offset = points[first.second].mean(axis=0) - first.turn @ points[first.first].mean(axis=0)
-        return cls(
-            first.sectors, first.turn, periodic_interfaces, np.linalg.lstsq(np.eye(len(offset)) - first.turn, offset)[0]
-        )
+        centre = np.linalg.lstsq(np.eye(len(offset)) - first.turn, offset)[0]
+        return cls(first.sectors, first.turn, periodic_interfaces, centre)
 
     def diameters(self, chosen: int | str | Sequence[int]) -> list[int]:
         """Return the requested nodal diameters, ascending; ModelError if the ring cannot have one of them."""
@@ -73,9 +70,7 @@ class Sectors:
         diameters = sorted({chosen} if isinstance(chosen, int) else set(chosen))
         invalid = [d for d in diameters if not 0 <= d <= highest]
         if invalid or not diameters:
-            raise ModelError(
-                f"nodal_diameters = {chosen}: a ring of {self.number} sectors has those from 0 to {highest}"
-            )
+            raise ModelError(f"nodal_diameters = {chosen}: a ring of {self.number} sectors has 0 to {highest}")
         return diameters
 
 

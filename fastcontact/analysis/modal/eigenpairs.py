@@ -112,9 +112,7 @@ def _by_multigrid(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Ar
                 solver.precondition(r, norm, z)
         return corrections.T
 
-    preconditioner = LinearOperator(
-        shifted.shape, matvec=lambda r: cycle(r.reshape(-1, 1)).ravel(), matmat=cycle, dtype=float
-    )
+    preconditioner = LinearOperator(shifted.shape, lambda r: cycle(r.reshape(-1, 1)).ravel(), matmat=cycle, dtype=float)
     vectors = start
     for _ in range(MAX_ITERATIONS // 20):  # LOBPCG makes 20 iterations by default
         with warnings.catch_warnings():

@@ -86,9 +86,8 @@ def joined(
             equations.append(csr_array(conditions.rows[nonempty]))
             nodes.append(conditions.nodes[nonempty])
         elif len(nonempty):
-            springs.append(
-                (csr_array(conditions.rows[nonempty]), conditions.compliance.toarray()[np.ix_(nonempty, nonempty)])
-            )
+            compliance = conditions.compliance.toarray()[np.ix_(nonempty, nonempty)]
+            springs.append((csr_array(conditions.rows[nonempty]), compliance))
     return HeldContact(csr_array(vstack(equations, format="csr")), np.concatenate(nodes), springs)
 
 
@@ -96,10 +95,8 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_
     """Return the conditions of all pairs at the end of a step; without a step, those of tied and bilateral pairs."""
     conditions: list[Conditions] = []
     for pair in model.contact:
-        formulation, contact = (
-            model.bind(pair, held, sectors_alike=False),
-            None if step is None else step.contact[pair.name],
-        )
+        formulation = model.bind(pair, held, sectors_alike=False)
+        contact = None if step is None else step.contact[pair.name]
         if formulation.options.gap_only:
             continue
         if formulation.options.cohesion is not None:
@@ -141,18 +138,12 @@ def _conditions(
         sticking = (contact.active & (contact.sticking | hold_sliding))[side_rows] & frictional
     closed_rows, sticking_rows = np.flatnonzero(closed), np.flatnonzero(sticking)
     weights = csr_array(moments[closed_rows])
-    yield Conditions(
-        csr_array(weights @ constraints.B),
-        nodes[closed_rows],
-        areas[closed_rows],
-        compliance=_compliance(weights, constraints.softness),
-    )
+    compliance = _compliance(weights, constraints.softness)
+    yield Conditions(csr_array(weights @ constraints.B), nodes[closed_rows], areas[closed_rows], compliance=compliance)
     if constraints.tangents:
         weights = csr_array(moments[sticking_rows])
-        rows, compliance = (
-            [weights @ T for T in constraints.tangents],
-            _compliance(weights, constraints.tangential_softness),
-        )
+        rows = [weights @ T for T in constraints.tangents]
+        compliance = _compliance(weights, constraints.tangential_softness)
         yield _along(directions, rows, sticking_rows, nodes, areas, compliance)
 
 
@@ -161,13 +152,11 @@ def _along(
     compliance: csr_array | None = None,
 ) -> Conditions:  # fmt: skip
     """Return the conditions along all tangents, with rows (k, n_dofs) for `selected` (k,) multipliers of a pair."""
-    count = len(rows)
-    stacked_compliance = None if compliance is None else csr_array(block_diag([compliance] * count, format="csr"))
+    k = len(rows)
+    softness = None if compliance is None else csr_array(block_diag([compliance] * k, format="csr"))
     stacked = csr_array(vstack(rows, format="csr"))
     tangents = np.concatenate([direction[selected] for direction in directions])
-    return Conditions(
-        stacked, np.tile(nodes[selected], count), np.tile(areas[selected], count), tangents, stacked_compliance
-    )
+    return Conditions(stacked, np.tile(nodes[selected], k), np.tile(areas[selected], k), tangents, softness)
 
 
 def _compliance(weights: csr_array, softness: Array) -> csr_array | None:

@@ -52,9 +52,7 @@ class Shapes(StepSequence):
 def _as_step(number: int, frequency: float, u: Array, stress: Array, model: Model) -> StepResult:
     equivalent = recovery.von_mises(stress)
     signed = recovery.von_mises_signed(stress, equivalent)
-    lengths = {
-        key: name for key, name in model.units.items() if key == "length"
-    }  # only of the mesh, since shapes have no scale
+    lengths = {key: name for key, name in model.units.items() if key == "length"}  # shapes have no scale
     return StepResult(
         number + 1, float(frequency), u, stress, equivalent, signed, np.zeros_like(u),
         iterations={"parameter": "frequency"}, units=lengths,
@@ -126,9 +124,7 @@ class Modes(Shapes):
     def whole_ring(self) -> RingModes:
         """Return the same modes on the mesh of the whole ring; ModelError if no nodal diameters were requested."""
         if self._sectors is None:
-            raise ModelError(
-                "shapes of the whole ring need modes with nodal_diameters, of a model with cyclic symmetry"
-            )
+            raise ModelError("shapes of the whole ring need modes with nodal_diameters of a model with cyclic symmetry")
         return RingModes(self, self._sectors)
 
     def __repr__(self) -> str:
@@ -203,9 +199,7 @@ class RingModes(Shapes):
     def mesh(self) -> Mesh:
         """Mesh of all sectors, see `RingModes`."""
         sector, centre = self.modes._model.mesh, self._sectors.centre
-        return union(
-            *(sector.replace(points=(sector.points - centre) @ rotation.T + centre) for rotation in self._rotations)
-        )
+        return union(*(sector.replace(points=(sector.points - centre) @ R.T + centre) for R in self._rotations))
 
     def _step(self, number: int) -> StepResult:
         modes = self.modes

@@ -129,9 +129,8 @@ class Adjoint:
             return s + self._transposed(*self._solve_transposed(s, zero))
 
         n = len(right_side)
-        s, info = gmres(
-            LinearOperator((n, n), product), pairing_terms, rtol=TOLERANCE, atol=0.0, restart=SOLUTIONS, maxiter=1
-        )
+        operator = LinearOperator((n, n), product)
+        s, info = gmres(operator, pairing_terms, rtol=TOLERANCE, atol=0.0, restart=SOLUTIONS, maxiter=1)
         if info:
             raise ConvergenceError(
                 f"the adjoint equations of the moving contact geometry do not converge in {self.solutions} solutions: "

@@ -38,26 +38,23 @@ def _by_constant(contact: MovingContact, parameter: Label) -> Change:
     step = CHANGED * _admissible_range(material, name, component)
 
     def with_increment(increment: float) -> MovingContact:
-        changed_model = copy.copy(model)
-        changed_model.materials = [
+        changed, problem = copy.copy(model), contact.problem
+        changed.materials = [
             (_with_constant(m, name, component, increment) if i == number else m, groups)
             for i, (m, groups) in enumerate(model.materials)
         ]
-        pairs = {
-            pair.name: changed_model.bind(pair, contact.problem.pairs[pair.name].held) for pair in changed_model.contact
-        }
-        return replace(contact, problem=replace(contact.problem, model=changed_model, pairs=pairs))
+        pairs = {pair.name: changed.bind(pair, problem.pairs[pair.name].held) for pair in changed.contact}
+        return replace(contact, problem=replace(problem, model=changed, pairs=pairs))
 
     # Central differences with an error of fourth order in the step.
     differences = [
-        weight
-        * (_internal_forces(with_increment(distance * step)) - _internal_forces(with_increment(-distance * step)))
-        for distance, weight in ((1, 8.0), (2, -1.0))
+        weight * (_internal_forces(with_increment(h)) - _internal_forces(with_increment(-h)))
+        for h, weight in ((step, 8.0), (2 * step, -1.0))
     ]
     change = replace(_zero_change(contact), residual=(differences[0] + differences[1]) / (12.0 * step))
-    return (
-        replace(change, sample=contact.parameter_derivative(with_increment, step)) if contact.problem.pairs else change
-    )
+    if not contact.problem.pairs:
+        return change
+    return replace(change, sample=contact.parameter_derivative(with_increment, step))
 
 
 def _constant_of(model: Model, parameter: Label) -> tuple[int, Material, int | None]:
@@ -118,9 +115,8 @@ def _with_constant(material: Material, name: str, component: int | None, increme
         value = value + increment
     if isinstance(material, LinearElastic):
         volumetric = "mean_dilatation" if material.averaged else "plain"
-        return replace(
-            material, **{"volumetric": volumetric, "incompatible_modes": material.incompatible_modes, name: value}
-        )
+        modes = material.incompatible_modes
+        return replace(material, **{"volumetric": volumetric, "incompatible_modes": modes, name: value})
     assert isinstance(material, Orthotropic | Anisotropic)
     return replace(material, **{name: value})
 
@@ -238,9 +234,7 @@ def _of_speed(contact: MovingContact, parameter: Label) -> Change:
     """Return the derivatives with respect to the angular speed of a group; forces are proportional to its square."""
     loads = [load for load in _speeds(contact.problem.model, parameter) if load.speed]
     derivatives = [-2.0 / load.speed * _forces(contact, [load]) for load in loads]
-    return replace(
-        _zero_change(contact), residual=np.sum(derivatives, axis=0) if derivatives else np.zeros(len(contact.u))
-    )
+    return replace(_zero_change(contact), residual=sum(derivatives, np.zeros(len(contact.u))))
 
 
 def _temperatures(model: Model, parameter: Label) -> list[Temperature]:

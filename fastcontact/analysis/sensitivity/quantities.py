@@ -81,9 +81,7 @@ def _reaction(contact: MovingContact, zero: Gradient, quantity: Label) -> Gradie
     model = contact.problem.model
     axis, points = _axis(model, quantity), model.mesh.points_of(str(quantity[1]))
     if model.springs:
-        raise ModelError(
-            "reactions of a model with springs have no sensitivities: request a displacement or a contact force"
-        )
+        raise ModelError("reactions of a model with springs have no sensitivities: use displacements or contact forces")
     unit_displacement = np.zeros(len(contact.u))
     unit_displacement[points * model.mesh.dim + axis] = 1.0
     balance = contact.problem.system.balance(unit_displacement)[0]
@@ -128,9 +126,7 @@ def _pressure(
     if not result.active[row]:
         raise ModelError(f"point {result.points[row]} of contact '{name}' is open: its pressure is zero")
     if contact.problem.model.periodic_interfaces:
-        raise ModelError(
-            "pressures of periodic and cyclic models have no sensitivities: request a force or a displacement"
-        )
+        raise ModelError("pressures of periodic and cyclic models have no sensitivities: use forces or displacements")
     contact = replace(contact, pair=name, closed=result.active)
     multiplier, by_multiplier = contact.solution.multiplier, zero.multiplier
     rows_of_pair, rows = contact.constraints.rows[name], contact.active

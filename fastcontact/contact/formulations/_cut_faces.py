@@ -106,11 +106,8 @@ def _heights(
         return none, none, np.zeros((len(pairs), 2))
     secondary, primary = smoothing.secondary.part(rows[0]), smoothing.primary.part(rows[1])
     axes_of_facets = axes[0][rows[0]], axes[1][rows[1]]
-    return (
-        secondary.heights,
-        primary.heights,
-        Smoothing(secondary, primary).shared(pairs[:, 0], pairs[:, 1], axes_of_facets),
-    )
+    factors = Smoothing(secondary, primary).shared(pairs[:, 0], pairs[:, 1], axes_of_facets)
+    return secondary.heights, primary.heights, factors
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,13 +42,7 @@ from fastcontact.contact.pairing import (
     rows_along,
     tangents,
 )
-from fastcontact.contact.projection import (
-    at_nodes_of_facets,
-    interpolated,
-    nodal_normals,
-    places,
-    smooth_normals,
-)
+from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
 from fastcontact.contact.search.closest import BESIDE
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
@@ -139,9 +133,7 @@ class Formulation(ABC):
         if not self.projection_tolerance >= 0:
             raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
         if self.surface_smoothing and not isinstance(self.primary, Surface):
-            raise ContactError(
-                "surface_smoothing corrects two meshed sides against each other: leave it out at an obstacle"
-            )
+            raise ContactError("surface_smoothing needs two meshed sides: leave it out at an obstacle")
         if self.friction:
             self.secondary = self._mirrored(self.secondary)
             self.primary = self._mirrored(self.primary) if isinstance(self.primary, Surface) else self.primary
@@ -278,9 +270,8 @@ class Formulation(ABC):
         left, lengths, right = np.linalg.svd(np.stack(frames, axis=1))
         axes = (left * (lengths > 0.0)[:, None]) @ right
         sizes = np.ones(len(nodes)) if areas is None else np.where(np.isfinite(areas), areas, 0.0)
-        return reduction(
-            axes, np.where(sizes[:, None, None] > 0.0, held[nodes], 0.0), nodes, sizes, self.secondary.beside
-        )
+        held = np.where(sizes[:, None, None] > 0.0, held[nodes], 0.0)
+        return reduction(axes, held, nodes, sizes, self.secondary.beside)
 
     def nodes_of(self, constraints: Constraints, moments: csr_array) -> Indices:
         """Return the secondary node (q,), numbered on its side, of each row of `moments`, see `tied.moments_of`."""
@@ -315,9 +306,8 @@ class Formulation(ABC):
         """Return averaged unit normals (n, dim) of the secondary side at candidates."""
         local = np.zeros(len(deformed), np.intp)
         local[self.secondary.points] = np.arange(len(self.secondary.points))
-        normal = np.einsum(
-            "nk,nkd->nd", candidates.shape, nodal_normals(self.secondary, deformed)[local[candidates.nodes]]
-        )
+        at_nodes = nodal_normals(self.secondary, deformed)[local[candidates.nodes]]
+        normal = np.einsum("nk,nkd->nd", candidates.shape, at_nodes)
         return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), TINY))
 
     def assembled(
@@ -346,9 +336,8 @@ class Formulation(ABC):
         """
         if self.held is None or not len(self.held.nodes) or not self.friction:
             return None
-        return spanned(
-            np.einsum("nk,nkde->nde", candidates.shape, self.held.at(candidates.nodes)), 1.0 - LENGTH_ROUND_OFF
-        )
+        held = np.einsum("nk,nkde->nde", candidates.shape, self.held.at(candidates.nodes))
+        return spanned(held, 1.0 - LENGTH_ROUND_OFF)
 
     def _geometry(
         self, candidates: Candidates, pairing: Pairing, at: Configuration, directions: Sequence[Array] = ()
@@ -365,9 +354,8 @@ class Formulation(ABC):
             rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
             rise = self.rise(candidates, pairing, rows, coordinates)
             points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, at.pose, rise=rise)
-            forces = Linearised(
-                self.secondary, points, None, points.normal, multiplier[rows], place=(rows, len(multiplier))
-            )
+            at_rows = rows, len(multiplier)
+            forces = Linearised(self.secondary, points, None, points.normal, multiplier[rows], place=at_rows)
             if not directions:
                 return forces
             moved = replace(at, displacement=displacement)
@@ -562,9 +550,8 @@ class Formulation(ABC):
         both = without(both, pairing.normal, np.sqrt(0.5))
         # Where the normal is held, a motion along it closes the gap and is not slip. Elsewhere the normal may be inclined to
         # the held directions, such as at the edge of a plane of symmetry.
-        closing = np.where(
-            np.linalg.norm(along, axis=1) > np.sqrt(0.5), np.einsum("nd,nd->n", moved, pairing.normal), 0.0
-        )
+        closing = np.einsum("nd,nd->n", moved, pairing.normal)
+        closing = np.where(np.linalg.norm(along, axis=1) > np.sqrt(0.5), closing, 0.0)
         moved -= closing[:, None] * pairing.normal
         both = without(both, moved, LENGTH_ROUND_OFF * max(np.abs(at.displacement).max(), np.abs(at.start).max()))
         held[nodes] = both

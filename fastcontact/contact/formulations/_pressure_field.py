@@ -167,12 +167,12 @@ class PressureField(NodalField):
         Nodal gaps are not used: between facets of different curvature, nodes of facets in contact have open gaps.
         """
         with_area = self.nodal_areas > NO_AREA * self.nodal_areas.max(initial=0.0)
-        near = _nearest(self.around[active], self.shape[active], len(gap))
-        near |= _nearest(
-            self.around[active], np.where(with_area[self.around[active]], self.shape[active], -np.inf), len(gap)
+        around, shape = self.around[active], self.shape[active]
+        near = _nearest(around, shape, len(gap)) | _nearest(
+            around, np.where(with_area[around], shape, -np.inf), len(gap)
         )
         usable, touched = self.projection.areas > 0, np.zeros(len(gap), bool)
-        touched[self.around[active]] = True
+        touched[around] = True
         near |= touched & ~_nearest(self.around[usable], self.shape[usable], len(gap))
         near &= pressure > 0
         # Forces at one end of a facet, opposite an edge, may cause a negative pressure at the nearest node.
@@ -287,13 +287,10 @@ class PressureFieldFormulation(Formulation):
                 Z = field.projection.compliant(columns)
                 in_axes = held if field.axes is None else np.einsum("nde,nd->ne", field.axes[1], held)
                 at_points = field.projection.P @ in_axes[field.independent]
-                components = np.stack(
-                    [np.einsum("nd,nd->n", along, at_points) for along in (normals(directions), *directions)]
-                )
+                axes = normals(directions), *directions
+                components = np.stack([np.einsum("nd,nd->n", along, at_points) for along in axes])
                 factor = components[:, :, None] * Z
-                pressure, shear = (
-                    np.linalg.norm(components_of_force, axis=(0, 1)) for components_of_force in (factor[:1], factor[1:])
-                )
+                pressure, shear = (np.linalg.norm(values, axis=(0, 1)) for values in (factor[:1], factor[1:]))
                 factor[0, :, pressure > PART_OF_CONE * constraints.friction.max() * shear] = 0.0
                 factors.append(factor)
         return np.concatenate(factors, axis=2) if factors else np.empty(0)

@@ -80,9 +80,8 @@ def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> Surface
         for end in ends:
             on_border[end[open_]] = True
         first += len(block.nodes)
-    return SurfaceFacets(
-        blocks, beyond, [normals for normals, _ in facet_normals_of_blocks], smooth, at_points, on_border
-    )
+    by_block = [normals for normals, _ in facet_normals_of_blocks]
+    return SurfaceFacets(blocks, beyond, by_block, smooth, at_points, on_border)
 
 
 def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:

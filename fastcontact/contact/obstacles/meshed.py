@@ -61,9 +61,7 @@ class MeshedSurface:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.crease <= 180.0:
-            raise ContactError(
-                f"crease = {self.crease} of the rigid surface '{self.group}' must lie between 0 and 180 degrees"
-            )
+            raise ContactError(f"crease = {self.crease} of the rigid surface '{self.group}' must be 0 to 180 degrees")
         object.__setattr__(self, "_facets", surface_facets(self.mesh, self.group, self.flip, self.crease))
 
     def __repr__(self) -> str:
@@ -89,7 +87,7 @@ class MeshedSurface:
         dim = self.mesh.dim
         if points.shape[1] != dim:
             raise ContactError(
-                f"the rigid surface '{self.group}' has {dim} dimensions, but the model has {points.shape[1]}"
+                f"the rigid surface '{self.group}' has {dim} dimensions, but the model {points.shape[1]}"
             )
         closest = closest_of_kinds(points, [block.corners for block in self._facets.blocks])
         pseudonormal, smooth, on_edge, on_border = self._frames(closest)

@@ -107,9 +107,7 @@ def _on_faces(points: Array, corners: Array, closest: Closest) -> None:
 def _refuse(points: Array, facet: Indices, corners: Array) -> None:
     """Raise ContactError for points whose projection failed."""
     if facet[0] < 0:
-        raise ContactError(
-            f"{len(points)} points to project are not finite (first: {points[0]}): the solution diverged"
-        )
+        raise ContactError(f"{len(points)} projected points are not finite (first: {points[0]}): the solution diverged")
     raise ContactError(
         f"the projection of {len(points)} points did not converge (first: {points[0]} on facet {facet[0]} near "
         f"{corners[facet[0]].mean(axis=0)}): the facet is folded or collapsed, so refine or repair the mesh there"

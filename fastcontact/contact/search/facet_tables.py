@@ -50,9 +50,7 @@ class Tables(NamedTuple):
 def tables(n_nodes: int) -> Tables:
     """Return the constants of facets with `n_nodes` nodes; ContactError if there are no such facets."""
     if n_nodes not in _NAMES:
-        raise ContactError(
-            f"there are no facets of {n_nodes} nodes in three dimensions: expected one of {sorted(_NAMES)}"
-        )
+        raise ContactError(f"there are no facets of {n_nodes} nodes in 3D: expected one of {sorted(_NAMES)}")
     nodes = elements.get(_NAMES[n_nodes]).nodes
     sides = _TRIANGLE_SIDES if n_nodes in (3, 6) else _SQUARE_SIDES
     to_terms = np.ascontiguousarray(np.linalg.inv(terms(nodes, n_nodes)))

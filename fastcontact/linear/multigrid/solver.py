@@ -369,9 +369,7 @@ class Multigrid:
                 if iteration.norm <= enough:
                     return
                 excess = iteration.norm / enough
-                raise StallError(
-                    f"conjugate residuals stall at {excess:.1e} times the tolerance after {made} iterations"
-                )
+                raise StallError(f"conjugate residuals stall at {excess:.1e} times the tolerance after {made} steps")
             made += 1
             self._count()
 

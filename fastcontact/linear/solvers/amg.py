@@ -27,12 +27,7 @@ from fastcontact.linear.elimination.loaded import put_back_tolerance, tighten
 from fastcontact.linear.factor_solver import AFFORDABLE
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
 from fastcontact.linear.multigrid.reduced import Reduced
-from fastcontact.linear.multigrid.solver import (
-    MAX_ITERATIONS,
-    Multigrid,
-    StallError,
-    TooManyIterationsError,
-)
+from fastcontact.linear.multigrid.solver import MAX_ITERATIONS, Multigrid, StallError, TooManyIterationsError
 from fastcontact.linear.protocol import TOLERANCE, FrictionTerms, LinearSolver, Loaded, Product
 from fastcontact.linear.solvers.direct import Direct
 from fastcontact.linear.springs import Springs

@@ -194,9 +194,7 @@ class ModelBase(Suggesting):
             raise ModelError(f"{name} has a direction, but no axial or transverse stiffness that would use it")
         vector = finite_vector(direction, self.mesh.dim)
         if vector is None or not vector.any():
-            raise ModelError(
-                f"the direction {direction} of {name} must be a vector of {self.mesh.dim} numbers, not all zero"
-            )
+            raise ModelError(f"the direction {direction} of {name} must be {self.mesh.dim} numbers, not all zero")
         return np.asarray(vector / np.linalg.norm(vector))
 
     def related_points(self) -> Mask:
@@ -353,16 +351,14 @@ class ModelBase(Suggesting):
         field = self.material_field()
         if np.size(displacement) != self.n_dofs:
             raise ModelError(
-                f"the displacement has the shape {np.shape(displacement)}, but the mesh {self.mesh.points.shape}"
+                f"the displacement has shape {np.shape(displacement)}, but the mesh {self.mesh.points.shape}"
             )
         bodies = self.nonlinear_bodies(field)
         if bodies is not None:
             if self.strain == "small":
                 raise ModelError("forces of plastic bodies depend on their history, not on the displacement alone")
             if self.temperatures or self.heat_loads:
-                raise ModelError(
-                    "forces of bodies that heat expands depend on their temperature, too: see step.reaction"
-                )
+                raise ModelError("forces of bodies that heat expands depend on their temperature: see step.reaction")
             return bodies.at(np.reshape(displacement, self.mesh.points.shape), bodies.beginning).force
         K = stiffness(self.mesh, self.kinematics, field.moduli, field.loops, None, field.treatment)
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)

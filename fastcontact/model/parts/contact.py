@@ -375,7 +375,7 @@ class ModelContact(ModelConnections):
                 )
             if axis == 0 and self.kinematics == "axisymmetric":
                 raise ModelError(
-                    f"a force cannot move obstacle '{name}' along x, the radius: in axisymmetry give y only"
+                    f"a force cannot move obstacle '{name}' along the radius x: in axisymmetry give y only"
                 )
         return tuple(float(forces[k]) if k in forces else None for k in range(self.mesh.dim))  # type: ignore[arg-type]
 
@@ -404,10 +404,7 @@ class ModelContact(ModelConnections):
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
         given = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
-        available = [
-            *SHARED_OPTIONS,
-            *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given),
-        ]
+        available = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given)]
         available += ["motion", "rotation", "force"] * (pair.obstacle is not None)  # arguments of `add_obstacle`
         for option in pair.options:
             check_known(f"option of {pair.formulation}", option, available, ContactError)
@@ -418,15 +415,12 @@ class ModelContact(ModelConnections):
             for interface in self.periodic_interfaces
         ]
         secondary = surface(self.mesh, pair.secondary).with_periodic_ends(ends)
-        options = pair_options(
-            pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None
-        )
+        against = pair.obstacle is not None
+        options = pair_options(pair.name, pair.options, self.mesh, secondary, against_obstacle=against)
         primary: Surface | RigidSide
         if pair.obstacle is not None:
             if not kind.against_obstacles:
-                raise ContactError(
-                    f"contact '{pair.name}': mortar in two dimensions needs multipliers='dual' at an obstacle"
-                )
+                raise ContactError(f"contact '{pair.name}': mortar in 2D needs multipliers='dual' at an obstacle")
             primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
             specific.setdefault("surface_smoothing", False)
         else:
@@ -435,9 +429,8 @@ class ModelContact(ModelConnections):
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
         axisymmetric = self.kinematics == "axisymmetric"
         interfaces = [interface for interface in self.periodic_interfaces if interface.turn is None or sectors_alike]
-        turning = next(
-            (e.rotation for e in interfaces if e.rotation and np.isin(e.second, secondary.points).any()), None
-        )
+        points = secondary.points
+        turning = next((e.rotation for e in interfaces if e.rotation and np.isin(e.second, points).any()), None)
         options = dataclasses.replace(
             options, same_place=same_place(interfaces, self.mesh.n_points), turning=turning,
             source=self._source(pair, secondary, options),

@@ -208,19 +208,13 @@ class ModelHeat(ModelBase):
         """Raise ModelError if data of the heat conduction problem are missing or its solution is not unique."""
         for pair in self.contact:
             if "friction_heat" in pair.options and not self.conducts:
-                raise ModelError(
-                    f"contact '{pair.name}' has a friction_heat, but nothing conducts it: fix a temperature"
-                )
+                raise ModelError(f"contact '{pair.name}' has friction_heat, but nothing conducts it: fix a temperature")
         if not self.conducts:
             return
         if self.temperatures:
-            raise ModelError(
-                "temperatures are both given by add_temperature and conducted: prescribe them by fix_temperature"
-            )
+            raise ModelError("temperatures are both given by add_temperature and conducted: use fix_temperature")
         if self.interpolated:
-            raise ModelError(
-                f"{self.interpolated[0]} joins meshes that differ, which no heat crosses: mesh its ends alike"
-            )
+            raise ModelError(f"{self.interpolated[0]} joins meshes that differ, which no heat crosses: mesh both alike")
         self.conduction().check()
         without_expansion = [material for material, _ in self.materials if material.expansion is None]
         if self.expands and without_expansion:

@@ -233,9 +233,8 @@ class ModelInitialStates(ModelLoads):
     ) -> None:
         names = self._solid_groups(groups, f": it has no initial {kind}")
         table = table_of(ramp, f"the ramp of the initial {kind}")
-        self.initial_states.append(
-            initial_state(kind, names, self._cells_of(names), components, axes, self.kinematics, table)
-        )
+        cells = self._cells_of(names)
+        self.initial_states.append(initial_state(kind, names, cells, components, axes, self.kinematics, table))
 
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:
         """Return the sum of the temperature rises (n_points,) [temperature]; None without temperatures.
@@ -245,9 +244,7 @@ class ModelInitialStates(ModelLoads):
         """
         if not self.temperatures or not len(factors):
             return None
-        rises = [
-            factor * temperature.rise(self.mesh) for factor, temperature in zip(factors, self.temperatures, strict=True)
-        ]
+        rises = [factor * load.rise(self.mesh) for factor, load in zip(factors, self.temperatures, strict=True)]
         return np.asarray(np.sum(rises, axis=0))
 
     def expanding_rise(self, temperature_factors: Sequence[float], temperature: Array | None) -> Array | None:

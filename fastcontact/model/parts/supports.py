@@ -134,9 +134,8 @@ class ModelSupports(ModelContact):
             nodes, directions = normals_of(self.mesh, group)
             values = evaluated(normal, self.mesh.points[nodes], name)
             table = table_of(ramp, f"the ramp of {name}")
-            self._related_support(
-                group, MultiPointConstraint(name, along(nodes, directions, self.n_dofs), values, table)
-            )
+            rows = along(nodes, directions, self.n_dofs)
+            self._related_support(group, MultiPointConstraint(name, rows, values, table))
         if components or normal is None:
             self._support(group, components, ramp)
 
@@ -241,6 +240,4 @@ class ModelSupports(ModelContact):
         supported = [self.mesh.points_of(support.group) for support in self.supports if support.component == 0]
         nodes = np.setdiff1d(self.axis_nodes, np.concatenate(supported)) if supported else self.axis_nodes
         if len(nodes):
-            log.info(
-                "axis of symmetry: x is held at zero at %d nodes with x = 0 (first: point %d)", len(nodes), nodes[0]
-            )
+            log.info("axis of symmetry: x is held at %d nodes with x = 0 (first: point %d)", len(nodes), nodes[0])

@@ -153,7 +153,7 @@ def test_a_kept_pairing_serves_friction_through_steps():
 
 
 def test_keeping_a_pairing_and_renewing_it_exclude_each_other():
-    with pytest.raises(fc.ModelError, match="keep_pairing leaves no room for geometry_updates = 2"):
+    with pytest.raises(fc.ModelError, match="keep_pairing excludes geometry_updates = 2"):
         fc.Criteria(keep_pairing=True, geometry_updates=2)
 
 

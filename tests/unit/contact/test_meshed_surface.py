@@ -189,7 +189,7 @@ def test_what_is_no_surface_is_refused():
         MeshedSurface(strip(), "STRIPE")
     with pytest.raises(fc.ContactError, match="crease"):
         MeshedSurface(strip(), "STRIP", crease=-1.0)
-    with pytest.raises(fc.ContactError, match="has 2 dimensions, but the model has 3"):
+    with pytest.raises(fc.ContactError, match="has 2 dimensions, but the model 3"):
         MeshedSurface(strip(), "STRIP").distance(np.zeros((1, 3)))
 
 

@@ -128,7 +128,7 @@ def test_the_tree_finds_what_one_facet_after_the_other_finds(n_nodes):
 def test_points_that_are_not_finite_are_told():
     corners, points = random_facets(1, 5, 3)
     points[3, 1] = np.nan
-    with pytest.raises(ContactError, match="1 points to project are not finite"):
+    with pytest.raises(ContactError, match="1 projected points are not finite"):
         closest(points, corners)
 
 
@@ -388,7 +388,7 @@ def test_threads_do_not_change_a_bit(name, monkeypatch):
 
 def test_what_cannot_be_projected_is_told():
     corners, points = scattered("quad4", 1, 3)
-    with pytest.raises(ContactError, match="1 points to project are not finite"):
+    with pytest.raises(ContactError, match="1 projected points are not finite"):
         closest(np.vstack([points, [np.nan, 0, 0]]), corners)
     with pytest.raises(ContactError, match=r"did not converge .* folded or collapsed"):
         closest(points, np.ones((1, 4, 3)))

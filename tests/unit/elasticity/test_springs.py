@@ -183,15 +183,15 @@ def test_a_spring_shares_the_load_with_a_contact():
     ("groups", "stiffness", "words"),
     [
         ([0], {"x": 1.0, "direction": [1.0, 0.0]}, "has a direction, but no axial or transverse stiffness"),
-        ([0], {"axial": 1.0, "direction": [0.0, 0.0]}, "must be a vector of 2 numbers, not all zero"),
-        ([0], {"axial": 1.0, "direction": [1.0, 0.0, 0.0]}, "must be a vector of 2 numbers, not all zero"),
+        ([0], {"axial": 1.0, "direction": [0.0, 0.0]}, "must be 2 numbers, not all zero"),
+        ([0], {"axial": 1.0, "direction": [1.0, 0.0, 0.0]}, "must be 2 numbers, not all zero"),
         (["NOWHERE"], {}, "NOWHERE"),
         (["BOTTOM"], {}, "has no component"),
         (["BOTTOM"], {"z": 1.0}, "component"),
         (["BOTTOM"], {"y": np.nan}, r"stiffness .*(positive|finite)"),
         (["BOTTOM"], {"y": np.inf}, r"stiffness .*(positive|finite)"),
         (["BOTTOM"], {"y": "stiff"}, "must be a number"),
-        (["BOTTOM", "BLOCK"], {"axial": 1.0}, "have 2 and 4 nodes: they are joined one by one"),
+        (["BOTTOM", "BLOCK"], {"axial": 1.0}, "have 2 and 4 nodes: they must match"),
         (["TOP_LEFT", "TOP_LEFT"], {"axial": 1.0}, "both ends are point"),
     ],
 )
