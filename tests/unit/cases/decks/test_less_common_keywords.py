@@ -377,6 +377,22 @@ def test_components_of_a_coupling_count_along_its_orientation(tmp_path, kind):
     np.testing.assert_allclose(steps[1].displacement, steps[0].displacement, atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("name", "components"),
+    [("xsymm", (1, 5, 6)), ("ysymm", (2, 4, 6)), ("zsymm", (3, 4, 5)), ("encastre", range(1, 7))],
+)
+def test_named_supports_of_a_node_with_rotations_hold_its_rotations(tmp_path, name, components):
+    coupled = WHOLE.replace(
+        "*Material", f"{COUPLED}*Coupling, ref node=90, surface=roof\n*Kinematic\n1, 6\n*Material", 1
+    )
+    decks = [
+        deck_of(tmp_path, coupled.replace("*Boundary\n", f"*Boundary\n{lines}", 1))
+        for lines in (f"90, {name}\n", "".join(f"90, {k}\n" for k in components))
+    ]
+    by_name, by_component = (np.argwhere(deck.model.prescribed()[0]) for deck in decks)
+    np.testing.assert_array_equal(by_name, by_component)
+
+
 FREQUENCY = "*Step, perturbation\n*Frequency\n 2\n*End Step\n"
 
 
