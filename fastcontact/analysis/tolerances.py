@@ -23,11 +23,12 @@ from fastcontact.arrays import Array, largest
 from fastcontact.linear.protocol import LinearSolver
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Relative residual of solutions by an iterative solver, over the last relative change of the displacements or the last
-# residual, whichever is smaller; the pairing is not more accurate. In the first solution of a step the residual is NOTABLE.
+# Forcing term of iterative solutions: ratio of the relative residual to the last relative change of the displacements, or
+# to the last relative residual if that is smaller. More accurate solutions are of no use, because contact detection has an
+# error of the size of this change. The relative residual of the first solution of a step is NOTABLE.
 RESIDUAL = 0.03
-# With friction the tolerance decreases at least by this factor, because inaccurate linear solutions may prevent the
-# residual of the friction law from decreasing.
+# If the residual of the friction law determines the tolerance, the tolerance decreases at least by this factor, because
+# the residual of the law may not decrease if linear solutions are inaccurate.
 LEAST_FALL = 0.2
 # Number of updates, or of Newton iterations, within which changes must decline.
 WINDOW = 8
@@ -65,8 +66,8 @@ class Tolerances:
     def tighten(self, relative_change: float, law_residual: float = 0.0) -> None:
         """Reduce the tolerance of linear solutions according to the last relative change of the displacements.
 
-        `law_residual` is the residual of the friction law, relative to the largest force. If it is larger than the change, it
-        determines the tolerance, because the next step of Newton's method is no more accurate.
+        `law_residual` is the residual of the friction law, relative to the largest force. It determines the tolerance if it
+        exceeds the smaller of the change and the last tolerance, because the next Newton step is not more accurate.
         """
         residual = RESIDUAL * min(self._residual, relative_change)
         if RESIDUAL * law_residual > residual:
@@ -93,8 +94,8 @@ class Tolerances:
 
         `size` is the largest displacement [length].
         """
-        # The errors of iterative solutions are about the tolerance times the contrast of cells, so that changes need not
-        # become smaller.
+        # The errors of iterative solutions are about the tolerance times the contrast of cells. Smaller changes are not
+        # significant.
         relative_error = self._solver.tolerance * (self._solver.contrast if self._solver.iterative else 1.0)
         return max(max(self._criteria.geometry, relative_error) * size, self._round_off)
 
@@ -154,9 +155,9 @@ class Watch:
         if len(self._window) < window:
             return None
         (displacements, forces, changes), half = zip(*list(self._window)[-window:], strict=True), window // 2
-        scatter = Scatter(_last_change(displacements) / size, _last_change(forces) / (largest(force) or 1.0))
+        scatter = Scatter(_spread(displacements) / size, _spread(forces) / (largest(force) or 1.0))
         declining = np.median(changes[half:]) < DECLINE * np.median(changes[:half])
-        # Displacements that move in one direction are apart by about WINDOW changes.
+        # Displacements that move in one direction are about `window` changes apart, those that oscillate about one change.
         if declining or scatter.displacement * size > half * float(np.median(changes)):
             return None
         acceptable = scatter.displacement <= SINGLE_PRECISION and scatter.force <= 100 * SINGLE_PRECISION
@@ -167,6 +168,6 @@ class Watch:
         self._window.clear()
 
 
-def _last_change(vectors: tuple[Array, ...]) -> float:
-    """Return the largest difference, in any component, between the last vector and the others."""
+def _spread(vectors: tuple[Array, ...]) -> float:
+    """Return the largest difference of a component between the last vector and one of the others."""
     return max(float(largest(vectors[-1] - other)) for other in vectors[:-1])

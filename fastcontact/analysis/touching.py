@@ -1,7 +1,8 @@
 """Load steps in which constraints close and slide: friction is solved in increments, see `friction.path`.
 
-Once the geometry has nearly converged, a pairing is solved in increments. In later pairings only the last increment is solved
-again, with the slips of the earlier ones, unless the geometry changes gaps and slips noticeably.
+Once the geometry has nearly converged, the contact problem of a pairing is solved in increments. For later pairings only
+the last increment is solved again, with the slips of the earlier ones, unless the geometry changes gaps and slips
+noticeably.
 """
 
 from __future__ import annotations
@@ -81,7 +82,7 @@ class Touching:
             self.due = self._settled and _slides(step, constraints, solution, self._allowed)
 
     def _outdated(self, step: StepContext, constraints: StackedConstraints, u: Array) -> bool:
-        """Return whether the geometry has changed since the increments were solved, and changes less than at the last time.
+        """Return whether the geometry has changed since the increments were solved, but by less than the last time.
 
         Slips of earlier increments are those of the pairing in which they were solved.
         """
@@ -102,13 +103,13 @@ def _shift(before: StackedConstraints, now: StackedConstraints, active: Mask, u:
     Displacements are `u` (n_dofs,), and at the beginning of the step `start` (n_dofs,) [length].
     """
 
-    def relative(part: StackedConstraints) -> Array:
-        """Return the gaps, and the slip vectors (dim,) (m, 1 + dim)."""
-        slips = zip(part.tangents, part.slip0, part.directions, strict=True)
-        vectors = [(T @ (u - start) + slip)[:, None] * along for T, slip, along in slips]
-        return np.column_stack([part.gap0 + part.B @ u, np.sum(vectors, axis=0)])[active]
+    def gaps_and_slips(constraints: StackedConstraints) -> Array:
+        """Return an array (n_active, 1 + dim) of the gaps and the slip vectors."""
+        tangents = zip(constraints.tangents, constraints.slip0, constraints.directions, strict=True)
+        vectors = [(T @ (u - start) + slip0)[:, None] * direction for T, slip0, direction in tangents]
+        return np.column_stack([constraints.gap0 + constraints.B @ u, np.sum(vectors, axis=0)])[active]
 
-    return largest(relative(before) - relative(now))
+    return largest(gaps_and_slips(before) - gaps_and_slips(now))
 
 
 def _slides(step: StepContext, constraints: StackedConstraints, solution: Solution, allowed: float) -> bool:
@@ -123,7 +124,10 @@ def _slides(step: StepContext, constraints: StackedConstraints, solution: Soluti
 def _path(
     step: StepContext, constraints: StackedConstraints, iterate: Iterate, nodes: SharedNodes | None
 ) -> Path | None:
-    """Return the path of a step with its data at the beginning; None if no constraint is open there."""
+    """Return the path of a step with the gaps and forces at its beginning.
+
+    None if no constraint is open there, or if the forces are unknown.
+    """
     forces = _forces(step, constraints)
     if forces is None:
         return None
@@ -138,9 +142,10 @@ def _path(
 
 
 def _allowed(problem: Problem) -> float:
-    """Return `Criteria.friction_while_touching`, or its default, which is 1 where friction is solved in whole steps.
+    """Return `Criteria.friction_while_touching` or its default; 1 means that friction is solved in whole steps.
 
-    Slip is counted from the beginning of the step in formulations that reproduce code_aster between bodies, as in code_aster.
+    With nonlinear bodies it is 1, because their steps are halved instead. Between bodies the default is 1 unless each node
+    has one weighted gap: the other formulations reproduce code_aster, which counts slip from the beginning of the step.
     """
     criteria = problem.criteria
     if problem.bodies is not None:
@@ -154,10 +159,10 @@ def _allowed(problem: Problem) -> float:
 
 
 def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> Array:
-    """Return the slips (m, dim) of closing the gaps (m,) between bodies with inclined normals [length].
+    """Return the tangential relative displacements (m, dim) that close the gaps (m,) if normals are inclined [length].
 
-    The constraints already contain the slips for the gaps at the beginning of the step in the geometry of its end, which are
-    scaled here to the actual gaps.
+    They are not slip, see `Path`. The constraints contain them as `slip0`, for the gaps that the displacements at the
+    beginning of the step have with the last pairing. Here they are scaled to `gap`.
     """
     closing = np.zeros_like(constraints.positions)
     for name, rows in constraints.rows.items():
@@ -186,7 +191,7 @@ def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, 
 
 
 def _gaps(step: StepContext, constraints: StackedConstraints, iterate: Iterate) -> Array:
-    """Return the gaps (m,) at the beginning of the step, in the configuration at this instant [length]."""
+    """Return the gaps (m,) at the beginning of the step, measured in the configuration at its beginning [length]."""
     state = step.state
     begin = replace(step.load, obstacles=state.obstacles, angles=state.angles)
     initial = pair_surfaces(step.problem, state, begin, Iterate.of(state))

@@ -1,14 +1,15 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Constitutive laws at one quadrature point: first Piola-Kirchhoff stress, its tangent, history.
 
-Shared arguments: ``F`` (3, 3) is the deformation gradient [-], ``P`` (3, 3) the first Piola-Kirchhoff stress [pressure] and
-``A`` (9, 9) its derivative dP/dF, of which components iJ have the number 3 i + J. Laws for small strains take the symmetric
-part of F - I; their P is the Cauchy stress. `constants` (n_constants,) begin with the number of the law, see
-`nonlinear_materials`. `old` and `new` (9,) are the history at the beginning and the end of the load step. It consists of the
-plastic strain (xx, yy, zz, xy, yz, xz, tensor components), the equivalent plastic strain, the plastic work [energy / volume],
-and in plane stress F_zz - 1. At finite strains, L - I takes the place of the plastic strain, where L is the lower triangular
-factor of the inverse plastic metric, C_p^-1 = L L^T. The element loop adds the volumetric part, U(J) = K (J - 1)^2 / 2, of
-laws that have a bulk modulus.
+Shared arguments: ``F`` (3, 3) is the deformation gradient [-] and ``P`` (3, 3) the first Piola-Kirchhoff stress [pressure].
+The first nine rows and columns of ``A`` (18, 12) contain its derivative dP/dF, in which component iJ has the index 3 i + J;
+the other entries are work space. Laws for small strains take the symmetric part of F - I; their P is the Cauchy stress.
+`constants` (n_constants,) begin with the number of the law, see `nonlinear_materials`. `old` and `new` (9,) are the history
+at the beginning and the end of the load step. It consists of the plastic strain (xx, yy, zz, xy, yz, xz, tensor
+components), the equivalent plastic strain, the plastic work [energy / volume], and in plane stress F_zz - 1. At finite
+strains, L - I takes the place of the plastic strain, where L is the lower triangular factor of the inverse plastic metric,
+C_p^-1 = L L^T. For laws that have a bulk modulus, `respond` adds the volumetric part of P and A, and the element loop that
+of the energy, U(J) = K (J - 1)^2 / 2.
 """
 
 import numpy as np
@@ -212,12 +213,12 @@ def _plastic(constants, F, everywhere, old, new, P, A):
     if not (everywhere or increment > 0.0):
         return energy
     shear = 2.0 * mu * (1.0 - 2.0 * mu * flow)
-    turn = 0.0
+    rank_one = 0.0
     if increment > 0.0:
-        turn = 9.0 * mu * mu / trial**2 * (1.0 / (3.0 * mu + kinematic + slope) - increment / trial)
+        rank_one = 9.0 * mu * mu / trial**2 * (1.0 / (3.0 * mu + kinematic + slope) - increment / trial)
     for row in range(9):
         for column in range(9):
-            A[row, column] = -turn * xi[row] * xi[column]
+            A[row, column] = -rank_one * xi[row] * xi[column]
     for i in range(3):
         for j in range(3):
             A[3 * i + j, 3 * i + j] += 0.5 * shear
@@ -255,17 +256,17 @@ def _push_forward(F, S, C, A):
 
 
 @kernel
-def _slope(x, y):
+def _first_difference(x, y):
     """Return the divided difference of ln(x) / 2 at x and y."""
     difference = (x - y) / y
     return 0.5 / x if difference == 0.0 else 0.5 * np.log1p(difference) / (x - y)
 
 
 @kernel
-def _bend(x, y, z):
+def _second_difference(x, y, z):
     """Return the second divided difference of ln(x) / 2 at x <= y <= z."""
     if z - x > CLOSE * z:
-        return (_slope(y, z) - _slope(x, y)) / (z - x)
+        return (_first_difference(y, z) - _first_difference(x, y)) / (z - x)
     mean = (x + y + z) / 3.0
     a, b, c = x / mean - 1.0, y / mean - 1.0, z / mean - 1.0
     return ((a**3 + b**3 + c**3) / 15.0 - (a * a + b * b + c * c) / 8.0 - 0.5) * 0.5 / mean**2
@@ -293,7 +294,7 @@ def _logarithmic(constants, F, everywhere, old, new, P, A):
     _flow(carried, axes, old, new)
     for a in range(3):
         for b in range(3):
-            slope[a, b] = 2.0 * _slope(squared[a], squared[b])
+            slope[a, b] = 2.0 * _first_difference(squared[a], squared[b])
     _fill_turn(axes, turn)
     T, factor = axes.T @ T @ axes, slope.reshape(9)
     S = carried @ (slope * T) @ carried.T
@@ -306,7 +307,7 @@ def _logarithmic(constants, F, everywhere, old, new, P, A):
         for b in range(3):
             for c in range(3):
                 low, high = min(a, b, c), max(a, b, c)
-                value = T[a, c] * _bend(squared[low], squared[a + b + c - low - high], squared[high])
+                value = T[a, c] * _second_difference(squared[low], squared[a + b + c - low - high], squared[high])
                 for row in (3 * a + b, 3 * b + a):
                     for column in (3 * b + c, 3 * c + b):
                         moduli[row, column] += value
@@ -328,7 +329,7 @@ def _fill_turn(axes, turn):
 
 @kernel
 def _flow(carried, axes, old, new):
-    """Replace the increment of plastic strain in `new` by the factor of the inverse plastic metric after the load step.
+    """Replace the increment of plastic strain in `new` by L - I at the end of the load step, see the header.
 
     The columns of `axes` (3, 3) are the principal axes of the increment, and `carried` (3, 3) is the factor before the load
     step times `axes`.
@@ -368,16 +369,16 @@ def _saint_venant(D, F, everywhere, P, A):
 
 
 @innermost_kernel
-def _add_isochoric(value, first, number, power, scale, J, G, slope, bend, everywhere, P, A):
+def _add_isochoric(value, first, number, power, scale, J, G, dW, d2W, everywhere, P, A):
     """Add to P and A the terms of an energy of the isochoric invariant ``scale * value``, except for second derivatives.
 
-    `scale` is ``J**-power``, and `first` (3, 3) the derivative of the value; `slope` and `bend` are derivatives of the energy
-    with respect to the invariant. The terms of A are stored as factors, see `first_invariant`. Returns the factors of the
-    second derivatives of the value and of J.
+    `scale` is ``J**-power``, and `first` (3, 3) the derivative of the value; `dW` and `d2W` are the first and second
+    derivatives of the energy with respect to the invariant. The terms of A are stored in the rows LEFT, ``LEFT + number``
+    and ``RIGHT + number``, see `first_invariant`. Returns the factors of the second derivatives of the value and of J.
     """
-    inverse, factor = power / J, slope * scale
-    ratio, by_volume = inverse * value, factor * inverse * (inverse + 1.0 / J) * value
-    curvature, shrinks = bend * scale * scale, factor * inverse
+    inverse, factor = power / J, dW * scale
+    ratio, of_GG = inverse * value, factor * inverse * (inverse + 1.0 / J) * value
+    curvature, mixed = d2W * scale * scale, factor * inverse
     for i in range(3):
         for j in range(3):
             change = first[i, j] - ratio * G[i, j]
@@ -385,14 +386,14 @@ def _add_isochoric(value, first, number, power, scale, J, G, slope, bend, everyw
             if everywhere:
                 e = 3 * i + j
                 A[RIGHT + number, e] = first[i, j]
-                A[LEFT + number, e] = curvature * change - shrinks * G[i, j]
-                A[LEFT, e] += by_volume * G[i, j] - shrinks * first[i, j] - curvature * ratio * change
+                A[LEFT + number, e] = curvature * change - mixed * G[i, j]
+                A[LEFT, e] += of_GG * G[i, j] - mixed * first[i, j] - curvature * ratio * change
     return factor, -factor * ratio
 
 
 @innermost_kernel
 def first_invariant(constants, F, J, G, volumetric, everywhere, P, A):
-    """Fill P, and A as factors, by a polynomial law of the isochoric first invariant and `volumetric` terms, see `respond`.
+    """Fill P and the work space of A for a polynomial law of the isochoric first invariant with `volumetric` terms.
 
     The energy is C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 (Yeoh, 1993); see `respond` for the other terms. Except
     for second derivatives, the tangent is a sum of dyadic products of the row LEFT + k of A and its row RIGHT + k. The rows
@@ -411,16 +412,16 @@ def first_invariant(constants, F, J, G, volumetric, everywhere, P, A):
     root = np.cbrt(J)
     scale = 1.0 / (root * root)
     x = scale * I1 - 3.0
-    slope, bend = C10 + 2.0 * C20 * x + 3.0 * C30 * x * x, 2.0 * C20 + 6.0 * C30 * x
-    factor, of_J = _add_isochoric(0.5 * I1, F, 1, 2.0 / 3.0, scale, J, G, 2.0 * slope, 4.0 * bend, everywhere, P, A)
+    dW, d2W = C10 + 2.0 * C20 * x + 3.0 * C30 * x * x, 2.0 * C20 + 6.0 * C30 * x
+    factor, of_J = _add_isochoric(0.5 * I1, F, 1, 2.0 / 3.0, scale, J, G, 2.0 * dW, 4.0 * d2W, everywhere, P, A)
     return C10 * x + C20 * x**2 + C30 * x**3, factor, d2J_factor + of_J, I1, scale
 
 
 @innermost_kernel
 def sum_products(n, factor, d2J_factor, everywhere, F, A):
-    """If `everywhere`, fill A with the products of n rows from LEFT and RIGHT on and the terms of second derivatives.
+    """If `everywhere`, fill A with the n dyadic products of its work space and the terms with second derivatives.
 
-    See `first_invariant` for their factors.
+    See `first_invariant` for the work space and the factors.
     """
     for row in range(0, 12 if everywhere else 0, 4):
         for column in range(0, 12, 4):
@@ -542,8 +543,8 @@ def respond(constants, D, F, J, G, volumetric, everywhere, old, new, P, A):
 
     The energy does not include the volumetric part of the law. `volumetric` contains a pressure, a bulk modulus and a factor:
     P includes ``pressure dJ/dF``, and A includes ``bulk dJ/dF dJ/dF + factor d2J/dF2``. D (6, 6) are the moduli of Hooke's
-    law, and J and G (3, 3) the determinant of F and its derivative. If `everywhere` is false, the caller needs A only where
-    plastic flow occurs at small strains.
+    law, and J and G (3, 3) the determinant of F and its derivative. If `everywhere` is false, the caller needs A at small
+    strains only where plastic flow occurs, and not at all at finite strains.
     """
     for e in range(9):
         new[e] = old[e]

@@ -44,11 +44,11 @@ SOLIDS = (1e2, 2e12)
 SAMPLE = 1000
 # Relative quadrature errors above which a warning is given: of a load, and of the stiffness (1.6 % on regular pyramids).
 LARGEST_LOAD_ERROR, LARGEST_STIFFNESS_ERROR = 1e-3, 5e-2
-# Nodes whose distance is below this fraction of the edges there, and below single precision of the model's size, probably
-# should coincide.
+# Nodes probably should coincide if their distance is below this fraction of the adjacent edges and below SINGLE_PRECISION
+# times the size of the model.
 NEAR = 1e-2
-# Largest penetration relative to the facet length that does not count as overlap: that of eight straight facets of a circle
-# in a round side is less.
+# Largest penetration, relative to the facet length, that is regarded as an effect of straight facets: the midpoints of the
+# sides of a regular octagon lie 0.0995 times their length inside the circle.
 SAG = 0.1
 # Largest plausible coefficient of friction; that of rubber on rough ground is 1 to 2.
 LARGEST_FRICTION = 3.0
@@ -68,7 +68,7 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
 
 
 def _split_sides(model: Model, pairs: Pairs) -> Iterator[str]:
-    """Return a warning for every two contacts whose sides continue each other; see `split_side_warnings`."""
+    """Return the warnings about pairs of contacts whose sides continue each other; see `split_side_warnings`."""
     nodes = {
         pair.name: np.union1d(*(model.mesh.points_of(side) for side in (pair.secondary, pair.primary)))
         for pair in model.contact
@@ -137,8 +137,8 @@ def _proportions(model: Model, motion: float) -> Iterator[str]:
     strain = max(forces, default=0.0) / stiffness
     if strain > PLAUSIBLE_STRAIN[1] or 0.0 < strain < PLAUSIBLE_STRAIN[0]:
         yield (
-            f"the loads strain the model by about {strain:.2g} (all forces over E times its size squared): are loads, "
-            "lengths and E in one set of units?"
+            f"the loads strain the model by about {strain:.2g} (total force over E times the cross-section of the "
+            "model): are loads, lengths and E in one set of units?"
         )
 
 
@@ -190,7 +190,7 @@ def _coincident(model: Model) -> str:
 
 
 def _wetted_twice(model: Model) -> list[str]:
-    """Return a warning for every two pairs with fluids that have common secondary facets."""
+    """Return the warnings about contacts with fluids that share secondary facets with each other."""
     groups, wetted = model.mesh.cell_groups, [pair for pair in model.contact if pair.fluid is not None]
     return [
         f"the fluids of contacts '{first.name}' and '{second.name}' both act on {len(shared)} secondary facets, and each "
@@ -203,8 +203,8 @@ def _wetted_twice(model: Model) -> list[str]:
 def _friction(model: Model) -> list[str]:
     """Return a warning for each implausible coefficient of friction."""
     return [
-        f"the friction of contact '{pair.name}' is {friction:g}, more than the {LARGEST_FRICTION:g} that surfaces have at "
-        "most: is it in percent? To exclude sliding, use kind='tied'"
+        f"the friction of contact '{pair.name}' is {friction:g}, but surfaces have at most "
+        f"{LARGEST_FRICTION:g}: is it in percent? To exclude sliding, use kind='tied'"
         for pair in model.contact
         if (friction := pair.options.get("friction") or 0.0) > LARGEST_FRICTION
     ]
@@ -229,13 +229,16 @@ def _penetrating(model: Model, pairs: Pairs, pushed: Array) -> Iterator[str]:
             yield (
                 f"contact '{pair.name}' begins with a penetration of {-gap[row]:.4g} at point {point} "
                 f"{np.array2string(model.mesh.points[point], precision=4)}, more than the {np.abs(normal[row]) @ motion:.4g} "
-                f"that {driver} along its normal: "
-                "forces are those of the penetration. Move a body apart, or give an interference that is meant as clearance"
+                f"that {driver} along its normal: the contact forces are due to this penetration. Separate the bodies, or "
+                "specify an intended interference as a clearance"
             )
 
 
 def _unramped(model: Model, ramp: Ramp) -> Iterator[str]:
-    """Yield a warning if some items have separate histories, and the ramp multiplies the others by more than 1."""
+    """Yield a warning if some items have separate ramps, and the common ramp multiplies the others by more than 1.
+
+    A common ramp of more than two points is assumed to be meant for them.
+    """
     top = max(ramp.value(instant) for instant in ramp.instants)
     if top <= 1.0 or len(ramp.table) > 2:
         return

@@ -217,7 +217,7 @@ DOUBTS = [
         lambda: block((1.0, 1.0), (2, 2)),
         of(STEEL, held("BOTTOM", x=0.0, y=0.0), '[[pressure]]\ngroup = "TOP"\nvalue = 1e-10\n'),
         (
-            r"the loads strain the model by about 1e-13 \(all forces over E times its size squared\): are loads, lengths and E in one set of units\?",
+            r"the loads strain the model by about 1e-13 \(total force over E times the cross-section of the model\): are loads, lengths and E in one set of units\?",
         ),
     ),
     Doubt(
@@ -285,7 +285,7 @@ DOUBTS = [
         block_on_block,
         of(STEEL, BLOCKS, PAIR, "friction = 30.0\n"),
         (
-            r"the friction of contact 'pair' is 30, more than the 3 that surfaces have at most: is it in percent\? To exclude sliding, use kind='tied'",
+            r"the friction of contact 'pair' is 30, but surfaces have at most 3: is it in percent\? To exclude sliding, use kind='tied'",
         ),
     ),
     Doubt(
@@ -293,7 +293,7 @@ DOUBTS = [
         lambda: raised(-0.02),
         of(STEEL, BLOCKS, PAIR),
         (
-            r"contact 'pair' begins with a penetration of 0\.02 at point \d+ \[.*\], more than the 0\.01 that supports push along its normal: forces are those of the penetration\. Move a body apart, or give an interference that is meant as clearance",
+            r"contact 'pair' begins with a penetration of 0\.02 at point \d+ \[.*\], more than the 0\.01 that supports push along its normal: the contact forces are due to this penetration\. Separate the bodies, or specify an intended interference as a clearance",
         ),
     ),
     Doubt(

@@ -267,7 +267,7 @@ MATERIALS = [
     Mistake("inconsistent units", lambda: solved(with_units(2.1e5, length="m", force="N", pressure="MPa")),
             fc.FastcontactWarning, r"the units do not fit each other: 1 N/m\^2 is 1e-06 MPa; change one of the three"),
     Mistake("E in Pa with a force and mm", lambda: solved(pushed(2.1e11, 1e-2)), fc.FastcontactWarning,
-            r"the loads strain the model by about .*e-1\d \(all forces over E times its size squared\): are loads, lengths and E in one set of units\?"),
+            r"the loads strain the model by about .*e-1\d \(total force over E times the cross-section of the model\): are loads, lengths and E in one set of units\?"),
     Mistake("a pressure in Pa with E in MPa", lambda: solved(pushed(210.0, 1e5)), fc.FastcontactWarning,
             r"the loads strain the model by about .*: are loads, lengths and E in one set of units\?"),
     Mistake("a displacement in mm of a model in m", lambda: solved(stretched(4.0)), fc.FastcontactWarning,

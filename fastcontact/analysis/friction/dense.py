@@ -1,11 +1,11 @@
 """Contact with Coulomb friction on a dense Delassus operator.
 
 The gaps g and the slips s depend on the normal forces n and the tangential forces t as ``(g, s) = free + F (n, t)``. Three
-methods are tried in turn:
+methods are combined, see `_Problem.starts`:
 
-1. Newton's method, see `cone_newton`, from several initial forces. In 2D it is an active set method, in which the state of a
-   constraint is open, stick, or slip in one of two directions.
-2. Newton's method with a compliance that decreases to zero.
+1. Newton's method with and without a line search, see `cone_newton`. In 2D it is an active set method, in which the state
+   of a constraint is open, stick, or slip in one of two directions.
+2. Newton's method from the solution with a compliance that decreases to round-off.
 3. Newton's method from the solution for a polyhedral friction cone with few edges. With such a cone the problem is a linear
    complementarity problem, which Lemke's method solves for every positive definite F and every coefficient of friction mu
    (Klarbring, 1986; Stewart and Trinkle, 1996; Klarbring and Pang, 1998).
@@ -154,8 +154,8 @@ class _Problem:
         """Return forces (1 + k, m) near a solution, from `y` with a compliance that decreases to round-off.
 
         Where constraints are nearly dependent, such as those of two pairs on one facet, Newton's method may alternate between
-        contact states. It does not with a compliance, which is reduced by the factor NOTABLE relative to that of the gaps, or
-        by less where the method fails.
+        contact states, which a compliance prevents. Relative to that of the gaps, the compliance begins with NOTABLE. It is
+        reduced by the factor NOTABLE after each solution, or by less if the method then fails.
         """
         compliance, last, halvings = NOTABLE, 1.0, 0
         while compliance > ROUND_OFF and halvings <= HALVINGS:

@@ -92,7 +92,7 @@ def _block(content: Mapping[str, Any], index: int, kind: str, nodes: AnyArray, o
 
 
 def _add(groups: dict[str, AnyArray], more: Mapping[str, AnyArray]) -> None:
-    """Add the members of groups to `groups`, each once."""
+    """Add the groups `more` to `groups`; a group of the same name becomes the union of both."""
     for name, rows in more.items():
         groups[name] = np.union1d(groups[name], rows) if name in groups else rows
 

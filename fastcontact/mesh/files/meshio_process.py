@@ -1,8 +1,10 @@
 """Reading of mesh files with meshio in a child process, with limits of memory and computing time.
 
 meshio allocates memory for the numbers of items that a file states, and some of its readers do not terminate on a truncated
-file. In these cases only the child process ends, and the file is rejected with the reason. On Windows only the elapsed time
-is limited. Frozen applications and programs with embedded Python, which cannot start an interpreter, read without limits.
+file. In these cases only the child process ends, and the file is rejected with the reason. Memory
+is not limited on Windows and macOS, and computing time not on Windows; elapsed time and the size of the answer are limited
+on all systems. Frozen applications and programs with embedded Python, which cannot start an interpreter, read without
+limits.
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ WAITING = 10
 
 # Integer cell data that define groups, in the formats of Gmsh, Medit and others; 0 means no group.
 TAGS = ("gmsh:physical", "medit:ref", "tetgen:ref", "netgen:index", "avsucd:material", "cell_tags")
-# In formats with named arrays a group is an array of 0 and 1, named by a prefix and its quoted name.
+# In formats with named arrays a group is an array of 0 and 1, whose name is a prefix and the percent-encoded group name.
 CELL_PREFIX, POINT_PREFIX = "cell_group:", "point_group:"
 
 

@@ -32,7 +32,10 @@ def number(name: str, value: Any) -> float:
 
 
 def positive(name: str, value: Any, at_most: float = math.inf, limit: str = "") -> float:
-    """Return `value` as a float. Raises MeshError unless 0 < value <= at_most, which the message calls `limit`."""
+    """Return `value` as a float. Raises MeshError unless 1 / LARGEST <= value <= at_most.
+
+    `limit` is the name of the upper bound in the message.
+    """
     result = number(name, value)
     if 0.0 < result < 1.0 / LARGEST:
         raise MeshError(f"{name} = {result:g} is out of range: it must be at least {1.0 / LARGEST:g}")

@@ -72,7 +72,7 @@ def deformed_shape(
     view: tuple[float, float] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the deformed mesh, in 3D its visible surface, coloured by a field, with the largest value marked.
+    """Plot the deformed mesh, in 3D its visible surface, coloured by a field; the value of largest magnitude is marked.
 
     Parameters
     ----------
@@ -94,13 +94,13 @@ def deformed_shape(
         Whether to draw also the mirror image at x = 0 of a 2D mesh, for example to show the full section of an axisymmetric
         body.
     zoom : float, optional
-        Half the width of the plotted region around the largest value, only for 2D meshes [length].
+        Half the width of the plotted region around the marked value, only for 2D meshes [length].
     limits : (float, float), optional
         Limits of the colour scale, in the unit of the field.
     title, units
         Described for `pressure_profile`.
     view : (float, float), optional
-        Elevation and azimuth of the view of a 3D mesh [degrees]. By default it is (25, -60) or, if the largest value is not
+        Elevation and azimuth of the view of a 3D mesh [degrees]. By default it is (25, -60) or, if the marked value is not
         visible from there, the first of eight views from corners of the bounding box from which it is.
     ax : matplotlib Axes, optional
         Axes of the plot, which in 3D must have ``projection="3d"``; by default those of a new figure.
@@ -112,7 +112,7 @@ def deformed_shape(
     Raises
     ------
     FastcontactError
-        If there is no such field, or `zoom` is given for a 3D mesh.
+        If there is no such field, `scale` is not finite or too large, or `zoom` is not positive or given for a 3D mesh.
 
     Examples
     --------
@@ -163,16 +163,16 @@ def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Mapping[str
 
 
 def _draw(
-    ax: Axes, shown: Field, nodes: Array, edges: bool | None, colours: tuple[float, float], box: Array
+    ax: Axes, shown: Field, nodes: Array, edges: bool | None, limits: tuple[float, float], box: Array
 ) -> Any:  # fmt: skip
     """Draw the cells of a 2D mesh at the positions `nodes` (n_points, 2), and return the artist with the colour scale.
 
-    `colours` contains the limits of the colour scale. By default edges are drawn if at most MOST_EDGES cells lie in the
+    `limits` are those of the colour scale. By default edges are drawn if at most MOST_EDGES cells lie in the
     bounding box of the points `box` (n, 2).
     """
     from matplotlib.collections import PolyCollection
 
-    artist = fill(ax, shown.mesh.solids, nodes, shown.values, shown.colours, colours)
+    artist = fill(ax, shown.mesh.solids, nodes, shown.values, shown.colours, limits)
     loops = [outlines(name, nodes[cells]) for name, cells in shown.mesh.solids.items()]
     low, high = box.min(axis=0), box.max(axis=0)
     inside = [((loop.max(axis=1) >= low) & (loop.min(axis=1) <= high)).all(axis=1) for loop in loops]
@@ -182,7 +182,8 @@ def _draw(
     return artist
 
 
-# Distance by which a plane that only touches a body is moved into the body, relative to the size of the body.
+# Distance, relative to the size of the mesh, by which a plane is moved along its normal, because it may coincide with
+# facets.
 INSIDE = 1e-7
 
 
@@ -201,7 +202,7 @@ def section(
     units: Units = UNKNOWN,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot a plane section through a 3D mesh, coloured by a field, with the largest value marked.
+    """Plot a plane section through a 3D mesh, coloured by a field; the value of largest magnitude is marked.
 
     The plane is defined in the reference configuration; the section is drawn in the deformed configuration, projected along
     the normal.
@@ -216,10 +217,12 @@ def section(
         A point of the plane in the reference configuration [length].
     normal : sequence of 3 floats
         Vector of any length normal to the plane [-].
-    field, scale, edges, title, units
-        Described for `deformed_shape`; the edges are the lines along which the plane cuts facets of cells.
+    field, scale, title, units
+        Described for `deformed_shape`.
+    edges : bool, optional
+        Whether to draw the lines along which the plane cuts facets of cells; by default if there are at most 20 000 of them.
     zoom : float, optional
-        Half the width of the plotted region around the largest value [length]; by default the entire section is plotted.
+        Half the width of the plotted region around the marked value [length]; by default the entire section is plotted.
     ax : matplotlib Axes, optional
         Axes of the plot; by default those of a new figure.
 
@@ -230,7 +233,8 @@ def section(
     Raises
     ------
     FastcontactError
-        If the mesh is not three-dimensional, the normal is zero, or the plane does not intersect the mesh.
+        If there is no such field, the mesh is not three-dimensional, the normal is zero, or the plane does not intersect the
+        mesh.
 
     Examples
     --------
@@ -295,8 +299,8 @@ def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple
 def _intersection(shown: Field, step: StepResult, origin: Array, direction: Array) -> tuple[Array, Array]:
     """Return the section as triangles (n, 3, 7) and lines (m, 2, 7), with position, displacement and value at each corner.
 
-    A plane that coincides with a surface is moved slightly into the body. Raises FastcontactError if the plane does not
-    intersect the mesh.
+    The plane is moved slightly along its normal, because it may coincide with facets, or in the opposite direction if it does
+    not intersect the mesh then. Raises FastcontactError if neither plane intersects the mesh.
     """
     size = float(np.ptp(shown.mesh.points, axis=0).max())
     data = np.column_stack([shown.mesh.points, step.displacement[shown.node], shown.values])
@@ -402,7 +406,9 @@ def view(
         raise FastcontactError("the interactive view needs PyVista: pip install 'fastcontact[view]'") from error
     displayed = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if screenshot is None and not displayed:
-        raise FastcontactError("there is no display to open a window on: write a picture instead, with --png FILE")
+        raise FastcontactError(
+            "there is no display to open a window on: write a picture instead, with screenshot=FILE or --png FILE"
+        )
     grid = results.to_pyvista(step)
     grid.points = scaled(grid.points, scale_of(scale, results.mesh, [step]), grid.point_data["displacement"])
     plotter: Any = pyvista.Plotter(off_screen=screenshot is not None)
@@ -510,14 +516,14 @@ def animate(
         size = _axes.size_around(mesh.points * [2.0 if mirrored else 1.0, 1.0], 3.8)
     figure = new_axes(None, size, projection).figure
     writer = writer_of(target, pictures_per_second)
-    colours, box = _over_all(mesh, steps, field, scale, mirrored)
+    limits, box = _over_all(mesh, steps, field, scale, mirrored)
     with _failure_of_writer(target), replacing(target) as temporary, writer.saving(figure, temporary, RESOLUTION):
         for step in steps:
             figure.clear()
             axes = figure.add_subplot(projection=projection)
             heading = f"{title}\n{step.instant}, displacements x {scale:g}".strip()
             deformed_shape(
-                mesh, step, field=field, scale=scale, mirrored=mirrored, limits=colours, title=heading, units=units,
+                mesh, step, field=field, scale=scale, mirrored=mirrored, limits=limits, title=heading, units=units,
                 view=view, ax=axes,
             )  # fmt: skip
             if mesh.dim == 3:
@@ -569,13 +575,13 @@ def _over_all(
 ) -> tuple[tuple[float, float], tuple[Array, Array]]:
     """Return the limits of the colour scale and the corners of the bounding box of the bodies over all steps."""
     low, high = np.full(mesh.dim, np.inf), np.full(mesh.dim, -np.inf)
-    colours = (np.inf, -np.inf)
+    limits = (np.inf, -np.inf)
     for step in steps:
         smallest, largest = field_of(mesh, step, field).range
-        colours = min(colours[0], smallest), max(colours[1], largest)
+        limits = min(limits[0], smallest), max(limits[1], largest)
         points = scaled(mesh.points, scale, step.displacement)
         low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
     if mirrored and mesh.dim == 2:
         low[0], high[0] = min(low[0], -high[0]), max(high[0], -low[0])
     margin = 0.03 * float((high - low).max())
-    return colours, (low - margin, high + margin)
+    return limits, (low - margin, high + margin)
