@@ -35,7 +35,7 @@ def packed(data: Any) -> NDArray[np.uint8]:
 def unpacked(values: NDArray[np.uint8]) -> Any:
     """Return the data from the bytes (n,) that `packed` has returned; further bytes are ignored.
 
-    Raises ValueError if the bytes are incomplete, or not from `packed`.
+    Raises ValueError, LookupError or TypeError if the bytes are incomplete, or not from `packed`.
     """
     buffer = np.ascontiguousarray(values, np.uint8).data
     line, separator, _ = bytes(buffer[:200]).partition(b"\n")
@@ -69,10 +69,10 @@ def _with_arrays(data: Any, arrays: memoryview) -> Any:
     if isinstance(data, dict):
         if _ARRAY not in data:
             return {key: _with_arrays(value, arrays) for key, value in data.items()}
-        offset, kind, shape = data[_ARRAY]
-        dtype = np.dtype(kind)
+        offset, dtype_string, shape = data[_ARRAY]
+        dtype = np.dtype(dtype_string)
         if dtype.kind not in _KINDS:
-            raise ValueError(f"an array of {kind} is not a packed array")
+            raise ValueError(f"an array of {dtype_string} is not a packed array")
         count = int(np.prod(shape, dtype=np.int64))
         return np.frombuffer(arrays, dtype, count, offset).reshape(shape).copy()
     if isinstance(data, list):

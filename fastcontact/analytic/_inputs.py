@@ -26,7 +26,7 @@ def number(name: str, value: object) -> float:
     if not size < math.inf:
         raise ModelError(f"{name} is {value!r}: it must be a finite number")
     if size > LARGEST:
-        raise ModelError(f"{name} is out of range: its magnitude must be at most {LARGEST:g}, in any unit")
+        raise ModelError(f"{name} is out of range: its magnitude must be at most {LARGEST:g}, whatever its unit")
     return float(value)  # type: ignore[arg-type]
 
 
@@ -51,7 +51,7 @@ def positive(name: str, value: object, *, infinite: bool = False) -> float:
     if checked <= 0.0:
         raise ModelError(f"{name} is {checked:g}: it must be positive")
     if checked < 1.0 / LARGEST:
-        raise ModelError(f"{name} is out of range: it must be at least {1.0 / LARGEST:g}, in any unit")
+        raise ModelError(f"{name} is out of range: it must be at least {1.0 / LARGEST:g}, whatever its unit")
     return checked
 
 

@@ -275,9 +275,9 @@ def build_case(
 ) -> Case:
     """Build a case from the parsed data of a case file, as returned by `tomllib`.
 
-    Paths in the data are relative to `folder`, and `mesh` replaces the mesh of the table ``[mesh]``. Result files and studies
-    store `text`; an empty text is generated from the data. Raises CaseError if a key is unknown or a value is invalid, and
-    FastcontactError if the mesh or the model is invalid.
+    Paths in the data are relative to `folder`, and `mesh` replaces the mesh of the table ``[mesh]``. Result files and
+    studies store `text`; if it is empty, a text is generated from the data. Raises CaseError if a key is unknown or a value
+    is invalid, and FastcontactError if the mesh or the model is invalid.
     """
     check_keys("", data, {**TOP, **dict.fromkeys(LISTS, list)})
     check_settings(data)
@@ -433,7 +433,7 @@ def _theory(where: str, data: dict[str, Any]) -> Any:
 
 
 def described(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the title, the theories, the approaches and the ramp table that a result file describes by its case text.
+    """Return the title, the theories, the approaches and the ramp table from the text of a case in a result file.
 
     `data` is the parsed text, which is empty for results without a case file.
     """

@@ -1,8 +1,9 @@
 """Dispatch to the subcommands, and conversion of errors to exit codes.
 
-The exit codes are 0 for success, 1 for invalid input, 2 for failed convergence or failed runs of a study, 3 for a failed
-check of the case (``run --strict``), 130 for an interruption from the keyboard, 143 for SIGTERM and 129 for SIGHUP. Invalid
-input is reported in one line. After failed convergence or an interruption, the result file contains all converged steps.
+The exit codes are 0 for success, 1 for invalid input, 2 for failed convergence, failed runs of a study or an adaptive
+study that misses its tolerance, 3 for a failed check of the case (``run --strict``), 130 for an interruption from the
+keyboard, 143 for SIGTERM and 129 for SIGHUP. Invalid input is reported in one line. After failed convergence or an
+interruption, the result file contains all converged steps.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ class Parser(argparse.ArgumentParser):
     """An argument parser that reports errors as the package does, in one line and with exit code 1."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        """Raise FastcontactError with the most similar valid choice, since argparse would exit with code 2."""
+        """Raise FastcontactError, where argparse would exit with code 2. An invalid choice is reported with a similar one."""
         choice = _CHOICE.search(message)
         if choice:
             message = unknown(choice["kind"].lower(), choice["given"], _NAME.findall(choice["known"]))
@@ -117,7 +118,8 @@ class PrintVersion(argparse.Action):
 def parser(command: str | None = None) -> argparse.ArgumentParser:
     """Return the parser of the subcommand `command`, or of all subcommands if none has this name.
 
-    Mesh generators, whose import takes most of the time, are declared only for the subcommand that was requested.
+    If `command` is given, mesh generators, whose import takes most of the time, are declared only for the subcommand
+    `mesh`.
     """
     top = Parser(prog="fastcontact", description="Fast finite elements for elastic contact problems.")
     top.add_argument("--version", action=PrintVersion, nargs=0, help="show program's version number and exit")

@@ -24,7 +24,7 @@ class Projection:
     Attributes
     ----------
     P : csr_array (m, k)
-        Values at the m integration points of the functions that belong to the k independent values of the field [-].
+        Values at the m integration points of the shape functions of the k independent values of the field [-].
     areas : ndarray (m,)
         Areas W of the points [area]. Points on the axis have no area and no compliance, and may carry concentrated forces.
     rho : float
@@ -69,12 +69,12 @@ class Projection:
         """Return the compliance of the points `rows` (q,) in a form for linear solvers; see `Compliance.among`."""
         if not self.eliminable or self.mass is None or not (self.areas[rows] > 0).all():
             return self.block(rows)
-        remaining = np.where(self.areas > 0, self.areas, 0.0) / self.rho
-        remaining[rows] = 0.0
-        mass, areas = csr_array(self.P.T @ diags_array(remaining) @ self.P), self.areas[rows]
-        mass.eliminate_zeros()
+        other_weights = np.where(self.areas > 0, self.areas, 0.0) / self.rho
+        other_weights[rows] = 0.0
+        mass_of_others, areas = csr_array(self.P.T @ diags_array(other_weights) @ self.P), self.areas[rows]
+        mass_of_others.eliminate_zeros()
         P, stiffness = csr_array(self.P[rows]), self.rho * areas
-        return FieldCompliance(P, areas, stiffness, mass, lambda: self.block(rows), self.quadratic)
+        return FieldCompliance(P, areas, stiffness, mass_of_others, lambda: self.block(rows), self.quadratic)
 
     def apply(self, multiplier: Array) -> Array:
         """Return ``C @ multiplier`` (m,) [length] for point forces (m,) [force]."""
@@ -86,7 +86,7 @@ class Projection:
         """Return the independent values (k,) of the multiplier field [pressure] for point forces (m,) [force]."""
         return np.zeros(self.P.shape[1]) if self.mass is None else self.mass.solve(self.P.T @ multiplier)
 
-    def compliant(self, columns: Indices) -> Array:
+    def compliance_factor(self, columns: Indices) -> Array:
         r"""Return the factor Z (m, h) of the compliance that is added if h values of the multiplier field are removed.
 
         At supported nodes, for example on an axis or in a plane of symmetry, the slip of a facet has one nodal value fewer

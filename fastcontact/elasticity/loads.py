@@ -327,7 +327,9 @@ def evaluated(value: Value, points: Array, name: str) -> Array:
     if len(bad):
         raise ModelError(f"{name} is {array[bad[0]]} at {flat[bad[0]]}: it must be finite everywhere")
     if np.abs(array).max(initial=0.0) > LARGEST:
-        raise ModelError(f"{name} is out of range: its magnitude must be at most {LARGEST:g} everywhere, in any unit")
+        raise ModelError(
+            f"{name} is out of range: its magnitude must be at most {LARGEST:g} everywhere, whatever its unit"
+        )
     return array.astype(np.float64).reshape(points.shape[:-1])
 
 
@@ -337,7 +339,7 @@ def check_number(name: str, value: Any) -> None:
     if not abs(number) < math.inf:
         raise ModelError(f"{name} is {value!r}, which is not a finite number")
     if abs(number) > LARGEST:
-        raise ModelError(f"{name} is out of range: its magnitude must be at most {LARGEST:g}, in any unit")
+        raise ModelError(f"{name} is out of range: its magnitude must be at most {LARGEST:g}, whatever its unit")
 
 
 def check_value(name: str, value: Any) -> None:

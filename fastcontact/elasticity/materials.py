@@ -64,8 +64,8 @@ class Material:
     @property
     def young(self) -> tuple[float, float]:
         """The smallest and the largest Young's modulus along the material axes [pressure]."""
-        diagonal = 1.0 / np.diagonal(self._all_compliances(), axis1=1, axis2=2)[:, :3]
-        return float(diagonal.min()), float(diagonal.max())
+        E = 1.0 / np.diagonal(self._all_compliances(), axis1=1, axis2=2)[:, :3]
+        return float(E.min()), float(E.max())
 
     @property
     def contact_modulus(self) -> float:
@@ -113,9 +113,10 @@ class Material:
         return (callable(self.axes) or any(v.inside for v in varying_constants)) and not self.averaged
 
     def check_thermal_and_density(self, most: int) -> None:
-        """Raise ModelError if the density is negative, or a thermal constant is neither a number nor `most` numbers.
+        """Raise ModelError if the density is negative or a thermal constant is inadmissible.
 
-        `most` is 3 for materials with axes, otherwise 1. Constants that vary are checked by `bound`.
+        For thermal constants see `check_expansion` and `check_conductivity`.
+        `most` is 3 for materials with axes, otherwise 1. The method `bound` checks constants that vary.
         """
         density = self.density
         if not isinstance(density, Varying) and density is not None and not 0.0 <= _real(density) < math.inf:
@@ -160,7 +161,7 @@ class Material:
         raise NotImplementedError
 
     def admissible(self, constants: Any) -> Any:
-        """Return for each set of constants (n,) whether it is admissible: whether the elastic energy is positive definite."""
+        """Return for each set of constants (n,) whether moduli are in range and the elastic energy is positive definite."""
         raise NotImplementedError
 
     def _cells(self) -> Cells:
@@ -222,14 +223,14 @@ class Material:
     def compliance_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the compliance (n, 4, 4), in 3D (n, 6, 6) [1 / pressure] at `points` (n, dim) [length].
 
-        In 2D it includes the component zz, so that stress : compliance : stress is twice the elastic energy density, since
-        the stresses yz and xz are zero.
+        In 2D it includes the component zz, and the stresses yz and xz are zero. Therefore stress : compliance : stress is
+        twice the density of the elastic energy.
         """
         size = 6 if kinematics == "3d" else 4
         return np.asarray(self._compliance6(points, kinematics, constants)[:, :size, :size])
 
     def expansion_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
-        """Return the thermal strain (n, 4), in 3D (n, 6) [1 / temperature] per unit rise at `points` (n, dim) [length].
+        """Return the strain (n, 4), in 3D (n, 6) [1 / temperature] per unit temperature rise at `points` (n, dim) [length].
 
         It is NaN without a coefficient of thermal expansion. ModelError if it has an out-of-plane shear component, which
         plane kinematics exclude.
@@ -250,8 +251,8 @@ class Material:
     def conductivity_at(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the conductivity (n, dim, dim) [power / (length temperature)] at `points` (n, dim) [length].
 
-        `constants` is the result of `constants_at` for these points. ModelError if inclined material axes conduct heat out of
-        the plane of the model.
+        `constants` is the result of `constants_at` for these points. ModelError if, due to inclined material axes, an
+        in-plane temperature gradient causes an out-of-plane heat flux.
         """
         conductivity, dim = constants.conductivity, points.shape[1]
         if not isinstance(conductivity, tuple):
@@ -259,7 +260,7 @@ class Material:
         along, tensor = self._along_axes(conductivity, points, kinematics, constants)
         if np.abs(tensor[:, :dim, dim:]).max(initial=0.0) > ROUND_OFF * along.max(initial=0.0):
             raise ModelError(
-                f"the conductivity of the material with {self.described} conducts heat out of the plane: align one "
+                f"the conductivity of the material with {self.described} causes an out-of-plane heat flux: align one "
                 "axis with z, or use a 3D mesh"
             )
         return np.asarray(tensor[:, :dim, :dim])
@@ -311,13 +312,15 @@ def _real(value: Any) -> float:
         return math.inf
 
 
-def check_positive(name: str, value: Any, caption: str = "a positive number") -> None:
-    """Raise ModelError if `value` is not a positive number; the message calls it `name`."""
+def check_positive(name: str, value: Any) -> None:
+    """Raise ModelError unless `value` is a number from 1 / LARGEST to LARGEST; the message calls it `name`."""
     number = _real(value)
     if not 0.0 < number < math.inf:
-        raise ModelError(f"{name} = {value!r} must be {caption}")
+        raise ModelError(f"{name} = {value!r} must be a positive number")
     if not 1.0 / LARGEST <= number <= LARGEST:
-        raise ModelError(f"{name} is out of range: it must lie between {1.0 / LARGEST:g} and {LARGEST:g}, in any unit")
+        raise ModelError(
+            f"{name} is out of range: it must lie between {1.0 / LARGEST:g} and {LARGEST:g}, whatever its unit"
+        )
 
 
 def check_expansion(value: Any, most: int) -> None:
@@ -339,8 +342,8 @@ def check_conductivity(value: Any, most: int) -> None:
             check_positive("the conductivity", number)
 
 
-# A number, a function of position, or numbers for all cells or points. It is Any for type checkers, because a constant that
-# was given as a number is read as a number.
+# A number, a function of position, or numbers for all cells or points. It is Any for type checkers, because a constant
+# given as a number is an attribute that holds a number, with which callers compute.
 if TYPE_CHECKING:
     Constant = Any
 else:
@@ -450,7 +453,7 @@ class LinearElastic(Material):
         return S
 
     def admissible(self, constants: Any) -> Any:
-        """Return for each set of constants (n,) whether E is positive and nu lies between -1 and 0.5."""
+        """Return for each set of constants (n,) whether E is positive and in range, and nu lies between -1 and 0.5."""
         E, nu = np.asarray(constants.E), np.asarray(constants.nu)
         return (E >= 1.0 / LARGEST) & (E <= LARGEST) & (nu > -1.0) & (nu < 0.5)
 

@@ -44,7 +44,7 @@ class Combination:
 
 @dataclass(frozen=True)
 class Named(Combination):
-    """Combination of a study of a function, identified by the name of the function."""
+    """Combination in a study that calls a function instead of solving a case; it has the name of the function."""
 
     name: str
 
@@ -63,8 +63,8 @@ class Settings:
     generator: str | None  # mesh generator; None if the mesh of the case is read from a file
     # Arguments of the generator on level 0, by shape of the cells (a key of `SHAPES`); "" for the arguments of the case.
     arguments: dict[str, dict[str, Any]]
-    halve: tuple[str, ...] = ()  # arguments to halve on each level; without `halve` and `double`, `RULES` apply
-    double: tuple[str, ...] = ()  # arguments to double on each level
+    halve: tuple[str, ...] = ()  # arguments to halve on each level; if empty, those of `RULES`
+    double: tuple[str, ...] = ()  # arguments to double on each level; if empty, those of `RULES`
     curves: tuple[Circle, ...] | None = None  # curved boundaries of a mesh file; None if circles are to be detected
     load_steps: int | None = None  # number of load steps of each run; None for the steps of the case
     options: dict[str, dict[str, Any]] = field(default_factory=dict)  # options of the contact pair, by formulation
@@ -86,7 +86,7 @@ def data_of(case: Case) -> dict[str, Any]:
     if "mesh" not in data:
         kind = "an input deck" if case.deck is not None else "made of data that a case file cannot represent"
         raise CaseError(
-            f"'{case.name}' is {kind}: studies change the mesh and the numbers of a case file (TOML), write one"
+            f"'{case.name}' is {kind}: studies change the mesh and the values of a case file (TOML); write such a file"
         )
     return data
 
@@ -169,17 +169,17 @@ def _checked_combination(element: str | None, formulation: str | None) -> Combin
 
 
 def combinations(
-    settings: Settings, names: Sequence[str] | None, formulations: Sequence[str] | None
+    settings: Settings, element_names: Sequence[str] | None, formulations: Sequence[str] | None
 ) -> tuple[Combination, ...]:
-    """Return all combinations of the elements `names` and the `formulations`, by default those of the settings.
+    """Return all combinations of elements and formulations, given their names; by default those of the settings.
 
-    Raises CaseError if an element or a formulation is unknown, or if the case has no contact pair.
+    Raises CaseError if an element or a formulation is unknown, or if formulations are given without a contact pair.
     """
-    if names is None and formulations is None:
+    if element_names is None and formulations is None:
         return settings.combinations
-    selected = [settings.case_combination.element] if names is None else list(names)
+    selected = [settings.case_combination.element] if element_names is None else list(element_names)
     if selected == ["all"]:
-        selected = [name for name in ALL_ELEMENTS if makeable(settings, name)]
+        selected = [name for name in ALL_ELEMENTS if can_make(settings, name)]
     if formulations is None:
         return tuple(_checked_combination(element, settings.case_combination.formulation) for element in selected)
     if settings.pair is None:
@@ -190,7 +190,10 @@ def combinations(
 
 
 def one_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
-    """Return the last combination of ``[study]`` with an element and a formulation, or a new combination of them."""
+    """Return the last combination of ``[study]`` with an element and a formulation, of which None admits any.
+
+    If there is none, return a new combination. It takes what is None from the last combination of ``[study]``.
+    """
     formulation = formulation.replace("-", "_") if formulation else None
     for combination in reversed(settings.combinations):
         if element in (None, combination.element) and formulation in (None, combination.formulation):
@@ -199,7 +202,7 @@ def one_combination(settings: Settings, element: str | None, formulation: str | 
     return _checked_combination(element or last.element, formulation or last.formulation)
 
 
-def makeable(settings: Settings, element: str) -> bool:
+def can_make(settings: Settings, element: str) -> bool:
     """Return whether meshes of an element can be made for the case."""
     if settings.by_shape:
         return shape_of(element) in settings.arguments
@@ -213,6 +216,8 @@ def shape_of(element: str) -> str:
 
 
 Arguments = dict[str, Any]
+# Data, in types of JSON, from which `make_mesh` makes a mesh: the number of refinements and either the generator with its
+# arguments, or the element and the curved boundaries if the mesh of the case is refined.
 Recipe = dict[str, Any]
 
 
@@ -235,7 +240,10 @@ def _sphere_rule(element: str, arguments: Mapping[str, Any]) -> Rule:
 
 
 def _round_body_rule(arguments: Mapping[str, Any], coarse: int, fine: int, *further: str) -> Rule:
-    """Return the rule of a body of radius R, whose edges on level 0 are R / `coarse`, and R / `fine` at the contact."""
+    """Return the rule of a body of radius R, which halves the edge lengths and the arguments `further`.
+
+    The default edge lengths on level 0 are R / `coarse`, and R / `fine` at the contact.
+    """
     R = float(arguments.get("R", 50.0))
     size = float(arguments.get("size", R / coarse))
     return Rule({"size": size, "contact_size": min(R / fine, size)}, ("size", "contact_size", *further))
@@ -250,7 +258,7 @@ def _half_space_rule(element: str, arguments: Mapping[str, Any]) -> Rule:
 
 
 # Rules of the generators, as functions of the element and the arguments on level 0. A `growth` that is the increase of the
-# edge length per distance is halved; of a `growth` that is the ratio of neighbouring edges, the square root is taken.
+# edge length per distance is halved. A `growth` that is the ratio of neighbouring edges is replaced by its square root.
 RULES: dict[str, Callable[[str, Mapping[str, Any]], Rule]] = {
     "half-spheres": _sphere_rule,
     "quarter-disc": _sphere_rule,
@@ -272,10 +280,10 @@ RULES: dict[str, Callable[[str, Mapping[str, Any]], Rule]] = {
 def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
     """Return the recipe of the mesh of a level; equal recipes give equal meshes.
 
-    Raises CaseError if the element cannot be made from the mesh of the case, or an argument of the generator is unknown.
+    Raises CaseError if meshes of the element cannot be made for the case, or an argument of the generator is unknown.
     """
-    if element is not None and not makeable(settings, element):
-        raise CaseError(_not_makeable(settings, element))
+    if element is not None and not can_make(settings, element):
+        raise CaseError(_no_meshes(settings, element))
     if settings.generator is None:
         curves = settings.curves and [[list(c.centre), c.radius, c.group] for c in settings.curves]
         return {"refinements": level, "element": element, "curves": curves}
@@ -290,8 +298,8 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
     return {"generator": settings.generator, "arguments": arguments, "refinements": refinements}
 
 
-def _not_makeable(settings: Settings, element: str) -> str:
-    """Return the message that an element cannot be made from the mesh of the case, with a remedy."""
+def _no_meshes(settings: Settings, element: str) -> str:
+    """Return the message that meshes of an element cannot be made for the case, with a remedy."""
     original = settings.case_combination.element or "mixed cells"
     if settings.by_shape:
         shape = shape_of(element) or "triangles"

@@ -168,7 +168,7 @@ def test_friction_beside_a_much_stiffer_secondary_side_is_not_solved_pairing_by_
 
 
 @pytest.mark.filterwarnings("ignore:Young's moduli")
-def test_warm_starts_go_on_to_what_is_right_for_what_is_soft():
+def test_initial_guesses_are_improved_beside_a_much_stiffer_body():
     checked("blocks", 6, 0.3, element="tet10", ratio=1e-4, most=22, pairings=20)
 
 

@@ -2,17 +2,19 @@
 
 If a load step is solved at once, the slip of a constraint is counted from the beginning of the step, although a constraint
 that closes within the step slides only after it has closed. Here the load increment is divided at the instants at which
-constraints close, and constraints carry no forces before they close. In 3D several constraints close in one increment; each
-slides from its own instant. These instants are found by linear interpolation of gaps. With the geometry and the Delassus
+constraints close, and constraints carry no forces before they close. Several constraints may close in one increment;
+each slides from its own instant. These instants are found by linear interpolation of gaps. With the geometry and the Delassus
 operator F at the end of the step, gaps vary linearly with the load while no constraint closes or opens, and none changes
-between stick and slip. The result therefore hardly depends on whether a force or a motion grows linearly in the step.
+between stick and slip. The result hardly depends on whether a force or a motion grows linearly in the step, because the
+constraints close in the same order.
 
 Let ``(g, s) = free + F y`` be the gaps and slips at the end of the step for forces y. At its beginning there are gaps g0,
 forces y0 and no slips. At a fraction p of the step, gaps and slips for forces y are
 ``free + (1 - p) * ((g0, 0) - free - F y0) + F y``.
 
 If normals are inclined, a constraint that closes has a tangential relative displacement that is not slip. The correction for
-closing the whole gap g0 is part of `free`; each increment counts the fraction of it by which this increment closes the gap.
+closing the whole gap g0 is part of `free`. An increment that closes a fraction of g0 counts the same fraction of the
+correction.
 
 The last increment depends on the earlier ones only through their slips, which stay fixed while the geometry converges.
 """
@@ -33,7 +35,8 @@ from fastcontact.round_off import SINGLE_PRECISION
 # Function that solves an increment, given gaps and slips (1 + k, m) [length] to be added, the constraints (m,) that may
 # close, those of them that are closed initially, and initial forces (1 + k, m) [force] or None.
 Increment = Callable[[Array, Mask, Mask, Array | None], Forces]
-# Largest number of constraints that begin to carry forces together, relative to the number of closed ones.
+# Number of constraints that may close in one increment, relative to the number of closed ones. In 3D `along` admits more
+# while few are closed.
 GROWTH = 1 / 32
 
 
@@ -61,8 +64,8 @@ def along(
     gaps : ndarray (1 + k, m)
         Gaps at the end of the step, and the slips of the whole step [length].
     before : (ndarray (k, m), ndarray (k, m), ndarray (m,), ndarray (m,))
-        Slips along the tangents, and slips when constraints close [length], frictional work [energy] and normal forces
-        [force] at the beginning of the last increment; see `Slid`.
+        Slips along the tangents, and their part before the constraint closed [length], frictional work [energy] and
+        normal forces [force] at the beginning of the last increment; see `Slid`.
     """
     closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros(lag.shape[1]), 0, True
     gap = last_gap = closing[0]
@@ -75,10 +78,10 @@ def along(
         remaining[1:] -= slip
         return solve(remaining, ~waiting, closed, y if y.any() else None)
 
-    def slip_after(since: Array, gaps: Array) -> Array:
-        """Return the slips (k, m) after further slips `since` (k, m), less the closing motion of open `gaps` (m,)."""
+    def slip_after(increase: Array, gaps: Array) -> Array:
+        """Return the slips (k, m) after an `increase` (k, m), less the closing motion left for the `gaps` (m,)."""
         open_fraction = np.divide(np.maximum(gaps, 0.0), gap, out=np.zeros_like(gap), where=gap > 0.0)
-        return np.asarray(slip + since - open_fraction * added)
+        return np.asarray(slip + increase - open_fraction * added)
 
     begin = 0.0
     while begin < 1.0:

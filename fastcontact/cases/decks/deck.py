@@ -117,7 +117,7 @@ class Deck:
         Parameters
         ----------
         name : str
-            Name of the set, whose case is ignored; ``Instance.set`` for a set of a part.
+            Name of the set, in upper or lower case; ``Instance.set`` for a set of a part.
 
         Raises
         ------

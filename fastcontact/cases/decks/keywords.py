@@ -29,9 +29,18 @@ ANYTHING = "*"
 class Keyword:
     """Properties of a keyword.
 
-    `context` says where the keyword may stand, and `read` is the function that reads it. `used` lists the parameters that
-    have an effect, and `ignored` those that are accepted without effect. `opens` is the attribute of `Reader` to which the
-    result of `read` is assigned: the object to which the next keywords belong, or None for a keyword that closes it.
+    `context` states where the keyword may stand:
+
+    - "material", "interaction", "coupling" and "procedure": below an open material, interaction, coupling or step;
+    - "part": in a part or in the assembly, outside instances and steps;
+    - "property": outside steps;
+    - "model": outside parts, instances and steps; *AMPLITUDE also in a step;
+    - "step": outside parts and instances, in a step or, if `read` admits it, before the steps;
+    - "deck": anywhere.
+
+    `read` is the function that reads the keyword. `used` lists the parameters that have an effect, and `ignored` those
+    that are accepted without effect. `opens` is the attribute of `Reader` to which the result of `read` is assigned: the
+    object to which the next keywords belong, or None for a keyword that closes it.
     """
 
     context: Literal["deck", "part", "material", "interaction", "coupling", "property", "model", "step", "procedure"]
@@ -57,13 +66,14 @@ def without_effect(text: str) -> Callable[..., None]:
 
 
 def end(content: Content, block: Block) -> None:
-    """Read the end of a part, an instance or the assembly."""
+    """Read the beginning of the assembly, or the end of a part, an instance or the assembly."""
 
 
-# Parameters of procedures and of *STEP that only control the solution.
+# Parameters of procedures that only control the solution.
 SOLUTION_CONTROLS = "SOLVER; DIRECT; STABILIZE; ALLSDTOL; CONTINUE; EXPLICIT; DELTMX; MXDEM; END"
-IGNORED_BY_STEPS = "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"
-# Supported keywords, by the context in which they stand.
+# Parameters of *STEP without effect.
+IGNORED_BY_STEPS = "NAME; INC; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"
+# Properties of the supported keywords, in groups of the same context.
 TRANSLATED = {
     # Keywords that open or close an object to which others belong.
     "ASSEMBLY": Keyword("deck", end, "NAME", opens="part"),
@@ -78,7 +88,7 @@ TRANSLATED = {
         "property", lambda content, block: block, "REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME", "coupling"
     ),
     **dict.fromkeys(("DISTRIBUTING", "KINEMATIC"), Keyword("coupling", relating.coupling, opens="coupling")),
-    "STEP": Keyword("step", stepping.new_step, "NLGEOM; AMPLITUDE", IGNORED_BY_STEPS, "step"),
+    "STEP": Keyword("step", stepping.new_step, "NLGEOM; AMPLITUDE; PERTURBATION", IGNORED_BY_STEPS, "step"),
     "END STEP": Keyword("step", stepping.end_step, opens="step"),
     "HEADING": Keyword("deck", heading, ANYTHING),
     # In parts, or in decks without parts.
@@ -99,7 +109,7 @@ TRANSLATED = {
     "HYPERELASTIC": Keyword("material", materials.hyperelastic, "NEO HOOKE; MOONEY-RIVLIN; YEOH; OGDEN; N", "MODULI"),
     "PLASTIC": Keyword("material", materials.plastic, "HARDENING"),
     "SPECIFIC HEAT": Keyword(
-        "material", without_effect("no effect, heat is steady, or temperatures are given"), ANYTHING
+        "material", without_effect("no effect, because heat conduction is steady or temperatures are given"), ANYTHING
     ),
     # Below *SURFACE INTERACTION.
     "COHESIVE BEHAVIOR": Keyword("interaction", interactions.keep, "TYPE; ELIGIBILITY"),

@@ -284,7 +284,7 @@ class PressureFieldFormulation(Formulation):
         for held, nodes in self.without_slip(at):
             columns = np.flatnonzero(nodes[field.independent])
             if len(columns):
-                Z = field.projection.compliant(columns)
+                Z = field.projection.compliance_factor(columns)
                 in_axes = held if field.axes is None else np.einsum("nde,nd->ne", field.axes[1], held)
                 at_points = field.projection.P @ in_axes[field.independent]
                 axes = normals(directions), *directions

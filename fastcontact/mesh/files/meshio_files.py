@@ -131,7 +131,7 @@ def read_data(path: Path, field: str, at_points: bool) -> tuple[AnyArray, AnyArr
 
 
 def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
-    """Return a mesh with its groups, the format, and the numbers of omitted cells, see `meshio_content.mesh_of`."""
+    """Return a mesh with its groups, the format, and counts of omitted cells by kind; see `meshio_content.mesh_of`."""
     file_format = _format(path, writing=False)
     if file_format == "gmsh":
         with tempfile.TemporaryDirectory() as folder:
@@ -149,7 +149,7 @@ def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
 
 
 def _check_input(path: Path, file_format: str) -> None:
-    """Raise FileError for files with which meshio would read files in other folders, or of which it would drop parts."""
+    """Raise FileError for a file that refers to files in other folders, or that meshio would read only in part."""
     import h5py
 
     if file_format == "abaqus":
@@ -206,7 +206,7 @@ def write(path: Path, temporary: Path, mesh: Mesh) -> None:
     if file_format in ("tetgen", "svg"):
         raise FileError(f"'{path}': {file_format} is not a single-file mesh format; {OTHER_FORMATS}")
     content = _arguments(mesh, file_format)
-    # By default the numbers of XDMF are in a second file, which cannot be replaced atomically together with the first.
+    # By default meshio writes the arrays of XDMF to a second file, which cannot be replaced atomically with the first.
     options = {"data_format": "XML"} if file_format == "xdmf" else {}
     with _contained("write", path):
         meshio.write(temporary, meshio.Mesh(**content), file_format=file_format, **options)

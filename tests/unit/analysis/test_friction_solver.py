@@ -60,7 +60,7 @@ def test_dropping_a_column_of_the_field_adds_what_it_represented():
         return Projection(part, areas, rho, splu((part.T @ diags_array(areas) @ part).tocsc()))
 
     everything = np.arange(9)
-    Z = projection([0, 1, 2, 3]).compliant(np.array([1, 3]))
+    Z = projection([0, 1, 2, 3]).compliance_factor(np.array([1, 3]))
     wanted = projection([0, 2]).block(everything) - projection([0, 1, 2, 3]).block(everything)
     np.testing.assert_allclose(Z @ Z.T, wanted, atol=1e-13)
 

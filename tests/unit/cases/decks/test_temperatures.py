@@ -107,7 +107,7 @@ def test_expansion_without_temperatures_is_noted(tmp_path):
     notes = "\n".join(deck_of(tmp_path, text).notes)
     assert "without temperatures the expansion has no effect" in notes
     assert notes.count("no effect, temperatures are given, not computed") == 1
-    assert notes.count("no effect, heat is steady, or temperatures are given") == 1
+    assert notes.count("no effect, because heat conduction is steady or temperatures are given") == 1
 
 
 @pytest.mark.parametrize(
