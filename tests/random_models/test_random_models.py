@@ -11,7 +11,7 @@ from drawing import drawn
 from models import elastic_model
 from outcome import BOUNDS, SAME, figures, outcome, told, unfit
 from stepping import watching
-from wording import WORDS
+from wording import WORDS, SpokenModel
 
 import fastcontact as fc
 
@@ -116,6 +116,29 @@ def test_bilateral_pairs_that_close_wide_gaps_are_told():
     (pair,) = given.model.contact
     given.model.contact[0] = replace(pair, options=pair.options | {"kind": "bilateral_once_closed"})
     assert fc.solve(given.model, given.ramp)[-1].contact[pair.name].active.any()
+
+
+@pytest.mark.parametrize(
+    ("seed", "remedy"),
+    [
+        (320432, lambda given: {"secondary": given["primary"], "primary": given["secondary"]}),
+        (101032, lambda _: {"integration": "simpson"}),
+    ],
+)
+def test_remedies_that_messages_about_quadratic_triangles_name_work(seed, remedy, monkeypatch):
+    refused, add = [], SpokenModel.add_contact
+
+    def added(model, name, **given):
+        try:
+            add(model, name, **given)
+        except fc.ContactError as error:
+            refused.append(str(error))
+            add(model, name, **given | remedy(given))
+
+    monkeypatch.setattr(SpokenModel, "add_contact", added)
+    assert outcome(seed)["outcome"] == "result"
+    assert all("tri6" in text for text in refused)
+    assert refused
 
 
 def test_cells_begin_at_other_corners():
