@@ -283,14 +283,9 @@ class Problem:
 
 @parallel.on_one_blas_thread
 def prepare(
-    model: Model,
-    ramp: Ramp,
-    criteria: Criteria,
-    *,
-    linear_solver: str = "auto",
-    linear_tolerance: float = TOLERANCE,
+    model: Model, ramp: Ramp, criteria: Criteria, *, linear_solver: str = "auto", linear_tolerance: float = TOLERANCE,
     linear_precision: str | None = None,
-) -> Problem:
+) -> Problem:  # fmt: skip
     """Return the discrete problem of a checked model: assemble the stiffness matrix, and prepare the linear solver.
 
     For the parameters see `run.solve`.

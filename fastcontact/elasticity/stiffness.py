@@ -100,13 +100,9 @@ def _slots(cells: Numbers, indptr: Numbers, indices: Numbers) -> Numbers:
 
 
 def stiffness(
-    mesh: Mesh,
-    kinematics: str,
-    moduli: Array,
-    material: dict[str, Numbers],
-    pattern: Sparsity | None = None,
+    mesh: Mesh, kinematics: str, moduli: Array, material: dict[str, Numbers], pattern: Sparsity | None = None,
     averaged: dilatation.Mask | None = None,
-) -> bsr_array:
+) -> bsr_array:  # fmt: skip
     """Assemble the stiffness matrix of the solid cells.
 
     Parameters
