@@ -216,10 +216,8 @@ def _add_part(
             owner, number, data,
         )  # fmt: skip
     if split is not None:
-        polynomials = dilatation.basis(name, elements.get(name).quadrature[0])
-        dilatation_kernels.add_stiffness(
-            mesh.points, cells, *tables, polynomials, split.bulk, of_cells(material), *target
-        )
+        basis = dilatation.basis(name, elements.get(name).quadrature[0])
+        dilatation_kernels.add_stiffness(mesh.points, cells, *tables, basis, split.bulk, of_cells(material), *target)
     return -1
 
 
