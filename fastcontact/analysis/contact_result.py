@@ -166,13 +166,9 @@ def _tangential_results(
 
 
 def _closed(
-    pair: Formulation,
-    constraints: Constraints,
-    multiplier: Array,
-    active: Mask,
-    gap: Array,
+    pair: Formulation, constraints: Constraints, multiplier: Array, active: Mask, gap: Array,
     configuration: Configuration,
-) -> tuple[Mask, Array, Array, Array]:
+) -> tuple[Mask, Array, Array, Array]:  # fmt: skip
     """Return the closed nodes of a pair, and pressures that integrate to the contact force.
 
     Returns
@@ -269,12 +265,9 @@ def _received(receivers: Mask, moved: Array, areas: Array, side: Surface) -> Arr
 
 
 def _nodal_shear(
-    constraints: Constraints,
-    directions: tuple[Array, ...],
-    tangential: Array,
-    normal: Array,
+    constraints: Constraints, directions: tuple[Array, ...], tangential: Array, normal: Array,
     along_normal: Array | None = None,
-) -> Array:
+) -> Array:  # fmt: skip
     """Return the tangential traction on the secondary nodes (n_nodes, dim) [pressure].
 
     Because tangents vary from point to point, the traction is computed from Cartesian components of the forces. Its component

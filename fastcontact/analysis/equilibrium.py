@@ -334,15 +334,8 @@ def balance(
     reaction = reaction[: problem.model.mesh.points.size]
     if problem.model.springs:
         reaction = reaction + ground_force(problem.model.springs, u[: len(reaction)])
-    return Balance(
-        reaction,
-        largest_so_far,
-        residual,
-        max(bound, round_off),
-        float(full_residual / force) if force > round_off else 0.0,
-        noise,
-        energy,
-    )
+    relative = float(full_residual / force) if force > round_off else 0.0
+    return Balance(reaction, largest_so_far, residual, max(bound, round_off), relative, noise, energy)
 
 
 def _round_off(problem: Problem, row_sums: Array, forces: tuple[Array, ...], scale: float) -> tuple[float, float]:

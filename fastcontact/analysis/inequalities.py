@@ -248,13 +248,9 @@ def _solve(
 
 
 def _with_floating_bodies(
-    step: StepContext,
-    bodies: FloatingBodies,
-    constraints: Constraints,
-    iterate: Iterate,
-    active: Mask,
+    step: StepContext, bodies: FloatingBodies, constraints: Constraints, iterate: Iterate, active: Mask,
     accuracy: Accuracy,
-) -> tuple[Solution, Array]:
+) -> tuple[Solution, Array]:  # fmt: skip
     """Solve if contact alone restrains some bodies; return the same as `solve_inequalities`.
 
     Springs that are anchored at a rigid position of these bodies hold them. `FloatingBodies.settle` iterates the position

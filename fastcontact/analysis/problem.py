@@ -238,7 +238,8 @@ class Problem:
         u : ndarray (n_dofs,)
             All displacements, which include those of force-driven obstacles [length].
         """
-        zero, worn = np.zeros(self.model.mesh.dim), state.worn.get(name)
+        zero, worn, side = np.zeros(self.model.mesh.dim), state.worn.get(name), self.pairs[name].secondary
+        depth = None if worn is None else at_points(side.points, worn.depth, self.model.mesh.n_points)
         return Configuration(
             displacement,
             self.displacement(state.u),
@@ -247,9 +248,7 @@ class Problem:
             load.clearance_factors.get(name, 1.0),
             state.never_opening.get(name),
             state.elastic_slip.get(name),
-            None
-            if worn is None
-            else at_points(self.pairs[name].secondary.points, worn.depth, self.model.mesh.n_points),
+            depth,
             state.bonds.get(name),
             load.fluids.get(name, 0.0),
             linearised=None if self.linearised_at is None else self.displacement(self.linearised_at),
@@ -272,25 +271,15 @@ class Problem:
         """Return the state before the first load step."""
         # Gaps are differences of coordinates, whose round-off limits their accuracy.
         round_off = 8 * np.finfo(float).eps * float(np.abs(self.model.mesh.points).max())
-        return State(
-            np.zeros(self.force_driven.n_dofs),
-            round_off,
-            solver=self.solver_at_rest,
-            work=Work(),
-            instant=self.ramp.table[0][0],
-        )
+        zero, instant = np.zeros(self.force_driven.n_dofs), self.ramp.table[0][0]
+        return State(zero, round_off, solver=self.solver_at_rest, work=Work(), instant=instant)
 
 
 @parallel.on_one_blas_thread
 def prepare(
-    model: Model,
-    ramp: Ramp,
-    criteria: Criteria,
-    *,
-    linear_solver: str = "auto",
-    linear_tolerance: float = TOLERANCE,
+    model: Model, ramp: Ramp, criteria: Criteria, *, linear_solver: str = "auto", linear_tolerance: float = TOLERANCE,
     linear_precision: str | None = None,
-) -> Problem:
+) -> Problem:  # fmt: skip
     """Return the discrete problem of a checked model: assemble the stiffness matrix, and prepare the linear solver.
 
     For the parameters see `run.solve`.

@@ -339,12 +339,8 @@ def _pose(step: StepResult, name: str) -> Pose:
 
 def _result_of_pair(pair: Formulation, step: StepResult, name: str) -> ContactResult:
     """Return the result of a contact pair in a step; ContactError if the step belongs to another model."""
-    contact = step.contact.get(name)
-    if (
-        contact is None
-        or len(step.displacement) != len(pair.points)
-        or len(contact.points) != len(pair.secondary.points)
-    ):
+    contact, sizes = step.contact.get(name), (len(pair.points), len(pair.secondary.points))
+    if contact is None or (len(step.displacement), len(contact.points)) != sizes:
         raise ContactError(f"load step {step.index} is of another model: it has no contact pair '{name}' on this mesh")
     return contact
 

@@ -63,14 +63,9 @@ class Touching:
         return step if path is None else replace(step, path=path)
 
     def check(
-        self,
-        step: StepContext,
-        constraints: StackedConstraints,
-        solution: Solution,
-        excess: float,
-        size: float,
+        self, step: StepContext, constraints: StackedConstraints, solution: Solution, excess: float, size: float,
         u: Array,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Set `due`, given the solution of a pairing with the displacements `u` (n_dofs,) [length].
 
         `excess` is the change of the displacements beyond the tolerance, and `size` the largest displacement [length].

@@ -182,9 +182,8 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     mean = weight @ normal
     dim = points.shape[1]
     meets_axis = np.abs(points[:, 0]).min() <= LENGTH_ROUND_OFF * np.ptp(points, axis=0).max()
-    if pair.axisymmetric and (
-        meets_axis or (abs(mean[0]) <= abs(mean[1]) and _radius_is_monotone(surface, pair.points))
-    ):
+    axial = abs(mean[0]) <= abs(mean[1])
+    if pair.axisymmetric and (meets_axis or (axial and _radius_is_monotone(surface, pair.points))):
         return ContactMiddle(np.array([0.0, float(weight @ points[:, 1])]), direction=np.array([0.0, 1.0]))
     planes = symmetry_planes(pair)
     if closed.any():  # only the planes that the contact reaches

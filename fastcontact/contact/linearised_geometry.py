@@ -478,13 +478,9 @@ class Slips:
         return np.einsum("nk,knd->nd", self.forces, self.tangents)
 
     def along(
-        self,
-        du: Array,
-        varied: Variation,
-        points: Points,
-        weights: csr_array | None,
+        self, du: Array, varied: Variation, points: Points, weights: csr_array | None,
         normals: tuple[Array, Array, Array],
-    ) -> Array:
+    ) -> Array:  # fmt: skip
         """Return the variation (k, n) of slips for a variation of the displacements [length].
 
         Parameters

@@ -140,14 +140,9 @@ class Pairing:
 
 
 def pair(
-    candidates: Array,
-    primary: Surface | RigidSide,
-    coordinates: Array,
-    projection_tolerance: float,
-    normals: str | Sequence[float] = "facet",
-    obstacle: Pose | None = None,
-    rounded: bool = False,
-) -> Pairing:
+    candidates: Array, primary: Surface | RigidSide, coordinates: Array, projection_tolerance: float,
+    normals: str | Sequence[float] = "facet", obstacle: Pose | None = None, rounded: bool = False,
+) -> Pairing:  # fmt: skip
     """Project candidates onto the closest facets of the primary side, or onto a rigid obstacle.
 
     Parameters

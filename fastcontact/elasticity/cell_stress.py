@@ -44,14 +44,9 @@ class CellStress:
     """
 
     def __init__(
-        self,
-        mesh: Mesh,
-        kinematics: str,
-        moduli: Array,
-        displacement: Array,
-        averaged: dilatation.Mask | None = None,
+        self, mesh: Mesh, kinematics: str, moduli: Array, displacement: Array, averaged: dilatation.Mask | None = None,
         offset: StressOffset | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._mesh, self._axisymmetric, self._moduli = mesh, kinematics == "axisymmetric", moduli
         self._displacement = np.ascontiguousarray(displacement)
         self._averaged = averaged if np.any(averaged) else None

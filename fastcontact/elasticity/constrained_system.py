@@ -140,12 +140,9 @@ class System(ConstrainedMotion):
     """
 
     def __init__(
-        self,
-        K: bsr_array,
-        supported: Mask,
-        relations: Sequence[MultiPointConstraint] = (),
+        self, K: bsr_array, supported: Mask, relations: Sequence[MultiPointConstraint] = (),
         without_stiffness: Mask | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         R = stacked_rows(relations, K.shape[0])
         related = np.zeros(K.shape[0], bool)
         related[R.indices] = True

@@ -50,14 +50,9 @@ class Springs:
 
 
 def grounded(
-    name: str,
-    nodes: AnyArray,
-    stiffness: Mapping[int, float],
-    n_dofs: int,
-    dim: int,
-    along: Mapping[str, float] | None = None,
-    direction: Array | None = None,
-) -> Springs:
+    name: str, nodes: AnyArray, stiffness: Mapping[int, float], n_dofs: int, dim: int,
+    along: Mapping[str, float] | None = None, direction: Array | None = None,
+) -> Springs:  # fmt: skip
     """Return springs from each of the `nodes` (n,) to the ground; see `joined`.
 
     A spring with the stiffness ``stiffness[axis]`` [force / length] acts along each axis in `stiffness`. Springs with the
@@ -70,13 +65,9 @@ def grounded(
 
 
 def joined(
-    name: str,
-    points: Array,
-    ends: tuple[AnyArray, AnyArray],
-    stiffness: Mapping[int, float],
-    along: Mapping[str, float],
-    direction: Array | None = None,
-) -> Springs:
+    name: str, points: Array, ends: tuple[AnyArray, AnyArray], stiffness: Mapping[int, float],
+    along: Mapping[str, float], direction: Array | None = None,
+) -> Springs:  # fmt: skip
     """Return springs between pairs of the `points` (n_points, dim) [length].
 
     `ends` (n,) of int each are the first and the second points of the pairs. Springs act along each axis in `stiffness`

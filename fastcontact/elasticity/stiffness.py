@@ -100,13 +100,9 @@ def _slots(cells: Numbers, indptr: Numbers, indices: Numbers) -> Numbers:
 
 
 def stiffness(
-    mesh: Mesh,
-    kinematics: str,
-    moduli: Array,
-    material: dict[str, Numbers],
-    pattern: Sparsity | None = None,
+    mesh: Mesh, kinematics: str, moduli: Array, material: dict[str, Numbers], pattern: Sparsity | None = None,
     averaged: dilatation.Mask | None = None,
-) -> bsr_array:
+) -> bsr_array:  # fmt: skip
     """Assemble the stiffness matrix of the solid cells.
 
     Parameters
@@ -220,10 +216,8 @@ def _add_part(
             owner, number, data,
         )  # fmt: skip
     if split is not None:
-        polynomials = dilatation.basis(name, elements.get(name).quadrature[0])
-        dilatation_kernels.add_stiffness(
-            mesh.points, cells, *tables, polynomials, split.bulk, of_cells(material), *target
-        )
+        basis = dilatation.basis(name, elements.get(name).quadrature[0])
+        dilatation_kernels.add_stiffness(mesh.points, cells, *tables, basis, split.bulk, of_cells(material), *target)
     return -1
 
 

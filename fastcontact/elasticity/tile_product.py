@@ -39,18 +39,9 @@ def tile_plain(
 
 
 def tile_in_vectors(
-    _context: Any,
-    left: Any,
-    first: Any,
-    b: Any,
-    right: Any,
-    second: Any,
-    a: Any,
-    n: Any,
-    out: Any,
-    row: Any,
+    _context: Any, left: Any, first: Any, b: Any, right: Any, second: Any, a: Any, n: Any, out: Any, row: Any,
     fresh: Any,
-) -> Any:
+) -> Any:  # fmt: skip
     """Return the signature and the code generator of `tile_plain`, as an intrinsic of Numba."""
     from llvmlite import ir
     from numba.core import cgutils, types

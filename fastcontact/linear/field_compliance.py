@@ -113,9 +113,8 @@ class FieldCompliance:
             coupled = np.flatnonzero(np.diff(coupling.indptr))
             rows = csr_array(coupling[coupled])
             correction = rows @ splu(csc_array(self.others[rest][:, rest])).solve(rows.T.toarray())
-            selection = csr_array(
-                (np.ones(len(coupled)), (coupled, np.arange(len(coupled)))), (len(values), len(coupled))
-            )
+            n = len(coupled)
+            selection = csr_array((np.ones(n), (coupled, np.arange(n))), (len(values), n))
             E = csr_array(E - selection @ csr_array(correction) @ selection.T)
         scaling = diags_array(units)
         return csr_array(scaling @ E @ scaling)

@@ -150,9 +150,8 @@ class ForceDrivenObstacles:
         slip0 = np.zeros_like(constraints.slip0)
         if moved is not None and constraints.tangents:
             slip0 = constraints.slip0 + np.stack([t @ moved for t in constraints.directions])
-        return dataclasses.replace(
-            constraints, B=B, gap0=constraints.gap0 + normal @ position, tangents=tangents, slip0=slip0
-        )
+        gap0 = constraints.gap0 + normal @ position
+        return dataclasses.replace(constraints, B=B, gap0=gap0, tangents=tangents, slip0=slip0)
 
     def _coupled(self, rows: csr_array, number: int) -> tuple[csr_array, Array]:
         """Return rows (m, n_dofs) that include the motion of an obstacle, and their directions (m, dim)."""

@@ -167,9 +167,8 @@ class Model(ModelSupports):
         for pair, formulation in bound:
             check_penetration(pair.name, formulation)
         check_prescribed(bound, Supports(fixed, prescribed, ramp or Ramp((1.0,))))
-        check_overlap(
-            self.mesh, self.kinematics, [(p.secondary, p.primary) for p in self.contact if p.obstacle is None]
-        )
+        sides = [(p.secondary, p.primary) for p in self.contact if p.obstacle is None]
+        check_overlap(self.mesh, self.kinematics, sides)
         driving = list(self.force_driven.forces(forces).values())
         self._check_changes(lambda acting: acting._check_motions(fixed, driving))
 

@@ -296,9 +296,8 @@ def _load_integral(model: Model, load: Load) -> Iterator[str]:
     for value in (value for value in load.values if callable(value)):
         cells_loaded = load.cells(model.mesh) if isinstance(load, (BodyForce, Pressure, Traction)) else {}
         for element, cells in cells_loaded.items():
-            coarse, fine = (
-                _integrals(model.mesh, element, _sample(cells), value, load.name, finer) for finer in (False, True)
-            )
+            arguments = model.mesh, element, _sample(cells), value, load.name
+            coarse, fine = (_integrals(*arguments, finer) for finer in (False, True))
             error, total = error + float(np.abs(coarse - fine).sum()), total + float(np.abs(fine).sum())
     if error > LARGEST_LOAD_ERROR * total:
         yield (

@@ -44,13 +44,9 @@ ENOUGH, ACCEPTABLE = 10.0, 300.0
 
 
 def solve(
-    loaded: LoadedNonsymmetric,
-    constraints: Constraints,
-    closed: Mask,
-    accuracy: Accuracy,
-    u: Array,
+    loaded: LoadedNonsymmetric, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array,
     forces: Array | None,
-) -> tuple[Array, Forces] | None:
+) -> tuple[Array, Forces] | None:  # fmt: skip
     """Return the unknowns (n,) [length] and the contact forces, or None if the method fails.
 
     Parameters

@@ -126,13 +126,10 @@ class Wave:
 
     def relations(self, model: Model, others: Sequence[MultiPointConstraint]) -> list[MultiPointConstraint]:
         """Return the constraints `others`, and those with phase factors between the ends of the sector, in the real form."""
-        ends = [
-            MultiPointConstraint(
-                "cyclic symmetry", self.real(turned_rows(interface, self.phase(interface), model.mesh))
-            )
-            for interface in self.sectors.periodic_interfaces
-        ]
-        return [*(MultiPointConstraint(constraint.name, self.real(constraint.rows)) for constraint in others), *ends]
+        rows = [(constraint.name, constraint.rows) for constraint in others]
+        for interface in self.sectors.periodic_interfaces:
+            rows.append(("cyclic symmetry", turned_rows(interface, self.phase(interface), model.mesh)))
+        return [MultiPointConstraint(name, self.real(of_constraint)) for name, of_constraint in rows]
 
     def on_ring(self, conditions: Conditions) -> Conditions:
         """Return contact conditions in the real form, one at each point of the ring.
@@ -141,26 +138,20 @@ class Wave:
         other end; at the axis it extends over all sectors.
         """
         P, main = self._combined(conditions)
-        nodes = conditions.nodes[main]
+        nodes, areas = conditions.nodes[main], self.repeated(conditions.areas[main])
         n_points = conditions.rows.shape[1] // self.sectors.turn.shape[0]
         compliance = None if conditions.compliance is None else self.real(P @ conditions.compliance @ P.conj().T)
         ring_nodes = nodes if self.single else np.concatenate([nodes, nodes + n_points])
-        return Conditions(
-            self.real(P @ conditions.rows), ring_nodes, self.repeated(conditions.areas[main]), compliance=compliance
-        )
+        return Conditions(self.real(P @ conditions.rows), ring_nodes, areas, compliance=compliance)
 
     def _combined(self, conditions: Conditions) -> tuple[csr_array, Indices]:
         """Return the matrix (k, q) that maps conditions to those of the ring, and the main condition (k,) of each."""
-        is_single, blocks = np.ones(len(conditions.nodes), bool), []
+        nodes = conditions.nodes
+        is_single, blocks = np.ones(len(nodes), bool), []
         for interface in self.sectors.periodic_interfaces:
-            on_interface = np.flatnonzero(
-                np.isin(conditions.nodes, interface.first) | np.isin(conditions.nodes, interface.second)
-            )
+            on_interface = np.flatnonzero(np.isin(nodes, interface.first) | np.isin(nodes, interface.second))
             for a, b in zip(interface.first.tolist(), interface.second.tolist(), strict=True):
-                first, second = (
-                    on_interface[conditions.nodes[on_interface] == a],
-                    on_interface[conditions.nodes[on_interface] == b],
-                )
+                first, second = (on_interface[nodes[on_interface] == node] for node in (a, b))
                 if a == b and len(first):
                     blocks.append((self._around(conditions, first), first, first))
                     is_single[first] = False
@@ -178,7 +169,7 @@ class Wave:
             main_conditions.append(main[: len(block)])
             count += len(block)
         entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-        return csr_array(coo_array(entries, shape=(count, len(conditions.nodes)))), np.concatenate(main_conditions)
+        return csr_array(coo_array(entries, shape=(count, len(nodes)))), np.concatenate(main_conditions)
 
     def _across(
         self, conditions: Conditions, interface: PeriodicInterface, at_first: Indices, at_second: Indices
@@ -208,11 +199,8 @@ class Wave:
 def without_ends(model: Model, sectors: Sectors) -> Model:
     """Return the model without the constraints between the ends of its sector."""
     open_model = copy.copy(model)
-    open_model.relations = [
-        relation
-        for relation in model.relations
-        if not any(relation is interface.relation for interface in sectors.periodic_interfaces)
-    ]
+    ends = [interface.relation for interface in sectors.periodic_interfaces]
+    open_model.relations = [item for item in model.relations if not any(item is end for end in ends)]
     return open_model
 
 

@@ -35,15 +35,9 @@ class LinePoints:
 
 
 def line_points(
-    block: FacetBlock,
-    primary: Surface,
-    reference: Array,
-    deformed: Array,
-    axisymmetric: bool,
-    n_gauss: int,
-    tolerance: float,
-    borders: tuple[Indices, Array] = NO_BORDERS,
-) -> LinePoints:
+    block: FacetBlock, primary: Surface, reference: Array, deformed: Array, axisymmetric: bool, n_gauss: int,
+    tolerance: float, borders: tuple[Indices, Array] = NO_BORDERS,
+) -> LinePoints:  # fmt: skip
     """Cut the facets of a block on the deformed configuration and place Gauss points on every segment.
 
     The primary side is extended by `tolerance` facet lengths at its ends. `borders` are further cuts: facets (n,) and xi

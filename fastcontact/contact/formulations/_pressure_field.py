@@ -167,10 +167,8 @@ class PressureField(NodalField):
         Nodal gaps are not used: between facets of different curvature, nodes of facets in contact have open gaps.
         """
         with_area = self.nodal_areas > NO_AREA * self.nodal_areas.max(initial=0.0)
-        around, shape = self.around[active], self.shape[active]
-        near = _nearest(around, shape, len(gap)) | _nearest(
-            around, np.where(with_area[around], shape, -np.inf), len(gap)
-        )
+        around, shape, n = self.around[active], self.shape[active], len(gap)
+        near = _nearest(around, shape, n) | _nearest(around, np.where(with_area[around], shape, -np.inf), n)
         usable, touched = self.projection.areas > 0, np.zeros(len(gap), bool)
         touched[around] = True
         near |= touched & ~_nearest(self.around[usable], self.shape[usable], len(gap))

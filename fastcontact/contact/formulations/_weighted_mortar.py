@@ -116,15 +116,8 @@ class WeightedMortar(Formulation):
             return obstacle_overlap(self.secondary, self.primary, (self.points, deformed), self.axisymmetric, pose)
         if deformed.shape[1] == 3:
             return face_overlap(self.secondary, self.primary, self.points, deformed, self.smoothing)
-        return line_overlap(
-            self.secondary,
-            self.primary,
-            self.points,
-            deformed,
-            self.axisymmetric,
-            self.projection_tolerance,
-            self.smoothing,
-        )
+        options = self.axisymmetric, self.projection_tolerance, self.smoothing
+        return line_overlap(self.secondary, self.primary, self.points, deformed, *options)
 
     def unilateral(self, at: Configuration) -> Constraints:
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
@@ -464,9 +457,8 @@ class WeightedPressures(NodalField):
     def covered(self) -> Array:
         """Covered part of the nodal areas; at mid nodes without a gap, the mean of their corners."""
         usable = np.isfinite(self.weight)
-        fraction = np.divide(
-            self.weight, self.tested, out=np.zeros_like(self.weight), where=usable & (self.tested > 0.0)
-        )
+        faced = usable & (self.tested > 0.0)
+        fraction = np.divide(self.weight, self.tested, out=np.zeros_like(self.weight), where=faced)
         return self._at_nodes(fraction, only_without_gap=True)
 
     def over_whole_side(self, force: Array) -> Array:

@@ -197,9 +197,8 @@ class _Row(_Writer):
         x_of_last = [self.shuffled(x_j[0], [0, 0, 1, 2])] if self.shifted else x_j
         for r in range(m):
             last = self.shifted and r == m - 1
-            for p, (piece, total, x) in enumerate(
-                zip(self.pieces, self.totals[r], x_of_last if last else x_j, strict=True)
-            ):
+            inputs = x_of_last if last else x_j
+            for p, (piece, total, x) in enumerate(zip(self.pieces, self.totals[r], inputs, strict=True)):
                 numbers = self.numbers(self.data, at, r * n + piece.column - last, piece.width)
                 builder.store(self.plus(builder.load(total), numbers, x), total)
                 self.process(r, p, numbers, last)

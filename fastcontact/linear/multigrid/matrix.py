@@ -66,9 +66,7 @@ class BlockMatrix:
     @property
     def nbytes(self) -> int:
         """Memory of the matrix, without its low part [bytes]."""
-        return (
-            self.indptr.nbytes + self.indices.nbytes + self.data.nbytes + sum(part.nbytes for part in self.storage[:3])
-        )
+        return sum(part.nbytes for part in (self.indptr, self.indices, self.data, *self.storage[:3]))
 
     def multiply(self, x: AnyArray, y: AnyArray) -> None:
         """Fill `y` with ``A @ x``."""
@@ -128,17 +126,8 @@ class BlockMatrix:
         """Return a square matrix as a SciPy matrix, in double precision."""
         size, n = len(self.rows), len(self.indptr) - 1
         data = np.empty(len(self.indices) * size * size)
-        spread(
-            symmetric_storage_kernels.expand,
-            n,
-            WORK_OF_ROW,
-            self.indptr,
-            self.indices,
-            self.storage,
-            self.exact,
-            size,
-            data,
-        )
+        arrays = self.indptr, self.indices, self.storage, self.exact
+        spread(symmetric_storage_kernels.expand, n, WORK_OF_ROW, *arrays, size, data)
         return bsr_array((data.reshape(-1, size, size), self.indices, self.indptr), shape=2 * (n * size,))
 
 

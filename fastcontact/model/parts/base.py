@@ -271,9 +271,8 @@ class ModelBase(Suggesting):
 
     def material_field(self) -> MaterialField:
         """Return the materials of all solid cells. Raises ModelError if a cell has no material or two different ones."""
-        return material_field(
-            self.mesh, self.kinematics, [material for material, _ in self.materials], self.material_of_cells()
-        )
+        materials = [material for material, _ in self.materials]
+        return material_field(self.mesh, self.kinematics, materials, self.material_of_cells())
 
     def material_of_cells(self) -> dict[str, Numbers]:
         """Return the index in `materials` of the material of each solid cell (n_cells,), by element type."""

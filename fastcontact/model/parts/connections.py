@@ -397,9 +397,8 @@ class ModelConnections(ModelInitialStates):
         """
         letters = "xyz"[: self.mesh.dim] if components is None else components
         axes = axes_of(f"the coupling of '{reference}'", dict.fromkeys(letters, 1.0), self.mesh.dim)
-        self.relations.append(
-            coupling(self.mesh, self.kinematics, (reference, group), kind, sorted(axes), (weighting, radius))
-        )
+        weights = weighting, radius
+        self.relations.append(coupling(self.mesh, self.kinematics, (reference, group), kind, sorted(axes), weights))
 
     def add_spring(
         self,

@@ -330,9 +330,8 @@ class ModelContact(ModelConnections):
             chosen.setdefault("multipliers", "dual")
         driving = self._driving(name, components, force)
         turned = rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
-        self._add_pair(
-            ContactPair(name, secondary, "", formulation, chosen, obstacle, displacement, history, driving, *turned)
-        )
+        moved = displacement, history, driving, *turned
+        self._add_pair(ContactPair(name, secondary, "", formulation, chosen, obstacle, *moved))
 
     def _source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
         """Return the mask (n_points,) of the points at which fluid enters a contact pair; None without a fluid."""
