@@ -18,7 +18,13 @@ from fastcontact.cases.decks.sections import Locks
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Components that the named supports of *BOUNDARY prescribe.
-NAMED = {"XSYMM": (1, 5, 6), "YSYMM": (2, 4, 6), "ZSYMM": (3, 4, 5), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}
+NAMED = {
+    "XSYMM": (1, 5, 6),
+    "YSYMM": (2, 4, 6),
+    "ZSYMM": (3, 4, 5),
+    "ENCASTRE": (1, 2, 3, 4, 5, 6),
+    "PINNED": (1, 2, 3),
+}
 # Point, component counted from 0, and whether the component is along a local axis.
 Component = tuple[int, int, bool]
 
