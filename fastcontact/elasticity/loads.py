@@ -37,7 +37,7 @@ Components = Mapping[int, Value]
 # Numbers of points of the product rule in each direction, and in the Cartesian directions of squares, cubes and prisms. The
 # rules are exact to degree 7 at least, that is for a constant load on curved quadratic cells in axisymmetry and for a
 # quadratic load on straight facets.
-_POINTS, _STRAIGHT = 5, 4
+LOAD_POINTS = 5, 4
 
 
 class DensityField(Protocol):
@@ -364,7 +364,7 @@ def axes_of(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, 
 def _quadrature(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array, Array, Array]:
     """Return positions (c, q, dim), shape functions (q, n), their derivatives (q, n, cell dim) and weights (q,)."""
     reference = elements.get(element)
-    xi, weights = quadrature.product_rule(reference.linear, _POINTS, _STRAIGHT)
+    xi, weights = quadrature.product_rule(reference.linear, *LOAD_POINTS)
     N = reference.shape(xi)
     return np.einsum("qn,cnd->cqd", N, mesh.points[cells]), N, reference.gradient(xi), weights
 

@@ -16,7 +16,7 @@ from fastcontact._tools.neighbours import close_pairs
 from fastcontact._tools.units import in_si, misfit
 from fastcontact.arrays import AnyArray, Array, Numbers
 from fastcontact.elasticity.energy import gradients_at, integration_rule
-from fastcontact.elasticity.loads import BodyForce, Load, Pressure, Traction, Value, evaluated
+from fastcontact.elasticity.loads import LOAD_POINTS, BodyForce, Load, Pressure, Traction, Value, evaluated
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
@@ -307,9 +307,9 @@ def _load_integral(model: Model, load: Load) -> Iterator[str]:
 
 
 def _integrals(mesh: Mesh, element: str, cells: Numbers, value: Value, name: str, finer: bool) -> Array:
-    """Return the integrals (n_cells,) of a load over cells, with 5 points in each direction or with 9 if `finer`."""
+    """Return the integrals (n_cells,) of a load over cells, with the quadrature of loads, or with 9 points if `finer`."""
     reference = elements.get(element)
-    xi, weights = quadrature.product_rule(reference.linear, 9 if finer else 5)
+    xi, weights = quadrature.product_rule(reference.linear, *((9,) if finer else LOAD_POINTS))
     J = np.einsum("qnk,cnd->cqdk", reference.gradient(xi), mesh.points[cells])
     x = np.einsum("qn,cnd->cqd", reference.shape(xi), mesh.points[cells])
     measure = np.sqrt(np.linalg.det(np.einsum("cqdk,cqdl->cqkl", J, J)))
