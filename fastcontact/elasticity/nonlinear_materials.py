@@ -8,6 +8,7 @@ small strains.
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -113,7 +114,7 @@ class ElasticPlastic(NonlinearElastic):
         try:
             rows = np.array([[float(value) for value in pair] for pair in self.hardening]).reshape(-1, 2)
         except (TypeError, ValueError, OverflowError):
-            is_slope = isinstance(self.hardening, float | int) and abs(self.hardening) <= np.finfo(float).max
+            is_slope = isinstance(self.hardening, float | int) and abs(self.hardening) <= sys.float_info.max
             slope = self.hardening if is_slope else self.yield_stress
             raise ModelError(
                 "hardening must be pairs (equivalent plastic strain, yield stress), for example "
