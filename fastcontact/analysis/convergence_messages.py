@@ -29,20 +29,21 @@ NEARLY_SLIDING = 0.9
 def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Array, limit: int) -> str:
     """Return the message for a contact geometry that did not converge.
 
-    `change` (n_dofs,) is the change of the displacements in the last update [length]. The nodes with the largest
-    changes are added to the last entry of the history.
+    `change` (n_dofs,) is the change of the displacements in the last update [length]. The nodes with the largest changes, by
+    pair in descending order, are added to the last entry of the history.
     """
     last = history[-1]
     magnitude = np.linalg.norm(change.reshape(problem.shape), axis=1)
     sides = {name: pair.secondary.points for name, pair in problem.pairs.items()}
     last["nodes"] = {
-        name: points[np.argsort(-magnitude[points], kind="stable")[:3]].tolist() for name, points in sides.items()
+        name: sides[name][np.argsort(-magnitude[sides[name]], kind="stable")[:3]].tolist()
+        for name in sorted(sides, key=lambda name: -magnitude[sides[name]].max())
     }
     changes = [entry["displacement_change"] for entry in history]
     declining = len(changes) <= WINDOW or min(changes[-WINDOW:]) <= DECLINE * min(changes[:-WINDOW])
     size = changes[-1] if declining else max(changes[-WINDOW:])
     more = ["more updates (Criteria.max_geometry_updates)"] if declining else []
-    advice = [*more, *_bilateral_advice(problem), *_smoothing_advice(problem)]
+    advice = [*more, *_bilateral_advice(problem), *_smoothing_advice(problem, last["nodes"])]
     advice.append("a fixed number of updates (Criteria.geometry_updates)")
     if size < NOTABLE:  # otherwise `Criteria` refuses it
         criterion = f"Criteria.geometry, which is {problem.criteria.geometry:g}, above {size:.0e}"
@@ -177,12 +178,16 @@ def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
     return "; ".join(texts)
 
 
-def _smoothing_advice(problem: Problem) -> list[str]:
-    """Return remedies for pairs that alternate between facets at a node, supports of dual functions, or branches of a law."""
-    faceted = [name for name, pair in problem.pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
-    laws = {name: pair.options.cohesion for name, pair in problem.pairs.items() if pair.options.cohesion is not None}
+def _smoothing_advice(problem: Problem, nodes: Nodes) -> list[str]:
+    """Return remedies for pairs that alternate between facets at a node, supports of dual functions, or branches of a law.
+
+    Each remedy is for the first such pair of `nodes`, whose displacements change most.
+    """
+    pairs = {name: problem.pairs[name] for name in nodes}
+    faceted = [name for name, pair in pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
+    laws = {name: pair.options.cohesion for name, pair in pairs.items() if pair.options.cohesion is not None}
     reach = {name: 2.0 * law.energy / law.strength for name, law in laws.items() if law.reversible}
-    dual = [name for name, pair in problem.pairs.items() if getattr(pair, "multipliers", "") == "dual"]
+    dual = [name for name, pair in pairs.items() if getattr(pair, "multipliers", "") == "dual"]
     options = {
         'normals="averaged"': faceted, 'multipliers="standard"': dual,
         f"facets no longer than the reach of adhesion, {min(reach.values(), default=0.0):.3g},": list(reach),

@@ -36,7 +36,7 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
-# Smallest number of pairings after which edges of facets are rounded, because nodes are assumed to alternate between facets.
+# Smallest number of pairings after which edges of facets are rounded, because pairings are assumed to alternate.
 PATIENT_UPDATES = 25
 # Safety factor of the expected contraction by the next solution, relative to the contraction in the last Newton step.
 SAFETY = 3.0
@@ -177,8 +177,8 @@ def _settle(
         next_pairing = mixing.next(settled, moved, displacement, tolerances)
         iterate.u = iterate.u if next_pairing is None else step.dofs.put(iterate.u, next_pairing)
         tolerances.tighten(moved.relative, solution.residual)
-        if update == max(limit // 2, PATIENT_UPDATES) and any(pair.faceted for pair in problem.pairs.values()):
-            log.info("nodes alternate between facets: from now on the edges of facets are rounded")
+        if update == max(limit // 2, PATIENT_UPDATES) and any(pair.alternates for pair in problem.pairs.values()):
+            log.info("pairings alternate: from now on edges of facets are rounded, and small overlaps have no gap")
             iterate.rounded = True
             mixing.restart()
             watch.forget()

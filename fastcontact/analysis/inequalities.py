@@ -53,7 +53,7 @@ class Iterate:
     history : list of dict
         Convergence data of each pairing, see `StepResult.iterations`.
     rounded : bool
-        Whether edges between facets are rounded, because nodes alternated between facets.
+        Whether edges between facets are rounded, because pairings alternated; see `Configuration`.
     fluid : dict of str to (ndarray of bool (n_nodes,), ndarray of int (n_nodes,))
         For each contact pair with fluid pressure, the nodes that fluid reaches, and how many times contact displaced it.
     """

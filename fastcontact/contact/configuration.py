@@ -40,7 +40,8 @@ class Configuration:
     pressure : ndarray (n_nodes,), optional
         Pressure at the secondary nodes in the last pairing, including that of fluid [pressure]; None before the first one.
     rounded : bool
-        Whether the normals of facets vary continuously across edges, see `pairing.pair`.
+        Whether the normals of facets vary continuously across edges, see `pairing.pair`, and nodes with dual functions and a
+        small overlap have no gap, because pairings alternated.
     linearised : ndarray (n_points, dim), optional
         Displacements at which the tangent of bodies in finite strain is computed [length]; None for small strains.
     friction_factor : float

@@ -162,8 +162,8 @@ class Formulation(ABC):
         return True
 
     @property
-    def faceted(self) -> bool:
-        """Whether normals are discontinuous at edges, so that the pairing of a point may alternate between two facets."""
+    def alternates(self) -> bool:
+        """Whether pairings may alternate: that of a point between two facets, if normals are discontinuous at edges."""
         return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
 
     @classmethod

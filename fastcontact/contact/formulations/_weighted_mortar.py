@@ -29,7 +29,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._cut_faces import face_overlap
 from fastcontact.contact.formulations._cut_lines import line_overlap
-from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions, positive
+from fastcontact.contact.formulations._dual_basis import COVERED, LEAST, dual_functions, positive
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, OverlapPoints, obstacle_overlap
 from fastcontact.contact.integration import NO_AREA, areas_of_rule, nodal_areas
@@ -119,12 +119,17 @@ class WeightedMortar(Formulation):
         options = self.axisymmetric, self.projection_tolerance, self.smoothing
         return line_overlap(self.secondary, self.primary, self.points, deformed, *options)
 
+    @property
+    def alternates(self) -> bool:
+        """See `Formulation`; a node may have a gap in every other pairing, if it has dual functions and a small overlap."""
+        return self.multipliers == "dual" or super().alternates
+
     def unilateral(self, at: Configuration) -> Constraints:
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
         deformed = self.points + at.displacement
         overlap = self._overlap(deformed, at.pose)
         weights = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
-        coverage = self._coverage(overlap, weights, self._nodes_with_gaps(weights))
+        coverage = self._coverage(overlap, weights, self._nodes_with_gaps(weights, LEAST if at.rounded else COVERED))
         rows, across, closer = self._weighted(coverage)
         # Only the gap of an excluded node is omitted. The functions of its neighbours are not extended over its area.
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
@@ -367,14 +372,17 @@ class WeightedMortar(Formulation):
                 functions.append((psi @ T, D @ np.linalg.inv(T).T))
         return Coverage(overlap, weights, kept, functions)
 
-    def _nodes_with_gaps(self, covered: list[Array]) -> Mask:
-        """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions."""
+    def _nodes_with_gaps(self, covered: list[Array], least: float) -> Mask:
+        """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions.
+
+        Dual functions have gaps where a larger fraction than `least` of their weights faces the other side.
+        """
         m = len(self.secondary.points)
         total, full_total, added = np.zeros(m), np.zeros(m), np.zeros(m, bool)
         for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
             np.add.at(total, block.local, weights)
             np.add.at(full_total, block.local, full)
-        sufficient = total > (COVERED if self.multipliers == "dual" else NO_AREA) * full_total
+        sufficient = total > (least if self.multipliers == "dual" else NO_AREA) * full_total
         for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
             # If no node of a facet has sufficient weight, that with the largest weight has a gap, so that no overlap is
             # omitted.
