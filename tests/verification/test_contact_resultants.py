@@ -238,10 +238,7 @@ def test_history_is_a_table_and_the_summary_tells(tmp_path, root):
     [
         (lambda m, s: fc.contact_resultants(m, s, "plan"), "unknown contact pair 'plan': did you mean 'plane'"),
         (lambda m, s: fc.wear(m, s, "plane", -1.0), "coefficient of wear -1.0 must be"),
-        (
-            lambda m, s: fc.contact_moment(s[0].contact["plane"], (0.0, 0.0, 0.0)),
-            "needs one number per dimension",
-        ),
+        (lambda m, s: fc.contact_moment(s[0].contact["plane"], (0.0, 0.0, 0.0)), "needs one number per dimension"),
     ],
 )
 def test_what_is_refused(call, said):

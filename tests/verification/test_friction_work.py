@@ -216,11 +216,7 @@ def pressed_ball(solver="auto", steps=5, friction_while_touching=0.01, **changes
 @pytest.mark.parametrize("kinematics", ["axisymmetric", "plane_strain"])
 @pytest.mark.parametrize(
     ("formulation", "element"),
-    [
-        ("mortar", "quad4"),
-        ("continuous", "quad8"),
-        pytest.param("node_to_segment", "tri3", marks=pytest.mark.slow),
-    ],
+    [("mortar", "quad4"), ("continuous", "quad8"), pytest.param("node_to_segment", "tri3", marks=pytest.mark.slow)],
 )
 def test_work_of_friction_does_not_depend_on_the_number_of_steps(formulation, element, kinematics):
     """Nodes that close in a step slide from where they touch on: few steps have the work and the shear of many."""

@@ -105,16 +105,8 @@ def told_for(changes):
 @pytest.mark.parametrize(
     ("changes", "words", "enough"),
     [
-        (
-            [1e-2 * 0.5**k for k in range(20)],
-            "Use more updates (Criteria.max_geometry_updates), multipliers",
-            "2e-08",
-        ),
-        (
-            [0.1, *[1.2e-4, 0.9e-4] * 10],
-            "These changes do not decline. Use multipliers",
-            "1e-04",
-        ),
+        ([1e-2 * 0.5**k for k in range(20)], "Use more updates (Criteria.max_geometry_updates), multipliers", "2e-08"),
+        ([0.1, *[1.2e-4, 0.9e-4] * 10], "These changes do not decline. Use multipliers", "1e-04"),
     ],
 )
 def test_the_remedy_follows_from_how_the_geometry_moves(changes, words, enough):

@@ -249,11 +249,7 @@ def model():
         ("add_pressure", {"group": "TOP", "value": "1.0"}, r"argument value of .* not the string '1.0'"),
         ("add_pressure", {"group": "TOP", "value": 1.0, "ramp": [(0, 0)]}, r"at least two points"),
         ("add_pressure", {"group": "TOP", "value": 1.0, "ramp": [(0, 0), (1, float("inf"))]}, r"not finite"),
-        (
-            "add_pressure",
-            {"group": "TOP", "value": 1.0, "ramp": [1, 2]},
-            r"argument ramp of .* must be a Ramp",
-        ),
+        ("add_pressure", {"group": "TOP", "value": 1.0, "ramp": [1, 2]}, r"argument ramp of .* must be a Ramp"),
         ("add_traction", {"group": "TOP"}, r"traction on 'TOP' has no component"),
         ("add_traction", {"group": "TOP", "z": 1.0}, r"component 'z'"),
         ("add_traction", {"group": "TOP", "x": float("inf")}, r"traction on 'TOP' is inf"),

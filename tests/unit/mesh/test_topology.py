@@ -115,8 +115,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(
-    ("element", "origins", "parts"),
-    [(element, origins, parts) for kinds, origins, parts in CASES for element in kinds],
+    ("element", "origins", "parts"), [(element, origins, parts) for kinds, origins, parts in CASES for element in kinds]
 )
 def test_motions_at_hinges_are_those_that_cost_no_energy(element, origins, parts):
     mesh = joined(element, *origins)
