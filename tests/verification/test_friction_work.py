@@ -304,9 +304,7 @@ def test_no_work_of_friction_is_not_told_where_the_strain_energy_is_round_off():
 
 def test_steps_as_a_whole_have_the_work_of_slip_before_nodes_touch():
     few = pressed_ball()
-    with pytest.warns(
-        fc.FastcontactWarning, match=r"of the work of friction is done at nodes in the load step in which"
-    ):
+    with pytest.warns(fc.FastcontactWarning, match=r"of the work of friction is done at nodes in the load step in"):
         whole = pressed_ball(friction_while_touching=1.0)
     assert whole[-1].work["friction_work"] > 2.0 * few[-1].work["friction_work"]
     assert whole[-1].work["friction_while_touching"] > 0.5 * whole[-1].work["friction_work"]

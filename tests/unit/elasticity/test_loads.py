@@ -284,12 +284,6 @@ def test_functions_are_checked_before_any_numerics(model, function, message):
         model.check()
 
 
-def test_a_prescribed_function_is_checked_too(model):
-    model.prescribe("TOP", y=lambda x: x)
-    with pytest.raises(fc.ModelError, match=r"displacement y prescribed on 'TOP'.*shape \(4, 2\)"):
-        model.check()
-
-
 def test_a_pressure_inside_the_solid_is_refused():
     mesh = fc.generate.block((1.0, 1.0), (2, 1), "quad4")
     inner = np.flatnonzero(np.abs(mesh.points[:, 0] - 0.5) < 1e-12)
