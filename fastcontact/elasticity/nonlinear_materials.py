@@ -113,7 +113,8 @@ class ElasticPlastic(NonlinearElastic):
         try:
             rows = np.array([[float(value) for value in pair] for pair in self.hardening]).reshape(-1, 2)
         except (TypeError, ValueError, OverflowError):
-            slope = self.hardening if isinstance(self.hardening, float | int) else self.yield_stress
+            is_number = isinstance(self.hardening, float | int) and abs(self.hardening) < 1e300
+            slope = self.hardening if is_number else self.yield_stress
             raise ModelError(
                 "hardening must be pairs (equivalent plastic strain, yield stress), for example "
                 f"[(0.0, {self.yield_stress:g}), (0.1, {self.yield_stress + 0.1 * slope:g})] for the slope {slope:g}"

@@ -79,7 +79,9 @@ def read_again(text):
 )
 def test_what_is_no_case_file_is_refused(study, tmp_path):
     (tmp_path / "plate.inp").write_text(DECK)
-    with pytest.raises(CaseError, match="'plate' is an input deck: studies change the mesh and the numbers of a case"):
+    with pytest.raises(
+        CaseError, match="'plate' is an input deck: studies change the mesh and the values of a case file"
+    ):
         study(read_case(tmp_path / "plate.inp"))
 
 
