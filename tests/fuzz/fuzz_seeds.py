@@ -142,11 +142,7 @@ top, 1, 1, 0.001
 def small_mesh() -> fc.Mesh:
     """Two blocks of unlike elements, with groups of solids, facets and points."""
     points = [(x, y) for y in (0.0, 1.0, 2.0) for x in (0.0, 1.0, 2.0)]
-    cells = {
-        "quad4": [(0, 1, 4, 3), (1, 2, 5, 4)],
-        "tri3": [(3, 4, 7), (3, 7, 6)],
-        "line2": [(0, 1), (1, 2), (6, 7)],
-    }
+    cells = {"quad4": [(0, 1, 4, 3), (1, 2, 5, 4)], "tri3": [(3, 4, 7), (3, 7, 6)], "line2": [(0, 1), (1, 2), (6, 7)]}
     groups = {"LOWER": [0, 1], "UPPER": [2, 3], "BOTTOM": [4, 5], "TOP": [6]}
     return fc.Mesh(points, cells, groups, {"CORNER": [0], "MIDDLE": [3, 4]})
 

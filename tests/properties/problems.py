@@ -13,12 +13,7 @@ from two_bodies import boxes
 
 import fastcontact as fc
 
-FORMULATIONS = (
-    ("node_to_segment", ()),
-    ("continuous", ()),
-    ("mortar", ()),
-    ("mortar", (("multipliers", "dual"),)),
-)
+FORMULATIONS = (("node_to_segment", ()), ("continuous", ()), ("mortar", ()), ("mortar", (("multipliers", "dual"),)))
 FLAT, SOLIDS = ("tri3", "quad4", "tri6", "quad8", "quad9"), ("hex8", "tet4")
 PLANES = ("plane_strain", "plane_stress", "axisymmetric")
 E = 1000.0  # of the upper body

@@ -186,12 +186,7 @@ def indented(random: Random) -> Draft:
     element = str(random.choice(CUT, p=[0.4, 0.1, 0.05, 0.35, 0.1]) if solid else random.choice(FLAT))
     fine = 0.1 if not solid else 0.25
     mesh = generate.graded_block(
-        element,
-        width=width,
-        contact_radius=0.25 * width,
-        contact_size=fine * 0.5 * width,
-        size=0.3 * width,
-        growth=1.0,
+        element, width=width, contact_radius=0.25 * width, contact_size=fine * 0.5 * width, size=0.3 * width, growth=1.0
     )
     kinematics = "3d" if solid else str(random.choice(["plane_strain", "plane_stress", "axisymmetric"]))
     draft = begun(random, mesh, kinematics, ["BLOCK"], width, element)

@@ -197,9 +197,7 @@ MASKED = {
 @pytest.mark.parametrize("what", MASKED)
 def test_masks_are_not_lost_without_a_word(what):
     """NumPy hands on what lies behind a mask as if it were valid; a mask that hides nothing changes nothing."""
-    with pytest.raises(
-        fc.FastcontactError, match="has entries that are masked, and masks are not kept: fill them first"
-    ):
+    with pytest.raises(fc.FastcontactError, match="has entries that are masked, and masks are not kept: fill them"):
         MASKED[what](masked)
     MASKED[what](lambda values: np.ma.array(values, mask=False))
 

@@ -384,10 +384,7 @@ def test_files_of_code_aster_that_are_no_mesh(tmp_path, monkeypatch):
 
 def test_groups_without_points():
     mesh = SQUARE.with_groups(points={"NONE": []})
-    for act in (
-        lambda m: m.add_periodicity("NONE", "NONE"),
-        lambda m: m.add_spring("LEFT", "NONE", x=1.0),
-    ):
+    for act in (lambda m: m.add_periodicity("NONE", "NONE"), lambda m: m.add_spring("LEFT", "NONE", x=1.0)):
         with pytest.raises(fc.FastcontactError, match=r"'NONE'.* is empty"):
             act(model(mesh))
 

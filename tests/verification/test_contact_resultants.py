@@ -238,10 +238,7 @@ def test_history_is_a_table_and_the_summary_tells(tmp_path, root):
     [
         (lambda m, s: fc.contact_resultants(m, s, "plan"), "unknown contact pair 'plan': did you mean 'plane'"),
         (lambda m, s: fc.wear(m, s, "plane", -1.0), "coefficient of wear -1.0 must be"),
-        (
-            lambda m, s: fc.contact_moment(s[0].contact["plane"], (0.0, 0.0, 0.0)),
-            "needs one number per dimension",
-        ),
+        (lambda m, s: fc.contact_moment(s[0].contact["plane"], (0.0, 0.0, 0.0)), "needs one number per dimension"),
     ],
 )
 def test_what_is_refused(call, said):
@@ -395,9 +392,7 @@ def test_bodies_wear_on_the_secondary_side(multipliers):
 
 @pytest.mark.filterwarnings("ignore:the energy of these load steps")
 def test_steps_that_wear_too_much_are_told():
-    with pytest.warns(
-        fc.FastcontactWarning, match=r"contact 'sole' wears so much in a load step .* use 3 times as many"
-    ):
+    with pytest.warns(fc.FastcontactWarning, match=r"'sole' wears so much in a load step .* use 3 times as many"):
         rough = fc.solve(shoe(wear=4e-5), np.linspace(1.0, 91.0, 46))[-1].contact["sole"]
     assert np.abs(np.diff(rough.pressure)).max() > 0.2 * FORCE / 2.0
 

@@ -367,11 +367,7 @@ def test_one_node_is_joined_with_all_of_a_group():
             "leave out 'at' or 'distribute'",
         ),
         ("add_force", {"group": "TOP_LEFT", "y": 1.0, "at": (1.0, 1.0)}, "are collinear or coincide"),
-        (
-            "add_coupling",
-            {"reference": "PIN", "group": "TOP", "weighting": "linear"},
-            "has no weighting or radius",
-        ),
+        ("add_coupling", {"reference": "PIN", "group": "TOP", "weighting": "linear"}, "has no weighting or radius"),
         (
             "add_coupling",
             {"reference": "PIN", "group": "TOP", "kind": "distributing", "weighting": "l"},

@@ -222,12 +222,6 @@ def test_files_without_the_place_of_obstacles_are_still_read(tmp_path):
     assert contact.force[1] < 0
 
 
-def test_a_force_in_a_case_file_is_checked(tmp_path):
-    (tmp_path / "case.toml").write_text(CASE.replace("{ y = -2.0e5 }", '{ y = "down" }'))
-    with pytest.raises(fc.CaseError, match=r"'obstacle.plane.force.y' must be of type"):
-        read_case(tmp_path / "case.toml")
-
-
 FRICTION, RADIUS = 0.3, 10.0
 PRESS, PRESS_AND_TURN = [(0.0, 0.0), (1.0, 1.0), (9.0, 1.0)], [(0.0, 0.0), (1.0, 0.0), (9.0, 1.0)]
 

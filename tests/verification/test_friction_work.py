@@ -217,11 +217,7 @@ def pressed_ball(solver="auto", steps=5, friction_while_touching=0.01, **changes
 @pytest.mark.parametrize("kinematics", ["axisymmetric", "plane_strain"])
 @pytest.mark.parametrize(
     ("formulation", "element"),
-    [
-        ("mortar", "quad4"),
-        ("continuous", "quad8"),
-        pytest.param("node_to_segment", "tri3", marks=pytest.mark.slow),
-    ],
+    [("mortar", "quad4"), ("continuous", "quad8"), pytest.param("node_to_segment", "tri3", marks=pytest.mark.slow)],
 )
 def test_work_of_friction_does_not_depend_on_the_number_of_steps(formulation, element, kinematics):
     """Nodes that close in a step slide from where they touch on: few steps have the work and the shear of many."""
@@ -309,9 +305,7 @@ def test_no_work_of_friction_is_not_told_where_the_strain_energy_is_round_off():
 
 def test_steps_as_a_whole_have_the_work_of_slip_before_nodes_touch():
     few = pressed_ball()
-    with pytest.warns(
-        fc.FastcontactWarning, match=r"of the work of friction is done at nodes in the load step in which"
-    ):
+    with pytest.warns(fc.FastcontactWarning, match=r"of the work of friction is done at nodes in the load step in"):
         whole = pressed_ball(friction_while_touching=1.0)
     assert whole[-1].work["friction_work"] > 2.0 * few[-1].work["friction_work"]
     assert whole[-1].work["friction_while_touching"] > 0.5 * whole[-1].work["friction_work"]

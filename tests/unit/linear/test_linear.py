@@ -115,7 +115,7 @@ def test_optional_direct_solvers_agree_or_say_what_they_need(name, package, extr
     if importlib.util.find_spec(package) is None:
         assert name not in linear.SOLVERS
         with pytest.raises(
-            ModelError, match=rf"'{name}' needs the package {package}: pip install 'fastcontact\[{extra}\]'"
+            ModelError, match=rf"{name}' needs the package {package}: pip install 'fastcontact\[{extra}\]'"
         ):
             linear.make(name, dim=2, n_dofs=10)
         pytest.skip(f"{package} is not installed: only the message was checked")

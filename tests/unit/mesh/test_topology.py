@@ -46,9 +46,7 @@ def test_a_folded_mesh_is_refused_with_the_cells_and_the_place(name):
     points = mesh.points.copy()
     inner = int(np.argmin(np.linalg.norm(points - 1 / 3, axis=1)))
     points[inner] += (0.45, 0.33, 0.4)[: mesh.dim]
-    with pytest.raises(
-        MeshError, match=r"cells \d+ and \d+ lie on the same side of the facet between them, near"
-    ) as error:
+    with pytest.raises(MeshError, match=r"cells \d+ and \d+ lie on the same side of the facet between them") as error:
         topology.oriented(mesh.replace(points=points))
     first, second = (int(word) for word in str(error.value).split()[1:4:2])
     rows = [number - mesh.offsets[name] for number in (first, second)]
@@ -115,8 +113,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(
-    ("element", "origins", "parts"),
-    [(element, origins, parts) for kinds, origins, parts in CASES for element in kinds],
+    ("element", "origins", "parts"), [(element, origins, parts) for kinds, origins, parts in CASES for element in kinds]
 )
 def test_motions_at_hinges_are_those_that_cost_no_energy(element, origins, parts):
     mesh = joined(element, *origins)

@@ -45,7 +45,7 @@ def test_a_box_on_the_edge_or_corner_of_another_is_refused(element, height, moti
     model = elastic_model(boxes(element, height))
     model.fix("A_YMIN", "xyz")
     with pytest.raises(
-        fc.ModelError, match=rf"{motions} not supported: .*the part 'B_BOX' that hangs at point \d+ at \(1, 1, "
+        fc.ModelError, match=rf"{motions} not supported: .*part 'B_BOX' that hangs at \w+ \d+ at \(1, 1, "
     ):
         model.check()
     model.fix("B_YMAX", "xyz")
@@ -107,9 +107,7 @@ def test_relations_and_springs_stop_a_hinge():
 
 def test_a_mesh_that_falls_into_very_many_parts_is_refused_at_once(monkeypatch):
     monkeypatch.setattr(rigid_motions, "MOST_MOTIONS", 4)
-    with pytest.raises(
-        fc.ModelError, match=r"consists of 2 parts .*first: point \d+ at \(1, 1\)\): let cells share whole"
-    ):
+    with pytest.raises(fc.ModelError, match=r"consists of 2 parts .*first: point \d+ at \(1, 1\)\): let cells share"):
         elastic_model(squares()).check()
 
 

@@ -133,9 +133,7 @@ def test_large_strains_without_stress_are_told(state):
         model.add_initial_stress(xx=500.0)
     else:
         model.add_temperature(5e4)
-    with pytest.warns(
-        fc.FastcontactWarning, match=r"temperatures and initial states cause strains of 0.5, beyond the 0.1"
-    ):
+    with pytest.warns(fc.FastcontactWarning, match=r"temperatures and initial states cause strains of 0.5, beyond"):
         fc.solve(model, 1)
 
 

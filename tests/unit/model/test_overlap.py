@@ -174,9 +174,7 @@ def test_a_side_pushed_into_a_floor_is_refused(mesh, kinematics, side, formulati
     model.fix("LEFT" if mesh.dim == 2 else "XMIN", "x")
     model.add_obstacle("floor", secondary=side, obstacle=floor(mesh.dim), formulation=formulation)
     n = len(mesh.points_of(side))
-    with pytest.raises(
-        fc.ModelError, match=rf"supports push {n} of the {n} nodes of '{side}' into the rigid .* by up to 0\.1 "
-    ):
+    with pytest.raises(fc.ModelError, match=rf"push {n} of the {n} nodes of '{side}' into the rigid .* by up to 0\.1 "):
         model.check()
 
 
@@ -345,9 +343,7 @@ def mesh():
 def test_facets_of_an_earlier_pair_are_refused(mesh, first, second, formulation):
     model = elastic_model(mesh)
     model.add_contact("first", secondary=first[0], primary=first[1], formulation=formulation)
-    with pytest.raises(
-        fc.ContactError, match=r"contact 'second' pairs .* that contact 'first' pairs already: .*point \d+"
-    ):
+    with pytest.raises(fc.ContactError, match=r"contact 'second' pairs .* that contact 'first' pairs already: .*point"):
         model.add_contact("second", secondary=second[0], primary=second[1], formulation=formulation)
     assert len(model.contact) == 1
 

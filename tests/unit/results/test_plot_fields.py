@@ -238,9 +238,7 @@ def test_a_section_has_the_area_and_the_field_of_the_body(element, point, normal
 
 def test_a_section_is_refused_where_there_is_none():
     mesh = box((1.0, 1.0, 1.0), (1, 1, 1), "hex8")
-    with pytest.raises(
-        FastcontactError, match=r"does not meet the mesh, which lies between \(0, 0, 0\) and \(1, 1, 1\)"
-    ):
+    with pytest.raises(FastcontactError, match=r"not meet the mesh, which lies between \(0, 0, 0\) and \(1, 1, 1\)"):
         fc.plot.section(mesh, step_of(mesh), (0, 0, 2), (0, 0, 1))
     for point, normal in (((0, 0), (0, 0, 1)), ((0, 0, 0), (0, 0, 0)), ((0, 0, float("nan")), (0, 0, 1))):
         with pytest.raises(FastcontactError, match="a point and a normal of 3 numbers"):
@@ -506,9 +504,7 @@ def test_what_ffmpeg_says_when_it_fails_is_told_in_one_line(reads, tmp_path, mon
     (folder / "ffmpeg").chmod(0o755)
     monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
     mesh = block((1.0, 1.0), (2, 2), "quad4")
-    with pytest.raises(
-        FastcontactError, match=r"a.mp4' was not written, ffmpeg ended with code 3 \(no encoder\): write a"
-    ):
+    with pytest.raises(FastcontactError, match=r"a.mp4' was not written, ffmpeg ended with code 3 \(no encoder\)"):
         fc.plot.animate(mesh, [step_of(mesh)] * 3, target)
     assert [path.name for path in tmp_path.iterdir()] == ["bin"]
 

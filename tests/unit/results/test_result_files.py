@@ -248,12 +248,7 @@ def test_steps_outlive_the_file(path: Path) -> None:
 
 
 def test_a_pair_may_come_late_and_go(path: Path) -> None:
-    pairs = [
-        {},
-        {"left": "node_to_segment"},
-        {"new": "continuous", "left": "continuous"},
-        {"new": "continuous"},
-    ]
+    pairs = [{}, {"left": "node_to_segment"}, {"new": "continuous", "left": "continuous"}, {"new": "continuous"}]
     steps = [step_result(number, pairs=names) for number, names in enumerate(pairs)]
     with ResultWriter(path, MESH) as out:
         for step in steps:

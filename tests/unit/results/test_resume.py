@@ -305,10 +305,7 @@ def test_steps_without_their_state_are_refused(path: Path) -> None:
     with ResultWriter(path, MESH) as out:
         out.write(step_result(0))
     model = fc.Model(spheres().mesh, "axisymmetric")
-    with (
-        ResultWriter(path, MESH, resume=True) as out,
-        pytest.raises(ModelError, match="does not contain restart data"),
-    ):
+    with ResultWriter(path, MESH, resume=True) as out, pytest.raises(ModelError, match="does not contain restart data"):
         fc.solve(model, resume=out.done)
 
 

@@ -29,12 +29,7 @@ from fastcontact.analysis.progress import Progress, StatusLine
 from fastcontact.errors import CaseError, FileError, MeshError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import HEAD, MOST_SHOWN, ContactResult, MaterialStress, StepResult, Steps, phases
-from fastcontact.results.tables import (
-    contact_table,
-    line_table,
-    with_column,
-    write_csv,
-)
+from fastcontact.results.tables import contact_table, line_table, with_column, write_csv
 
 # Longest repr of anything [characters]: a screen.
 SCREEN = 4000

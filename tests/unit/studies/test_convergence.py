@@ -9,8 +9,7 @@ import pytest
 import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.cli import main
-from fastcontact.errors import CaseError, ContactError
-from fastcontact.studies import execute
+from fastcontact.errors import CaseError
 from fastcontact.studies import runs as convergence
 from fastcontact.studies import settings as levels
 from fastcontact.studies.runs import convergence_study
@@ -112,13 +111,6 @@ def test_what_failed_is_told_and_the_rest_shown(case):
     assert len(study.series[1].failed) == 3
     assert study.html().count("class='failed'") >= 2
     assert study.table()["element"].tolist() == ["quad8"] * 4 + ["quad4"]
-
-
-def test_where_nothing_could_be_solved_the_first_error_is_raised(case, monkeypatch):
-    broken = {"error": "side 'CONT1' is empty", "kind": "ContactError", "seconds": 1.0}
-    monkeypatch.setattr(execute, "run_all", lambda jobs, **_: [broken] * len(jobs))
-    with pytest.raises(ContactError, match=r"no level could be solved; .* side 'CONT1' is empty"):
-        convergence.convergence_study(case, 2, ["quad8"], ["continuous"])
 
 
 def test_a_quantity_that_nothing_gives_is_named(case):

@@ -208,12 +208,7 @@ def flows(found):
 
 
 def test_films_come_change_and_go_between_steps(tmp_path):
-    steps = (
-        "*FILM\n5, F2, 20., 10.\n",
-        "*FILM\n5, F2, 30., 40.\n",
-        "*FILM, OP=NEW\n",
-        "*FILM\n5, F2, 0., 10.\n",
-    )
+    steps = ("*FILM\n5, F2, 20., 10.\n", "*FILM\n5, F2, 30., 40.\n", "*FILM, OP=NEW\n", "*FILM\n5, F2, 0., 10.\n")
     _, found = solved(tmp_path, "DC3D8", CONTACT, "*BOUNDARY\nHOT, 11, 11, 100.\n", "", *steps)
     films = [80.0 / (RESISTANCE + 0.1), 70.0 / (RESISTANCE + 0.025), 0.0, 100.0 / (RESISTANCE + 0.1)]
     assert flows(found) == pytest.approx([0.0, *films], rel=1e-9, abs=1e-7)

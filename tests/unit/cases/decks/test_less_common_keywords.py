@@ -208,10 +208,7 @@ def test_gap_elements_between_bodies(tmp_path):
 
 def test_fixed_supports_keep_where_they_are(tmp_path):
     """*BOUNDARY, FIXED after a step that moved them; in the first step it holds them at zero."""
-    steps = [
-        "*Boundary\ntop, 3, 3, -0.01\n",
-        "*Boundary, fixed\ntop, 3\n",
-    ]
+    steps = ["*Boundary\ntop, 3, 3, -0.01\n", "*Boundary, fixed\ntop, 3\n"]
     text = WHOLE.replace(STEP, "".join(f"*Step\n*Static\n{lines}*End Step\n" for lines in steps))
     found = [step.contact["ss/sm"].force[2] for step in deck_of(tmp_path, text).solve()]
     assert found == pytest.approx([1000.0, 1000.0])
@@ -417,10 +414,7 @@ def test_frequencies_about_the_last_step(tmp_path, capsys):
     for wrong, said in (
         (text.replace(STEP, FREQUENCY), r"\*FREQUENCY needs a step with \*STATIC before"),
         (text + FREQUENCY + STEP, r"\*STEP: follows a step with \*FREQUENCY"),
-        (
-            text + FREQUENCY.replace(" 2\n", " 2\n*Boundary\ntop, 3\n"),
-            r"\*BOUNDARY: cannot be in a step with \*FREQ",
-        ),
+        (text + FREQUENCY.replace(" 2\n", " 2\n*Boundary\ntop, 3\n"), r"\*BOUNDARY: cannot be in a step with \*FREQ"),
         (text + FREQUENCY.replace(" 2\n", " 0\n"), "the number of modes must be at least 1"),
         (text + FREQUENCY.replace(" 2\n", " 2\n*Static\n"), r"either \*STATIC or one"),
     ):

@@ -9,13 +9,7 @@ import fastcontact as fc
 SETS = "*Nset, nset=low_face, generate\n5, 8\n*Nset, nset=up_face, generate\n11, 14\n"
 
 
-@pytest.mark.parametrize(
-    "lines",
-    [
-        "PIN, 11, 5\nTIE, 12, 6\nPin, 13, 7\nTie, 14, 8\n",
-        "TIE, up_face, low_face\n",
-    ],
-)
+@pytest.mark.parametrize("lines", ["PIN, 11, 5\nTIE, 12, 6\nPin, 13, 7\nTie, 14, 8\n", "TIE, up_face, low_face\n"])
 def test_pinned_cubes_are_one_bar(lines, tmp_path):
     deck = deck_of(tmp_path, NODES + SETS + MATERIAL + "*MPC\n" + lines + SUPPORTS + STEP)
     (step,) = deck.solve()

@@ -124,10 +124,7 @@ def test_medcoupling_reads_our_fields_at_all_instants(tmp_path):
     expected = {
         "DEPL": (("DX", "DY"), lambda step: step.displacement),
         "SIEF_NOEU": (("SIXX", "SIYY", "SIZZ", "SIXY"), lambda step: step.stress),
-        "SIEQ_NOEU": (
-            ("VMIS", "VMIS_SG"),
-            lambda step: np.column_stack([step.von_mises, step.von_mises_signed]),
-        ),
+        "SIEQ_NOEU": (("VMIS", "VMIS_SG"), lambda step: np.column_stack([step.von_mises, step.von_mises_signed])),
         "REAC_NODA": (("DX", "DY"), lambda step: step.reaction),
     }
     for name, (components, values) in expected.items():
@@ -153,11 +150,7 @@ def written_by_medcoupling(mc, path, write="write"):
     lines.insertNextCell(mc.NORM_SEG2, [1, 4])
     file = mc.MEDFileUMesh()
     file[0], file[-1] = solids, lines
-    for level, groups in {
-        0: {"all": [0, 1], "square": [1]},
-        -1: {"bottom": [0, 1]},
-        1: {"corner": [2, 4]},
-    }.items():
+    for level, groups in {0: {"all": [0, 1], "square": [1]}, -1: {"bottom": [0, 1]}, 1: {"corner": [2, 4]}}.items():
         arrays = []
         for name, numbers in groups.items():
             arrays.append(mc.DataArrayInt(numbers))
@@ -365,11 +358,7 @@ def write_med_2(path):
             mesh.create_dataset(f"{where}/NOD", data=np.int32(nodes)).attrs["NBR"] = np.int32(len(families))
             mesh.create_dataset(f"{where}/FAM", data=np.int32(families)).attrs["NBR"] = np.int32(len(families))
         mesh.create_group("FAS/FAMILLE_ZERO").attrs["NUM"] = np.int32(0)
-        for where, number, names in [
-            ("ELEME/a", -1, ["one"]),
-            ("ELEME/b", -2, ["one", "two"]),
-            ("NOEUD/c", 1, ["P"]),
-        ]:
+        for where, number, names in [("ELEME/a", -1, ["one"]), ("ELEME/b", -2, ["one", "two"]), ("NOEUD/c", 1, ["P"])]:
             family = mesh.create_group(f"FAS/{where}")
             family.attrs["NUM"] = np.int32(number)
             group = family.create_group("GRO")
@@ -437,10 +426,7 @@ def add_vertices(path, points, family):
     with h5py.File(path, "a") as file:
         step = next(iter(file["ENS_MAA/mesh"].values()))
         entry = step["MAI"].create_group("PO1")
-        for name, data in {
-            "NOD": np.int32(points) + 1,
-            "FAM": np.full(len(points), family, np.int32),
-        }.items():
+        for name, data in {"NOD": np.int32(points) + 1, "FAM": np.full(len(points), family, np.int32)}.items():
             entry.create_dataset(name, data=data).attrs["NBR"] = len(points)
 
 
@@ -492,10 +478,7 @@ def test_unknown_kinds_are_named_and_counted(tmp_path):
         read_med(path)
 
 
-@pytest.mark.parametrize(
-    ("attribute", "value", "message"),
-    [("TYP", 1, "structured grid"), ("REP", 1, "cylindrical")],
-)
+@pytest.mark.parametrize(("attribute", "value", "message"), [("TYP", 1, "structured grid"), ("REP", 1, "cylindrical")])
 def test_meshes_of_another_kind(tmp_path, attribute, value, message):
     path = tmp_path / "other.med"
     write_med_mesh(path, all_elements())
@@ -580,12 +563,7 @@ def test_soft_links_inside_the_file_are_followed(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [
-        ("g" * 81, "81 bytes, but MED allows 1 to 80"),
-        ("é" * 41, "82 bytes"),
-        ("", "0 bytes"),
-        ("end ", "blank"),
-    ],
+    [("g" * 81, "81 bytes, but MED allows 1 to 80"), ("é" * 41, "82 bytes"), ("", "0 bytes"), ("end ", "blank")],
 )
 def test_names_that_med_cannot_hold(tmp_path, name, message):
     path = tmp_path / "names.med"

@@ -249,11 +249,7 @@ def test_medit_references(tmp_path):
         "Triangles\n2\n1 2 3 8\n1 3 4 9\nEdges\n1\n1 2 8\nEnd\n"
     )
     mesh = read_mesh(tmp_path / "plate.mesh")
-    assert members(mesh) == {
-        "surface_8": {("tri3", 0)},
-        "surface_9": {("tri3", 1)},
-        "curve_8": {("line2", 0)},
-    }
+    assert members(mesh) == {"surface_8": {("tri3", 0)}, "surface_9": {("tri3", 1)}, "curve_8": {("line2", 0)}}
     assert {name: points.tolist() for name, points in mesh.point_groups.items()} == {"point_3": [1]}
 
 
