@@ -34,11 +34,11 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
     """
     last = history[-1]
     magnitude = np.linalg.norm(change.reshape(problem.shape), axis=1)
-    sides = {name: pair.secondary.points for name, pair in problem.pairs.items()}
-    last["nodes"] = {
-        name: sides[name][np.argsort(-magnitude[sides[name]], kind="stable")[:3]].tolist()
-        for name in sorted(sides, key=lambda name: -magnitude[sides[name]].max())
-    }
+    nodes: Nodes = {}
+    for name, pair in problem.pairs.items():
+        points = pair.secondary.points
+        nodes[name] = points[np.argsort(-magnitude[points], kind="stable")[:3]].tolist()
+    last["nodes"] = dict(sorted(nodes.items(), key=lambda item: -magnitude[item[1][0]]))
     changes = [entry["displacement_change"] for entry in history]
     declining = len(changes) <= WINDOW or min(changes[-WINDOW:]) <= DECLINE * min(changes[:-WINDOW])
     size = changes[-1] if declining else max(changes[-WINDOW:])

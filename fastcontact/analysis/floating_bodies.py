@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -305,24 +306,15 @@ class FloatingBodies:
                 length *= 0.5
                 position = position - length * step[0]
                 continue
+            step, length = None, 1.0
             if stretch > last_stretch:
                 mixing.restart()
-            step, length = None if stretch > last_stretch else _newton_step(freed, state, elongation), 1.0
+            elif freed is not None and state.response is not None:
+                with suppress(LinAlgError):  # the constraints are linearly dependent
+                    step = freed(state.response()).slackened(elongation, state.gap)
             # Without Newton's method positions are accelerated, because parts much softer than the springs, such as a
             # peeling layer, approach equilibrium slowly.
             position = mixing.mixed(position, position + elongation) if step is None else position + step[0]
             last_stretch, relaxed = stretch, 0.0 if step is None else stretch
         state = dataclasses.replace(state, iterations=iterations)
         return RigidPosition(state, position, self.stiffness * elongation, positions, slack)
-
-
-def _newton_step(
-    freed: Callable[[Response], Freed] | None, state: Solution, elongation: Array
-) -> tuple[Array, float] | None:
-    """Return the change of the positions by Newton's method, see `Freed.slackened`; None if the response is unknown."""
-    if freed is None or state.response is None:
-        return None
-    try:
-        return freed(state.response()).slackened(elongation, state.gap)
-    except LinAlgError:  # the constraints are linearly dependent
-        return None

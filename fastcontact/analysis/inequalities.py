@@ -290,15 +290,8 @@ def _with_floating_bodies(
     relative_accuracy = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
     # The response requires many linear solutions, which are cheap only if the matrix is factorised.
     freed = None if problem.solver.iterative else partial(bodies.freed, constraints, dofs)
-    rigid = bodies.settle(
-        solve_at,
-        freed,
-        dofs.numbers(bodies.dofs),
-        start,
-        state.largest_rigid_force,
-        relative_accuracy,
-        state.gap_round_off,
-    )
+    springs, load = dofs.numbers(bodies.dofs), state.largest_rigid_force
+    rigid = bodies.settle(solve_at, freed, springs, start, load, relative_accuracy, state.gap_round_off)
     if rigid.state.settled and not rigid.slack:
         gaps = gaps_at_rest(problem.model, bodies.motions)
         raise failure(not_balanced(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))

@@ -102,8 +102,15 @@ def test_models_that_had_another_answer_in_other_words(seed):
 # positions of two floating layers that alternated; a linearised geometry of facets of which strips are covered;
 # points beyond the end of a side that alternated between two facets of its edge; centres of segments as the only points of
 # partly covered facets (two models); contact states that alternate; nearly dependent constraints with friction; layers that
-# float above a gap a hundred times as wide as a spring's elongation.
-@pytest.mark.parametrize("seed", [40068, 90675, 50073, 300026, 300028, 300063, 101378, 103058, 320200, 320293, 320421])
+# float above a gap a hundred times as wide as a spring's elongation; nodes of which a small part faces the other side in
+# every other pairing (three models).
+@pytest.mark.parametrize(
+    "seed",
+    [
+        *(40068, 90675, 50073, 300026, 300028, 300063, 101378, 103058, 320200, 320293, 320421, 310180, 103449),
+        pytest.param(100162, marks=pytest.mark.slow),
+    ],
+)
 def test_models_that_had_no_result(seed):
     assert outcome(seed)["outcome"] == "result"
 

@@ -92,12 +92,14 @@ def test_progress_tells_that_a_step_is_cut(capsys):
 
 
 def told_for(changes):
+    """The message for two pairs, of which the second one moves more."""
     mesh = block((1.0, 1.0), (1, 1))
     side = SimpleNamespace(points=np.arange(4))
     options = SimpleNamespace(cohesion=None, kind="unilateral")
     pair = SimpleNamespace(secondary=side, primary=side, normals="averaged", multipliers="dual", options=options)
+    still = SimpleNamespace(**vars(pair) | {"secondary": SimpleNamespace(points=np.arange(2))})
     model, criteria = SimpleNamespace(mesh=mesh), Criteria()
-    problem = SimpleNamespace(model=model, criteria=criteria, shape=(4, 2), pairs={"joint": pair})
+    problem = SimpleNamespace(model=model, criteria=criteria, shape=(4, 2), pairs={"still": still, "joint": pair})
     history = [{"displacement_change": change, "active": 3} for change in changes]
     return geometry_moves(problem, history, np.arange(8.0), 60)
 
