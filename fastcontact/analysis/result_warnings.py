@@ -230,7 +230,7 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     isotropic = np.array([isinstance(law, LinearElastic) and not law.graded for law in laws])
     # Strains of other materials are computed below.
     shear = np.array(
-        [getattr(law, "shear_modulus", math.inf) if constant else math.inf for law, constant in zip(laws, isotropic)]
+        [getattr(law if known else None, "shear_modulus", math.inf) for law, known in zip(laws, isotropic)]
     )
     strain, interface = 0.0, last.material_stress
     interior = np.ones(len(last.stress), bool)
