@@ -348,8 +348,8 @@ def _depth_of_primary(model: Model, pair: Formulation, last: StepResult) -> floa
     """Return the largest depth of primary nodes inside bodies of the secondary side [length]."""
     primary, of_secondary = pair.primary.points, bodies(model.mesh)[1][pair.secondary.points]
     overlaps = depths(model.mesh, model.kinematics, model.mesh.points + last.displacement)
-    deepest = (largest(depth[np.isin(points, primary)]) for _, body, points, depth in overlaps if body in of_secondary)
-    return max(deepest, default=0.0)
+    inside = (depth[np.isin(points, primary)] for _, body, points, depth in overlaps if body in of_secondary)
+    return max((float(depth.max(initial=0.0)) for depth in inside), default=0.0)
 
 
 def _unresolved(name: str, pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:

@@ -368,8 +368,8 @@ def test_a_table_is_straight_between_its_places_and_constant_beyond():
         fc.Tabulated("z", [(0, 1)])(np.zeros((1, 2)))
     for arguments, words in (
         (("r", [(0, 1)]), "along x, y, z or radius, not along 'r'"),
-        (("x", [(0, 1), (0, 2)]), "must ascend"),
-        (("x", []), "must ascend, and there must be at least one"),
+        (("x", [(0, 1), (0, 2)]), "must have ascending coordinates"),
+        (("x", []), "ascending coordinates, at least one"),
         (("x", [(0, 1, 2)]), "pairs"),
         (("x", [(0, np.inf)]), "not a finite number"),
     ):
