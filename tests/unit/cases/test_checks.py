@@ -113,10 +113,7 @@ def test_it_says_what_is_compared():
         ({}, r"check\[0\] needs 'quantity'"),
         ({"quantity": "pole.pressure"}, "either 'theory'.* or 'value'"),
         ({"quantity": "pole.pressure", "value": 1.0, "theory": "hertz"}, "either 'theory'.* or 'value'"),
-        (
-            {"quantity": "pole.pressure", "value": 0.0},
-            r"check\[0\]: the value is 0, so the relative deviation is undefined",
-        ),
+        ({"quantity": "pole.pressure", "value": 0.0}, r"check\[0\]: the value is 0, so the relative deviation is"),
         *(
             ({"quantity": "pole.pressure", "value": 1.0, name: number}, rf"check\[0\].{name} = .* must be ")
             for name, numbers in {
