@@ -158,9 +158,8 @@ class Heat:
         conductivity, exchange = self.matrix, self.loads
         if displacement is not None and self.finite:
             conductivity, exchange = self.conductors(displacement).matrix(), thermal_loads(self.model, displacement)
-        rise, loads, ambient = (
-            combined(by_ramp, self.ramp, instant, n) for by_ramp in (self.prescribed, exchange.powers, exchange.ambient)
-        )
+        given = self.prescribed, exchange.powers, exchange.ambient
+        rise, loads, ambient = (combined(by_ramp, self.ramp, instant, n) for by_ramp in given)
         friction_power = np.zeros(n) if friction is None else friction
         conductivity = conductivity if contact is None else csr_array(conductivity + contact)
         films = exchange.films
@@ -187,10 +186,8 @@ class Heat:
         round_off = SUM_ROUND_OFF * float((abs(A) @ np.abs(rise)).max())
         rise = P @ rise
         film_power = ambient - films @ rise
-        largest = max(
-            float(np.abs(powers).max())
-            for powers in (reaction, loads, film_power, friction_power, P.T @ (conductivity @ rise))
-        )
+        flows = reaction, loads, film_power, friction_power, P.T @ (conductivity @ rise)
+        largest = max(float(np.abs(powers).max()) for powers in flows)
         residual = float(np.abs(heat_flow[free]).max(initial=0.0))
         if residual > max(self.criteria.relative * largest, round_off):
             raise ConvergenceError(

@@ -60,11 +60,8 @@ def _without_contact(
     texts: dict[frozenset[int], str] = {}
     for first, second, points, depth in sorted(overlaps, key=lambda entry: -float(entry[3].max())):
         body_pair, row = frozenset((first, second)), int(np.argmax(depth))
-        if (
-            body_pair not in between
-            and body_pair not in texts
-            and depth[row] > LENGTH_ROUND_OFF * np.ptp(mesh.points, axis=0).max()
-        ):
+        notable = depth[row] > LENGTH_ROUND_OFF * np.ptp(mesh.points, axis=0).max()
+        if notable and body_pair not in between and body_pair not in texts:
             where = mesh.points[points[row]]
             texts[body_pair] = (
                 f"bodies {body_name(mesh, body, first)} and {body_name(mesh, body, second)} interpenetrate by "

@@ -111,10 +111,8 @@ class StressScatter:
             computed = stress.at(name, xi, cells, field.loops[name][rows], rows)
             difference = N @ recovered[rows] - computed
             volume = cell_volumes(mesh.points[cells], N, dN, problem.model.kinematics == "axisymmetric") * weights
-            compliance, mean_weights = (
-                field.compliance[numbers][:, None],
-                volume * (self._nearly_incompressible[numbers] & simplex)[:, None],
-            )
+            compliance = field.compliance[numbers][:, None]
+            mean_weights = volume * (self._nearly_incompressible[numbers] & simplex)[:, None]
             sums += [
                 (elastic_energy(difference, compliance) * volume).sum(),
                 (elastic_energy(computed, compliance) * volume).sum(),
@@ -158,9 +156,7 @@ def scatter_warnings(problem: Problem, step: StepResult) -> list[str]:
             "averages at the nodes, and contact pressures with it; use quadrangles or hexahedra, or quadratic elements "
             "(generate.to_quadratic)"
         ]
-    if (
-        measure.energy > BENDING and problem.model.kinematics != "axisymmetric"
-    ):  # cells at the axis scatter by this amount anyway
+    if measure.energy > BENDING and problem.model.kinematics != "axisymmetric":  # cells at the axis scatter anyway
         return [
             f"{names} cells are too stiff, as in thin parts that bend: the error of their stress is {measure.energy:.0%} "
             "(energy norm of the difference from stress recovered at the nodes); use hexahedra or quadrangles with "

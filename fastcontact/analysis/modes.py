@@ -212,11 +212,8 @@ class _Vibration:
         values, vectors = self.lowest(n if wave.single else 2 * n, linear_solver, wave)
         if wave.single:
             return values, vectors
-        K, M = (
-            joined(self.contact, 2 * self.K.shape[0], wave.on_ring).stiffened(wave.real_blocks(self.K)),
-            wave.real_blocks(self.M),
-        )
-        return pairs_of(vectors, K, M, n)
+        K = joined(self.contact, 2 * self.K.shape[0], wave.on_ring).stiffened(wave.real_blocks(self.K))
+        return pairs_of(vectors, K, wave.real_blocks(self.M), n)
 
 
 def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> bsr_array:

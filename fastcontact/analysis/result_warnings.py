@@ -233,7 +233,7 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     isotropic = np.array([isinstance(law, LinearElastic) and not law.graded for law in laws])
     # Strains of other materials are computed below.
     shear = np.array(
-        [getattr(law, "shear_modulus", math.inf) if constant else math.inf for law, constant in zip(laws, isotropic)]
+        [getattr(law if known else None, "shear_modulus", math.inf) for law, known in zip(laws, isotropic)]
     )
     strain, interface = 0.0, last.material_stress
     interior = np.ones(len(last.stress), bool)
@@ -352,8 +352,8 @@ def _depth_of_primary(model: Model, pair: Formulation, last: StepResult) -> floa
     """Return the largest depth of primary nodes inside bodies of the secondary side [length]."""
     primary, of_secondary = pair.primary.points, bodies(model.mesh)[1][pair.secondary.points]
     overlaps = depths(model.mesh, model.kinematics, model.mesh.points + last.displacement)
-    deepest = (largest(depth[np.isin(points, primary)]) for _, body, points, depth in overlaps if body in of_secondary)
-    return max(deepest, default=0.0)
+    inside = (depth[np.isin(points, primary)] for _, body, points, depth in overlaps if body in of_secondary)
+    return max((float(depth.max(initial=0.0)) for depth in inside), default=0.0)
 
 
 def _unresolved(name: str, pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:

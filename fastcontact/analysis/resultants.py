@@ -486,10 +486,8 @@ def pretension_history(steps: Iterable[StepResult]) -> NDArray[np.void]:
     steps = list(steps)
     names = list(dict.fromkeys(name for step in steps for name in step.pretension))
     columns_of = [(name, kind) for name in names for kind in ("force", "shortening")]
-    rows = [
-        (step.index, step.load_factor, *(step.pretension.get(name, {}).get(kind, np.nan) for name, kind in columns_of))
-        for step in steps
-    ]
+    forces = ([step.pretension.get(name, {}).get(kind, np.nan) for name, kind in columns_of] for step in steps)
+    rows = [(step.index, step.load_factor, *values) for step, values in zip(steps, forces, strict=True)]
     columns = [(f"{name}_{kind}", float) for name, kind in columns_of]
     return np.array(rows, [("step", int), ("load_factor", float), *columns])
 

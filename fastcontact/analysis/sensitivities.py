@@ -221,13 +221,9 @@ def settled_step(
 
 
 def _check_path(model: Model, step: StepResult, criteria: Criteria) -> None:
+    meanings = {"friction": "friction", "wear": "wear", "cohesion": "a cohesive layer", "adhesion": "adhesion"}
     for pair in model.contact:
-        for option, meaning in (
-            ("friction", "friction"),
-            ("wear", "wear"),
-            ("cohesion", "a cohesive layer"),
-            ("adhesion", "adhesion"),
-        ):
+        for option, meaning in meanings.items():
             if pair.options.get(option):
                 raise ModelError(
                     f"contact '{pair.name}' has {meaning}: its results depend on all load steps, and sensitivities consider "
@@ -276,13 +272,8 @@ def checked_margin(contact: MovingContact, least: float) -> float:
     if len(critical):
         nodes = nearest_nodes(contact.problem, constraints, critical)
         largest_distance = float(np.abs(distance[critical]).max())
-        change = (
-            "open"
-            if solution.active[critical].all()
-            else "close"
-            if not solution.active[critical].any()
-            else "open or close"
-        )
+        closed = solution.active[critical]
+        change = "open" if closed.all() else "close" if not closed.any() else "open or close"
         count_text = "1 constraint is" if len(critical) == 1 else f"{len(critical)} constraints are"
         raise ModelError(
             f"{count_text} about to {change}, at {named_nodes(contact.problem, nodes)}: forces or gaps are "

@@ -106,10 +106,7 @@ class SharedNodes:
         """Return the rows (m, n_dofs) of the mean slip of each representative along its own tangents."""
         products = np.einsum("mjd,mkd->jkm", self.frame, self.frame[self.representative])
         sums = [[self._summation(self.tangential_fraction * factor) for factor in factors] for factors in products]
-        return tuple(
-            csr_array(sum(matrices[k] @ T for matrices, T in zip(sums, constraints.tangents, strict=True)))
-            for k in range(len(sums))
-        )
+        return tuple(csr_array(sum(M @ T for M, T in zip(of_axis, constraints.tangents))) for of_axis in zip(*sums))
 
     def _mean(self, components: Array, weight: Array) -> Array:
         """Return the weighted means, along the representatives' tangents, of components along the tangents (m, k)."""
@@ -231,9 +228,8 @@ def _fractions(constraints: StackedConstraints, representative: Indices) -> tupl
 
 def _areas(constraints: StackedConstraints) -> Array:
     """Return the area of each constraint (m,), NaN without one [area]."""
-    return np.concatenate(
-        [np.full(len(part), np.nan) if part.areas is None else part.areas for part in constraints.parts.values()]
-    )
+    parts = constraints.parts.values()
+    return np.concatenate([np.full(len(part), np.nan) if part.areas is None else part.areas for part in parts])
 
 
 def _nodes(constraints: StackedConstraints) -> Indices:

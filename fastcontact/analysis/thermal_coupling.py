@@ -49,12 +49,10 @@ class Heated(Temperatures):
         """Return the result of a load step with heat fluxes and heat reactions added."""
         assert problem.heat is not None
         flux = problem.heat.conductors(step.displacement).flux(self.rise)
-        contact = {
-            name: replace(pair, heat_flux=self.fluxes[name]) if name in self.fluxes else pair
-            for name, pair in step.contact.items()
-        }
+        heated = {name: replace(step.contact[name], heat_flux=power) for name, power in self.fluxes.items()}
         return replace(
-            step, contact=contact, heat_reaction=self.reaction, iterations={**step.iterations, "heat": self.balance},
+            step, contact=step.contact | heated, heat_reaction=self.reaction,
+            iterations={**step.iterations, "heat": self.balance},
             cell_fields={**step.cell_fields, **dict(zip(HEAT_FLUX, flux.T, strict=False))},
         )  # fmt: skip
 

@@ -254,11 +254,8 @@ def _forces(
     force_vectors = rows.sum(axis=0).reshape(-1, dim)[pair.secondary.points]
     normals = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
     inverse_area = 1.0 / np.where(constraints.finite_areas > 0.0, constraints.finite_areas, np.inf)
-    penetration = (
-        np.zeros(len(constraints))
-        if constraints.normal_compliance is None
-        else constraints.normal_compliance.apply(normal)
-    )
+    compliance = constraints.normal_compliance
+    penetration = np.zeros(len(constraints)) if compliance is None else compliance.apply(normal)
     if constraints.law is not None:  # The energy of the law is not that of a linear spring.
         energy = 2.0 * constraints.finite_areas * constraints.law.energy(normal * inverse_area)
         penetration = np.divide(energy, normal, out=np.zeros_like(normal), where=normal != 0.0)
@@ -296,6 +293,5 @@ def _added(pair: Formulation, configuration: Configuration, contact: ContactResu
     if pair.options.clearance is None and configuration.worn is None:
         return np.zeros(len(contact.gap))
     gap_alone = pair.nodal_gap(configuration, with_clearance=False)[0]
-    return np.subtract(
-        contact.gap, gap_alone, out=np.zeros_like(gap_alone), where=np.isfinite(gap_alone) & np.isfinite(contact.gap)
-    )
+    known = np.isfinite(gap_alone) & np.isfinite(contact.gap)
+    return np.subtract(contact.gap, gap_alone, out=np.zeros_like(gap_alone), where=known)

@@ -88,11 +88,8 @@ class Conductance:
         if self._number is not None:
             return np.where(touching, self._number, 0.0)
         if not callable(self.given):
-            interpolated = {
-                key: np.interp(at, *self._tables[key].T)
-                for key, at in zip(TABLES, (pressure, gap))
-                if key in self._tables
-            }
+            at = {"pressure": pressure, "gap": gap}
+            interpolated = {key: np.interp(at[key], *table.T) for key, table in self._tables.items()}
             closed = interpolated.get("pressure", interpolated.get("gap", 0.0))
             return np.where(touching, closed, interpolated.get("gap", 0.0))
         try:

@@ -653,6 +653,5 @@ def faced(
     """
     if not isinstance(primary, RigidSide):
         return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, direction, rise)
-    return _ObstaclePoints(
-        shapes_at(candidates.shape[rows], candidates.nodes[rows], len(coordinates)), primary, coordinates, pose
-    )
+    shapes = shapes_at(candidates.shape[rows], candidates.nodes[rows], len(coordinates))
+    return _ObstaclePoints(shapes, primary, coordinates, pose)

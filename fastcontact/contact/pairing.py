@@ -184,9 +184,8 @@ def pair(
         continued = _at_smooth_ends(primary, coordinates, closest)
         paired = closest.overhang <= np.where(continued, max(projection_tolerance, OVERHANG), projection_tolerance)
         outside = paired & ~continued & (closest.overhang > LENGTH_ROUND_OFF)
-        return _with_overhang(
-            Pairing(closest.facet, closest.xi, closest.normal, paired), candidates, primary, coordinates, outside
-        )
+        pairing = Pairing(closest.facet, closest.xi, closest.normal, paired)
+        return _with_overhang(pairing, candidates, primary, coordinates, outside)
     at_nodes = at_nodes_of_facets(smooth_normals(primary, coordinates))
     if not isinstance(normals, str):
         at_nodes = np.broadcast_to(np.array(normals), at_nodes.shape).copy()
@@ -195,9 +194,8 @@ def pair(
     if normals == "facet":
         normal = _round_edges(primary, coordinates, facet, xi, normal)
     paired = overhang <= projection_tolerance
-    return _with_overhang(
-        Pairing(facet, xi, normal, paired), candidates, primary, coordinates, paired & (overhang > LENGTH_ROUND_OFF)
-    )
+    outside = paired & (overhang > LENGTH_ROUND_OFF)
+    return _with_overhang(Pairing(facet, xi, normal, paired), candidates, primary, coordinates, outside)
 
 
 def onto(points: Array, primary: Surface, facet: Indices, coordinates: Array, along: Array) -> Pairing:

@@ -73,7 +73,7 @@ def make(
 def check_tolerance(tolerance: float) -> None:
     """Raise a ModelError if the tolerance of a linear solver is out of range."""
     if not 0.0 < tolerance <= LOOSEST:
-        raise ModelError(f"the linear tolerance {tolerance} must be positive and at most {LOOSEST}, such as 1e-10")
+        raise ModelError(f"linear_tolerance = {tolerance} must be positive and at most {LOOSEST}, such as 1e-10")
 
 
 def tight_enough(tolerance: float, relative: float) -> float:

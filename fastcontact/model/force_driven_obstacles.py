@@ -102,9 +102,8 @@ class ForceDrivenObstacles:
     def _extended(self, by_ramp: Mapping[Any, Array], values: Sequence[tuple[float, ...]]) -> dict[PartHistory, Array]:
         """Return nodal values by ramp, extended by the `values` of the obstacles."""
         n, dim = self.shape
-        extended: dict[PartHistory, Array] = {
-            ramp: np.vstack([rows, np.zeros((len(self), dim))]) for ramp, rows in by_ramp.items()
-        }
+        zero = np.zeros((len(self), dim))
+        extended: dict[PartHistory, Array] = {ramp: np.vstack([rows, zero]) for ramp, rows in by_ramp.items()}
         for number, (pair, value) in enumerate(zip(self.pairs, values, strict=True)):
             if any(value):
                 rows = extended.setdefault(pair.ramp, np.zeros((n + len(self), dim)))

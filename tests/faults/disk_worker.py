@@ -27,14 +27,8 @@ import numpy as np
 from fastcontact.cli import main
 
 # Children have what all commands import; none of it runs a kernel.
-for needed in (
-    "analysis.run",
-    "cases.case",
-    "results.reader",
-    "results.writer",
-    "mesh.files.mesh_files",
-    "mesh.generate",
-):
+NEEDED = "analysis.run", "cases.case", "results.reader", "results.writer", "mesh.files.mesh_files", "mesh.generate"
+for needed in NEEDED:
     importlib.import_module(f"fastcontact.{needed}")
 with contextlib.suppress(ImportError):
     importlib.import_module("matplotlib.pyplot")

@@ -518,7 +518,7 @@ OPTIONS = [
     Mistake("a linear solver that is not there", lambda: solved(blocks(), linear_solver="direkt"), fc.ModelError,
             r"unknown linear solver 'direkt': did you mean 'direct'"),
     Mistake("a tolerance that accepts everything", lambda: solved(blocks(), linear_tolerance=10.0), fc.ModelError,
-            r"the linear tolerance 10\.0 must be positive and at most 0\.001, such as 1e-10"),
+            r"linear_tolerance = 10\.0 must be positive and at most 0\.001, such as 1e-10"),
     Mistake("a criterion of zero", lambda: fc.Criteria(relative=0.0), fc.ModelError,
             r"the convergence criterion relative = 0\.0 must be positive and at most 0\.01: beyond that nothing has converged"),
     Mistake("a criterion that accepts everything", lambda: fc.Criteria(geometry=1e3), fc.ModelError,

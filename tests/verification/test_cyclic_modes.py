@@ -203,7 +203,7 @@ def test_shapes_of_the_whole_ring(tmp_path):
 def test_what_is_refused():
     part = sector(6, 1.0, 2.0, (5, 2))
     model = model_of(part, 6)
-    for given, said in (([4], "from 0 to 3"), ([], "from 0 to 3"), ("none", 'write "all"'), (-1, "from 0 to 3")):
+    for given, said in (([4], "has 0 to 3"), ([], "has 0 to 3"), ("none", 'write "all"'), (-1, "has 0 to 3")):
         with pytest.raises(fc.ModelError, match=said):
             fc.modes(model, nodal_diameters=given)
     with pytest.raises(fc.ModelError, match="need a sector of a ring"):

@@ -327,7 +327,7 @@ def test_nodes_that_touch_at_the_beginning_do_not_close_in_the_step():
 
 
 def test_fraction_while_touching_is_checked():
-    with pytest.raises(fc.ModelError, match="friction_while_touching = 0 must be a fraction"):
+    with pytest.raises(fc.ModelError, match="friction_while_touching = 0 must be above 0"):
         fc.Criteria(friction_while_touching=0)
 
 

@@ -108,12 +108,7 @@ def test_a_stress_in_balance_leaves_the_body_as_it_is(kinematics, element):
         expected[:, 0] = 7.0 - 14.0 * model.mesh.points[:, 1]
     step = solved(model)
     assert np.abs(step.displacement).max() < 1e-12
-    if element not in (
-        "tri3",
-        "tet4",
-        "wedge6",
-        "pyramid5",
-    ):  # of a linear function, these have the mean of their cells
+    if element not in ("tri3", "tet4", "wedge6", "pyramid5"):  # these have the mean of their cells
         np.testing.assert_allclose(step.stress, expected, atol=1e-9)
     np.testing.assert_allclose(step.reaction.sum(axis=0), 0.0, atol=1e-9)
 
@@ -196,38 +191,14 @@ def case(tmp_path, text, kinematics="plane_stress"):
 @pytest.mark.parametrize(
     ("text", "kinematics", "message"),
     [
-        (
-            "[[initial_stress]]",
-            "plane_stress",
-            r"initial_stress\[0\]: the initial stress of all solid cells has no component",
-        ),
+        ("[[initial_stress]]", "plane_stress", r"initial_stress\[0\]: the initial stress of .* has no component"),
         ("[[initial_stress]]\nyz = 1.0", "plane_strain", "has the component yz, which plane_strain does not have"),
-        (
-            "[[initial_stress]]\nzz = 1.0",
-            "plane_stress",
-            "has out-of-plane components, which plane_stress does not have",
-        ),
-        (
-            "[[initial_stress]]\ngroups = 'TOP'\nxx = 1.0",
-            "plane_stress",
-            "group 'TOP' contains no solid cells: it has no initial",
-        ),
-        (
-            "[[initial_strain]]\nxx = 1.0\naxes = [[1, 0, 1], [0, 1, 0]]",
-            "plane_strain",
-            "which plane_strain does not have",
-        ),
-        (
-            "[[initial_strain]]\nxx = nan",
-            "plane_strain",
-            "component xx of the initial strain of all solid cells is nan",
-        ),
+        ("[[initial_stress]]\nzz = 1.0", "plane_stress", "has out-of-plane components, which plane_stress does"),
+        ("[[initial_stress]]\ngroups = 'TOP'\nxx = 1.0", "plane_stress", "'TOP' contains no solid cells"),
+        ("[[initial_strain]]\nxx = 1.0\naxes = [[1, 0, 1], [0, 1, 0]]", "plane_strain", "which plane_strain does"),
+        ("[[initial_strain]]\nxx = nan", "plane_strain", "xx of the initial strain of all solid cells is nan"),
         ("[[initial_strain]]\nrr = 1.0", "plane_strain", r"unknown key 'initial_strain\[0\].rr'"),
-        (
-            "[[initial_strain]]\nxx = 'a'",
-            "plane_strain",
-            r"'initial_strain\[0\].xx' must be of type int or float or dict",
-        ),
+        ("[[initial_strain]]\nxx = 'a'", "plane_strain", r"'initial_strain\[0\].xx' must be of type int or float"),
     ],
 )
 def test_mistakes_are_told(tmp_path, text, kinematics, message):

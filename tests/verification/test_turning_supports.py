@@ -67,11 +67,8 @@ def test_a_bent_bar_is_turned_with_its_stress() -> None:
         rotation = {"angle": 2.0 * np.pi, "centre": (1.0, 0.5), "ramp": TURN}
         # Bent by a rotation about a point of its own that turns likewise: R(a) R(b) is a rotation by a + b.
         if bend:
-            rotation = {
-                "angle": 1.0,
-                "centre": (1.0, 0.5),
-                "ramp": [(0.0, 0.0), (1.0, bend), (2.0, bend + 2.0 * np.pi)],
-            }
+            ramp = [(0.0, 0.0), (1.0, bend), (2.0, bend + 2.0 * np.pi)]
+            rotation = {"angle": 1.0, "centre": (1.0, 0.5), "ramp": ramp}
         model.prescribe(group, rotation=rotation)
     steps = fc.solve(model, [1.0, *np.linspace(1.0, 2.0, 9)[1:]])
     bent, quarter, whole = steps[0], steps[2], steps[-1]

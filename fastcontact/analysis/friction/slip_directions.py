@@ -97,8 +97,6 @@ def idle(compliance: Array) -> Mask:
     no more accurate than the solutions of iterative solvers.
     """
     k = len(compliance) - 1
-    of_slips = compliance[np.arange(1, k + 1), np.arange(1, k + 1)]
-    return np.asarray(
-        of_slips * compliance[0, 0] - compliance[1:, 0] ** 2
-        <= TOLERANCE * compliance[0, 0] * np.maximum(of_slips, compliance[0, 0])
-    )
+    of_slips, normal = compliance[np.arange(1, k + 1), np.arange(1, k + 1)], compliance[0, 0]
+    bound = TOLERANCE * normal * np.maximum(of_slips, normal)
+    return np.asarray(of_slips * normal - compliance[1:, 0] ** 2 <= bound)

@@ -191,10 +191,8 @@ class MovingContact:
         dim, B = self.problem.model.mesh.dim, csr_array(self.constraints.B[self.active])
         keep = (B.indices < self.problem.model.n_dofs) & (B.data != 0.0)
         row = entry_rows(B)[keep]
-        pattern = csr_array(
-            (np.ones(len(row)), (row, B.indices[keep] // dim)),
-            shape=(len(self.active), self.problem.model.mesh.n_points),
-        )
+        shape = len(self.active), self.problem.model.mesh.n_points
+        pattern = csr_array((np.ones(len(row)), (row, B.indices[keep] // dim)), shape=shape)
         return _ones(pattern)
 
     def _reached(self) -> csr_array:
@@ -238,13 +236,11 @@ class MovingContact:
         first = entry_rows(moved)
         by_constraint[first] = dofs[moved.indices]
         for constraint in np.unique(first):
-            by_point[
-                self._involved.indices[self._involved.indptr[constraint] : self._involved.indptr[constraint + 1]]
-            ] = by_constraint[constraint]
+            begin, end = self._involved.indptr[constraint : constraint + 2]
+            by_point[self._involved.indices[begin:end]] = by_constraint[constraint]
         nodes = self.problem.pairs[self.pair].secondary.points if self.pair else np.empty(0, np.intp)
-        dof_of_value = np.concatenate(
-            [np.repeat(by_point, dim), np.full(n - dim * len(by_point), dofs[0]), by_constraint, by_point[nodes]]
-        )
+        others = np.full(n - dim * len(by_point), dofs[0])
+        dof_of_value = np.concatenate([np.repeat(by_point, dim), others, by_constraint, by_point[nodes]])
         return dof_of_value[rows].astype(np.intp)
 
     def _agrees(self, derivative: csr_array, dofs: Indices) -> bool:

@@ -216,9 +216,8 @@ class SegmentMortar(PressureFieldFormulation):
         assert isinstance(self.primary, Surface)
         block, borders = self.secondary.blocks[0], self.options.borders(self.secondary)
         n_gauss = block.facets.shape[1] + 1 if self.n_gauss is None else self.n_gauss
-        points = line_points(
-            block, self.primary, self.points, deformed, self.axisymmetric, n_gauss, self.projection_tolerance, borders
-        )
+        options = self.axisymmetric, n_gauss, self.projection_tolerance, borders
+        points = line_points(block, self.primary, self.points, deformed, *options)
         facet, shape, area = points.facet, points.shape, points.area
         candidates = Candidates(self.secondary.facets[facet], shape, facet, points.xi[:, None])
         faced = self.facing(candidates, at)

@@ -71,8 +71,6 @@ def terms(places: Array, n_nodes: int) -> Array:
 def _bend(nodes: Array) -> Array:
     """Return, for each term of the polynomial, the largest error of its interpolation on the flat triangles."""
     weights = np.array([[i, j, 20 - i - j] for i in range(21) for j in range(21 - i)]) / 20.0
-    error = [
-        weights @ terms(nodes[flat], len(nodes)) - terms(weights @ nodes[flat], len(nodes))
-        for flat in flat_triangles(len(nodes))
-    ]
+    n = len(nodes)
+    error = [weights @ terms(nodes[flat], n) - terms(weights @ nodes[flat], n) for flat in flat_triangles(n)]
     return np.abs(error).max(axis=(0, 1))

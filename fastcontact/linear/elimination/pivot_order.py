@@ -107,10 +107,8 @@ def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInvers
     if np.bincount(label).max(initial=0) > largest:
         return None
     inside = np.repeat(label, np.diff(P.indptr)) == label[P.indices]
-    diagonal, beyond = (
-        csr_array((np.where(mask, P.data, 0.0), P.indices, P.indptr), shape=P.shape, copy=True)
-        for mask in (inside, ~inside)
-    )
+    values = (np.where(mask, P.data, 0.0) for mask in (inside, ~inside))
+    diagonal, beyond = (csr_array((data, P.indices, P.indptr), shape=P.shape, copy=True) for data in values)
     diagonal.eliminate_zeros()
     beyond.eliminate_zeros()
     # The inverse of a block triangular matrix is a finite Neumann series.

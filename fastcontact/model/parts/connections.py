@@ -237,9 +237,8 @@ class ModelConnections(ModelInitialStates):
         free_axes = sorted(axes_of(name, dict.fromkeys(free, 1.0), self.mesh.dim)) if free else []
         if any(axis in jump for axis in free_axes):
             raise ModelError(f"{name}: '{free}' is free, so no displacement can be prescribed there")
-        relations, interface = periodic(
-            self.mesh, (first, second), jump, free_axes, translation, table_of(ramp, f"the ramp of {name}")
-        )
+        table = table_of(ramp, f"the ramp of {name}")
+        relations, interface = periodic(self.mesh, (first, second), jump, free_axes, translation, table)
         self.relations.extend(relations)
         self.periodic_interfaces.append(interface)
 

@@ -54,17 +54,8 @@ def assert_same(found, expected, relative):
     assert list(found.contact) == list(expected.contact)
     for pair, other in expected.contact.items():
         one = found.contact[pair]
-        for name in (
-            "gap",
-            "pressure",
-            "multiplier",
-            "force_vectors",
-            "normal",
-            "force",
-            "radius",
-            "shear",
-            "abscissa",
-        ):
+        numbers = "gap", "pressure", "multiplier", "force_vectors", "normal", "force", "radius", "shear", "abscissa"
+        for name in numbers:
             close(f"{pair}.{name}", getattr(one, name), getattr(other, name))
         for name in ("points", "active", "sticking"):
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)

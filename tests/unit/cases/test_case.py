@@ -191,18 +191,10 @@ MISTAKES = {
         (
             GOOD[GOOD.index("[theory") : GOOD.index("[[check")],
             "[theory]\nhertz = 3\n",
-            r"'theory.hertz' must be a table with",
+            r"'theory.hertz' must be a table",
         ),
-        (
-            "E = 20000.0\nnu",
-            "groups = [3]\nE = 20000.0\nnu",
-            r"'material\[0\].groups' must be a list of strings or a string, not",
-        ),
-        (
-            'primary = "CONT2"',
-            'primary = "CONT2"\nformulation = 3',
-            r"'contact.hertz.formulation' must be a string, not the int 3",
-        ),
+        ("E = 20000.0\nnu", "groups = [3]\nE = 20000.0\nnu", r"'material\[0\].groups' must be a list of strings or"),
+        ('primary = "CONT2"', 'primary = "CONT2"\nformulation = 3', r"'contact.hertz.formulation' must be a string"),
     ],
     LOADED: [
         ("value = 1\n", "", r"pressure\[0\] needs 'value'"),
@@ -210,11 +202,7 @@ MISTAKES = {
         ("value = 1\n", 'value = "1"\n', r"'pressure\[0\].value' must be of type int or float"),
         ("distribute = true", "distribute = 1", r"'force\[0\].distribute' must be of type bool"),
         ("ramp = [[0, 0], [1, 1]]", "ramp = [0, 1]", r"'traction\[0\].ramp' must be a list of pairs"),
-        (
-            "ramp = [[0.0, 1.0], [1.0, 1.0]]",
-            "ramp = [[0.0]]",
-            r"'support\[0\].ramp' must be|'support\[1\].ramp' must be",
-        ),
+        ("ramp = [[0.0, 1.0], [1.0, 1.0]]", "ramp = [[0.0]]", r"'support\[0\].ramp' must be|'support\[1\].ramp' must"),
         ('component = "y"', "component = 2", r"'couple\[0\].component' must be of type str"),
         ('component = "y"\n', "", r"couple\[0\] needs 'component'"),
         ('["A2", "y", 1.0]', '["A2", "y"]', r"'relation\[0\].terms' must be a list of"),

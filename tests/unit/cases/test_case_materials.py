@@ -57,31 +57,13 @@ def test_constants_that_vary_reach_the_model(tmp_path):
         ("G = [1, 1, 1]\nnu = [0, 0, 0]", r"material\[0\] needs 'E'"),
         (WOOD.replace("430]", "430, 1]"), r"material\[0\]: E = .* must be three numbers"),
         (WOOD.replace("0.45", "4.5"), r"material\[0\]: Poisson's ratio nu12 = 4.5 must be less than"),
-        (
-            WOOD + "volumetric = 'plain'",
-            r"the key 'material\[0\].volumetric' does not belong to an orthotropic material",
-        ),
-        (
-            "E = 1.0\nnu = 0.3\naxes = [[1, 0, 0], [0, 1, 0]]",
-            r"the key 'material\[0\].axes' does not belong to .* isotropic",
-        ),
-        (
-            "E = {along = 'r', table = [[0, 1]]}\nnu = 0.3",
-            r"'material\[0\].E': a table is along x, y, z or radius, not",
-        ),
+        (WOOD + "volumetric = 'plain'", r"the key 'material\[0\].volumetric' does not belong to an orthotropic"),
+        ("E = 1.0\nnu = 0.3\naxes = [[1, 0, 0], [0, 1, 0]]", r"'material\[0\].axes' does not belong to .* isotropic"),
+        ("E = {along = 'r', table = [[0, 1]]}\nnu = 0.3", r"'material\[0\].E': a table is along x, y, z or radius"),
         ("E = {along = 'x'}\nnu = 0.3", r"'material\[0\].E' needs 'table'"),
-        (
-            "E = {alon = 'x', table = [[0, 1]]}\nnu = 0.3",
-            r"'material\[0\].E.alon': did you mean 'material\[0\].E.along'",
-        ),
-        (
-            "E = {along = 'x', table = [[0, -1]]}\nnu = 0.3",
-            r"material\[0\]: in cell 0 of quad4 .*Young's modulus E = -1",
-        ),
-        (
-            WOOD.replace("0.45", "{along = 'x', table = [[0, 4.5]]}"),
-            r"material\[0\]: in cell 0 .* nu12 = 4.5 must be less",
-        ),
+        ("E = {alon = 'x', table = [[0, 1]]}\nnu = 0.3", r"E.alon': did you mean 'material\[0\].E.along'"),
+        ("E = {along = 'x', table = [[0, -1]]}\nnu = 0.3", r"material\[0\]: in cell 0 of quad4 .* modulus E = -1"),
+        (WOOD.replace("0.45", "{along = 'x', table = [[0, 4.5]]}"), r"material\[0\]: in cell 0 .* nu12 = 4.5 must"),
         ("D = [[1, 2], [2, 1]]", r"material\[0\]: the moduli D must be a matrix of 6 x 6"),
         (WOOD + "axes = {orgin = [0, 0, 0]}", r"'material\[0\].axes.orgin': did you mean 'material\[0\].axes.origin'"),
         (WOOD + "axes = [[1, 0, 0], [1, 1, 0]]", r"material\[0\]: .* not at right angles"),
@@ -139,11 +121,7 @@ def test_a_law_of_a_case_file_is_that_of_python(text: str) -> None:
         ('law = "neo_hooke"\nE = 6\nnu = 0.3', "", "law.*neo_hooke.*neo_hookean"),
         ('law = "yeoh"\nC10 = 1', 'strain = "finite"', r"material\[0\] needs 'C20'"),
         ('law = "neo_hookean"\nE = 6\nnu = 0.3', "", "NeoHookean requires finite strains"),
-        (
-            'law = "neo_hookean"\nE = 6\nnu = 0.3\nbulk = 3',
-            'strain = "finite"',
-            r"'material\[0\].bulk' does not belong to",
-        ),
+        ('law = "neo_hookean"\nE = 6\nnu = 0.3\nbulk = 3', 'strain = "finite"', r"'material\[0\].bulk' does not"),
         ("E = 6\nnu = 0.3", 'strain = "huge"', "strain.*huge"),
     ],
 )

@@ -113,10 +113,7 @@ def test_it_says_what_is_compared():
         ({}, r"check\[0\] needs 'quantity'"),
         ({"quantity": "pole.pressure"}, "either 'theory'.* or 'value'"),
         ({"quantity": "pole.pressure", "value": 1.0, "theory": "hertz"}, "either 'theory'.* or 'value'"),
-        (
-            {"quantity": "pole.pressure", "value": 0.0},
-            r"check\[0\]: the value is 0, so the relative deviation is undefined",
-        ),
+        ({"quantity": "pole.pressure", "value": 0.0}, r"check\[0\]: the value is 0, so the relative deviation is"),
         *(
             ({"quantity": "pole.pressure", "value": 1.0, name: number}, rf"check\[0\].{name} = .* must be ")
             for name, numbers in {
@@ -265,18 +262,12 @@ def test_moments_of_circles_are_refused():
 def test_units_are_named_where_they_are_known_and_nothing_where_not(steps):
     asked = checks({"torque": -1.0, "force": 1.0})
     known, unknown = (lines(summary(DRUM + units + asked, steps)) for units in (UNITS, ""))
-    for text in (
-        " N/mm (normal ",
-        " N/mm), largest pressure ",
-        " MPa, half-width ",
-        "N mm/mm",
-        " mm\n",
-        "worn by up to ",
-    ):
+    told = " N/mm (normal ", " N/mm), largest pressure ", " MPa, half-width ", "N mm/mm", " mm\n", "worn by up to "
+    for text in told:
         assert text in "\n".join(known)
-    told = "\n".join(unknown)
+    text = "\n".join(unknown)
     for dash in (" - ", " -,", " -\n", "- -", "[-]", "  is "):
-        assert dash not in told, told
+        assert dash not in text, text
     assert [line.split()[0] for line in known] == [line.split()[0] for line in unknown]
     dashes = UNITS.replace('"mm"', '"-"').replace('"N"', '"-"').replace('"MPa"', '"-"')
     assert lines(summary(DRUM + dashes + asked, steps)) == unknown

@@ -143,10 +143,7 @@ BLOCKS = {"generator": "block-on-block"}
         ({"options": {"mortal": {}}}, "unknown formulation in study.options 'mortal'"),
         ({"contact": "none"}, "unknown contact pair in study.contact 'none'"),
         ({"load_steps": 0}, "load steps must be a positive whole number, not 0"),
-        (
-            {**BLOCKS, "quadrangles": {"size_upper": [math.nan, 1.0]}},
-            r"study.quadrangles.size_upper\[0\] = nan must be",
-        ),
+        ({**BLOCKS, "quadrangles": {"size_upper": [math.nan, 1.0]}}, r"study.quadrangles.size_upper\[0\] = nan must"),
         ({**BLOCKS, "quadrangles": {"size_upper": [-1.0, 1.0]}}, "quad4 mortar: .*size_upper"),
         ({"options": {"mortar": {"normals": "none"}}}, "contact.pair: unknown kind of normals 'none'"),
         ({"options": {"mortar": {"no_option": 1}}}, "contact.pair: unknown option of mortar 'no_option'"),

@@ -134,15 +134,8 @@ def test_degenerate_and_strongly_warped_facets_are_right_or_refused(seed):
     folded[2] = [0.1, 0.1, 0.0]  # not convex
     line = square * [1, 0, 0]
     point_like = np.zeros((4, 3))
-    for corners in (
-        triangle,
-        needle,
-        folded,
-        line,
-        point_like,
-        rng.normal(size=(4, 3)),
-        rng.normal(size=(4, 3)) * [1, 1, 9],
-    ):
+    drawn = rng.normal(size=(4, 3)), rng.normal(size=(4, 3)) * [1, 1, 9]
+    for corners in (triangle, needle, folded, line, point_like, *drawn):
         compare_bilinear(corners[None], rng.uniform(-1, 2, 3))
     facets, _, _ = prepared(np.stack([line, point_like]))
     assert facets.convex.tolist() == [0.0, 0.0]

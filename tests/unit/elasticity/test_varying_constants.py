@@ -288,16 +288,10 @@ def block_model(**constants):
 @pytest.mark.parametrize(
     ("constants", "words"),
     [
-        (
-            {"E": lambda x: 1.5 - x[:, 0]},
-            r"in cell 3 of quad4 near \[1.75 0.5 *\]|in cell \d of quad4 near .*: Young's modulus E = -",
-        ),
+        ({"E": lambda x: 1.5 - x[:, 0]}, r"in cell 3 of quad4 near \[1.75 0.5 *\]|in cell \d of .* modulus E = -"),
         ({"nu": lambda x: 0.2 + 0.2 * x[:, 0]}, r"in cell \d of quad4 near .*: Poisson's ratio nu = 0\.[5]"),
         ({"density": lambda x: x[:, 0] - 1.0}, r"in cell 0 of quad4 near .*: the density = -"),
-        (
-            {"E": np.ones(7)},
-            r"constant E of the material is an array .* shape \(7,\).* \(8 cells, 8 solid cells .*, 15 points",
-        ),
+        ({"E": np.ones(7)}, r"constant E of .* is an array .* shape \(7,\).* \(8 cells, 8 solid cells .*, 15 points"),
         ({"E": np.array([1.0] * 7 + [np.nan])}, "constant E of the material is not finite at row 7"),
         ({"nu": lambda x: x}, "constant nu of the material is a function that returned .* shape"),
         ({"expansion": lambda x: x[:, 0] / 0.0}, "constant expansion of the material is .* finite everywhere"),
@@ -316,10 +310,7 @@ def test_orthotropic_constants_that_cannot_be_are_told_with_their_place():
     model = fc.Model(fc.generate.block((2.0, 1.0), (4, 2), "quad4"), "plane_strain")
     for change, words in (
         ({"nu": (lambda x: x[:, 0], 0.3, 0.3)}, r"in cell \d of quad4 near .*: Poisson's ratio nu12 = 1"),
-        (
-            {"nu": (lambda x: 0.5 * x[:, 0], 0.5, 0.5)},
-            r"in cell \d of quad4 near .*: Poisson's ratios .* too large together",
-        ),
+        ({"nu": (lambda x: 0.5 * x[:, 0], 0.5, 0.5)}, r"in cell \d of quad4 .*: Poisson's ratios .* too large"),
         ({"G": (np.linspace(-1, 1, 8), 1.0, 1.0)}, r"in cell 0 of quad4 near .*: the shear modulus G12 = -1"),
     ):
         constants = {"E": (1000.0,) * 3, "nu": (0.3,) * 3, "G": (400.0,) * 3, **change}
@@ -368,8 +359,8 @@ def test_a_table_is_straight_between_its_places_and_constant_beyond():
         fc.Tabulated("z", [(0, 1)])(np.zeros((1, 2)))
     for arguments, words in (
         (("r", [(0, 1)]), "along x, y, z or radius, not along 'r'"),
-        (("x", [(0, 1), (0, 2)]), "must ascend"),
-        (("x", []), "must ascend, and there must be at least one"),
+        (("x", [(0, 1), (0, 2)]), "must have ascending coordinates"),
+        (("x", []), "ascending coordinates, at least one"),
         (("x", [(0, 1, 2)]), "pairs"),
         (("x", [(0, np.inf)]), "not a finite number"),
     ):

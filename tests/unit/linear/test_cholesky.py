@@ -147,17 +147,8 @@ def test_factors_reuse_what_has_not_changed(m):
     last = np.arange(m)
     reusing = factorisation.SymbolicFactors(bsr_array(K, blocksize=(2, 2)), last)
     reused = []
-    corners = [
-        slice(0, 0),
-        slice(0, 40),
-        slice(0, 40),
-        slice(0, 80),
-        slice(0, 60),
-        slice(300, 320),
-        slice(300, 320),
-        slice(0, 0),
-    ]
-    for corner in corners:
+    corners = (0, 0), (0, 40), (0, 40), (0, 80), (0, 60), (300, 320), (300, 320), (0, 0)
+    for corner in (slice(*ends) for ends in corners):
         there = np.zeros(n * n)
         there[corner] = rng.random(corner.stop - corner.start)
         changed = bsr_array(csr_array(K + diags_array(there)), blocksize=(2, 2))

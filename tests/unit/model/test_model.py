@@ -288,36 +288,20 @@ REFUSED = [
     (touching_corners, fc.ContactError, "meet back to back at point 3"),
     (isotropic_across(-1.0), fc.ModelError, "nu_across = -1.0 must be above -1"),
     *((at(place), fc.MeshError, NO_PLACE) for place in [(0.5,), (0.5, 0.5, 0.5), (np.nan, 0.0)]),
-    (
-        lambda: fc.generate.with_reference_points(block(), {"TOP": (0.5, 3.0)}),
-        fc.MeshError,
-        "already a group 'TOP': give",
-    ),
+    (lambda: fc.generate.with_reference_points(block(), {"TOP": (0.5, 3.0)}), fc.MeshError, "already a group 'TOP'"),
     (lambda: fc.solve(cube(), np.zeros((3, 3))), fc.ModelError, NO_RAMP),
     (lambda: fc.solve(cube(), np.zeros((1, 1))), fc.ModelError, NO_RAMP),
     (lambda: block((1.0,), (2, 2)), fc.MeshError, "argument size of block must be two numbers, not the tuple"),
     (lambda: block((1.0, 1.0), "ab"), fc.MeshError, "divisions of block must be two"),
-    (
-        lambda: cube().add_coupling("HANDLE", "line", kind="distributing"),
-        fc.ModelError,
-        f"of 'HANDLE' with 'line': {NO_TURN}",
-    ),
+    (lambda: cube().add_coupling("HANDLE", "line", kind="distributing"), fc.ModelError, f"with 'line': {NO_TURN}"),
     (turned_by_a_line, fc.ModelError, f"the moment on 'line': {NO_TURN}"),
     (lambda: cube().add_moment("none", z=1.0), fc.ModelError, "'none' is empty: the moment"),
-    (
-        lambda: ring().add_gravity(x=9.81),
-        fc.ModelError,
-        "has a radial component x: in axisymmetry it can act only along the axis",
-    ),
+    (lambda: ring().add_gravity(x=9.81), fc.ModelError, "radial component x: in axisymmetry it can act only along the"),
     (lambda: ring().add_centrifugal(3.0, direction=(0.0, 0.0, 1.0)), fc.ModelError, r"its direction is \(0, 1, 0\)"),
     *((spread("ZMAX", r), fc.ModelError, f"of the force on 'ZMAX' = {r:g} must be positive") for r in (0.0, -1.0)),
     (spread("none", 0.1), fc.ModelError, "'none' is empty: the force"),
     *((turned_about(c), fc.ModelError, NO_CENTRE) for c in [(0.0, 0.0, 0.0), (np.inf, 0.0), ("left", 0.0)]),
-    (
-        lambda: thin_plate().add_material(ALONG_Z),
-        fc.ModelError,
-        "a table is along z, but the mesh is plane: use x, y or radius",
-    ),
+    (lambda: thin_plate().add_material(ALONG_Z), fc.ModelError, "a table is along z, but the mesh is plane: use x, y"),
 ]
 
 

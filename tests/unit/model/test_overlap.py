@@ -130,18 +130,8 @@ def test_lines_wind_around_what_a_ray_leaves_once(seed):
 def test_depths_in_a_lens_of_two_parabolas():
     """Points at the very height of its ends, its middle and its top, and between a parabola and its chords."""
     lens = np.array([[[1.0, 0.0], [-1.0, 0.0], [0.0, 0.5]], [[-1.0, 0.0], [1.0, 0.0], [0.0, -0.5]]])
-    points = [
-        [-2.0, 0.0],
-        [0.0, 0.0],
-        [0.5, 0.0],
-        [2.0, 0.0],
-        [-2.0, 0.5],
-        [0.0, 0.4],
-        [0.0, -0.4],
-        [-3, -0.5],
-        [0.5, 0.37],
-    ]
-    depth, facet = _depths(np.array(points), [lens])
+    x, y = [-2.0, 0.0, 0.5, 2.0, -2.0, 0.0, 0.0, -3.0, 0.5], [0.0, 0.0, 0.0, 0.0, 0.5, 0.4, -0.4, -0.5, 0.37]
+    depth, facet = _depths(np.column_stack([x, y]), [lens])
     assert (depth > 0).tolist() == [False, True, True, False, False, True, True, False, True]
     assert depth[[1, 5, 6]] == pytest.approx([0.5, 0.1, 0.1], abs=1e-12)
     assert facet[[5, 6, 8]].tolist() == [0, 1, 0]

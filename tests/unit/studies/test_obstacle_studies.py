@@ -84,19 +84,8 @@ def test_a_study_with_an_obstacle_measures_its_contact(ball, tmp_path):
     found = json.loads(out.read_text())["quantities"]
     hertz = fc.analytic.hertz_point(E1=1000.0, nu1=0.3, R1=10.0, approach=0.1)
     assert found["force"]["limit"] == pytest.approx(hertz.force, rel=0.1)
-    words = [
-        "sweep",
-        str(ball),
-        "--set",
-        "material[0].E=1000,2000",
-        "--level",
-        "0",
-        "--workers",
-        "1",
-        "--json",
-        str(out),
-    ]
-    assert main([*words, "-q"]) == 0
+    words = ["sweep", str(ball), "--set", "material[0].E=1000,2000", "--level", "0", "--workers", "1"]
+    assert main([*words, "--json", str(out), "-q"]) == 0
     one, two = (point["force"] for point in json.loads(out.read_text())["points"])
     assert two / one == pytest.approx(2.0, rel=1e-6)
 

@@ -360,13 +360,8 @@ def test_materials_with_axes(tmp_path):
 def test_a_deck_with_a_line_left_out_cut_or_twice_is_read_or_refused_in_one_line(tmp_path):
     lines, texts = WHOLE.splitlines(), []
     for number, line in enumerate(lines):
-        for instead in (
-            [],
-            [line[: len(line) // 2]],
-            [line, line],
-            [line.replace("1", "x")],
-            [line.replace(",", ",,")],
-        ):
+        cut, changed = line[: len(line) // 2], (line.replace("1", "x"), line.replace(",", ",,"))
+        for instead in ([], [cut], [line, line], *([text] for text in changed)):
             try:
                 deck_of(tmp_path, "\n".join([*lines[:number], *instead, *lines[number + 1 :]]))
             except fc.FastcontactError as error:

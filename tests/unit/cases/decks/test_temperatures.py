@@ -187,10 +187,7 @@ def test_in_the_plane_there_are_four_components(tmp_path):
 @pytest.mark.parametrize(
     ("lines", "words"),
     [
-        (
-            "1, 1, 20., 0., 0., 0., 0., 0.\n",
-            r"line \d+, \*INITIAL CONDITIONS: 8 entries, but 7 are needed: .* integration point",
-        ),
+        ("1, 1, 20., 0., 0., 0., 0., 0.\n", r"\*INITIAL CONDITIONS: 8 entries, but 7 are needed: .* integration point"),
         ("low, 20.\n", r"2 entries, but 7 are needed"),
         ("lo, 20., 0., 0., 0., 0., 0.\n", r"line \d+, \*INITIAL CONDITIONS: .*'lo'"),
         ("low, a, 0., 0., 0., 0., 0.\n", "'a' is not a number"),

@@ -111,22 +111,14 @@ TOO_LARGE = [
         {"element": "quad4", "arc_sizes": (1e-3, 1e-3), "radial_sizes": (1e-3, 1e-3)},
         r"cells, more than",
     ),
-    (
-        "block-on-block",
-        {"divisions_lower": (2**32, 2)},
-        r"divisions\[0\] = 4294967296 is out of range: .* at most 1000000",
-    ),
+    ("block-on-block", {"divisions_lower": (2**32, 2)}, r"divisions\[0\] = 4294967296 is out .* at most 1000000"),
     ("block-on-block", {"divisions_lower": (100_000, 100_000)}, r"1e\+10 cells, more than 5000000"),
     ("box", {"divisions": (1000, 1000, 1000)}, r"1e\+09 cells"),
     ("box", {"divisions": (100, 100, 100), "element": "tet4"}, r"6e\+06 cells"),
     ("rings", {"divisions_inner": (100_000, 100_000)}, r"1e\+10 cells"),
     ("crowned-blocks", {"element": "quad4", "contact_size": 1e-9}, "segments, more than 1000000"),
     ("quarter-disc", {"element": "tri3", "R": 1e-200}, r"R = 1e-200 is out of range: it must be at least 1e-100"),
-    (
-        "quarter-disc",
-        {"element": "tri3", "R": 1e200},
-        r"R = 1e\+200 is out of range: its magnitude must be at most 1e\+100",
-    ),
+    ("quarter-disc", {"element": "tri3", "R": 1e200}, r"R = 1e\+200 is out of range: .* must be at most 1e\+100"),
 ]
 
 
