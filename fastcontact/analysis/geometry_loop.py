@@ -177,7 +177,8 @@ def _settle(
         next_pairing = mixing.next(settled, moved, displacement, tolerances)
         iterate.u = iterate.u if next_pairing is None else step.dofs.put(iterate.u, next_pairing)
         tolerances.tighten(moved.relative, solution.residual)
-        if update == max(limit // 2, PATIENT_UPDATES) and any(pair.alternates for pair in problem.pairs.values()):
+        late = update >= max(limit // 2, PATIENT_UPDATES) and not iterate.rounded
+        if late and any(pair.alternates(constraints.parts[name]) for name, pair in problem.pairs.items()):
             log.info("pairings alternate: from now on edges of facets are rounded, and small overlaps have no gap")
             iterate.rounded = True
             mixing.restart()

@@ -188,9 +188,10 @@ def _loose(problem: Problem, last: StepResult) -> Iterator[str]:
     flipped = next((previous for previous, following in pairwise(history) if "rounded" in following), None)
     if flipped is not None:
         yield (
-            "nodes alternated between two facets of the primary side, which changed the displacement by "
-            f"{flipped['displacement_change']:.1e} of its largest component, until normals were interpolated from one to "
-            'the other over a tenth of either; normals="averaged" does not need this'
+            "nodes alternated between two facets of the primary side, or gained and lost their gaps, which changed the "
+            f"displacement by {flipped['displacement_change']:.1e} of its largest component, until normals were interpolated "
+            'from one facet to the other over a tenth of either (normals="averaged" does not need this), and nodes with a '
+            "small overlap had no gap"
         )
     if scatter is not None and scatter["force"] > criteria.relative:
         yield (

@@ -103,6 +103,7 @@ class NodalAverage:
     def __init__(self, count: int, components: int) -> None:
         self._total, self._count = np.zeros((count, components)), np.zeros(count)
 
+    @typed(ModelError)
     def add(self, cells: Numbers, extrapolation: Array, values: Array) -> None:
         """Add the stresses `values` (n_cells, n_q, n_components) [pressure] at quadrature points of cells.
 

@@ -161,9 +161,8 @@ class Formulation(ABC):
         """
         return True
 
-    @property
-    def alternates(self) -> bool:
-        """Whether pairings may alternate: that of a point between two facets, if normals are discontinuous at edges."""
+    def alternates(self, constraints: Constraints) -> bool:
+        """Return whether pairings like `constraints` may alternate: points between two facets with different normals."""
         return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
 
     @classmethod

@@ -119,10 +119,11 @@ class WeightedMortar(Formulation):
         options = self.axisymmetric, self.projection_tolerance, self.smoothing
         return line_overlap(self.secondary, self.primary, self.points, deformed, *options)
 
-    @property
-    def alternates(self) -> bool:
-        """See `Formulation`; a node may have a gap in every other pairing, if it has dual functions and a small overlap."""
-        return self.multipliers == "dual" or super().alternates
+    def alternates(self, constraints: Constraints) -> bool:
+        """See `Formulation`; a node with dual functions and a small overlap may have a gap in every other pairing."""
+        covered = np.zeros(1) if constraints.nodal is None else np.asarray(constraints.nodal.covered)
+        small = self.multipliers == "dual" and bool(((covered > 0.0) & (covered < LEAST)).any())
+        return small or super().alternates(constraints)
 
     def unilateral(self, at: Configuration) -> Constraints:
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
