@@ -336,7 +336,9 @@ def _without_force(problem: Problem, name: str, last: StepResult, touched: bool,
             f"contact '{name}' carries nothing although its sides penetrate by {-smallest:.4g}: supports or relations "
             "hold its nodes there; leave these nodes free, or out of the contact as 'excluded'"
         )
-    elif not touched and (depth := _depth_of_primary(problem.model, pair, last)) > 0.0:
+    elif (
+        not touched and pair.options.clearance is None and (depth := _depth_of_primary(problem.model, pair, last)) > 0.0
+    ):
         assert isinstance(pair.primary, Surface)
         yield (
             f"contact '{name}' carries nothing although nodes of '{pair.primary.group}' are up to {depth:.4g} deep in the "
