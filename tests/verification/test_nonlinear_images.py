@@ -129,6 +129,7 @@ def cases():
             yield pytest.param(name, what, marks=() if j == k % len(possible) else pytest.mark.slow)
 
 
+@pytest.mark.filterwarnings("ignore:contact 'pair'. the largest nodal pressure")
 @pytest.mark.parametrize(("name", "what"), [*cases()])
 def test_an_image_has_the_image_of_the_result(name: str, what: str) -> None:
     image, tolerance = IMAGES[what]
