@@ -184,7 +184,7 @@ def check_type(name_shown: str, value: Any, annotation: Any, error: type[Fastcon
     remedy = ""
     if isinstance(value, str) and _is_number(value) and fits(1, annotation):
         remedy = f": write {value.strip()} without quotation marks"
-    elif isinstance(value, list | tuple) and name_shown.startswith(VECTORS):
+    elif isinstance(value, list | tuple) and value and name_shown.startswith(VECTORS) and fits({}, annotation):
         remedy = f": write {dict(zip('xyz', value, strict=False))}"
     raise error(f"{name_shown} must be {words(annotation)}, not {description}{remedy}")
 

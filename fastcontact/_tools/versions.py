@@ -18,6 +18,8 @@ def versions() -> dict[str, str]:
     by_name = {"fastcontact": __version__, "python": platform.python_version()}
     for name in LIBRARIES:
         with contextlib.suppress(metadata.PackageNotFoundError):
-            text = metadata.distribution(name).read_text("METADATA") or ""  # `metadata.version` would import `email`
+            found = metadata.distribution(name)
+            # `metadata.version` would import `email`.
+            text = found.read_text("METADATA") or found.read_text("PKG-INFO") or ""
             by_name[name] = text.partition("\nVersion: ")[2].partition("\n")[0]
     return by_name

@@ -31,7 +31,7 @@ from fastcontact.contact.search.limits import MAX_ITERATIONS
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Largest overhang, in facet lengths, at which a point is still paired with a facet end where the surface continues smoothly,
 # and with any edge in 3D by default. When a body slides beyond an edge or a plane of symmetry, its nodes lose contact one
@@ -218,9 +218,12 @@ def onto(points: Array, primary: Surface, facet: Indices, coordinates: Array, al
             offset = points[left] - np.einsum("nk,nkd->nd", at.shape, nodes)
             step = np.einsum("nid,nd->ni", dual, offset) / volume[:, None]
             xi[left] += step
-            left = left[~(np.abs(step).max(axis=1) <= LENGTH_ROUND_OFF)]
+            size = np.abs(step).max(axis=1)
+            unfinished = ~(size <= LENGTH_ROUND_OFF)
+            left, size = left[unfinished], size[unfinished]
             if not len(left):
                 break
+    left = left[~(size <= SINGLE_PRECISION)]  # far from the origin, round-off of positions exceeds LENGTH_ROUND_OFF
     paired = np.ones(len(points), bool)
     paired[left], xi[left], normal[left] = False, 0.0, along[left]
     return Pairing(facet, xi, normal / np.linalg.norm(normal, axis=1, keepdims=True), paired)

@@ -68,6 +68,9 @@ class Conditions:
         self.heat = HeatConditions(assembly, initial)
         self.locks = Locks(assembly)
         self.directions = local_directions(assembly)
+        if assembly.dim == 3:  # rotations of a node have its axes
+            rotations, turned = assembly.rotations, self.directions
+            self.directions = {rotations[p]: axes for p, axes in turned.items() if p in rotations} | turned
 
     def run(self) -> None:
         """Record the supports and loads of all steps."""
@@ -172,8 +175,8 @@ class Conditions:
         if self.locks.take(point, component, "FIXED" in condition.block.parameters):
             return
         sign = 1.0
-        if point in self.directions and component <= 3:
-            name, sign = self._local(point, component)
+        if name[0] in self.directions:
+            name, sign = self._local(*name[:2])
         if "FIXED" in condition.block.parameters:
             self.fixed_now.add(name)
             if self._acts(name):
@@ -191,13 +194,13 @@ class Conditions:
             return (self.assembly.rotations[point], axis, False) if axis >= 0 else None
         return None
 
-    def _local(self, point: int, component: int) -> tuple[Component, float]:
+    def _local(self, point: int, number: int) -> tuple[Component, float]:
         """Return the component along a local axis and 1.0, or the parallel global component and 1.0 or -1.0, its sign."""
-        direction = self.directions[point][component - 1]
+        direction = self.directions[point][number]
         axis = int(np.argmax(np.abs(direction)))
         if abs(abs(direction[axis]) - 1.0) < LENGTH_ROUND_OFF and axis < self.assembly.dim:
             return (point, axis, False), float(np.sign(direction[axis]))
-        return (point, component - 1, True), 1.0
+        return (point, number, True), 1.0
 
     def _forces(self, block: Block) -> Iterator[tuple[Component, float, Location]]:
         """Yield the component, the value [force] and the location of each force of a *CLOAD."""
@@ -207,4 +210,4 @@ class Conditions:
                 name = self._component(point, component) if 1 <= component <= 6 else None
                 if name is None:
                     raise row.refuse(f"a force cannot act on component {component} of this node")
-                yield (*name[:2], point in self.directions and component <= 3), value, row.location
+                yield (*name[:2], name[0] in self.directions), value, row.location

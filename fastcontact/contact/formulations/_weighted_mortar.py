@@ -122,7 +122,9 @@ class WeightedMortar(Formulation):
     def alternates(self, constraints: Constraints) -> bool:
         """See `Formulation`; a node with dual functions and a small overlap may have a gap in every other pairing."""
         covered = np.zeros(1) if constraints.nodal is None else np.asarray(constraints.nodal.covered)
-        small = self.multipliers == "dual" and bool(((covered > 0.0) & (covered < LEAST)).any())
+        small = (
+            self.multipliers == "dual" and not self.options.tied and bool(((covered > 0.0) & (covered < LEAST)).any())
+        )
         return small or super().alternates(constraints)
 
     def unilateral(self, at: Configuration) -> Constraints:

@@ -390,6 +390,17 @@ def test_named_supports_of_a_node_with_rotations_hold_its_rotations(tmp_path, na
     np.testing.assert_array_equal(by_name, by_component)
 
 
+def test_rotations_of_a_node_are_about_its_local_axes(tmp_path):
+    """Local x, y and z are y, z and x of the mesh."""
+    coupling = f"{COUPLED}*Coupling, ref node=90, surface=roof\n*Kinematic\n1, 6\n"
+    coupled = WHOLE.replace("*Material", f"{coupling}*Nset, nset=ref\n90\n*Material", 1)
+    turned = coupled.replace("*Material", "*Transform, nset=ref\n0., 1., 0., 0., 0., 1.\n*Material", 1)
+    pairs = ((turned, "90, xsymm\n"), (coupled, "90, 2\n90, 4\n90, 6\n"))
+    decks = [deck_of(tmp_path, text.replace("*Boundary\n", f"*Boundary\n{lines}", 1)) for text, lines in pairs]
+    local, plain = (np.argwhere(deck.model.prescribed()[0]) for deck in decks)
+    np.testing.assert_array_equal(local, plain)
+
+
 FREQUENCY = "*Step, perturbation\n*Frequency\n 2\n*End Step\n"
 
 
