@@ -45,7 +45,7 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
     more = ["more updates (Criteria.max_geometry_updates)"] if declining else []
     advice = [*more, *_bilateral_advice(problem), *_smoothing_advice(problem, last["nodes"])]
     advice.append("a fixed number of updates (Criteria.geometry_updates)")
-    if size < NOTABLE:  # otherwise `Criteria` refuses it
+    if float(f"{size:.0e}") < NOTABLE:  # otherwise `Criteria` refuses it
         criterion = f"Criteria.geometry, which is {problem.criteria.geometry:g}, above {size:.0e}"
         advice.append(f"accept changes of that size ({criterion})")
     use = " or ".join(filter(None, [", ".join(advice[:-1]), advice[-1]]))
@@ -187,7 +187,9 @@ def _smoothing_advice(problem: Problem, nodes: Nodes) -> list[str]:
     faceted = [name for name, pair in pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
     laws = {name: pair.options.cohesion for name, pair in pairs.items() if pair.options.cohesion is not None}
     reach = {name: 2.0 * law.energy / law.strength for name, law in laws.items() if law.reversible}
-    dual = [name for name, pair in pairs.items() if getattr(pair, "multipliers", "") == "dual"]
+    dual = [
+        name for name, pair in pairs.items() if getattr(pair, "multipliers", "") == "dual" and len(pair.primary.points)
+    ]
     options = {
         'normals="averaged"': faceted, 'multipliers="standard"': dual,
         f"facets no longer than the reach of adhesion, {min(reach.values(), default=0.0):.3g},": list(reach),

@@ -290,7 +290,8 @@ class _Newton:
     ) -> tuple[Array, Array]:
         """Return the result of `_solve` for a tangent."""
         terms, iterate = self._terms, self._iterate
-        problem, self._reusable = self._reusable if self._tangent_suffices(changes) else None, None
+        suffices = self._reusable is not None and self._tangent_suffices(changes)
+        problem, self._reusable = self._reusable if suffices else None, None
         self._reused = problem is not None
         if problem is not None:
             problem = replace(problem, linearised_at=None if problem.linearised_at is None else u)

@@ -34,7 +34,6 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.body_overlap import depths
-from fastcontact.model.model import Model
 from fastcontact.model.rigid_motions import body_name
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
@@ -336,9 +335,7 @@ def _without_force(problem: Problem, name: str, last: StepResult, touched: bool,
             f"contact '{name}' carries nothing although its sides penetrate by {-smallest:.4g}: supports or relations "
             "hold its nodes there; leave these nodes free, or out of the contact as 'excluded'"
         )
-    elif (
-        not touched and pair.options.clearance is None and (depth := _depth_of_primary(problem.model, pair, last)) > 0.0
-    ):
+    elif not touched and pair.options.clearance is None and (depth := _depth_of_primary(problem, pair, last)) > 0.0:
         assert isinstance(pair.primary, Surface)
         yield (
             f"contact '{name}' carries nothing although nodes of '{pair.primary.group}' are up to {depth:.4g} deep in the "
@@ -351,9 +348,11 @@ def _without_force(problem: Problem, name: str, last: StepResult, touched: bool,
         yield f"contact '{name}' has opened again at the end: {gap}"
 
 
-def _depth_of_primary(model: Model, pair: Formulation, last: StepResult) -> float:
-    """Return the largest depth of primary nodes inside bodies of the secondary side [length]."""
-    primary, of_secondary = pair.primary.points, bodies(model.mesh)[1][pair.secondary.points]
+def _depth_of_primary(problem: Problem, pair: Formulation, last: StepResult) -> float:
+    """Return the largest depth inside secondary bodies of primary nodes that belong to no closed pair [length]."""
+    model, of_secondary = problem.model, bodies(problem.model.mesh)[1][pair.secondary.points]
+    closed = [other.primary.points for name, other in problem.pairs.items() if last.contact[name].active.any()]
+    primary = np.setdiff1d(pair.primary.points, np.concatenate([np.empty(0, np.intp), *closed]))
     overlaps = depths(model.mesh, model.kinematics, model.mesh.points + last.displacement)
     inside = (depth[np.isin(points, primary)] for _, body, points, depth in overlaps if body in of_secondary)
     return max((float(depth.max(initial=0.0)) for depth in inside), default=0.0)
@@ -440,7 +439,7 @@ def _peak_at_edge(pair: Formulation, last: StepResult, contact: ContactResult) -
     largest one was 1201, 1020 and 998 with the continuous formulation, and 845, 920 and 940 with mortar.
     """
     plastic = last.cell_fields.get("plastic_strain")
-    if plastic is None or not plastic.any() or pair.options.always_closed:
+    if plastic is None or plastic.max(initial=0.0) < NOTABLE or pair.options.always_closed:
         return
     near_open = pair.secondary.near @ (~contact.active & ~pair.options.excluded_nodes(pair.secondary)) > 0
     inside = float(contact.pressure[contact.active & ~near_open].max(initial=0.0))
@@ -449,7 +448,8 @@ def _peak_at_edge(pair: Formulation, last: StepResult, contact: ContactResult) -
         yield (
             f"contact '{contact.name}': the largest nodal pressure, {contact.pressure_max:.4g}, is within two facets of open "
             f"nodes, and pressures inside are at most {inside:.4g}. Where bodies yield, nodal pressures overshoot on facets "
-            f"that are only partly in contact, and the true maximum is between both: use smaller facets{remedy}"
+            "that are only partly in contact. Unless the contact ends at a corner, the true maximum is between both: use "
+            f"smaller facets{remedy}"
         )
 
 

@@ -114,11 +114,11 @@ class ElasticPlastic(NonlinearElastic):
         try:
             rows = np.array([[float(value) for value in pair] for pair in self.hardening]).reshape(-1, 2)
         except (TypeError, ValueError, OverflowError):
-            is_slope = isinstance(self.hardening, float | int) and abs(self.hardening) <= sys.float_info.max
+            is_slope = isinstance(self.hardening, float | int) and 0.0 <= self.hardening <= sys.float_info.max
             slope = self.hardening if is_slope else self.yield_stress
             raise ModelError(
                 "hardening must be pairs (equivalent plastic strain, yield stress), for example "
-                f"[(0.0, {self.yield_stress:g}), (0.1, {self.yield_stress + 0.1 * slope:g})] for the slope {slope:g}"
+                f"[(0.0, {float(self.yield_stress)}), (0.1, {self.yield_stress + 0.1 * slope:g})] for the slope {slope:g}"
             ) from None
         if not len(rows) or rows[0, 0] > 0.0:
             rows = np.vstack([[0.0, float(self.yield_stress)], rows])

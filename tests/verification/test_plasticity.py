@@ -183,3 +183,16 @@ def test_a_ball_on_a_flat_far_past_yield() -> None:
     force = flattened([*np.linspace(1.0, 6.0, 6), *np.linspace(8.0, 110.0, 52)], 0.003)
     assert force[5] == pytest.approx(1.03 * 6.0**1.425, rel=0.05)
     assert force[-1] == pytest.approx(1.40 * 110.0**1.263, rel=0.05)
+
+
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
+def test_a_reused_tangent_with_which_contact_does_not_converge_is_replaced():
+    model = fc.Model(fc.generate.block_on_block(), kinematics="plane_strain")
+    model.add_material(fc.ElasticPlastic(E=1000.0, nu=0.3, yield_stress=30.0, hardening=[(0.1, 60.0)]))
+    supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.3, "y": -0.2})
+    model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.2)
+    last, other = (
+        fc.solve(model, 5, criteria=fc.Criteria(max_geometry_updates=updates))[-1].contact["joint"]
+        for updates in (1, 60)
+    )
+    assert last.force == pytest.approx(other.force, rel=1e-6)

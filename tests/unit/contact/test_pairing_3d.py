@@ -125,9 +125,10 @@ def test_gap_rows_do_not_see_rigid_motions():
     assert np.abs(B @ spin).max() < 1e-13
 
 
-@pytest.mark.parametrize("element", SOLIDS)
-def test_points_are_projected_onto_given_facets(element):
+@pytest.mark.parametrize(("element", "shift"), [*((element, 0.0) for element in SOLIDS), ("hex8", 1e7)])
+def test_points_are_projected_onto_given_facets(element, shift):
     mesh = sphere_octant(element, R=2.0, size=1.0, contact_size=0.2, contact_radius=0.4)
+    mesh = mesh.replace(points=mesh.points + shift)
     side, random = surface(mesh, "CONT_SPHERE"), np.random.default_rng(2)
     facet = np.arange(side.n_facets)
     foot = places(side, facet, random.uniform(0.1, 0.4, (len(facet), 2)))
@@ -140,8 +141,10 @@ def test_points_are_projected_onto_given_facets(element):
     pairing = onto(position + random.uniform(-0.05, 0.05, (len(facet), 1)) * along, side, facet, mesh.points, along)
     again = pairing.places(side, facet)
     assert pairing.paired.all()
-    np.testing.assert_allclose(np.einsum("nk,nkd->nd", again.shape, mesh.points[again.nodes]), position, atol=1e-12)
-    np.testing.assert_allclose(pairing.normal, normal, atol=1e-8)
+    np.testing.assert_allclose(
+        np.einsum("nk,nkd->nd", again.shape, mesh.points[again.nodes]), position, atol=1e-12 + 1e-15 * shift, rtol=0.0
+    )
+    np.testing.assert_allclose(pairing.normal, normal, atol=1e-8 + 1e-14 * shift)
 
 
 def test_points_that_cannot_be_projected_are_not_paired():
