@@ -118,7 +118,7 @@ class ElasticPlastic(NonlinearElastic):
             slope = self.hardening if is_slope else self.yield_stress
             raise ModelError(
                 "hardening must be pairs (equivalent plastic strain, yield stress), for example "
-                f"[(0.0, {float(self.yield_stress)}), (0.1, {self.yield_stress + 0.1 * slope:g})] for the slope {slope:g}"
+                f"[(0.0, {self.yield_stress}), (0.1, {self.yield_stress + 0.1 * slope:g})] for the slope {slope:g}"
             ) from None
         if not len(rows) or rows[0, 0] > 0.0:
             rows = np.vstack([[0.0, float(self.yield_stress)], rows])

@@ -309,7 +309,7 @@ SUPPORTS = [
     Mistake("a motion without names of axes", lambda: with_obstacle(1.0, motion=(0, -1)), fc.ModelError,
             r"the argument motion of Model\.add_obstacle must be a dictionary of numbers by name or None, not the tuple \(0, -1\): write \{'x': 0, 'y': -1\}"),
     Mistake("hardening as a number", lambda: fc.ElasticPlastic(E=2e5, nu=0.3, yield_stress=250.0, hardening=1000.0), fc.ModelError,
-            r"hardening must be pairs \(equivalent plastic strain, yield stress\), for example \[\(0\.0, 250\), \(0\.1, 350\)\] for the slope 1000"),
+            r"hardening must be pairs \(equivalent plastic strain, yield stress\), for example \[\(0\.0, 250\.0\), \(0\.1, 350\)\] for the slope 1000"),
     Mistake("a support that moves the axis of symmetry", lambda: solved(on_axis(lambda model: model.prescribe("TOP", x=0.1))),
             fc.ModelError,
             r"x = 0\.1 is prescribed at point \d+ on the axis of symmetry, where the radial displacement is zero: leave the points at x = 0 out of the group"),
