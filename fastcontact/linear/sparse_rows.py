@@ -108,8 +108,6 @@ def without_remnants(matrix: csr_array, origin: csr_array, least: float) -> csr_
 
     In these rows, no entry exceeds `least` times the largest entry in the same row of `origin`, in absolute values.
     """
-    largest = np.zeros((2, matrix.shape[0]))
-    for of_rows, rows in zip(largest, (matrix, origin), strict=True):
-        np.maximum.at(of_rows, entry_rows(rows), np.abs(rows.data))
-    significant = largest[0] > least * largest[1]
+    largest, largest_in_origin = (np.ravel(abs(rows).max(axis=1).toarray()) for rows in (matrix, origin))
+    significant = largest > least * largest_in_origin
     return matrix if significant.all() else scaled(matrix, significant)

@@ -35,7 +35,7 @@ def test_random_models_end_right():
 
 def test_once_wrong_models_end_right():
     """A soft body on a stiff one, by multigrid; constraints that penetrate from the start; dual functions of a numbering."""
-    check([100358, 101568, 102727, 102979])
+    check([100358, 101460, 101521, 101568, 102727, 102979])
 
 
 @pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
