@@ -21,5 +21,6 @@ def versions() -> dict[str, str]:
             found = metadata.distribution(name)
             # `metadata.version` would import `email`.
             text = found.read_text("METADATA") or found.read_text("PKG-INFO") or ""
-            by_name[name] = text.partition("\nVersion: ")[2].partition("\n")[0]
+            if version := text.partition("\nVersion: ")[2].partition("\n")[0]:
+                by_name[name] = version
     return by_name

@@ -260,7 +260,7 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     if plastic is not None and (largest := float(plastic.max())) > LARGEST_PLASTIC_STRAIN:
         yield (
             f"the largest plastic strain is {largest:.2f}, beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics "
-            "are valid: contact pressures there are too low, under a ball by 10 % at 0.2 and 20 % at 0.5; "
+            "are valid: contact pressures there are too low, under a ball by 10 % at 0.2; "
             "strain='finite' has no such limit"
         )
 
@@ -402,7 +402,7 @@ def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     The measure is the median difference from the mean of the neighbours, over the mean pressure. On rings of tri3 cells 4.6
     times as deep as wide it is 0.30, with pressure errors of 0.16 to 0.27; on wider ones 0.16 (0.09 to 0.13), on quadrangles
     0.002; under punches of hex8 and tet4, whose pressures are singular at the edges, 0.10 to 0.12, and under a wearing hex8
-    sole 0.22. On quadratic facets, the neighbours of corners are the other nodes and vice versa, see `_alternate`. On rings
+    sole 0.22. On quadratic facets, the neighbours of corners are the other nodes and vice versa, see `_alternating`. On rings
     of quad8 and tri6 cells it is 0.15 or more with pressure errors of 0.14 to 1, and less with errors of up to 0.2, or 0.4
     where meshes nearly match: errors then come and go along the side, which a median does not see. On coarse faces of hex20
     under an elastic punch it is up to 0.18.
@@ -412,7 +412,7 @@ def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     if pair.options.always_closed or pair.options.cohesion is not None:
         return
     side = pair.secondary
-    others = _alternate(side)
+    others = _alternating(side)
     count = np.asarray(others.sum(axis=1)).ravel()
     inside = contact.active & (side.beside @ ~contact.active == 0) & (count > 0)
     if inside.sum() < MANY:
@@ -453,8 +453,8 @@ def _peak_at_edge(pair: Formulation, last: StepResult, contact: ContactResult) -
         )
 
 
-def _alternate(side: Surface) -> csr_array:
-    """Return a matrix (m, m), one for the nodes of a facet between which pressures alternate, otherwise zero.
+def _alternating(side: Surface) -> csr_array:
+    """Return the matrix (m, m) that is 1 for nodes of a facet between which pressures may alternate, otherwise 0.
 
     On quadratic facets they alternate between corners and other nodes, and on linear ones between any two.
     """

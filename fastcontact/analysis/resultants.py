@@ -163,18 +163,23 @@ def contact_resultants(model: Model, steps: Iterable[StepResult], name: str) -> 
     (20.0, 10.0, 2.0)
     """
     pair = _formulation(model, name)
-    work, resultants = 0.0, []
+    areas, work, resultants = lumped_areas(pair.secondary, pair.points, pair.axisymmetric), 0.0, []
     for step in steps:
         contact = _result_of_pair(pair, step, name)
-        displacement = step.displacement if model.strain == "finite" else np.zeros_like(step.displacement)
-        areas = lumped_areas(pair.secondary, pair.points + displacement, pair.axisymmetric)
-        if not isinstance(pair.primary, RigidSide):
-            field = pair.unilateral(end_of(None, step, name)).nodal
-            assert field is not None
-            areas = areas * field.covered
+        if model.strain == "finite":
+            areas = lumped_areas(pair.secondary, pair.points + step.displacement, pair.axisymmetric)
         work += contact.dissipation
-        resultants.append(_resultants(contact, areas, pair.axisymmetric, work))
+        resultants.append(_resultants(contact, areas * _covered(pair, step, name), pair.axisymmetric, work))
     return resultants
+
+
+def _covered(pair: Formulation, step: StepResult, name: str) -> Array | float:
+    """Return the fraction (n_nodes,) of the tributary areas that has an opposite side; 1 against obstacles [-]."""
+    if isinstance(pair.primary, RigidSide):
+        return 1.0
+    field = pair.unilateral(end_of(None, step, name)).nodal
+    assert field is not None
+    return field.covered
 
 
 #: The earlier name of `ContactResultants`.

@@ -2,8 +2,8 @@
 
 In axisymmetry the middle lies on the axis if the surface reaches the axis, or if it faces along the axis and its radius
 changes monotonically. Otherwise the middle is the centre of pressure of the contact, completed by reflection at the planes of
-symmetry that it reaches: a half or quarter model has its middle on these planes. In a plane of symmetry, supports hold the
-nodes at an end of the surface at rest in the direction normal to the plane, and the opposite body ends there, too.
+symmetry that it reaches: a half or quarter model has its middle on these planes. In a plane of symmetry, supports
+prescribe zero displacement along its normal at an end of the surface, and the opposite body does not extend beyond it.
 
 In plane models, positions are arc lengths along the surface, so that a ring is unrolled. The same holds in axisymmetry where
 the surface runs along the axis rather than across it, as in a press fit of cylinders, or closes on itself, like that of an
@@ -225,7 +225,7 @@ def _radius_is_monotone(surface: Surface, coordinates: Array) -> bool:
 def symmetry_planes(pair: Formulation) -> list[tuple[int, Indices]]:
     """Return the planes of symmetry at the ends of a surface, by the axis normal to each and the nodes of the surface on it.
 
-    Supports hold the nodes in a plane of symmetry at rest, and the opposite body does not extend beyond the plane.
+    Supports prescribe zero displacement along its normal, and the opposite body does not extend beyond the plane.
     """
     surface, coordinates, motions = pair.secondary, pair.points, pair.held
     if motions is None:

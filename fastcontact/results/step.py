@@ -191,8 +191,8 @@ class ContactResult(Suggesting):
     middle : ndarray (dim,)
         Centre of the contact on the reference surface [length]. In axisymmetry it lies on the axis, unless the surface is
         parallel to it or closes on itself, like that of an O-ring; otherwise it is the centre of pressure, moved onto the
-        planes of symmetry that the contact reaches. A plane of symmetry is assumed where supports hold an end of the
-        surface at rest and the other body ends, too.
+        planes of symmetry that the contact reaches. A plane of symmetry is assumed where supports
+        prescribe zero displacement at an end of the surface beyond which the other body does not extend.
     place : ndarray (m,)
         Position of each node relative to the `middle` [length]: the radius in axisymmetry; the signed arc length in 2D, and
         where an axisymmetric surface is parallel to the axis or closes on itself; in 3D the distance from the line through

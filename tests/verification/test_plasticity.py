@@ -185,7 +185,6 @@ def test_a_ball_on_a_flat_far_past_yield() -> None:
     assert force[-1] == pytest.approx(1.40 * 110.0**1.263, rel=0.05)
 
 
-@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
 def test_a_reused_tangent_with_which_contact_does_not_converge_is_replaced():
     model = fc.Model(fc.generate.block_on_block(), kinematics="plane_strain")
     model.add_material(fc.ElasticPlastic(E=1000.0, nu=0.3, yield_stress=30.0, hardening=[(0.1, 60.0)]))

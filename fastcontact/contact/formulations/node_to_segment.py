@@ -60,7 +60,7 @@ class NodeToSegment(Formulation):
             # A uniform pressure on a facet must have compressive forces at all nodes.
             if not all_nodes_carry(block.element):
                 other = self.primary.blocks if isinstance(self.primary, Surface) else ()
-                swap = ", or swap the sides" if other and all(all_nodes_carry(one.element) for one in other) else ""
+                swap = ", or swap the sides" if other and all(all_nodes_carry(block.element) for block in other) else ""
                 raise ContactError(
                     f"node_to_segment cannot have facets of {block.element} on its secondary side '{self.secondary.group}', "
                     f"whose corner nodes carry no pressure: use formulation 'continuous' or 'mortar'{swap}"

@@ -113,21 +113,33 @@ def outer_legend(ax: Any, columns: int) -> None:
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns, fontsize=8)
 
 
-def laid_out(axes: Any) -> Any:
-    """Enlarge the box of axes in space with its labels to the size of the axes, lay out the figure and return the axes."""
+def laid_out(axes: Any, zoom: float | None = None) -> Any:
+    """Enlarge the box of axes in space by the factor `zoom`, lay out the figure and return the axes.
+
+    By default the box with its labels has the size of the axes.
+    """
+    axes.set_box_aspect(_box_size(axes), zoom=zoom_to_axes(axes) if zoom is None else zoom)
+    axes.figure.draw_without_rendering()
+    return axes
+
+
+def _box_size(axes: Any) -> Array:
+    """Return the lengths (3,) of the edges of the box of axes in space, in the units of the data."""
+    return np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
+
+
+def zoom_to_axes(axes: Any) -> float:
+    """Return the factor by which the box of axes in space with its labels can be enlarged to the size of the axes [-]."""
     from mpl_toolkits.mplot3d.proj3d import proj_transform
 
-    limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
-    size = np.ptp(limits, axis=1)
-    axes.set_box_aspect(size)
+    axes.set_box_aspect(_box_size(axes))
     axes.figure.draw_without_rendering()
+    limits = axes.get_xlim(), axes.get_ylim(), axes.get_zlim()
     corners = np.transpose(proj_transform(*map(np.ravel, np.meshgrid(*limits)), axes.get_proj()))[:, :2]
     labels = [axis.get_tightbbox(axes.figure.canvas.get_renderer()) for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
     ends = np.concatenate([axes.transData.transform(corners), *(box.get_points() for box in labels)])
     first, last = axes.get_window_extent().get_points()  # whose centre is that of the box
-    axes.set_box_aspect(size, zoom=((last - first) / 2.0 / np.abs(ends - (first + last) / 2.0).max(axis=0)).min())
-    axes.figure.draw_without_rendering()
-    return axes
+    return float(((last - first) / 2.0 / np.abs(ends - (first + last) / 2.0).max(axis=0)).min())
 
 
 # Mean width of a letter of a label [inch].

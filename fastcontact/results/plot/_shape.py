@@ -517,6 +517,7 @@ def animate(
     figure = new_axes(None, size, projection).figure
     writer = writer_of(target, pictures_per_second)
     limits, box = _over_all(mesh, steps, field, scale, mirrored)
+    zoom: float | None = None  # that of the first picture, so that the scale of all pictures is the same
     with _failure_of_writer(target), replacing(target) as temporary, writer.saving(figure, temporary, RESOLUTION):
         for step in steps:
             figure.clear()
@@ -528,7 +529,8 @@ def animate(
             )  # fmt: skip
             if mesh.dim == 3:
                 show_box(axes, *box, view)
-                _axes.laid_out(axes)
+                zoom = zoom or _axes.zoom_to_axes(axes)
+                _axes.laid_out(axes, zoom)
             else:
                 axes.set(**{f"{axis}lim": ends for axis, *ends in zip("xy", *box, strict=True)})
             writer.grab_frame()
