@@ -49,7 +49,8 @@ def contact_results(
         )
         for name, rows in settled.constraints.rows.items()
     }  # fmt: skip
-    results = _with_periodic_nodes(problem, results)
+    if problem.model.periodic_interfaces:
+        results = _with_periodic_nodes(problem, results)
     if problem.model.strain == "small":
         return results
     return {name: _on_deformed_surface(problem.pairs[name], result, displacement) for name, result in results.items()}
@@ -376,7 +377,7 @@ def _stretch(contact: ContactResult, displacement: Array, before: Array, after: 
 def _with_periodic_nodes(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
     """Return contact results in which both nodes of a periodic pair have the same traction, and close together."""
     results_of_pairs = dict(results)
-    for name, contact in results.items() if problem.model.periodic_interfaces else ():
+    for name, contact in results.items():
         pair = problem.pairs[name]
         areas = lumped_areas(pair.secondary, pair.points, pair.axisymmetric)
         pressure, shear, active = contact.pressure.copy(), contact.shear.copy(), contact.active.copy()

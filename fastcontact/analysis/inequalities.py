@@ -106,23 +106,20 @@ def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Itera
 
 def initially_active(constraints: StackedConstraints, iterate: Iterate, extrapolation: Extrapolation | None) -> Mask:
     """Return the initial active set (m,): the one predicted by the last solution, or extrapolated at the first pairing."""
-    sets = [_initially_active_of_pair(name, part, iterate, extrapolation) for name, part in constraints.parts.items()]
+    sets = []
+    for name, part in constraints.parts.items():
+        if part.equality.all():
+            active = part.equality
+        elif name not in iterate.active:
+            active = np.zeros(len(part), bool)
+        elif part.tied is not None:
+            active = part.equality | (part.gap0 + part.B @ iterate.u < 0.0)
+        else:
+            assert part.nodal is not None
+            last = iterate.active[name] if extrapolation is None else extrapolation.active(name, iterate.active[name])
+            active = part.nodal.initially_active(part.gap0 + part.B @ iterate.u, iterate.pressure[name], last)
+        sets.append(active)
     return np.concatenate(sets)
-
-
-def _initially_active_of_pair(
-    name: str, constraints: Constraints, iterate: Iterate, extrapolation: Extrapolation | None
-) -> Mask:
-    """Return the initial active set of the contact pair `name`; see `initially_active`."""
-    if constraints.equality.all():
-        return constraints.equality
-    if name not in iterate.active:
-        return np.zeros(len(constraints), bool)
-    active = constraints.initially_active(iterate.u, iterate.pressure[name])
-    if active is not None:
-        return active
-    last = iterate.active[name]
-    return last if extrapolation is None else extrapolation.active(name, last)
 
 
 @dataclass(frozen=True, eq=False)

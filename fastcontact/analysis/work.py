@@ -197,15 +197,14 @@ def contact_work(
     work_at_end, work_at_begin = (-0.5 * np.einsum("md,md->m", f, slips) for f in (force, areas[:, None] * traction))
     work = np.where(normal != 0.0, (1.0 + ratio) * work_at_end, np.maximum(work_at_begin, 0.0))
     closing = pressure == 0.0
-    if work_at_end[closing].any():
+    if solution.work is not None:  # the work of all increments, in which constraints carry no force before they close
+        work, closing = solution.work[rows], np.zeros_like(closing)
+    elif work_at_end[closing].any():
         # The secondary nodes nearest to these constraints were open at the beginning of the step.
         gap = pair.nodal_gap(replace(configuration, displacement=configuration.start, pose=configuration.pose_start))[0]
         open_before = gap > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
         closing &= open_before[nearest(pair.points[pair.secondary.points], constraints.positions)[1]]
-    touching = float(work_at_end[closing].sum())
-    if solution.work is not None:
-        work, touching = solution.work[rows], 0.0
-    friction, mu = float(work.sum()), constraints.friction
+    touching, friction, mu = float(work_at_end[closing].sum()), float(work.sum()), constraints.friction
     over_slip = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(slips, axis=1)
     np.divide(work, mu, out=over_slip, where=mu > 0.0)
     sliding = float((work_at_end + work_at_begin).sum())

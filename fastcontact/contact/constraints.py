@@ -120,12 +120,12 @@ class NodalField(Protocol):
         """
         return active
 
-    def initially_active(self, gap: Array, pressure: Array) -> Mask | None:
+    def initially_active(self, gap: Array, pressure: Array, last: Mask) -> Mask:
         """Return an initial active set (m,) for gaps (m,) [length] and the last nodal pressures (n_nodes,) [pressure].
 
-        None means that each constraint exists in every pairing, so that the last active set is a better initial guess.
+        If each constraint exists in every pairing, the `last` active set (m,) is the best initial guess.
         """
-        return None
+        return last
 
 
 class Wetted(Protocol):
@@ -351,16 +351,6 @@ class Constraints:
         """Return nodal pressures (n_nodes,) per unit reference area for multipliers (m,) [pressure]."""
         assert self.nodal is not None
         return self.nodal.pressure(self.normal_forces(multiplier))
-
-    def initially_active(self, u: Array, pressure: Array) -> Mask | None:
-        """Return an initial active set (m,) or None, see `NodalField.initially_active`.
-
-        `u` (n_dofs,) are displacements [length], `pressure` (n_nodes,) the last nodal pressures [pressure].
-        """
-        assert self.nodal is not None
-        if self.tied is not None:
-            return self.equality | (self.gap0 + self.B @ u < 0.0)
-        return self.nodal.initially_active(self.gap0 + self.B @ u, pressure)
 
 
 @dataclass(frozen=True, eq=False)

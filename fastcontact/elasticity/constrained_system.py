@@ -197,12 +197,9 @@ class System(ConstrainedMotion):
 
     def reduced(self, force: Array) -> Array:
         """Return the forces (n,) on the unknowns that do the same work as `force` (n,) on all displacements [force]."""
-        return self._of_unknowns(force.copy() if self.T is None else self.T.T @ force)
-
-    def _of_unknowns(self, values: Array) -> Array:
-        """Set to zero, in place, the values (n,) of components that are not unknowns."""
-        values[self._no_unknowns] = 0.0
-        return values
+        reduced = force.copy() if self.T is None else self.T.T @ force
+        reduced[self._no_unknowns] = 0.0
+        return reduced
 
     def rows(self, rows: csr_array, offset: Array, t: Array) -> tuple[csr_array, Array]:
         """Return the affine function ``rows @ u + offset`` as rows (m, n) and offset (m,) for the unknowns v."""
@@ -218,7 +215,9 @@ class System(ConstrainedMotion):
 
     def unknowns(self, u: Array, t: Array | float = 0.0) -> Array:
         """Return the unknowns v (n,) [length] of displacements u (n,) that satisfy the constraints."""
-        return self._of_unknowns(u - t)
+        v = u - t
+        v[self._no_unknowns] = 0.0
+        return v
 
     def unknowns_of(self, motions: Array) -> Array:
         """Return the unknowns (n, k) of motions (n, k) that satisfy homogeneous supports and constraints."""

@@ -178,10 +178,10 @@ class PressureField(NodalField):
         near[isolated[pressure[isolated] > 0]] = True
         return near
 
-    def initially_active(self, gap: Array, pressure: Array) -> Mask | None:
-        """Return the points (m,) at which the field exceeds rho times the gap; None if all pairings have the same points."""
+    def initially_active(self, gap: Array, pressure: Array, last: Mask) -> Mask:
+        """Return the points (m,) where the field exceeds rho times the gap; `last` if all pairings have the same points."""
         if not self.renewed:
-            return None
+            return last
         field = self.projection.P @ pressure[self.independent]
         return (self.projection.areas > 0) & (field - self.projection.rho * gap > 0)
 
