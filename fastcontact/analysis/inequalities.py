@@ -18,7 +18,7 @@ from fastcontact.analysis.convergence_messages import friction_exceeded, not_bal
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.solution import Accuracy, Path, Slid, Solution
+from fastcontact.analysis.solution import Accuracy, Path, Slid, Solution, completed, shifted
 from fastcontact.analysis.state import State
 from fastcontact.arrays import AnyArray, Array, Mask, largest
 from fastcontact.contact.constraints import Constraints, StackedConstraints, stacked
@@ -233,7 +233,6 @@ def _solve(
     if not constraints.tangents:
         return active_set.solve(step.loaded, condensed, active, accuracy, u)
     from fastcontact.analysis.friction import solve as friction
-    from fastcontact.analysis.friction.path import completed, shifted
 
     condensed = replace(condensed, driven=step.driven(constraints))
     slid = step.path if isinstance(step.path, Slid) and len(step.path.slip) == len(constraints) else None

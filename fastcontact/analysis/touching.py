@@ -1,4 +1,4 @@
-"""Load steps in which constraints close and slide: friction is solved in increments, see `friction.path`.
+"""Load steps in which constraints close and slide, whose friction is solved in increments (`solution.in_increments`).
 
 Once the geometry has nearly converged, the contact problem of a pairing is solved in increments. For later pairings only
 the last increment is solved again, with the slips of the earlier ones, unless the geometry changes gaps and slips

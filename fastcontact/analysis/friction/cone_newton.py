@@ -1,5 +1,7 @@
 r"""Unilateral contact and Coulomb's law as a nonsmooth complementarity function, and Newton's method for it.
 
+This is the common part of the solvers `dense` and `eliminated`.
+
 The unknowns of a constraint are its normal force n and its k tangential forces t. Its gap g and its slips s along the k
 tangents belong to these forces. All values are scaled such that the compliance of each constraint is near one. Forces, gaps
 and slips then have the same unit, and ``n - g`` is meaningful. The solution is the zero of
@@ -14,6 +16,12 @@ To implement another law, begin with `Law`. The tangential force of the law is a
 which linearises sliding constraints, and in the fallback `dense._on_edges`. Parameters of the law
 come from `PairOptions` through `Constraints`; parameters that are forces must be scaled by the caller that creates the
 `Law`. `Law.state` and the formulations assume that a constraint without friction needs no tangents.
+
+At a constraint on a symmetry plane or on an axis, supports prevent slip along one tangent or along both. The functions at the
+end of this file detect such idle tangents by the compliance of each constraint, and rotate the two tangents of a constraint
+in 3D so that one of them is the direction in which slip is prevented. The compliance of m constraints, without their
+coupling, is an array (1 + k, 1 + k, m): the changes of the gap and of the k slips of a constraint by its normal force and its
+k tangential forces [length / force], in this order.
 """
 
 from __future__ import annotations
@@ -22,10 +30,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from scipy.sparse import block_array, csr_array, diags_array
 
 from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS
+from fastcontact.analysis.solution import Forces
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.round_off import ROUND_OFF, TINY
+from fastcontact.linear.protocol import TOLERANCE
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, TINY
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,35 +113,6 @@ class Law:
         return E, D
 
 
-@dataclass(frozen=True, eq=False)
-class Forces:
-    """Solution of Newton's method, or the best iterate if it has not converged.
-
-    Attributes
-    ----------
-    y : ndarray (1 + k, m)
-        Normal forces, then the tangential forces along each of k tangents.
-    gaps : ndarray (1 + k, m)
-        Gaps, then the slips along each tangent.
-    closed, sticking : ndarray of bool (m,)
-        Constraints that are closed, and closed constraints that stick.
-    settled : bool
-        Whether the iteration has converged.
-    residual : float
-        Largest residual, relative to the largest force [-].
-    iterations : int
-        Number of Newton iterations.
-    """
-
-    y: Array
-    gaps: Array
-    closed: Mask
-    sticking: Mask
-    settled: bool
-    residual: float
-    iterations: int
-
-
 class Linearised(Protocol):
     """Contact problem whose Newton step can be computed.
 
@@ -205,3 +187,88 @@ def newton(
     if not settled:
         y, gaps, relative = best
     return Forces(y, gaps, *law.state(y, gaps), settled, relative, iteration)
+
+
+# Compliance of a prescribed slip relative to the compliance of its gap. It is negligible, but with it the equation of stick
+# has a solution. The force of this solution lies outside the friction cone, so that the constraint slides.
+GIVING = LENGTH_ROUND_OFF
+
+
+def own_compliance(F: Array, parts: int) -> Array:
+    """Return the compliance (parts, parts, m) of each constraint, given the compliance F (parts m, parts m) of all.
+
+    `parts` is 1 + k; F has the normal components of all constraints first, then the components along each tangent.
+    """
+    m = len(F) // parts
+    index = np.arange(parts * m).reshape(parts, m)
+    return np.asarray(F[index[:, None], index[None]])
+
+
+def compliance_of_rows(rows: tuple[csr_array, ...], unknown_compliance: Array) -> Array:
+    """Return the compliance (1 + k, 1 + k, m) of each constraint for a diagonal stiffness matrix.
+
+    Parameters
+    ----------
+    rows : tuple of csr_array (m, n)
+        Derivatives of the gaps, and of the slips along each of k tangents, with respect to the n unknowns [-].
+    unknown_compliance : ndarray (n,)
+        Compliance of each unknown, the reciprocal of its stiffness [length / force].
+    """
+    weighted = [csr_array((R.data * unknown_compliance[R.indices], R.indices, R.indptr), shape=R.shape) for R in rows]
+    return np.array([[weighted_rows.multiply(R).sum(axis=1) for R in rows] for weighted_rows in weighted])
+
+
+def aligning(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array | None:
+    """Return the matrix that rotates the two tangents of each constraint in 3D so that one is idle if possible.
+
+    If supports leave one slip direction free, both tangents may be oblique to it, and neither is idle before the rotation.
+
+    Parameters
+    ----------
+    compliance : ndarray (3, 3, m)
+        Compliance of each constraint [length / force].
+    directions : tuple of two ndarray (m, 3), optional
+        The tangents. If they are given, the tangents of the other constraints are rotated, too, so that the first one is
+        perpendicular to one of the coordinate axes: the elimination of displacements, which are components along these axes,
+        then does not depend on the choice of tangents.
+
+    Returns
+    -------
+    csr_array (3 m, 3 m) or None
+        Q, for components of normals and then of both tangents. None if no tangent needs a rotation.
+    """
+    m = compliance.shape[2]
+    gap = np.maximum(compliance[0, 0], TINY)
+    first, second = compliance[1, 1] - compliance[1, 0] ** 2 / gap, compliance[2, 2] - compliance[2, 0] ** 2 / gap
+    mixed = compliance[1, 2] - compliance[1, 0] * compliance[2, 0] / gap
+    radius = np.hypot(0.5 * (first - second), mixed)
+    largest, least = 0.5 * (first + second) + radius, 0.5 * (first + second) - radius
+    oblique = (least <= TOLERANCE * np.maximum(largest, gap)) & (np.abs(mixed) > TOLERANCE * np.maximum(largest, gap))
+    if not oblique.any() and not directions:
+        return None
+    angle = np.where(oblique, 0.5 * np.arctan2(2 * mixed, first - second), _to_axes(*directions) if directions else 0.0)
+    c, s, zero = diags_array(np.cos(angle)), diags_array(np.sin(angle)), csr_array((m, m))
+    return csr_array(block_array([[diags_array(np.ones(m)), zero, zero], [zero, c, s], [zero, -s, c]], format="csr"))
+
+
+def _to_axes(tangent: Array, second_tangent: Array) -> Array:
+    """Return angles (m,) by which the tangents (m, 3) rotate until the first is perpendicular to a coordinate axis [rad].
+
+    The axis is the one with the largest angle to the normal.
+    """
+    normal = np.cross(tangent, second_tangent)
+    aligned = np.cross(np.eye(3)[np.argmin(np.abs(normal), axis=1)], normal)
+    return np.asarray(np.arctan2((aligned * second_tangent).sum(axis=1), (aligned * tangent).sum(axis=1)))
+
+
+def idle(compliance: Array) -> Mask:
+    """Return which tangents (k, m) are idle, given the `compliance` (1 + k, 1 + k, m) of each constraint.
+
+    Along an idle tangent, supports allow no motion, or only a motion that is proportional to the change of the gap. The
+    equation of its slip would be empty or linearly dependent. This occurs on axes and in planes of symmetry. Compliances are
+    no more accurate than the solutions of iterative solvers.
+    """
+    k = len(compliance) - 1
+    of_slips, normal = compliance[np.arange(1, k + 1), np.arange(1, k + 1)], compliance[0, 0]
+    bound = TOLERANCE * normal * np.maximum(of_slips, normal)
+    return np.asarray(of_slips * normal - compliance[1:, 0] ** 2 <= bound)

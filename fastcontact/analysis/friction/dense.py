@@ -21,7 +21,8 @@ import numpy as np
 from scipy.linalg import lu_solve
 
 from fastcontact.analysis.criteria import HALVINGS, NOTABLE
-from fastcontact.analysis.friction.cone_newton import Forces, Law, newton
+from fastcontact.analysis.friction.cone_newton import Law, newton
+from fastcontact.analysis.solution import Forces
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.linear.delassus import lu_factors
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION, SUM_ROUND_OFF

@@ -15,9 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
-from fastcontact.analysis.friction.cone_newton import Forces, Law, newton
-from fastcontact.analysis.friction.slip_directions import GIVING, aligning, compliance_of_rows, idle
-from fastcontact.analysis.solution import Accuracy
+from fastcontact.analysis.friction.cone_newton import GIVING, Law, aligning, compliance_of_rows, idle, newton
+from fastcontact.analysis.solution import Accuracy, Forces
 from fastcontact.analysis.tolerances import RESIDUAL
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints

@@ -19,10 +19,8 @@ import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction import dense, eliminated
-from fastcontact.analysis.friction.cone_newton import Law
-from fastcontact.analysis.friction.path import along
-from fastcontact.analysis.friction.slip_directions import GIVING, aligning, idle, own_compliance
-from fastcontact.analysis.solution import Accuracy, Path, Response, Slid, Solution, response
+from fastcontact.analysis.friction.cone_newton import GIVING, Law, aligning, idle, own_compliance
+from fastcontact.analysis.solution import Accuracy, Forces, Path, Response, Slid, Solution, in_increments, response
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import normals
@@ -90,7 +88,7 @@ def _eliminated(
     """Return the solution by `eliminated`, without the Delassus operator; None if this fails. Parameters as in `solve`."""
     usable, before = constraints.usable, None
 
-    def solved(constraints: Constraints, closed: Mask, accuracy: Accuracy, forces: Array | None) -> dense.Forces:
+    def solved(constraints: Constraints, closed: Mask, accuracy: Accuracy, forces: Array | None) -> Forces:
         nonlocal u
         solution = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
         if solution is None:
@@ -99,7 +97,7 @@ def _eliminated(
         result.gaps[:, ~usable] = 0.0
         return result
 
-    def increment(offset: Array, carrying: Mask, closed: Mask, forces: Array | None) -> dense.Forces:
+    def increment(offset: Array, carrying: Mask, closed: Mask, forces: Array | None) -> Forces:
         gaps = constraints.gaps_at_rest() + offset
         gaps[0, ~carrying] += distance
         moved = replace(constraints, gap0=gaps[0], slip0=gaps[1:], elastic_slip=np.empty(0))
@@ -114,7 +112,7 @@ def _eliminated(
             y, closing = path.along(constraints.directions, np.arange(len(constraints)))
             lag = _lag(loaded, constraints, path, y)
             distance = 4.0 * float(np.abs(lag[0]).max())  # further than constraints can close
-            result, gaps, before = along(lag, closing, y, path.waiting, increment)
+            result, gaps, before = in_increments(lag, closing, y, path.waiting, increment)
             result = replace(result, gaps=gaps)
     except ConvergenceError:
         return None
@@ -127,7 +125,7 @@ def _eliminated(
 
 
 def _lag(loaded: Loaded, constraints: Constraints, path: Path, y: Array) -> Array:
-    """Return the argument `lag` (1 + k, m) of `path.along`, given the forces y (1 + k, m) at the beginning of the step."""
+    """Return the argument `lag` (1 + k, m) of `in_increments`, given the forces y (1 + k, m) at the beginning of the step."""
     end = loaded.full_solution(constraints.force(y[0], y[1:].T))
     lag = -constraints.gaps_at_rest() - np.stack([R @ end for R in (constraints.B, *constraints.tangents)])
     lag -= eliminated.diagonal_compliance(constraints) * y
@@ -180,10 +178,10 @@ def _with_chosen(
         lag = -free - (F @ y0.ravel()).reshape(free.shape)
         lag[0] += closing[0]
 
-        def increment(offset: Array, carrying: Mask, closed: Mask, guess: Array | None) -> dense.Forces:
+        def increment(offset: Array, carrying: Mask, closed: Mask, guess: Array | None) -> Forces:
             return _with_forces_among(F, free + offset, mu, carrying, closed, equations, guess)
 
-        result, gaps_of_chosen, before = along(lag, closing, y0, path.waiting[rows], increment)
+        result, gaps_of_chosen, before = in_increments(lag, closing, y0, path.waiting[rows], increment)
     y = result.y
     if Q is not None:
         y, gaps_of_chosen = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ gaps_of_chosen.ravel()).reshape(y.shape)
@@ -207,7 +205,7 @@ def _with_chosen(
 
 def _response(
     loaded: Loaded, among: tuple[csr_array, Indices, csr_array | None], idle_slips: Mask,
-    forces: tuple[Array, Law, dense.Forces],
+    forces: tuple[Array, Law, Forces],
 ) -> Response:  # fmt: skip
     """Return the linear response of a solution to additional forces and gaps.
 
@@ -240,8 +238,8 @@ def _slid(
     Parameters
     ----------
     before : (ndarray (k, q), ndarray (k, q), ndarray (q,), ndarray (q,))
-        Slips, slips when constraints close [length], frictional work [energy] and normal forces [force] that `path.along`
-        returns.
+        Slips, slips when constraints close [length], frictional work [energy] and normal forces [force] that
+        `in_increments` returns.
     Q : csr_array, optional
         Rotation of the tangents, which is undone.
     rows : ndarray of int (q,)
@@ -275,7 +273,7 @@ def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
 
 def _with_forces_among(
     F: Array, free: Array, mu: Array, carrying: Mask, closed: Mask, equality: Mask, start: Array | None
-) -> dense.Forces:
+) -> Forces:
     """Return the solution of `dense.solve` if only the constraints `carrying` (m,) carry forces."""
     rows = np.flatnonzero(carrying)
     unknown = (np.arange(len(free))[:, None] * len(carrying) + rows).ravel()

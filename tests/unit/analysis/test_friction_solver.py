@@ -12,7 +12,7 @@ import fastcontact as fc
 from fastcontact.analysis import newton, step_halving
 from fastcontact.analysis.friction import cone_newton, dense
 from fastcontact.analysis.friction import solve as friction
-from fastcontact.analysis.friction.slip_directions import aligning, compliance_of_rows, idle, own_compliance
+from fastcontact.analysis.friction.cone_newton import aligning, compliance_of_rows, idle, own_compliance
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import normals, tangents
