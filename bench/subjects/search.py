@@ -7,7 +7,7 @@ tree, the reference does not: the construction of the cKDTree is reported separa
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fastcontact.contact.search.closest import closest
+from fastcontact.contact.projection import closest
 
 SIZES = (1_000, 10_000, 100_000)
 

@@ -10,8 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.arrays import Array, Indices, Mask, Numbers
-from fastcontact.contact.projection import CORNER
-from fastcontact.contact.search.closest import closest_of_kinds
+from fastcontact.contact.projection import CORNER, closest_of_kinds
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.mesh.mesh import Mesh

@@ -15,10 +15,12 @@ from scipy.sparse import csr_array
 from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.projection import (
+    Closest,
     Places,
     along_line_normals,
     along_normals,
     at_nodes_of_facets,
+    closest_of_kinds,
     facet_normals,
     interpolated,
     nodal_normals,
@@ -26,7 +28,6 @@ from fastcontact.contact.projection import (
     smooth_ends,
     smooth_normals,
 )
-from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.contact.search.limits import MAX_ITERATIONS
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
@@ -172,7 +173,7 @@ def pair(
     Raises
     ------
     ContactError
-        If a projection does not converge; see `search.closest`.
+        If a projection does not converge; see `projection.closest`.
     """
     if isinstance(primary, RigidSide):
         pose = Pose(np.zeros(candidates.shape[1])) if obstacle is None else obstacle

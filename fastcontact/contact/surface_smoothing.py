@@ -23,8 +23,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.projection import CORNER
-from fastcontact.contact.search.closest import closest_of_kinds
+from fastcontact.contact.projection import CORNER, closest_of_kinds
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors

@@ -8,7 +8,7 @@ from itertools import permutations
 import numpy as np
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.search.closest import closest_of_kinds
+from fastcontact.contact.projection import closest_of_kinds
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh

@@ -13,8 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.contact.obstacles.rigid_side import Rotation
-from fastcontact.contact.projection import places
-from fastcontact.contact.search.closest import closest_of_kinds
+from fastcontact.contact.projection import closest_of_kinds, places
 from fastcontact.contact.surface import surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError

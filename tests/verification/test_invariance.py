@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
 from fastcontact.contact.pairing import tangents
-from fastcontact.contact.search.closest import closest
+from fastcontact.contact.projection import closest
 
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])

@@ -16,8 +16,8 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.contact.formulations import _cut_faces_kernels
 from fastcontact.contact.formulations._overlap import Coupling, Overlap
 from fastcontact.contact.pairing import FACING
+from fastcontact.contact.projection import closest_of_kinds
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
-from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames

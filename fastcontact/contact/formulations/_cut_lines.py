@@ -14,8 +14,7 @@ import numpy as np
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations._overlap import Coupling, Overlap, OverlapPoints
 from fastcontact.contact.pairing import FACING, Candidates, pair
-from fastcontact.contact.projection import CORNER, facet_normals, nodal_normals
-from fastcontact.contact.search.closest import closest
+from fastcontact.contact.projection import CORNER, closest, facet_normals, nodal_normals
 from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature

@@ -42,8 +42,14 @@ from fastcontact.contact.pairing import (
     rows_along,
     tangents,
 )
-from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
-from fastcontact.contact.search.closest import BESIDE
+from fastcontact.contact.projection import (
+    BESIDE,
+    at_nodes_of_facets,
+    interpolated,
+    nodal_normals,
+    places,
+    smooth_normals,
+)
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.contact.tied import TiedPair, moments_of, reduction, tied, with_arms

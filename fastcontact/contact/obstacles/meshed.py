@@ -9,7 +9,7 @@ import numpy as np
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.obstacles._facets import Block, SurfaceFacets, surface_facets
-from fastcontact.contact.search.closest import BESIDE, Closest, closest_of_kinds
+from fastcontact.contact.projection import BESIDE, Closest, closest_of_kinds
 from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION

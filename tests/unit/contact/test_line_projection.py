@@ -12,13 +12,13 @@ from fastcontact.contact.projection import (
     along_line_normals,
     along_normals,
     at_nodes_of_facets,
+    closest_of_kinds,
     facet_normals,
     interpolated,
     nodal_normals,
     places,
     smooth_normals,
 )
-from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import surface
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import box, merge_points, union

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from fastcontact import ContactError
 from fastcontact._jit import decorators
-from fastcontact.contact.search.closest import closest, closest_of_kinds
+from fastcontact.contact.projection import closest, closest_of_kinds
 from fastcontact.contact.search.facet_tables import flat_triangles, tables, terms
 from fastcontact.mesh import elements
 
