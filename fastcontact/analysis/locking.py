@@ -28,11 +28,10 @@ from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Mask
 from fastcontact.elasticity import incompatible_modes, recovery
-from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.elasticity.incompatible_modes import BENDING as BENDING_ELEMENTS
 from fastcontact.elasticity.materials import LinearElastic
-from fastcontact.elasticity.recovery import BATCH
+from fastcontact.elasticity.recovery import BATCH, CellStress
 from fastcontact.elasticity.smoothed_stress import smoothed_stress
 from fastcontact.mesh import elements
 from fastcontact.model.model import Model

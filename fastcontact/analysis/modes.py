@@ -19,11 +19,11 @@ from fastcontact.analysis.problem import near_nullspace
 from fastcontact.analysis.stages import stage_of
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.held_motions import HeldMotions
-from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.inertia_loads import Densities
 from fastcontact.elasticity.mass import mass, stress_stiffness
 from fastcontact.elasticity.material_field import MaterialField
+from fastcontact.elasticity.recovery import CellStress
 from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.errors import ModelError, warn

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.sparse import bsr_array
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.energy import cell_volumes, gradients_at, integration_rule
 from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.loads import DensityField
+from fastcontact.elasticity.recovery import CellStress
 from fastcontact.elasticity.stiffness import Sparsity, sparsity
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements

@@ -15,7 +15,6 @@ import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.elasticity import recovery
-from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.mesh import elements
@@ -45,7 +44,7 @@ def smoothed_stress(
         Contribution of temperatures and initial states to the stress.
     """
     components = field.moduli.shape[1]
-    stress = CellStress(mesh, kinematics, field.moduli, displacement, field.treatment, offset)
+    stress = recovery.CellStress(mesh, kinematics, field.moduli, displacement, field.treatment, offset)
     at_nodes = {name: np.empty((*block.shape, components)) for name, block in mesh.solids.items()}
     material = field.distinct
     for number in np.unique(np.concatenate([*material.values()])):

@@ -23,11 +23,11 @@ from fastcontact._tools.html_table import fields_table
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.surface import surface
-from fastcontact.elasticity.cell_stress import CellStress, interpolation
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.loads import check_solids, solid_rows
+from fastcontact.elasticity.recovery import CellStress, interpolation
 from fastcontact.elasticity.smoothed_stress import smoothed_stress
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements

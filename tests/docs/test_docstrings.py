@@ -20,9 +20,7 @@ WITH_EXAMPLES = [path for path in sorted(PACKAGE.rglob("*.py")) if ">>>" in path
 ROOMS = ["analytic", "mesh/generate", "mesh/elements", "mesh/mesh.py", "mesh/quadrature.py", "mesh/quality.py"]
 ROOMS += ["mesh/topology.py", "model/checks.py"]
 ROOMS += [f"elasticity/{name}.py" for name in ("energy", "loads", "materials", "recovery", "springs", "stiffness")]
-ROOMS += [
-    f"elasticity/{name}.py" for name in ("cell_stress", "dilatation", "multipoint_constraints", "smoothed_stress")
-]
+ROOMS += [f"elasticity/{name}.py" for name in ("dilatation", "multipoint_constraints", "smoothed_stress")]
 
 
 @pytest.mark.parametrize("path", WITH_EXAMPLES, ids=lambda path: str(path.relative_to(PACKAGE)))
