@@ -135,7 +135,7 @@ class _Newton:
                     raise
                 log.info("an iterate is rejected: %s", error)  # an equilibrium may exist nevertheless
                 break
-            u, fraction = self._reach(before, target, changes)
+            u, fraction = (target, 1.0) if self._terms.bodies is None else self._reach(before, target, changes)
             balanced = self._balanced(u, contact_force, before)
             if self._terms.bodies is None:
                 if self._is_exact(balanced):
@@ -389,8 +389,7 @@ class _Newton:
         The step is halved until no cells are inverted. After a full step, `changes` decide whether another tangent is needed.
         """
         fraction, bodies = 1.0, self._terms.bodies
-        if bodies is None:
-            return target, fraction
+        assert bodies is not None
         changes = [*changes, self._relative(largest(target - u), target)]
         last = self._has_converged(changes) or (self._reusable is not None and self._tangent_suffices(changes))
         for _ in range(HALVINGS):

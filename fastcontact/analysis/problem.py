@@ -172,7 +172,7 @@ class Problem:
         """Return the loads at an instant of the ramp."""
         prescribed = combined(self.prescribed, self.ramp, instant, self.shape)
         factors = [multiplier(relation.ramp, self.ramp, instant) for relation in self.model.relations]
-        lift = self.system.lift(prescribed.ravel(), self.system.values(factors))
+        lift = self.system.lift(prescribed.ravel(), factors)
         obstacles, clearances, angles, frictions = {}, {}, {}, {}
         for pair in self.model.contact:
             side = self.pairs[pair.name].primary

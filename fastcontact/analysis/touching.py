@@ -16,7 +16,7 @@ from fastcontact.analysis.inequalities import Iterate, StepContext, pair_surface
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Path, Solution
-from fastcontact.arrays import Array, Mask, largest
+from fastcontact.arrays import Array, largest
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
@@ -86,25 +86,21 @@ class Touching:
             return False
         if not len(before) == len(constraints) == len(self._active):  # slips of other constraints are of no use
             return True
-        shift = _shift(before, constraints, self._active, u, step.state.u)
+        difference = _gaps_and_slips(before, u, step.state.u) - _gaps_and_slips(constraints, u, step.state.u)
+        shift = largest(difference[self._active])
         outdated = SINGLE_PRECISION * self._size < shift < self._shift
         self._shift = shift if outdated else self._shift
         return outdated
 
 
-def _shift(before: StackedConstraints, now: StackedConstraints, active: Mask, u: Array, start: Array) -> float:
-    """Return the largest difference of gaps and slips of `active` constraints (m,) between two pairings [length].
+def _gaps_and_slips(constraints: StackedConstraints, u: Array, start: Array) -> Array:
+    """Return the gaps and the slip vectors of constraints, (m, 1 + dim) [length].
 
     Displacements are `u` (n_dofs,), and at the beginning of the step `start` (n_dofs,) [length].
     """
-
-    def gaps_and_slips(constraints: StackedConstraints) -> Array:
-        """Return an array (n_active, 1 + dim) of the gaps and the slip vectors."""
-        tangents = zip(constraints.tangents, constraints.slip0, constraints.directions, strict=True)
-        vectors = [(T @ (u - start) + slip0)[:, None] * direction for T, slip0, direction in tangents]
-        return np.column_stack([constraints.gap0 + constraints.B @ u, np.sum(vectors, axis=0)])[active]
-
-    return largest(gaps_and_slips(before) - gaps_and_slips(now))
+    tangents = zip(constraints.tangents, constraints.slip0, constraints.directions, strict=True)
+    vectors = [(T @ (u - start) + slip0)[:, None] * direction for T, slip0, direction in tangents]
+    return np.column_stack([constraints.gap0 + constraints.B @ u, np.sum(vectors, axis=0)])
 
 
 def _slides(step: StepContext, constraints: StackedConstraints, solution: Solution, allowed: float) -> bool:

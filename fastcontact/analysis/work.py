@@ -70,20 +70,17 @@ class ContactForces:
         rows = nearest(self.positions, positions)[1]
         return self.pressure[rows], self.traction[rows]
 
-    def work_at_closed(self, other: ContactForces, displacement: Array) -> float:
-        """Return half the work of normal forces at constraints that are closed at both ends of the step [energy].
+    def normal_work(self, other: ContactForces, displacement: Array) -> tuple[float, float]:
+        """Return half the work of normal forces in the step, and the energy of penalties where gaps open or close [energy].
 
         `other` are the forces at the other end of the step, and `displacement` (n_points, dim) the displacements in the step
-        [length]. Gaps that open or close in the step are omitted, because no force acts on an open gap.
+        [length]. The work is that at constraints that are closed at both ends, because no force acts on an open gap; the
+        energy is that of constraints without a force at the other end.
         """
         closed = other.at(self.positions)[0] != 0.0
         data, indices, start = self.rows
         opening = csr_array((data, indices, start), shape=(len(start) - 1, displacement.size)) @ displacement.ravel()
-        return -0.5 * float(opening[closed].sum())
-
-    def energy_at_single(self, other: ContactForces) -> float:
-        """Return the energy of normal penalties at constraints without a force at the other end of the step [energy]."""
-        return 0.5 * float(self.energy[other.at(self.positions)[0] == 0.0].sum())
+        return -0.5 * float(opening[closed].sum()), 0.5 * float(self.energy[~closed].sum())
 
 
 @dataclass(frozen=True)
@@ -212,12 +209,10 @@ def contact_work(
     if isinstance(pair.primary, RigidSide):  # relative to the obstacle
         points = pair.secondary.points
         displacement[points] -= pair.carried(Candidates(points[:, None], np.ones((len(points), 1))), configuration)
-    gained = (
-        after.work_at_closed(before, displacement)
-        + before.work_at_closed(after, displacement)
-        + after.energy_at_single(before)
-        - before.energy_at_single(after)
+    (work_after, energy_after), (work_before, energy_before) = (
+        forces.normal_work(other, displacement) for forces, other in ((after, before), (before, after))
     )
+    gained = work_after + work_before + energy_after - energy_before
     added_gap = np.where((after.pressing != 0.0) & (before.pressing != 0.0), after.added - before.added, 0.0)
     gained -= 0.5 * float((after.pressing + before.pressing) @ added_gap)
     gained -= 0.5 * float(((after.tangential + before.tangential) * displacement).sum())

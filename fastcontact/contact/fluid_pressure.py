@@ -20,7 +20,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.surface import Surface
-from fastcontact.linear.sparse_rows import Entries, rows_of
+from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import weighted_area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
@@ -78,7 +78,7 @@ class AreaVectors:
         The derivative is a matrix (n_nodes * dim, n_points * dim) [1 / length].
         """
         dim, n = self.points.shape[1], len(self.side.points)
-        areas, vectors, entries = np.zeros(n), np.zeros((n, dim)), Entries()
+        areas, vectors, blocks = np.zeros(n), np.zeros((n, dim)), list[Blocks]()
         for block in self.side.blocks:
             element, (xi, weights) = elements.get(block.element), fine_rule(block.element)
             N, dN = element.shape(xi), element.gradient(xi)
@@ -93,9 +93,9 @@ class AreaVectors:
                 (nodes[:, :, None] * dim + np.arange(dim)).reshape(len(nodes), -1)
                 for nodes in (block.local, block.facets)
             )
-            entries.add(rows, columns, derivative.reshape(*rows.shape, -1))
+            blocks.append((rows, columns, derivative.reshape(*rows.shape, -1)))
         share = np.divide(1.0, areas, out=np.zeros(n), where=areas > 0.0)
-        by_node = diags_array(np.repeat(share, dim)) @ entries.matrix((n * dim, self.points.size))
+        by_node = diags_array(np.repeat(share, dim)) @ assembled(blocks, (n * dim, self.points.size))
         return vectors * share[:, None], csr_array(by_node)
 
 

@@ -7,7 +7,7 @@ from scipy.sparse import csr_array, eye_array
 
 from fastcontact.arrays import Array, Numbers
 from fastcontact.contact.surface import FacetBlock, Surface
-from fastcontact.linear.sparse_rows import Entries
+from fastcontact.linear.sparse_rows import assembled
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.round_off import SINGLE_PRECISION
@@ -78,11 +78,9 @@ def mass_matrix(surface: Surface, points: Array, axisymmetric: bool) -> csr_arra
     Rows and columns are in the order of ``surface.points``; `points` (n_points, dim) are the coordinates of all points
     [length].
     """
-    entries = Entries()
-    for block in surface.blocks:
-        N, dA = areas_of_rule(block, points, axisymmetric)
-        entries.add(block.local, block.local, np.einsum("fq,qa,qb->fab", dA, N, N))
-    return entries.matrix((len(surface.points), len(surface.points)))
+    rules = [(block.local, *areas_of_rule(block, points, axisymmetric)) for block in surface.blocks]
+    blocks = [(local, local, np.einsum("fq,qa,qb->fab", dA, N, N)) for local, N, dA in rules]
+    return assembled(blocks, (len(surface.points), len(surface.points)))
 
 
 def nodal_areas(surface: Surface, points: Array, axisymmetric: bool) -> Array:

@@ -391,7 +391,7 @@ def along_line_normals(
     points: Array, side: Surface, coordinates: Array, normals: Array, start: Closest
 ) -> tuple[Indices, Array, Array, Array]:
     """Project points (n, 2) onto a line along its interpolated normals; for the other parameters see `along_normals`."""
-    n_facets = side.n_facets
+    n_facets = len(normals)
     corners, at_nodes = np.zeros((n_facets, 3, 2)), np.zeros((n_facets, 3, 2))
     at_nodes[:, : normals.shape[1]] = normals
     counts, ends = np.empty(n_facets, np.intp), np.empty((n_facets, 2), np.intp)

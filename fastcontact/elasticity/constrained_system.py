@@ -79,16 +79,8 @@ class ConstrainedMotion:
         T.eliminate_zeros()
         self.T = T
 
-    def values(self, multiplier: Sequence[float]) -> Array:
-        """Return the right-hand sides (m,) of all equations, given the load multiplier of each constraint."""
-        blocks = [
-            np.full(relation.rows.shape[0], np.asarray(relation.value) * factor)
-            for relation, factor in zip(self.relations, multiplier, strict=True)
-        ]
-        return np.concatenate(blocks) if blocks else np.empty(0)
-
-    def lift(self, prescribed: Array, values: Array) -> Array:
-        """Return t (n,) for prescribed displacements (n,) and right-hand sides (m,) of the constraints [length].
+    def lift(self, prescribed: Array, multipliers: Sequence[float]) -> Array:
+        """Return t (n,) for prescribed displacements (n,) [length] and the load multiplier of each constraint [-].
 
         Raises
         ------
@@ -98,6 +90,11 @@ class ConstrainedMotion:
         held: Array = np.where(self.fixed, prescribed, 0.0)
         if not self.relations:
             return held
+        relations = zip(self.relations, multipliers, strict=True)
+        right_sides = [
+            np.full(relation.rows.shape[0], np.asarray(relation.value) * factor) for relation, factor in relations
+        ]
+        values = np.concatenate(right_sides)
         conditions, known = self._elimination.conditions, np.concatenate([held, values])
         violation = np.abs(conditions @ known)
         violated = np.flatnonzero(violation > CONFLICT * (np.abs(conditions) @ np.abs(known)))

@@ -7,7 +7,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity.loads import Pressure, evaluated
-from fastcontact.linear.sparse_rows import Entries
+from fastcontact.linear.sparse_rows import Blocks, assembled
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import weighted_area_vectors
 from fastcontact.mesh.mesh import Mesh
@@ -46,11 +46,11 @@ class FollowingPressure:
         The derivative is symmetric if the pressure is uniform and the facets enclose a volume or end at supports.
         """
         x = self._mesh.points + displacement
-        forces, entries, dim = np.zeros_like(x), Entries(), x.shape[1]
+        forces, blocks, dim = np.zeros_like(x), list[Blocks](), x.shape[1]
         for facets, N, dN, pressure in self._by_element:
             vectors, K = weighted_area_vectors(x[facets], N, dN, pressure, N, self._axisymmetric)
             np.add.at(forces, facets, -vectors)
             dofs = (facets[:, :, None] * dim + np.arange(dim)).reshape(len(facets), -1)
-            entries.add(dofs, dofs, K.reshape(*dofs.shape, -1))
-        total = entries.matrix((x.size, x.size))
+            blocks.append((dofs, dofs, K.reshape(*dofs.shape, -1)))
+        total = assembled(blocks, (x.size, x.size))
         return forces, csr_array(0.5 * (total + total.T))

@@ -25,7 +25,7 @@ from fastcontact.elasticity.loads import (
     measured_points,
 )
 from fastcontact.errors import ModelError
-from fastcontact.linear.sparse_rows import Entries
+from fastcontact.linear.sparse_rows import Blocks, assembled
 from fastcontact.mesh.mesh import Mesh
 
 
@@ -181,7 +181,7 @@ class Film(TemporaryHeat):
         The powers are those of the ambient rise above `reference` [temperature] at multiplier 1. Raises ModelError if a
         coefficient is negative.
         """
-        entries, powers = Entries(), np.zeros((mesh.n_points, 1))
+        blocks, powers = list[Blocks](), np.zeros((mesh.n_points, 1))
         for element, facets in self.cells(mesh).items():
             x, N, _ = measured_points(mesh, element, facets, kinematics)
             h = evaluated(self.coefficient, x, f"the coefficient of {self.name}")
@@ -190,5 +190,5 @@ class Film(TemporaryHeat):
             h *= measured_points(deformed, element, facets, kinematics)[2]
             rise = evaluated(self.ambient, x, f"the ambient temperature of {self.name}") - reference
             add_density(powers, facets, N, (h * rise)[:, :, None])
-            entries.add(facets, facets, np.einsum("fq,qa,qb->fab", h, N, N))
-        return entries.matrix((mesh.n_points, mesh.n_points)), powers[:, 0]
+            blocks.append((facets, facets, np.einsum("fq,qa,qb->fab", h, N, N)))
+        return assembled(blocks, (mesh.n_points, mesh.n_points)), powers[:, 0]

@@ -46,27 +46,18 @@ class KnownLoads:
         norm = float(np.linalg.norm(f))
         if norm == 0.0:
             return np.zeros_like(f)
-        weights, error = self._projected(f)
-        if len(weights) and np.linalg.norm(error) <= SUM_ROUND_OFF * norm:
-            return sum((w * u for w, u in zip(weights, self._solutions, strict=True)), np.zeros_like(f))
-        f = f / norm
-        u = solve(f)
-        self._keep(f, u)
-        return norm * u
-
-    def _projected(self, f: Array) -> tuple[Array, Array]:
-        """Return the weights of the stored right-hand sides in the least-squares approximation of f, and its error (n,)."""
-        weights, error = np.zeros(len(self._loads)), f
-        if self._loads:
+        if self._loads:  # the least-squares approximation of f
+            weights, error = np.zeros(len(self._loads)), f
             gram = np.array([[row @ column for column in self._loads] for row in self._loads])
             for _ in range(2):  # The second pass removes the error of the normal equations.
                 weights = weights + np.linalg.lstsq(gram, [load @ error for load in self._loads], rcond=None)[0]
                 error = f - sum((w * load for w, load in zip(weights, self._loads, strict=True)), np.zeros_like(f))
-        return weights, error
-
-    def _keep(self, f: Array, u: Array) -> None:
-        """Store the right-hand side f (n,) and its solution u (n,); discard the oldest ones beyond KEPT."""
+            if np.linalg.norm(error) <= SUM_ROUND_OFF * norm:
+                return sum((w * u for w, u in zip(weights, self._solutions, strict=True)), np.zeros_like(f))
+        f = f / norm
+        u = solve(f)
         self._loads, self._solutions = [*self._loads[1 - KEPT :], f], [*self._solutions[1 - KEPT :], u]
+        return norm * u
 
     def snapshot(self) -> list[dict[str, Any]]:
         """Return the stored right-hand sides: the indices ``places`` and the ``values`` of their nonzero entries."""
@@ -74,13 +65,14 @@ class KnownLoads:
 
     def put_back(self, snapshot: Sequence[Mapping[str, Any]], n: int, solve: Callable[[Array], Array]) -> None:
         """Restore the right-hand sides of a `snapshot` for the same matrix (n, n); `solve` computes missing solutions."""
-        stored = list(zip(self._loads, self._solutions, strict=True))
-        self._loads, self._solutions = [], []
+        loads, solutions = [], []
         for entry in snapshot:
             f = np.zeros(n)
             f[entry["places"]] = entry["values"]
-            solutions = [u for load, u in stored if np.array_equal(load, f)]
-            self._keep(f, solutions[0] if solutions else solve(f))
+            stored = [u for load, u in zip(self._loads, self._solutions, strict=True) if np.array_equal(load, f)]
+            loads.append(f)
+            solutions.append(stored[0] if stored else solve(f))
+        self._loads, self._solutions = loads, solutions
 
 
 class FactorSolver(LinearSolver):

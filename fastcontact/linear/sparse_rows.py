@@ -9,30 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, coo_array, csr_array, vstack
 
-from fastcontact.arrays import AnyArray, Array, Indices, Numbers
+from fastcontact.arrays import AnyArray, Array, Indices
+
+# Rows (n, k), columns (n, l) and values (n, k, l) of n dense blocks, such as the matrices of cells.
+Blocks = tuple[NDArray[np.integer], NDArray[np.integer], Array]
 
 
-class Entries:
-    """A sparse matrix that is assembled from dense blocks, such as the matrices of cells."""
-
-    def __init__(self) -> None:
-        self._rows: list[Numbers] = []
-        self._columns: list[Numbers] = []
-        self._values: list[Array] = []
-
-    def add(self, rows: NDArray[np.integer], columns: NDArray[np.integer], values: Array) -> None:
-        """Add n dense blocks `values` (n, k, l) in `rows` (n, k) and `columns` (n, l); zeros are not stored."""
+def assembled(blocks: Sequence[Blocks], size: tuple[int, int]) -> csr_array:
+    """Return the matrix of shape `size` that is the sum of dense blocks; zeros are not stored."""
+    entries = []
+    for rows, columns, values in blocks:
         nonzero = np.flatnonzero(values)
-        self._rows.append(np.broadcast_to(rows[:, :, None].astype(np.int32), values.shape).ravel()[nonzero])
-        self._columns.append(np.broadcast_to(columns[:, None, :].astype(np.int32), values.shape).ravel()[nonzero])
-        self._values.append(values.ravel()[nonzero])
-
-    def matrix(self, size: tuple[int, int]) -> csr_array:
-        """Return the matrix of shape `size`; entries at the same position are added up."""
-        if not self._rows:
-            return csr_array(size)
-        positions = np.concatenate(self._rows), np.concatenate(self._columns)
-        return csr_array(coo_array((np.concatenate(self._values), positions), shape=size))
+        row, column = rows[:, :, None].astype(np.int32), columns[:, None, :].astype(np.int32)
+        positions = (np.broadcast_to(index, values.shape).ravel()[nonzero] for index in (row, column))
+        entries.append((values.ravel()[nonzero], *positions))
+    if not entries:
+        return csr_array(size)
+    data, row, column = map(np.concatenate, zip(*entries, strict=True))
+    return csr_array(coo_array((data, (row, column)), shape=size))
 
 
 def shapes_at(shape: Array, local: NDArray[np.integer], n_nodes: int) -> csr_array:

@@ -201,7 +201,7 @@ class Model(ModelSupports):
         motion = ConstrainedMotion(fixed.ravel(), relations)
         for instant in ramp.instants:
             lift = combined(prescribed, ramp, instant, fixed.shape)
-            motion.lift(lift.ravel(), motion.values([multiplier(r.ramp, ramp, instant) for r in relations]))
+            motion.lift(lift.ravel(), [multiplier(r.ramp, ramp, instant) for r in relations])
 
     def _check_motions(self, fixed: Mask, forces: Sequence[Array]) -> None:
         """Raise ModelError if a rigid-body motion is possible.

@@ -177,10 +177,7 @@ def _with_chosen(
     else:
         lag = -free - (F @ y0.ravel()).reshape(free.shape)
         lag[0] += closing[0]
-
-        def increment(offset: Array, carrying: Mask, closed: Mask, guess: Array | None) -> Forces:
-            return _with_forces_among(F, free + offset, mu, carrying, closed, equations, guess)
-
+        increment = partial(_increment, F, free, mu, equations)
         result, gaps_of_chosen, before = in_increments(lag, closing, y0, path.waiting[rows], increment)
     y = result.y
     if Q is not None:
@@ -271,11 +268,11 @@ def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
     F[np.arange(len(rows)), np.arange(len(rows))] += constraints.softness[rows]
 
 
-def _with_forces_among(
-    F: Array, free: Array, mu: Array, carrying: Mask, closed: Mask, equality: Mask, start: Array | None
+def _increment(
+    F: Array, free: Array, mu: Array, equality: Mask, offset: Array, carrying: Mask, closed: Mask, start: Array | None
 ) -> Forces:
-    """Return the solution of `dense.solve` if only the constraints `carrying` (m,) carry forces."""
-    rows = np.flatnonzero(carrying)
+    """Return the solution of `dense.solve` if only the constraints `carrying` (m,) carry forces; see `Increment`."""
+    free, rows = free + offset, np.flatnonzero(carrying)
     unknown = (np.arange(len(free))[:, None] * len(carrying) + rows).ravel()
     start = None if start is None else start[:, rows]
     result = dense.solve(F[np.ix_(unknown, unknown)], free[:, rows], mu[rows], closed[rows], start, equality[rows])

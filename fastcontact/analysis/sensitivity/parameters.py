@@ -312,8 +312,7 @@ def _of_prescribed_values(contact: MovingContact, values: Array, relation_number
         multiplier(relation.ramp, problem.ramp, contact.instant) if i in relation_numbers else 0.0
         for i, relation in enumerate(problem.model.relations)
     ]
-    lift = problem.system.lift(values.ravel(), problem.system.values(factors))
-    return replace(_zero_change(contact), lift=lift)
+    return replace(_zero_change(contact), lift=problem.system.lift(values.ravel(), factors))
 
 
 def _with_motion(model: Model, parameter: Label) -> ContactPair:
@@ -333,7 +332,7 @@ def _of_motion(contact: MovingContact, parameter: Label) -> Change:
         values = np.zeros(len(contact.u))
         values[problem.force_driven.dofs(number)] = motion
         zero_factors = [0.0] * len(problem.model.relations)
-        return replace(_zero_change(contact), lift=problem.system.lift(values, problem.system.values(zero_factors)))
+        return replace(_zero_change(contact), lift=problem.system.lift(values, zero_factors))
 
     def changed(increment: float) -> MovingContact:
         obstacles = {**contact.load.obstacles, name: contact.load.obstacles[name] + increment * motion}

@@ -40,7 +40,7 @@ from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_
 from fastcontact.contact.search.limits import BEYOND
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
-from fastcontact.linear.sparse_rows import Entries, rows_of, scaled
+from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, scaled
 from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
@@ -191,7 +191,7 @@ class WeightedMortar(Formulation):
         """
         at, is_loaded, overlap = replace(at, displacement=displacement), multiplier != 0.0, coverage.overlap
         deformed = self.points + displacement
-        functions, tests, first, first_facet = Entries(), Entries(), 0, 0
+        functions, tests, first, first_facet = list[Blocks](), list[Blocks](), 0, 0
         nodes, shapes, facets, opposite, corners = [], [], [], [], []
         of_blocks = zip(self.secondary.blocks, self._test, coverage.functions, strict=True)
         for number, (block, T, (psi, _)) in enumerate(of_blocks):
@@ -202,8 +202,9 @@ class WeightedMortar(Formulation):
                 opposite.append(inside.opposite[kept])
                 corners.append(block.facets[facet, : elements.get(block.element).n_corners])
             columns = first + np.arange(len(facet))[:, None]
-            functions.add(block.local[facet], columns, np.einsum("qak,qk,q->qa", psi[facet], shape, area)[:, :, None])
-            tests.add(block.local[facet], columns, (area[:, None] * (shape @ T.T))[:, :, None])
+            local, psi_at = block.local[facet], np.einsum("qak,qk,q->qa", psi[facet], shape, area)
+            functions.append((local, columns, psi_at[:, :, None]))
+            tests.append((local, columns, (area[:, None] * (shape @ T.T))[:, :, None]))
             nodes.append(block.facets[facet])
             shapes.append(shape)
             facets.append(first_facet + facet)
@@ -222,8 +223,8 @@ class WeightedMortar(Formulation):
         along = "facet" if self.normals == "secondary" else self.normals
         rise = self.rise(candidates, pairing, rows, deformed)
         points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, direction, rise)
-        weighted = scaled(csr_array(functions.matrix(size)[:, rows]), 1.0 / weight)
-        mean = csr_array(tests.matrix(size)[:, rows])
+        weighted = scaled(csr_array(assembled(functions, size)[:, rows]), 1.0 / weight)
+        mean = csr_array(assembled(tests, size)[:, rows])
         separate_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
             column = self.secondary.points[:, None]
@@ -348,18 +349,18 @@ class WeightedMortar(Formulation):
         """
         overlap = coverage.overlap
         size = (len(self.secondary.points), len(self.points))
-        rows, across, functions = Entries(), Entries(), {}
+        rows, across, functions = list[Blocks](), list[Blocks](), {}
         closer = np.zeros((size[0], self.points.shape[1]))
         of_blocks = zip(self.secondary.blocks, coverage.functions, overlap.closer, strict=True)
         for block, (psi, products), depth in of_blocks:
-            rows.add(block.local, block.facets, products)
+            rows.append((block.local, block.facets, products))
             functions[block.element] = psi
             np.add.at(closer, block.local, psi @ depth)
         for coupling in overlap.couplings:
             secondary_facet, primary_facet = coupling.pairs.T
             values = functions[coupling.secondary.element][secondary_facet] @ coupling.integrals
-            across.add(coupling.secondary.local[secondary_facet], coupling.primary.facets[primary_facet], values)
-        return rows.matrix(size), across.matrix(size), closer
+            across.append((coupling.secondary.local[secondary_facet], coupling.primary.facets[primary_facet], values))
+        return assembled(rows, size), assembled(across, size), closer
 
     def _coverage(self, overlap: Overlap, weights: list[Array], kept: Mask) -> Coverage:
         """Return the coverage with the functions psi of the nodes `kept` (m,)."""

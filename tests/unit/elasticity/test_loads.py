@@ -227,7 +227,7 @@ def test_coupling_to_a_support_prescribes_all():
     model.prescribe("TOP_LEFT", y=0.25)
     fixed, values = model.prescribed()
     motion = ConstrainedMotion(fixed.ravel(), model.relations)
-    lift = motion.lift(values.ravel(), motion.values([1.0])).reshape(-1, 2)
+    lift = motion.lift(values.ravel(), [1.0]).reshape(-1, 2)
     assert lift[mesh.points_of("TOP"), 1] == pytest.approx(0.25)
 
 
