@@ -94,6 +94,8 @@ def contact_result(
     forces, total, primary_points, primary_forces = _forces(pair, constraints, multiplier, tangential)
     finite_normal = np.where(np.isfinite(normal), normal, 0.0)
     middle = contact_middle(pair, finite_normal, np.einsum("nd,nd->n", forces, finite_normal), closed, gap)
+    place, along = middle.places(constraints.positions), middle.tangent
+    across = place if along is None else (constraints.positions - middle.position) @ along
     fluid = None if pair.options.source is None else np.zeros(len(points))
     if constraints.wetted is not None:
         fluid = constraints.wetted.pressure
@@ -120,7 +122,7 @@ def contact_result(
         normal=normal,
         active=closed,
         force=total,
-        radius=half_width(middle.places(constraints.positions), active, middle.across(constraints.positions)),
+        radius=half_width(place, active, across),
         shear=shear,
         sticking=closed & sticking,
         middle=middle.position,

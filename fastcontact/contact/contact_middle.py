@@ -144,10 +144,6 @@ class ContactMiddle:
     ignored: tuple[int, ...] = ()
     tangent: Array | None = None
 
-    def across(self, positions: Array) -> Array:
-        """Return the distances (n,) of reference positions (n, dim) along `tangent` or, without it, `places` [length]."""
-        return self.places(positions) if self.tangent is None else (positions - self.position) @ self.tangent
-
     def places(self, positions: Array) -> Array:
         """Return the distances (n,) of reference positions (n, dim) from the middle, with a sign along a line [length]."""
         if self.line is not None:

@@ -59,31 +59,17 @@ class Places:
 
 def places(side: Surface, facet: Indices, xi: Array) -> Places:
     """Return the points of `side` at the reference coordinates `xi` (n, dim - 1) in the facets numbered `facet` (n,)."""
-    if len(side.blocks) == 1:
-        return _of_block(side.blocks[0], facet, xi)
-    width = max(block.facets.shape[1] for block in side.blocks)
-    n = len(facet)
-    projected = Places(
-        np.empty((n, width), np.int32),
-        np.empty((n, width), np.intp),
-        np.zeros((n, width)),
-        np.zeros((n, width, xi.shape[1])),
-    )
-    first = 0
+    width, n, first = max(block.facets.shape[1] for block in side.blocks), len(facet), 0
+    nodes, local = np.empty((n, width), np.int32), np.empty((n, width), np.intp)
+    shape, gradient = np.zeros((n, width)), np.zeros((n, width, xi.shape[1]))
     for block in side.blocks:
-        in_block = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
-        of_block, k = _of_block(block, facet[in_block] - first, xi[in_block]), block.facets.shape[1]
+        rows = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
+        element, number, k = elements.get(block.element), facet[rows] - first, block.facets.shape[1]
         columns = np.minimum(np.arange(width), k - 1)
-        projected.nodes[in_block], projected.local[in_block] = of_block.nodes[:, columns], of_block.local[:, columns]
-        projected.shape[in_block, :k], projected.gradient[in_block, :k] = of_block.shape, of_block.gradient
+        nodes[rows], local[rows] = block.facets[number][:, columns], block.local[number][:, columns]
+        shape[rows, :k], gradient[rows, :k] = element.shape(xi[rows]), element.gradient(xi[rows])
         first += len(block.facets)
-    return projected
-
-
-def _of_block(block: FacetBlock, rows: Indices, xi: Array) -> Places:
-    """Return the points at reference coordinates `xi` (n, dim - 1) in the facets `rows` (n,) of a block."""
-    element = elements.get(block.element)
-    return Places(block.facets[rows], block.local[rows], element.shape(xi), element.gradient(xi))
+    return Places(nodes, local, shape, gradient)
 
 
 def at_common_edges(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, Indices, Array]:

@@ -93,6 +93,7 @@ class FactorSolver(LinearSolver):
         Number of unknowns.
     last : ndarray of int (m,) or None
         The unknowns that are eliminated last, if any.
+    factors : SymmetricFactors
     """
 
     name: str
@@ -102,7 +103,7 @@ class FactorSolver(LinearSolver):
         self.tolerance = ATTAINABLE
         self.counters = Counters()
         self.n = 0
-        self._factors: SymmetricFactors
+        self.factors: SymmetricFactors
         self.last: Indices | None = None
 
     def __repr__(self) -> str:
@@ -124,12 +125,12 @@ class FactorSolver(LinearSolver):
         """
         self.n, self._K, self.refines = K.shape[0], K, False
         last = np.empty(0, np.intp) if involved is None or len(involved) > LAST_UP_TO else involved
-        self._factors = self._factorised(K, last)
+        self.factors = self._factorised(K, last)
         self.counters.setups += 1
-        self.columns, self.known_loads = InverseColumns(self.n, self._factors.inverse_entries), KnownLoads()
+        self.columns, self.known_loads = InverseColumns(self.n, self.factors.inverse_entries), KnownLoads()
         self.last = last if len(last) else None
         if self.last is not None:
-            self.inverse = self._factors.last_inverse()
+            self.inverse = self.factors.last_inverse()
             self.columns.give(self.last, self.inverse)
         return K
 
@@ -151,7 +152,7 @@ class FactorSolver(LinearSolver):
         """See `LinearSolver.put_back`."""
         self.refines = snapshot.get("refines", False)
         self.columns.put_back(snapshot["asked"])
-        self.known_loads.put_back(snapshot["loads"], self.n, self._factors.solve)
+        self.known_loads.put_back(snapshot["loads"], self.n, self.factors.solve)
 
     def improve(self, excess: float) -> bool:
         """Apply one step of iterative refinement in later solutions; see `LinearSolver.improve`."""
@@ -169,12 +170,7 @@ class FactorSolver(LinearSolver):
     def back_substitute(self, f: Array) -> Array:
         """Return ``K^-1 f`` (n,)."""
         self.counters.iterations += 1
-        return self._factors.solve(f)
-
-    def extend(self, u: Array) -> Array:
-        """Return the displacements (n,) under forces on the unknowns `last` alone, given those of `last`, u (m,) [length]."""
-        self.counters.iterations += 1
-        return self._factors.extended(u)
+        return self.factors.solve(f)
 
 
 class LoadedFactor:
@@ -218,7 +214,8 @@ class LoadedFactor:
         change = self._change_of_last(force)
         if change is None:
             return self._solver.back_substitute(self._f + force)
-        return self._free + self._solver.extend(change)
+        self._solver.counters.iterations += 1
+        return self._free + self._solver.factors.extended(change)
 
     def condensed(self) -> CondensedProblem | None:
         """See `Loaded`."""

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,7 +147,13 @@ class WeightedMortar(Formulation):
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
         geometry = partial(self._linearised, at, coverage, normal, weight)
         constraints = Constraints(
-            B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=self._nodal(weight), geometry=geometry
+            B,
+            gap0,
+            self.points[points],
+            areas=weight,
+            nodes=nodes,
+            geometry=geometry,
+            nodal=WeightedPressures(weight, *self._whole_side),
         )
         if not self.slides:
             return constraints
@@ -273,28 +279,20 @@ class WeightedMortar(Formulation):
         area = 0.25 * size[:, None] * weights
         return OverlapPoints(facet, element.shape(xi.reshape(-1, 2)), area.ravel(), opposite)
 
-    def _nodal(self, weight: Array) -> WeightedPressures:
-        """Return the nodal interpretation of forces; `weight` (m,) are the areas of the gaps [area]."""
-        quadratic = [
-            (elements.get(block.element).n_corners, T, block.local)
-            for block, T in zip(self.secondary.blocks, self._test, strict=True)
-            if elements.get(block.element).order == 2
-        ]
-        m = len(self.secondary.points)
-        held = np.zeros(m, bool)
+    @cached_property
+    def _whole_side(self) -> tuple[Array, Array, list[Any], Mask]:
+        """The attributes of `WeightedPressures` that are the same in all pairings."""
+        full_area, quadratic = nodal_areas(self.secondary, self.points, self.axisymmetric), []
+        tested, held = np.zeros_like(full_area), np.zeros(len(full_area), bool)
+        for block, T, full in zip(self.secondary.blocks, self._test, self._whole, strict=True):
+            np.add.at(tested, block.local, full)
+            element = elements.get(block.element)
+            if element.order == 2:
+                quadratic.append((element.n_corners, T, block.local))
         if self.held is not None:
             projectors = self.held.at(self.secondary.points)
-            held[:] = np.trace(projectors, axis1=1, axis2=2) > self.points.shape[1] - 0.5
-        return WeightedPressures(weight, *self._areas, quadratic, held)
-
-    @cached_property
-    def _areas(self) -> tuple[Array, Array]:
-        """The integrals (m,) of the test functions and of the shape functions over the whole secondary side [area]."""
-        full_area = nodal_areas(self.secondary, self.points, self.axisymmetric)
-        tested = np.zeros_like(full_area)
-        for block, full in zip(self.secondary.blocks, self._whole, strict=True):
-            np.add.at(tested, block.local, full)
-        return tested, full_area
+            held = np.trace(projectors, axis1=1, axis2=2) > self.points.shape[1] - 0.5
+        return tested, full_area, quadratic, held
 
     def _closing(self, constraints: Constraints, normal: Array, at: Configuration) -> tuple[Array, Array]:
         """Return the lengths (m,) by which gaps close in the step [length], and the directions (m, dim) of this motion.
