@@ -135,9 +135,9 @@ def test_tangents_share_an_order_with_fewer_entries():
     for factor, tangent in enumerate(tangents, 2):
         tangent.prepare(factor * K, none, last)
         f = np.random.default_rng(3).normal(size=n * n)
-        np.testing.assert_allclose(factor * tangent._factors.solve(f), solver._factors.solve(f), rtol=1e-10)
-    fewer = [tangent._factors.nnz for tangent in tangents]
-    assert fewer[0] == fewer[1] < 0.95 * solver._factors.nnz
+        np.testing.assert_allclose(factor * tangent.factors.solve(f), solver.factors.solve(f), rtol=1e-10)
+    fewer = [tangent.factors.nnz for tangent in tangents]
+    assert fewer[0] == fewer[1] < 0.95 * solver.factors.nnz
     assert tangents[0]._symbolic[True] is tangents[1]._symbolic[True]
 
 
@@ -147,7 +147,7 @@ def test_solutions_are_those_of_dense_algebra(name, last):
     K, _, solver = prepared(name, last)
     f = np.random.default_rng(3).normal(size=K.shape[0])
     exact = np.linalg.solve(K.toarray(), f)
-    np.testing.assert_allclose(solver._factors.solve(f), exact, atol=1e-12 * np.abs(exact).max())
+    np.testing.assert_allclose(solver.factors.solve(f), exact, atol=1e-12 * np.abs(exact).max())
     assert solver.counters.setups == 1
 
 
@@ -160,7 +160,7 @@ def test_entries_of_the_inverse_are_those_of_dense_algebra(name, last, monkeypat
     for together in (128, 5):
         monkeypatch.setattr(symmetric_factors, "TOGETHER", together)
         for rows, columns in ((top, top[::-1]), (rng.permutation(len(exact))[:50], np.array([7])), (top, np.arange(0))):
-            found = solver._factors.inverse_entries(rows, columns)
+            found = solver.factors.inverse_entries(rows, columns)
             np.testing.assert_allclose(found, exact[np.ix_(rows, columns)], atol=1e-13 * np.abs(exact).max())
 
 
