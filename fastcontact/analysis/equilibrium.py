@@ -393,11 +393,6 @@ class StepEquilibrium:
     newton: list[dict[str, Any]] = field(default_factory=list)
 
     @property
-    def bodies(self) -> DeformedBodies | None:
-        """The nonlinear bodies at the displacements u; None if bodies are linear."""
-        return None if self.terms.bodies is None else self.terms.bodies.at(self.u)
-
-    @property
     def history(self) -> list[dict[str, Any]]:
         """Convergence data of each pairing of the contact surfaces."""
         return self.settled.iterate.history if self.settled is not None else []

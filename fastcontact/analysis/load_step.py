@@ -116,7 +116,8 @@ def _end_of_step(
             free = problem.floating_bodies.undetermined(*forces, u, end.largest_rigid_force, balance.residual)
             iterations["regularised"]["undetermined"] = free
     end = replace(end, solver=problem.solver.snapshot())
-    result = recover(problem, end, contact, balance.reaction, iterations, instant, solution.bodies)
+    bodies = None if solution.terms.bodies is None else solution.terms.bodies.at(u)
+    result = recover(problem, end, contact, balance.reaction, iterations, instant, bodies)
     return end, result if heated is None else heated.completed(problem, result)
 
 

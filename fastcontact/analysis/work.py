@@ -253,23 +253,14 @@ def _forces(
     if constraints.law is not None:  # The energy of the law is not that of a linear spring.
         energy = 2.0 * constraints.finite_areas * constraints.law.energy(normal * inverse_area)
         penetration = np.divide(energy, normal, out=np.zeros_like(normal), where=normal != 0.0)
+    stored = float(normal @ penetration) + float(constraints.tangential_softness @ (tangents**2).sum(axis=1))
+    all_forces = np.column_stack([normal, tangents]).T
+    amplitudes = np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)])
     return ContactForces(
         constraints.positions, normal * inverse_area, force * inverse_area[:, None], penetration * normal,
         (rows.data, rows.indices, rows.indptr), nodal_forces.reshape(-1, dim),
-        np.einsum("nd,nd->n", force_vectors, normals), added, _stored(constraints, normal, tangents, penetration),
+        np.einsum("nd,nd->n", force_vectors, normals), added, 0.5 * (stored + float((amplitudes**2).sum())),
     )  # fmt: skip
-
-
-def _stored(constraints: Constraints, normal: Array, tangents: Array, penetration: Array) -> float:
-    """Return the energy stored in penalties [energy].
-
-    `normal` (m,) and `tangents` (m, k) are normal and tangential forces [force], and `penetration` (m,) the penetrations
-    under the normal forces [length].
-    """
-    total = float(normal @ penetration) + float(constraints.tangential_softness @ (tangents**2).sum(axis=1))
-    all_forces = np.column_stack([normal, tangents]).T
-    amplitudes = np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)])
-    return 0.5 * (total + float((amplitudes**2).sum()))
 
 
 def _no_forces(forces: ContactForces) -> ContactForces:
