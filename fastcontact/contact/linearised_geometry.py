@@ -479,7 +479,9 @@ class Slips:
         if self.turning is not None:
             change -= _weighted(weights, points.motion @ du @ self.turning)
         if self.closing is not None:
-            change += self.closing.along(du, (normal, turned), primary, by_sliding(self.start))
+            # The openings that weighted gaps close are those of smooth surfaces, whose variation `foot` contains.
+            of_start = by_sliding(self.start) if self.closing.along_mean else -change - _weighted(weights, varied.foot)
+            change += self.closing.along(du, (normal, turned), primary, of_start)
         leaning = np.einsum("nd,nd->n", normal, self.total)
         T = self.tangents
         return np.einsum("knd,nd->kn", T, change) - np.einsum("knd,nd,n->kn", T, turned, leaning)

@@ -236,7 +236,7 @@ class WeightedMortar(Formulation):
         directions, length = slipping
         slips = self._sliding(means.motion, directions, tangential, at)
         if not isinstance(self.primary, RigidSide) and self.slip == "symmetric":
-            opening = means.motion @ slips.start
+            opening = means.motion @ slips.start - means.closer
             closing = Closing.of(means.normal, NodalNormals(self.secondary, deformed), opening, length)
             slips = replace(slips, total=slips.total + closing.vector, closing=closing)
         return replace(linearised, slips=slips)
