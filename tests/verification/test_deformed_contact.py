@@ -318,7 +318,7 @@ def loose_blocks(mesh, **options):
     return model
 
 
-# The derivative of weighted gaps in 3D is a one-sided difference. In the plane and on obstacles it leaves out how weights move.
+# The derivative of weighted gaps is a one-sided difference in 3D. In 2D and on obstacles it leaves out how weights move.
 EXACT, WEIGHTED, DIFFERENCE = 1e-7, 0.01, 1e-5
 # In planes of symmetry friction acts through the functions of neighbours, whose variation is left out.
 SYMMETRY = 0.05
