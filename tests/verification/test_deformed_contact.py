@@ -280,6 +280,15 @@ def blocks(mesh, drawn=None, **options):
     return model
 
 
+def punch(mesh, **options):
+    """A block pressed into a wider one, whose facets are secondary and partly covered at the ends of the punch."""
+    sizes = {"size_lower": (14.0, 4.0), "size_upper": (6.0, 3.0), "shift": 4.03}
+    mesh = fc.generate.block_on_block(mesh, **sizes, divisions_lower=(14, 4), divisions_upper=(9, 4))
+    model = elastic_model(mesh, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.05, "y": -0.05})
+    model.add_contact("hertz", secondary="CONT_LOWER", primary="CONT_UPPER", **options)
+    return model
+
+
 def shell(element, divisions, radii, angle, group, double):
     """Part of a hollow cylinder or sphere, with `group` on one of its curved sides."""
     inside, outside = radii
@@ -318,7 +327,8 @@ def loose_blocks(mesh, **options):
     return model
 
 
-# The derivative of weighted gaps is a one-sided difference in 3D. In 2D and on obstacles it leaves out how weights move.
+# The derivative of weighted gaps is a one-sided difference in 3D and where the primary side ends. Otherwise, it leaves out how
+# weights move.
 EXACT, WEIGHTED, DIFFERENCE = 1e-7, 0.01, 1e-5
 # In planes of symmetry friction acts through the functions of neighbours, whose variation is left out.
 SYMMETRY = 0.05
@@ -341,6 +351,8 @@ DERIVATIVES = [
     (blocks, "quad4", {"formulation": "node_to_segment", **FRICTION}, EXACT),
     (blocks, "quad8", {"formulation": "continuous", **FRICTION}, EXACT),
     (blocks, "quad4", {"formulation": "mortar", "multipliers": "dual", **FRICTION}, WEIGHTED),
+    (punch, "quad4", {"formulation": "mortar", "multipliers": "dual"}, DIFFERENCE),
+    (punch, "quad8", {"formulation": "mortar", "multipliers": "dual", **FRICTION}, DIFFERENCE),
     (ball_on_block, "tet4", {"formulation": "node_to_segment"}, EXACT),
     (ball_on_block, "tet4", {"formulation": "node_to_segment", **FRICTION}, EXACT),
     (ball_on_block, "hex8", {"formulation": "continuous", **FRICTION}, EXACT),
@@ -452,6 +464,8 @@ def test_forces_gaps_and_slips_vary_as_their_differences(make, mesh, options, er
         (blocks, "quad4", {"formulation": "node_to_segment", **FRICTION}, 4),
         (blocks, "quad4", {"formulation": "mortar", "slip": "primary", **FRICTION}, 5),
         (blocks, "quad8", {"formulation": "continuous", **FRICTION}, 5),
+        (punch, "quad4", {"formulation": "mortar", "multipliers": "dual", **FRICTION}, 4),
+        (punch, "quad8", {"formulation": "mortar", "multipliers": "dual"}, 4),
         (ball_on_block, "tet4", {"formulation": "node_to_segment", **FRICTION}, 4),
         (ball_on_block, "hex8", {"formulation": "continuous", **FRICTION}, 5),
         (ball_on_block, "hex8", FRICTION, 5),

@@ -225,7 +225,9 @@ class WeightedMortar(Formulation):
         `slipping` are tangents (k, m, dim), and lengths (m,) by which gaps close.
         """
         at, deformed = replace(at, displacement=displacement), self.points + displacement
-        if isinstance(self.primary, RigidSide) or deformed.shape[1] == 2:
+        if isinstance(self.primary, RigidSide) or (
+            deformed.shape[1] == 2 and not self._partly_covered(means, multiplier)
+        ):
             linearised = self._at_points(at, means, multiplier)
         else:
             sides = np.concatenate([self.secondary.points, self.primary.points])
@@ -241,10 +243,21 @@ class WeightedMortar(Formulation):
             slips = replace(slips, total=slips.total + closing.vector, closing=closing)
         return replace(linearised, slips=slips)
 
+    def _partly_covered(self, means: Means, multiplier: Array) -> bool:
+        """Return whether facets that carry forces are partly covered."""
+        partly = False
+        for block, weights, whole in zip(self.secondary.blocks, means.coverage.weights, self._whole, strict=True):
+            covered = weights.sum(axis=1) / whole.sum(axis=1)
+            partly |= bool(
+                (multiplier[block.local].any(axis=1) & (covered > NO_AREA) & (covered < 1.0 - NO_AREA)).any()
+            )
+        return partly
+
     def _at_points(self, at: Configuration, means: Means, multiplier: Array) -> Linearised:
         """Return the linearisation of contact forces and mean gaps by the projections of the integration points.
 
-        Segments are constant, because the variation of the cuts has no effect if the integrand is continuous across them.
+        Segments are constant, because the variation of the cuts has no effect if the integrand is continuous across them, as
+        it is except at ends of the primary side.
         """
         deformed, is_loaded, overlap = self.points + at.displacement, multiplier != 0.0, means.coverage.overlap
         functions, tests, first, first_facet = Entries(), Entries(), 0, 0
