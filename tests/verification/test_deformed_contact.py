@@ -327,8 +327,8 @@ def loose_blocks(mesh, **options):
     return model
 
 
-# The derivative of weighted gaps is a one-sided difference in 3D and where the primary side ends. Otherwise, it leaves out how
-# weights move.
+# The derivative of weighted gaps is a one-sided difference in 3D and where the primary side ends. Elsewhere it leaves out
+# how weights move.
 EXACT, WEIGHTED, DIFFERENCE = 1e-7, 0.01, 1e-5
 # In planes of symmetry friction acts through the functions of neighbours, whose variation is left out.
 SYMMETRY = 0.05
