@@ -25,7 +25,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.arrays import AnyArray, Array, Indices
+from fastcontact.arrays import Array, Indices, largest
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, Pairing, tangents
 from fastcontact.contact.projection import (
@@ -39,7 +39,6 @@ from fastcontact.contact.projection import (
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.mesh import elements
-from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.round_off import DIFFERENCES, TINY
 
 
@@ -157,37 +156,6 @@ class InterpolatedNormals:
         return across(self.normal, self._local @ self._nodal.along(du)) / self._length
 
 
-class PolygonNormals:
-    """Unit normals of polygons, and their variation.
-
-    Parameters
-    ----------
-    corners : ndarray of int (n, k)
-        Points of the mesh at the corners of the polygons.
-    coordinates : ndarray (n_points, 3)
-        Coordinates of all points [length].
-
-    Attributes
-    ----------
-    normal : ndarray (n, 3)
-        Normals, with the orientation of `flat_area_vectors` [-].
-    """
-
-    def __init__(self, corners: AnyArray, coordinates: Array) -> None:
-        self._corners, at = corners, coordinates[corners]
-        self._spokes = at[:, 1:] - at[:, :1]
-        vector = flat_area_vectors(at)
-        self._area = np.linalg.norm(vector, axis=1, keepdims=True)
-        self.normal = vector / self._area
-
-    def along(self, du: Array) -> Array:
-        """See `NodalNormals.along`."""
-        displaced, spokes = du[self._corners], self._spokes
-        varied = displaced[:, 1:] - displaced[:, :1]
-        vector = 0.5 * (np.cross(varied[:, :-1], spokes[:, 1:]) + np.cross(spokes[:, :-1], varied[:, 1:])).sum(axis=1)
-        return across(self.normal, vector) / self._area
-
-
 def across(normal: Array, vector: Array) -> Array:
     """Return the components of vectors (n, dim) perpendicular to unit vectors (n, dim)."""
     return np.asarray(vector - np.einsum("nd,nd->n", normal, vector)[:, None] * normal)
@@ -200,6 +168,8 @@ class Variation(NamedTuple):
     ----------
     xi : ndarray (n, dim - 1)
         Variation of the reference coordinates of the facing points [-].
+    motion : csr_array (n, n_points)
+        Variation of the matrix `motion` of the points [-].
     foot : ndarray (n, dim)
         Variation of the positions of the facing points, on the smooth surface if there is one, due to that of xi, with fixed
         facets [length].
@@ -208,6 +178,7 @@ class Variation(NamedTuple):
     """
 
     xi: Array
+    motion: csr_array
     foot: Array
     normal: Array
 
@@ -227,9 +198,9 @@ class _SurfacePoints:
         Coordinates of the pairing [length].
     normals : str or tuple of float
         Normals of the primary side: ``"facet"``, ``"averaged"``, or a fixed vector.
-    direction : PolygonNormals or bool
-        Direction of the projection: False for the normals, True for the closest points on the primary side, or other
-        directions. The first two coincide for facet normals.
+    closest : bool
+        Whether points face the closest points on the primary side, instead of projections along the normals. Both coincide
+        for facet normals.
     rise : ndarray (n, dim - 1), optional
         Derivatives of the heights of a smooth primary surface above its facets with respect to reference coordinates, see
         `surface_smoothing` [length].
@@ -250,19 +221,17 @@ class _SurfacePoints:
 
     def __init__(
         self, candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface, coordinates: Array,
-        normals: object, direction: PolygonNormals | bool, rise: Array | None,
+        normals: object, closest: bool, rise: Array | None,
     ) -> None:  # fmt: skip
         at, n_points, facet = pairing.places(primary, rows), len(coordinates), pairing.facet[rows]
         nodes, shape = np.hstack([candidates.nodes[rows], at.nodes]), np.hstack([candidates.shape[rows], -at.shape])
         self.motion = shapes_at(shape, nodes, n_points)
-        self._slopes = [shapes_at(slope, at.nodes, n_points) for slope in np.moveaxis(at.gradient, 2, 0)]
-        self._spreading = [csr_array(matrix.T) for matrix in (self.motion, *self._slopes)]
-        self.axes = self.slopes(coordinates)
+        self._at = at
+        self.axes = self._slopes(coordinates)
         self.apart = self.motion @ coordinates
         self.normal, self.averaged = pairing.normal[rows], None
         self._bend = np.zeros_like(self.axes)
         self._facet: Array | None = None  # facet normals, where these vary
-        closest = direction is True
         if normals == "facet" or closest:
             self._facet, bend = self.normal, self._facet_bend(primary, coordinates, facet, pairing.xi[rows], at)
         if normals == "facet":
@@ -275,17 +244,12 @@ class _SurfacePoints:
         # With the tangent vectors a_i, the distance g along the direction d of the projection, and the motion v of points
         # relative to the facing points, ``a_i dxi_i + g dd = dv``. The component along d is eliminated.
         along, bend = (pairing.normal[rows], bend) if closest else (self.normal, self._bend)
-        if isinstance(direction, PolygonNormals):
-            along, bend = direction.normal, np.zeros_like(self.axes)
         frame = np.stack(tangents(along), axis=1)
-        self._direction, self._bent = direction, normals == "facet"
+        self._closest, self._bent = closest, normals == "facet"
         self._gap = np.einsum("nd,nd->n", self.apart, along)[:, None]
         inverse = np.linalg.inv(np.einsum("ntd,nid->nti", frame, self.axes + self._gap[:, :, None] * bend))
         self._inverse = inverse @ frame
         self._foot = self.axes if rise is None else self.axes + rise[:, :, None] * self.normal[:, None]
-        self._smooth = rise is not None and isinstance(direction, PolygonNormals)
-        if self._smooth:  # the smooth surfaces touch, and only their facets are apart
-            self.apart = np.zeros_like(self.apart)
 
     def _facet_bend(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, at: Places) -> Array:
         """Return the derivatives (n, dim - 1, dim) of facet normals along facets, and store the dual axes of the facets."""
@@ -297,39 +261,24 @@ class _SurfacePoints:
         curvature = np.einsum("nkij,nkd,nd->nij", second, coordinates[at.nodes], self.normal)
         return -np.einsum("njd,nij->nid", self._dual_axes, curvature)
 
-    def slopes(self, values: Array) -> Array:
+    def _slopes(self, values: Array) -> Array:
         """Return the derivatives (n, dim - 1, dim) of a nodal field (n_points, dim) along facets at the facing points."""
-        return np.stack([slope @ values for slope in self._slopes], axis=1)
+        return np.asarray(np.swapaxes(self._at.gradient, 1, 2) @ values[self._at.nodes])
 
     def along(self, du: Array) -> Variation:
         """Return the variation of projections and normals for a variation `du` (n_points, dim) of displacements [length]."""
         moved, of_facet = self.motion @ du, np.zeros_like(self.normal)
         if self._facet is not None:
-            tilt = np.einsum("nid,nd->ni", self.slopes(du), self._facet)
+            tilt = np.einsum("nid,nd->ni", self._slopes(du), self._facet)
             of_facet = -np.einsum("nid,ni->nd", self._dual_axes, tilt)
         at_fixed_xi = of_facet if self._bent else np.zeros_like(of_facet)
         if self.averaged is not None:
             at_fixed_xi = self.averaged.along(du)
-        turned = of_facet if self._direction is True else at_fixed_xi
-        if isinstance(self._direction, PolygonNormals):
-            turned = self._direction.along(du)
+        turned = of_facet if self._closest else at_fixed_xi
         xi = np.einsum("nid,nd->ni", self._inverse, moved - self._gap * turned)
         foot = np.einsum("nid,ni->nd", self._foot, xi)
-        if self._smooth:
-            foot += self._gap * turned
-        return Variation(xi, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._bend, xi))
-
-    def spread(self, force: Array, varied: Array, xi: Array) -> Array:
-        """Return the variation (n_points, dim) of nodal forces [force].
-
-        The forces `force` (n, dim) of the points have the variation `varied` (n, dim) [force], and `xi` is that of
-        `Variation`.
-        """
-        motion, *slopes = self._spreading
-        total: Array = motion @ varied
-        for slope, step in zip(slopes, xi.T, strict=True):
-            total -= slope @ (step[:, None] * force)
-        return total
+        motion = shapes_at(-np.einsum("nki,ni->nk", self._at.gradient, xi), self._at.nodes, len(du))
+        return Variation(xi, motion, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._bend, xi))
 
 
 class _ObstaclePoints:
@@ -360,18 +309,45 @@ class _ObstaclePoints:
         """See `_SurfacePoints.along`; there are no reference coordinates."""
         moved = self.motion @ du
         normal = np.einsum("nde,ne->nd", self._gradient, moved)
-        return Variation(np.zeros((len(normal), 0)), across(self.normal, moved) - self._gap * normal, normal)
-
-    def spread(self, force: Array, varied: Array, xi: Array) -> Array:
-        """See `_SurfacePoints.spread`."""
-        return np.asarray(self.motion.T @ varied)
-
-    def slopes(self, values: Array) -> Array:
-        """See `_SurfacePoints.slopes`."""
-        return np.zeros((len(self.normal), 0, values.shape[1]))
+        foot = across(self.normal, moved) - self._gap * normal
+        return Variation(np.zeros((len(normal), 0)), csr_array(self.motion.shape), foot, normal)
 
 
-Points: TypeAlias = _SurfacePoints | _ObstaclePoints
+class MeanMotions:
+    """Weighted means of relative motions, and their variation by differences of the weights.
+
+    The means are used like points, whose attributes are described in `_SurfacePoints`.
+
+    Parameters
+    ----------
+    means : Callable
+        Function from the coordinates (n_points, dim) of all points [length] to the means: their weights `motion`
+        (m, n_points) [-], the mean vectors (m, dim) by which smooth surfaces are closer than facets [length], and the unit
+        normals (m, dim) [-].
+    coordinates : ndarray (n_points, dim)
+        Coordinates at which the means are linearised [length].
+    sides : ndarray of int (k,)
+        Points on which the means depend.
+    """
+
+    def __init__(
+        self, means: Callable[[Array], tuple[csr_array, Array, Array]], coordinates: Array, sides: Indices
+    ) -> None:
+        self._means, self._coordinates, self._sides, self.averaged = means, coordinates, sides, None
+        self.motion, self._closer, self.normal = means(coordinates)
+        self.apart = self.motion @ coordinates - self._closer
+        self._step = DIFFERENCES**1.5 * float(np.ptp(coordinates[sides], axis=0).max())
+
+    def along(self, du: Array) -> Variation:
+        """See `_SurfacePoints.along`; there are no reference coordinates."""
+        rate = (largest(du[self._sides]) or 1.0) / self._step
+        motion, closer, normal = self._means(self._coordinates + du / rate)
+        varied = rate * csr_array(motion - self.motion)
+        foot = rate * (closer - self._closer) - varied @ self._coordinates
+        return Variation(np.zeros((len(normal), 0)), varied, foot, across(self.normal, rate * (normal - self.normal)))
+
+
+Points: TypeAlias = _SurfacePoints | _ObstaclePoints | MeanMotions
 
 
 @dataclass(frozen=True, eq=False)
@@ -497,13 +473,15 @@ class Slips:
         """
 
         def by_sliding(values: Array) -> Array:
-            return -_weighted(weights, np.einsum("nid,ni->nd", points.slopes(values), varied.xi))
+            return _weighted(weights, varied.motion @ values)
 
         change, (normal, turned, primary) = by_sliding(self.motion), normals
         if self.turning is not None:
             change -= _weighted(weights, points.motion @ du @ self.turning)
         if self.closing is not None:
-            change += self.closing.along(du, (normal, turned), primary, by_sliding(self.start))
+            # The openings that weighted gaps close are those of smooth surfaces, whose variation `foot` contains.
+            of_start = by_sliding(self.start) if self.closing.along_mean else -change - _weighted(weights, varied.foot)
+            change += self.closing.along(du, (normal, turned), primary, of_start)
         leaning = np.einsum("nd,nd->n", normal, self.total)
         T = self.tangents
         return np.einsum("knd,nd->kn", T, change) - np.einsum("knd,nd,n->kn", T, turned, leaning)
@@ -585,7 +563,7 @@ class Linearised:
             rows, of_rows = self.place[0], gaps
             gaps = np.zeros((len(gaps), self.place[1]))
             gaps[:, rows] = of_rows
-        return self.points.spread(self._force, force, varied.xi), gaps
+        return self.points.motion.T @ force + varied.motion.T @ self._force, gaps
 
     def _elastic(self, normal: Array, force: Array) -> Array:
         """Return the variation (1 + k, m) of elastic gaps and slips [length] due to those of normals and forces (m, dim)."""
@@ -645,13 +623,13 @@ Geometry = Callable[[Array, Array, Array], Linearised]
 
 def faced(
     candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface | RigidSide, coordinates: Array,
-    normals: object, pose: Pose, direction: PolygonNormals | bool = False, rise: Array | None = None,
+    normals: object, pose: Pose, closest: bool = False, rise: Array | None = None,
 ) -> Points:  # fmt: skip
     """Return the points in the rows `rows` (n,) of `pairing`, which was computed at `coordinates` (n_points, dim) [length].
 
-    `pose` applies to obstacles. `normals`, `direction` and `rise` apply to meshed primary sides, see `_SurfacePoints`.
+    `pose` applies to obstacles. `normals`, `closest` and `rise` apply to meshed primary sides, see `_SurfacePoints`.
     """
     if not isinstance(primary, RigidSide):
-        return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, direction, rise)
+        return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, closest, rise)
     shapes = shapes_at(candidates.shape[rows], candidates.nodes[rows], len(coordinates))
     return _ObstaclePoints(shapes, primary, coordinates, pose)

@@ -28,11 +28,10 @@ from fastcontact.contact.projection import (
     smooth_ends,
     smooth_normals,
 )
-from fastcontact.contact.search.limits import MAX_ITERATIONS
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements
-from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Largest overhang, in facet lengths, at which a point is still paired with a facet end where the surface continues smoothly,
 # and with any edge in 3D by default. When a body slides beyond an edge or a plane of symmetry, its nodes lose contact one
@@ -197,37 +196,6 @@ def pair(
     paired = overhang <= projection_tolerance
     outside = paired & (overhang > LENGTH_ROUND_OFF)
     return _with_overhang(Pairing(facet, xi, normal, paired), candidates, primary, coordinates, outside)
-
-
-def onto(points: Array, primary: Surface, facet: Indices, coordinates: Array, along: Array) -> Pairing:
-    """Project points (n, 3) onto given facets (n,) and their extensions along unit vectors `along` (n, 3).
-
-    `coordinates` (n_points, 3) are those of all points of the mesh [length]. Points for which Newton's method does not
-    converge, such as those of facets parallel to `along`, are not paired.
-    """
-    xi = np.zeros((len(points), 2))
-    xi[primary.triangular[facet]] = 1.0 / 3.0
-    normal, left = np.empty_like(along), np.arange(len(points))
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # points that are not paired
-        for _ in range(MAX_ITERATIONS):
-            at, direction = places(primary, facet[left], xi[left]), along[left]
-            nodes = coordinates[at.nodes]
-            first, second = np.moveaxis(np.einsum("nki,nkd->ndi", at.gradient, nodes), 2, 0)
-            normal[left] = np.cross(first, second)
-            dual = np.stack([np.cross(second, direction), np.cross(direction, first)], axis=1)
-            volume = np.einsum("nd,nd->n", normal[left], direction)
-            offset = points[left] - np.einsum("nk,nkd->nd", at.shape, nodes)
-            step = np.einsum("nid,nd->ni", dual, offset) / volume[:, None]
-            xi[left] += step
-            size = np.abs(step).max(axis=1)
-            unfinished = ~(size <= LENGTH_ROUND_OFF)
-            left, size = left[unfinished], size[unfinished]
-            if not len(left):
-                break
-    left = left[~(size <= SINGLE_PRECISION)]  # far from the origin, round-off of positions exceeds LENGTH_ROUND_OFF
-    paired = np.ones(len(points), bool)
-    paired[left], xi[left], normal[left] = False, 0.0, along[left]
-    return Pairing(facet, xi, normal / np.linalg.norm(normal, axis=1, keepdims=True), paired)
 
 
 def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array, mean: Array) -> Array:

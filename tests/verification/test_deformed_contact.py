@@ -9,6 +9,7 @@ from models import elastic_model
 from pairwise import first_of
 
 import fastcontact as fc
+from fastcontact.analysis import geometry_loop
 from fastcontact.analysis.inequalities import Iterate, pair_surfaces
 from fastcontact.analysis.problem import prepare
 from fastcontact.contact.pairing import normals
@@ -279,6 +280,15 @@ def blocks(mesh, drawn=None, **options):
     return model
 
 
+def punch(mesh, **options):
+    """A block pressed into a wider one, whose facets are secondary and partly covered at the ends of the punch."""
+    sizes = {"size_lower": (14.0, 4.0), "size_upper": (6.0, 3.0), "shift": 4.03}
+    mesh = fc.generate.block_on_block(mesh, **sizes, divisions_lower=(14, 4), divisions_upper=(9, 4))
+    model = elastic_model(mesh, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.05, "y": -0.05})
+    model.add_contact("hertz", secondary="CONT_LOWER", primary="CONT_UPPER", **options)
+    return model
+
+
 def shell(element, divisions, radii, angle, group, double):
     """Part of a hollow cylinder or sphere, with `group` on one of its curved sides."""
     inside, outside = radii
@@ -317,9 +327,11 @@ def loose_blocks(mesh, **options):
     return model
 
 
-# The derivative of weighted gaps leaves out how weights move. In 3D points in a rectangle replace a segment; the segments of
-# quadratic facets are not those of their polygons.
-EXACT, WEIGHTED, IN_SPACE, CURVED = 1e-7, 0.01, 1e-3, 0.1
+# The derivative of weighted gaps is a one-sided difference in 3D and where the primary side ends. Elsewhere it leaves out
+# how weights move.
+EXACT, WEIGHTED, DIFFERENCE = 1e-7, 0.01, 1e-5
+# In planes of symmetry friction acts through the functions of neighbours, whose variation is left out.
+SYMMETRY = 0.05
 # The axes of curvature of two cylinders turn against each other, which changes the height of smooth surfaces a little.
 TURNING = 1e-5
 FRICTION, SMOOTH = {"friction": 0.3}, {"surface_smoothing": True}
@@ -339,16 +351,22 @@ DERIVATIVES = [
     (blocks, "quad4", {"formulation": "node_to_segment", **FRICTION}, EXACT),
     (blocks, "quad8", {"formulation": "continuous", **FRICTION}, EXACT),
     (blocks, "quad4", {"formulation": "mortar", "multipliers": "dual", **FRICTION}, WEIGHTED),
+    (punch, "quad4", {"formulation": "mortar", "multipliers": "dual"}, DIFFERENCE),
+    (punch, "quad8", {"formulation": "mortar", "multipliers": "dual", **FRICTION}, DIFFERENCE),
     (ball_on_block, "tet4", {"formulation": "node_to_segment"}, EXACT),
     (ball_on_block, "tet4", {"formulation": "node_to_segment", **FRICTION}, EXACT),
     (ball_on_block, "hex8", {"formulation": "continuous", **FRICTION}, EXACT),
     (ball_on_block, "hex8", {"formulation": "continuous", "slip": "primary", **FRICTION}, EXACT),
-    (ball_on_block, "hex8", {"formulation": "mortar", "multipliers": "dual", **FRICTION}, CURVED),
-    (nested, ("hex8", True), {"formulation": "mortar", "surface_smoothing": False}, IN_SPACE),
-    (nested, ("hex8", True), {"formulation": "mortar", "multipliers": "dual", **FRICTION}, IN_SPACE),
-    (nested, ("tet4", True), {"formulation": "mortar", "multipliers": "dual"}, IN_SPACE),
-    (nested, ("tet4", False), {"formulation": "mortar", **FRICTION}, IN_SPACE),
-    (nested, ("hex20", True), {"formulation": "mortar", "multipliers": "dual"}, CURVED),
+    (ball_on_block, "hex8", {"formulation": "mortar", "multipliers": "dual", **FRICTION}, SYMMETRY),
+    (ball_on_block, "hex27", {"formulation": "mortar"}, DIFFERENCE),
+    (nested, ("hex8", True), {"formulation": "mortar", "surface_smoothing": False}, DIFFERENCE),
+    (nested, ("hex8", True), {"formulation": "mortar", "multipliers": "dual", **FRICTION}, DIFFERENCE),
+    (nested, ("tet4", True), {"formulation": "mortar", "multipliers": "dual"}, DIFFERENCE),
+    (nested, ("tet4", False), {"formulation": "mortar", **FRICTION}, DIFFERENCE),
+    (nested, ("hex20", True), {"formulation": "mortar", "multipliers": "dual"}, DIFFERENCE),
+    (nested, ("hex20", True), {"formulation": "mortar", "multipliers": "dual", "normals": "secondary"}, DIFFERENCE),
+    (nested, ("hex27", True), {"formulation": "mortar", **FRICTION}, DIFFERENCE),
+    (nested, ("tet10", False), {"formulation": "mortar", "multipliers": "dual", **FRICTION}, DIFFERENCE),
     (nested, ("hex8", True), {"formulation": "node_to_segment", **FRICTION}, EXACT),
     (nested, ("hex8", True), {"formulation": "node_to_segment", **SMOOTH}, EXACT),
     (nested, ("tet4", True), {"formulation": "node_to_segment", **SMOOTH, **FRICTION}, EXACT),
@@ -437,7 +455,7 @@ def test_forces_gaps_and_slips_vary_as_their_differences(make, mesh, options, er
         (half_spheres, "C", {"formulation": "node_to_segment"}, 5),
         (ball_on_block, "hex8", {"formulation": "continuous"}, 4),
         (ball_on_block, "tet4", {"formulation": "node_to_segment"}, 4),
-        (ball_on_block, "hex8", {}, 5),
+        (ball_on_block, "hex8", {}, 4),
         (ball_on_ball, "hex8", {}, 3),
         (half_spheres, "C", {"formulation": "node_to_segment", **FRICTION}, 5),
         (half_spheres, "B", FRICTION, 5),
@@ -446,13 +464,20 @@ def test_forces_gaps_and_slips_vary_as_their_differences(make, mesh, options, er
         (blocks, "quad4", {"formulation": "node_to_segment", **FRICTION}, 4),
         (blocks, "quad4", {"formulation": "mortar", "slip": "primary", **FRICTION}, 5),
         (blocks, "quad8", {"formulation": "continuous", **FRICTION}, 5),
+        (punch, "quad4", {"formulation": "mortar", "multipliers": "dual", **FRICTION}, 4),
+        (punch, "quad8", {"formulation": "mortar", "multipliers": "dual"}, 4),
         (ball_on_block, "tet4", {"formulation": "node_to_segment", **FRICTION}, 4),
         (ball_on_block, "hex8", {"formulation": "continuous", **FRICTION}, 5),
         (ball_on_block, "hex8", FRICTION, 5),
-        (nested, ("hex8", True), {"formulation": "mortar", "surface_smoothing": False}, 5),
-        (nested, ("tet4", True), {"formulation": "mortar", "multipliers": "dual"}, 5),
-        (nested, ("hex8", False), {"formulation": "mortar", "multipliers": "dual", **FRICTION}, 5),
-        (nested, ("tet4", True), {"formulation": "mortar", **FRICTION}, 5),
+        (ball_on_block, "hex20", {"multipliers": "dual"}, 4),
+        (ball_on_block, "hex20", FRICTION, 5),
+        (ball_on_block, "hex27", {}, 4),
+        (nested, ("hex8", True), {"formulation": "mortar", "surface_smoothing": False}, 4),
+        (nested, ("tet4", True), {"formulation": "mortar", "multipliers": "dual"}, 4),
+        (nested, ("hex8", False), {"formulation": "mortar", "multipliers": "dual", **FRICTION}, 4),
+        (nested, ("tet4", True), {"formulation": "mortar", **FRICTION}, 4),
+        (nested, ("hex20", True), {"formulation": "mortar", "multipliers": "dual", **FRICTION}, 4),
+        (nested, ("hex20", True), {"formulation": "mortar", "multipliers": "standard"}, 4),
         (nested, ("hex8", True), {"formulation": "node_to_segment", **SMOOTH}, 4),
         (nested, ("hex8", True), {"formulation": "node_to_segment", **SMOOTH, **FRICTION}, 4),
         (nested, ("tet4", True), {"formulation": "continuous"}, 4),
@@ -467,7 +492,7 @@ def test_forces_gaps_and_slips_vary_as_their_differences(make, mesh, options, er
         (loose_blocks, "quad8", {"formulation": "continuous", **FRICTION}, 4),
     ],
 )
-def test_load_steps_take_few_pairings_and_converge_quadratically(make, mesh, options, updates):
+def test_load_steps_take_few_pairings_and_converge_quadratically(make, mesh, options, updates, monkeypatch):
     """Alternating between pairing and solution takes 8 to 12, each with a fourth of the last change."""
     ramp = [k / 20.0 for k in range(1, 7)] if make is half_spheres else 4
     model = make(mesh, **options)
@@ -479,7 +504,8 @@ def test_load_steps_take_few_pairings_and_converge_quadratically(make, mesh, opt
     along = fc.solve(model, ramp, linear_solver="direct")
     assert all(step.iterations["geometry_updates"] < count + 2 for step, count in zip(along, counts, strict=True))
     assert max(counts) > 2
-    for step in steps[-2:]:
+    monkeypatch.setattr(geometry_loop, "SAFETY", np.inf)  # no Newton step is omitted
+    for step in fc.solve(model, ramp, criteria=whole, linear_solver="direct")[-2:]:
         changes = [entry["displacement_change"] for entry in step.iterations["history"]]
         for before, after in list(pairwise(changes))[-2:]:
-            assert after < max(10.0 * before**2 if before < 1e-2 else 0.01 * before, 0.03 * min(before, 1e-6), 1e-11)
+            assert after < max(10.0 * before**2 if before < 1e-2 else 0.01 * before, 1e-11)

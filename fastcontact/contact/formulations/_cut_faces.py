@@ -75,7 +75,7 @@ def face_overlap(
         masses.append(mass)
         depths.append(depth[:, :, None] * -of_secondary.axes[:, None, 2])
         first += size
-    return Overlap(masses, couplings, depths)
+    return Overlap(masses, couplings, depths, [])
 
 
 def _heights(
@@ -219,7 +219,7 @@ def _integrated(
         raise ContactError(f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there")
     of_facets = csr_array((np.ones(len(pairs)), np.arange(len(pairs)), start), shape=(n, len(pairs)))
     total = (of_facets @ mass.reshape(-1, k * k)).reshape(-1, k, k)
-    return Coupling(secondary.block, primary.block, pairs, integrals, mass), total, closer
+    return Coupling(secondary.block, primary.block, pairs, integrals), total, closer
 
 
 def _middle(element: elements.Element) -> Array:

@@ -28,15 +28,12 @@ class Coupling:
         Numbers of the secondary and the primary facet of each pair, each in its block.
     integrals : ndarray (n, n_nodes, n_primary_nodes)
         Integrals of secondary times primary shape functions over the overlap [area].
-    mass : ndarray (n, n_nodes, n_nodes), optional
-        In 3D, integrals of products of two secondary shape functions over the overlap [area].
     """
 
     secondary: FacetBlock
     primary: FacetBlock
     pairs: Indices
     integrals: Array
-    mass: Array | None = None
 
 
 class OverlapPoints(NamedTuple):
@@ -50,14 +47,11 @@ class OverlapPoints(NamedTuple):
         Shape functions of the k nodes of the facet at the point [-].
     area : ndarray (n,)
         Undeformed area of the point, zero outside of the overlap [area].
-    opposite : ndarray of int (n,), optional
-        Number of the opposite facet; facets are numbered through the blocks of the primary side.
     """
 
     facet: Indices
     shape: Array
     area: Array
-    opposite: Indices | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,14 +68,14 @@ class Overlap:
         For each block, integrals of its shape functions times the distance by which the smooth surfaces are closer to each
         other than the facets, see `surface_smoothing`, along the normals of the primary side [volume]. Against an obstacle,
         which has no points in the mesh, the integrals are those of the shape functions times the opposite positions.
-    points : list of OverlapPoints, optional
-        For each block, the integration points, if the method has them.
+    points : list of OverlapPoints
+        For each block, the integration points; empty for faces, whose segments are divided into triangles.
     """
 
     mass: list[Array]
     couplings: list[Coupling]
     closer: list[Array]
-    points: list[OverlapPoints] | None = None
+    points: list[OverlapPoints]
 
 
 def obstacle_overlap(
@@ -99,7 +93,7 @@ def obstacle_overlap(
     pose : Pose
         Position and rotation of the obstacle.
     """
-    mass, positions_faced = [], []
+    mass, positions_faced, inside = [], [], []
     for block in secondary.blocks:
         N, full_area = areas_of_rule(block, points[0], axisymmetric)
         positions = np.einsum("qk,fkd->fqd", N, points[1][block.facets])
@@ -108,4 +102,5 @@ def obstacle_overlap(
         area = np.where(paired.reshape(full_area.shape), full_area, 0.0)
         mass.append(np.einsum("fq,qa,qb->fab", area, N, N))
         positions_faced.append(np.einsum("fq,qa,fqd->fad", area, N, foot))
-    return Overlap(mass, [], positions_faced)
+        inside.append(OverlapPoints(np.repeat(np.arange(len(area)), len(N)), np.tile(N, (len(area), 1)), area.ravel()))
+    return Overlap(mass, [], positions_faced, inside)

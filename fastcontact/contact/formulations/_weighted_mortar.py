@@ -31,17 +31,16 @@ from fastcontact.contact.formulations._cut_faces import face_overlap
 from fastcontact.contact.formulations._cut_lines import line_overlap
 from fastcontact.contact.formulations._dual_basis import COVERED, LEAST, dual_functions, positive
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.formulations._overlap import Overlap, OverlapPoints, obstacle_overlap
+from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.integration import NO_AREA, areas_of_rule, nodal_areas
-from fastcontact.contact.linearised_geometry import Closing, Linearised, NodalNormals, Points, PolygonNormals, faced
+from fastcontact.contact.linearised_geometry import Closing, Linearised, MeanMotions, NodalNormals, Points, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import FACING, Candidates, Normals, filled_up, onto, pair, tangents
+from fastcontact.contact.pairing import FACING, Candidates, Normals, filled_up, pair, tangents
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.contact.search.limits import BEYOND
-from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, scaled
-from fastcontact.mesh import elements, quadrature
+from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
 MULTIPLIERS = ("standard", "dual")
@@ -65,6 +64,33 @@ class Coverage(NamedTuple):
     weights: list[Array]
     kept: Mask
     functions: list[tuple[Array, Array]]
+
+
+class Means(NamedTuple):
+    """Mean relative motions of the nodes.
+
+    Attributes
+    ----------
+    coverage : Coverage
+    rows, across : csr_array (m, n_points)
+        Integrals of psi with secondary and with primary shape functions [area].
+    weight : ndarray (m,)
+        Integrals of psi; infinite for nodes without gaps [area].
+    motion : csr_array (m, n_points)
+        Map from displacements to mean displacements relative to the primary side [-].
+    closer : ndarray (m, dim)
+        Mean vectors by which smooth surfaces are closer than facets [length].
+    normal : ndarray (m, dim)
+        Unit normals [-].
+    """
+
+    coverage: Coverage
+    rows: csr_array
+    across: csr_array
+    weight: Array
+    motion: csr_array
+    closer: Array
+    normal: Array
 
 
 @dataclass(eq=False)
@@ -129,23 +155,15 @@ class WeightedMortar(Formulation):
 
     def unilateral(self, at: Configuration) -> Constraints:
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
-        deformed = self.points + at.displacement
-        overlap = self._overlap(deformed, at.pose)
-        weights = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
-        coverage = self._coverage(overlap, weights, self._nodes_with_gaps(weights, LEAST if at.rounded else COVERED))
-        rows, across, closer = self._weighted(coverage)
-        # Only the gap of an excluded node is omitted. The functions of its neighbours are not extended over its area.
-        sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
-        weight = np.where(sums > 0.0, sums, np.inf)
-        mean = scaled(csr_array(rows - across), 1.0 / weight)
-        normal = self._mean_normals(overlap, deformed, at.pose)
+        means = self._means(self.points + at.displacement, at)
+        coverage, rows, across, weight, mean, closer, normal = means
         B = rows_of(mean, normal)
         gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(rows, across, weight)
-        gap0 -= np.einsum("nd,nd->n", closer, normal) / weight
+        gap0 -= np.einsum("nd,nd->n", closer, normal)
         if at.worn is not None:
             gap0 += rows @ at.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
-        geometry = partial(self._linearised, at, coverage, normal, weight)
+        geometry = partial(self._linearised, at, means)
         constraints = Constraints(
             B,
             gap0,
@@ -183,30 +201,77 @@ class WeightedMortar(Formulation):
             directions=directions,
             friction=friction,
             slip0=slip0,
-            geometry=partial(geometry, slipping=(np.stack(rubbing), mean, length)),
+            geometry=partial(geometry, slipping=(np.stack(rubbing), length)),
         )
 
+    def _means(self, deformed: Array, at: Configuration, kept: Mask | None = None) -> Means:
+        """Return the mean relative motions of nodes at the coordinates `deformed` (n_points, dim) [length].
+
+        `kept` (m,) are the nodes with gaps; by default, they result from the overlap.
+        """
+        overlap = self._overlap(deformed, at.pose)
+        weights = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
+        if kept is None:
+            kept = self._nodes_with_gaps(weights, LEAST if at.rounded else COVERED)
+        coverage = self._coverage(overlap, weights, kept)
+        rows, across, closer = self._weighted(coverage)
+        # Only the gap of an excluded node is omitted. The functions of its neighbours are not extended over its area.
+        sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
+        weight = np.where(sums > 0.0, sums, np.inf)
+        mean = scaled(csr_array(rows - across), 1.0 / weight)
+        normal = self._mean_normals(overlap, deformed, at.pose)
+        return Means(coverage, rows, across, weight, mean, closer / weight[:, None], normal)
+
     def _linearised(
-        self, at: Configuration, coverage: Coverage, normal: Array, weight: Array, multiplier: Array, tangential: Array,
-        displacement: Array, slipping: tuple[Array, csr_array, Array] | None = None,
+        self, at: Configuration, means: Means, multiplier: Array, tangential: Array, displacement: Array,
+        slipping: tuple[Array, Array] | None = None,
     ) -> Linearised:  # fmt: skip
         """Return the linearisation of contact forces, mean gaps and slips; see `linearised_geometry`.
 
-        `slipping` are tangents (k, m, dim), mean relative motions (m, n_points), and lengths (m,) by which gaps close.
-        Segments are constant, because the variation of the cuts has no effect if the integrand is continuous across them.
+        `slipping` are tangents (k, m, dim), and lengths (m,) by which gaps close.
         """
-        at, is_loaded, overlap = replace(at, displacement=displacement), multiplier != 0.0, coverage.overlap
-        deformed = self.points + displacement
+        at, deformed = replace(at, displacement=displacement), self.points + displacement
+        if isinstance(self.primary, RigidSide) or (
+            deformed.shape[1] == 2 and not self._partly_covered(means, multiplier)
+        ):
+            linearised = self._at_points(at, means, multiplier)
+        else:
+            sides = np.concatenate([self.secondary.points, self.primary.points])
+            points = MeanMotions(lambda moved: self._means(moved, at, means.coverage.kept)[-3:], deformed, sides)
+            linearised = Linearised(self.secondary, points, None, means.normal, multiplier)
+        if slipping is None:
+            return linearised
+        directions, length = slipping
+        slips = self._sliding(means.motion, directions, tangential, at)
+        if not isinstance(self.primary, RigidSide) and self.slip == "symmetric":
+            opening = means.motion @ slips.start - means.closer
+            closing = Closing.of(means.normal, NodalNormals(self.secondary, deformed), opening, length)
+            slips = replace(slips, total=slips.total + closing.vector, closing=closing)
+        return replace(linearised, slips=slips)
+
+    def _partly_covered(self, means: Means, multiplier: Array) -> bool:
+        """Return whether facets that carry forces are partly covered."""
+        partly = False
+        for block, weights, whole in zip(self.secondary.blocks, means.coverage.weights, self._whole, strict=True):
+            covered = weights.sum(axis=1) / whole.sum(axis=1)
+            partly |= bool(
+                (multiplier[block.local].any(axis=1) & (covered > NO_AREA) & (covered < 1.0 - NO_AREA)).any()
+            )
+        return partly
+
+    def _at_points(self, at: Configuration, means: Means, multiplier: Array) -> Linearised:
+        """Return the linearisation of contact forces and mean gaps by the projections of the integration points.
+
+        Segments are constant, because the variation of the cuts has no effect if the integrand is continuous across them, as
+        it is except at ends of the primary side.
+        """
+        deformed, is_loaded, overlap = self.points + at.displacement, multiplier != 0.0, means.coverage.overlap
         functions, tests, first, first_facet = list[Blocks](), list[Blocks](), 0, 0
-        nodes, shapes, facets, opposite, corners = [], [], [], [], []
-        of_blocks = zip(self.secondary.blocks, self._test, coverage.functions, strict=True)
-        for number, (block, T, (psi, _)) in enumerate(of_blocks):
-            inside = self._points_of(number, overlap) if overlap.points is None else overlap.points[number]
+        nodes, shapes, facets = [], [], []
+        of_blocks = zip(self.secondary.blocks, self._test, means.coverage.functions, overlap.points, strict=True)
+        for block, T, (psi, _), inside in of_blocks:
             kept = is_loaded[block.local].any(axis=1)[inside.facet]
-            facet, shape, area = (values[kept] for values in inside[:3])
-            if inside.opposite is not None:
-                opposite.append(inside.opposite[kept])
-                corners.append(block.facets[facet, : elements.get(block.element).n_corners])
+            facet, shape, area = (values[kept] for values in inside)
             columns = first + np.arange(len(facet))[:, None]
             local, psi_at = block.local[facet], np.einsum("qak,qk,q->qa", psi[facet], shape, area)
             functions.append((local, columns, psi_at[:, :, None]))
@@ -216,20 +281,12 @@ class WeightedMortar(Formulation):
             facets.append(first_facet + facet)
             first, first_facet = first + len(facet), first_facet + len(block.facets)
         candidates = Candidates(filled_up(nodes), filled_up(shapes), np.concatenate(facets))
-        positions = candidates.positions(deformed)
-        direction: PolygonNormals | bool = True
-        if opposite and isinstance(self.primary, Surface):
-            polygons = filled_up(corners)
-            across = PolygonNormals(polygons, deformed).normal
-            pairing = onto(positions, self.primary, np.concatenate(opposite), deformed, across)
-            direction = PolygonNormals(polygons[pairing.paired], deformed)
-        else:
-            pairing = pair(positions, self.primary, deformed, BEYOND, "facet", at.pose)
+        pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", at.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), first)
         along = "facet" if self.normals == "secondary" else self.normals
         rise = self.rise(candidates, pairing, rows, deformed)
-        points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, direction, rise)
-        weighted = scaled(csr_array(assembled(functions, size)[:, rows]), 1.0 / weight)
+        points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, True, rise)
+        weighted = scaled(csr_array(assembled(functions, size)[:, rows]), 1.0 / means.weight)
         mean = csr_array(assembled(tests, size)[:, rows])
         separate_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
@@ -238,46 +295,7 @@ class WeightedMortar(Formulation):
             separate_normals = faced(at_nodes, pairing, all_nodes, self.primary, deformed, self.normals, at.pose)
         elif self.normals == "secondary":
             separate_normals = NodalNormals(self.secondary, deformed)
-        slips = None
-        if slipping is not None:
-            directions, motion, length = slipping
-            slips = self._sliding(motion, directions, tangential, at)
-            if not isinstance(self.primary, RigidSide) and self.slip == "symmetric":
-                closing = Closing.of(normal, NodalNormals(self.secondary, deformed), motion @ slips.start, length)
-                slips = replace(slips, total=slips.total + closing.vector, closing=closing)
-        return Linearised(self.secondary, points, weighted, normal, multiplier, mean, separate_normals, slips)
-
-    def _points_of(self, number: int, overlap: Overlap) -> OverlapPoints:
-        """Return integration points of the facets of a block, on the parts that face the other side.
-
-        Against obstacles they are Gauss points of whole facets. In 3D they are those of the rectangle with the same second
-        moments of area as a segment in the reference facet. They are exact on flat triangles, where the integrand is
-        quadratic.
-        """
-        block = self.secondary.blocks[number]
-        segments = [(c, c.mass) for c in overlap.couplings if c.secondary is block and c.mass is not None]
-        if not segments:
-            N, area = areas_of_rule(block, self.points, self.axisymmetric)
-            facet = np.repeat(np.arange(len(area)), len(N))
-            return OverlapPoints(facet, np.tile(N, (len(area), 1)), area.ravel())
-        assert isinstance(self.primary, Surface)
-        starts, first = {}, 0
-        for primary_block in self.primary.blocks:
-            starts[primary_block.element], first = first, first + len(primary_block.facets)
-        pairs = np.concatenate([np.add(c.pairs, (0, starts[c.primary.element])) for c, _ in segments])
-        mass = np.concatenate([products for _, products in segments])
-        size = mass.sum(axis=(1, 2))
-        pairs, mass, size = pairs[size > 0.0], mass[size > 0.0], size[size > 0.0]
-        element = elements.get(block.element)
-        mean = mass.sum(axis=2) @ element.nodes / size[:, None]
-        moments = element.nodes.T @ (mass / size[:, None, None]) @ element.nodes - mean[:, :, None] * mean[:, None]
-        variance, axes = np.linalg.eigh(moments)
-        square, weights = quadrature.square(quadrature.gauss_line(2 if element.n_nodes == 3 else 3))
-        stretched = axes * np.sqrt(3.0 * np.maximum(variance, 0.0))[:, None]
-        xi = mean[:, None] + square @ stretched.transpose(0, 2, 1)
-        facet, opposite = np.repeat(pairs, len(weights), axis=0).T
-        area = 0.25 * size[:, None] * weights
-        return OverlapPoints(facet, element.shape(xi.reshape(-1, 2)), area.ravel(), opposite)
+        return Linearised(self.secondary, points, weighted, means.normal, multiplier, mean, separate_normals)
 
     @cached_property
     def _whole_side(self) -> tuple[Array, Array, list[Any], Mask]:

@@ -155,14 +155,14 @@ class Hierarchy:
         """Multiply the bounds of the smoothers by `factor`, until the next call of `set_bounds`."""
         self.bounds = [factor * bound for bound in self.bounds]
 
-    def set_bounds(self, estimated: Sequence[int] = ()) -> None:
+    def set_bounds(self, estimated: bool = False) -> None:
         """Set the bounds of the smoothers to those without equations and springs.
 
-        On the levels with the numbers `estimated`, bounds are also estimated for the current matrices, and used if larger.
+        If `estimated`, bounds are also estimated for the current matrices, and used if larger.
         """
         self.bounds = [
-            max(bound, SAFETY * largest_eigenvalue(level)) if number in estimated else bound
-            for number, (level, bound) in enumerate(zip(self.levels, self._free_bounds, strict=True))
+            max(bound, SAFETY * largest_eigenvalue(level)) if estimated and level.P is not None else bound
+            for level, bound in zip(self.levels, self._free_bounds, strict=True)
         ]
 
     def cycle(self, number: int = 0) -> None:

@@ -9,7 +9,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations.continuous import Continuous
 from fastcontact.contact.formulations.node_to_segment import NodeToSegment
 from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule, mass_matrix, nodal_areas
-from fastcontact.contact.pairing import Candidates, gap_rows, onto, pair
+from fastcontact.contact.pairing import Candidates, gap_rows, pair
 from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
 from fastcontact.contact.surface import surface
 from fastcontact.mesh import quadrature
@@ -123,38 +123,6 @@ def test_gap_rows_do_not_see_rigid_motions():
     spin = np.cross([0.1, 0.4, -0.2], lifted).ravel()
     # A rotation moves the foot and the candidate alike, but across the arm between them, which stands along the normal.
     assert np.abs(B @ spin).max() < 1e-13
-
-
-@pytest.mark.parametrize(("element", "shift"), [*((element, 0.0) for element in SOLIDS), ("hex8", 1e7)])
-def test_points_are_projected_onto_given_facets(element, shift):
-    mesh = sphere_octant(element, R=2.0, size=1.0, contact_size=0.2, contact_radius=0.4)
-    mesh = mesh.replace(points=mesh.points + shift)
-    side, random = surface(mesh, "CONT_SPHERE"), np.random.default_rng(2)
-    facet = np.arange(side.n_facets)
-    foot = places(side, facet, random.uniform(0.1, 0.4, (len(facet), 2)))
-    position = np.einsum("nk,nkd->nd", foot.shape, mesh.points[foot.nodes])
-    first, second = np.moveaxis(np.einsum("nki,nkd->ndi", foot.gradient, mesh.points[foot.nodes]), 2, 0)
-    normal = np.cross(first, second)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    along = normal + random.uniform(-0.2, 0.2, normal.shape)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    pairing = onto(position + random.uniform(-0.05, 0.05, (len(facet), 1)) * along, side, facet, mesh.points, along)
-    again = pairing.places(side, facet)
-    assert pairing.paired.all()
-    np.testing.assert_allclose(
-        np.einsum("nk,nkd->nd", again.shape, mesh.points[again.nodes]), position, atol=1e-12 + 1e-15 * shift, rtol=0.0
-    )
-    np.testing.assert_allclose(pairing.normal, normal, atol=1e-8 + 1e-14 * shift)
-
-
-def test_points_that_cannot_be_projected_are_not_paired():
-    mesh = box((1.0, 1.0, 1.0), (2, 2, 2))
-    side = surface(mesh, "ZMAX")
-    points, along = np.full((2, 3), 0.3), np.array([[0.6, 0.0, 0.8], [1.0, 0.0, 0.0]])
-    pairing = onto(points, side, np.zeros(2, int), mesh.points, along)
-    np.testing.assert_array_equal(pairing.paired, [True, False])
-    assert np.isfinite(pairing.xi).all()
-    assert np.isfinite(pairing.normal).all()
 
 
 def bound(kind, element="hex8", group="CONT_SPHERE", primary="hex8", **options):
