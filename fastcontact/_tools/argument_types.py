@@ -158,8 +158,8 @@ def types_of(call: Callable[..., Any]) -> dict[str, Any]:
     namespace = vars(sys.modules[call.__module__])
     for name, text in inspect.get_annotations(call).items():
         try:
-            annotations |= typing.get_type_hints(types.SimpleNamespace(__annotations__={name: text}), namespace)
-        except (NameError, TypeError):  # a name that only type checkers import, or not the annotation of an argument
+            annotations[name] = eval(text, namespace) if isinstance(text, str) else text
+        except NameError:  # a name that only type checkers import
             continue
     return annotations
 
