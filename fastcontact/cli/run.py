@@ -7,7 +7,7 @@ import dataclasses
 import math
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -58,12 +58,14 @@ def run(options: argparse.Namespace) -> int:
     with warnings_shown() as setup_warnings:
         case = read_case(options.case)
     read_end = time.perf_counter()
-    with in_file(case_path(options.case)):
-        case.model.check(case.ramp)  # an invalid model must not replace existing results
+    with in_file(case_path(options.case)):  # an invalid model must not replace existing results
+        new = None if options.resume else _new_steps(options, case)
+        if new is None:
+            case.model.check(case.ramp)
         setup_warnings += _checked_study(case)
     with warnings_shown() as caught:
         caught += setup_warnings
-        n_done, stored_warnings, last, steps = _solved(options, case, output)
+        n_done, stored_warnings, last, steps = _solved(options, case, output, new)
     texts = list(dict.fromkeys([*stored_warnings, *caught]))
     computed = _modes(options, case, last)
     timings = {"read": read_end - started, "solve": time.perf_counter() - read_end, "cpu": time.process_time()}
@@ -124,14 +126,23 @@ def _diameters(text: str | None) -> dict[str, Any]:
         raise CaseError(f"--nodal-diameters {text}: write integers separated by commas, or all") from None
 
 
-def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int, list[str], Any, list[dict[str, Any]]]:
-    """Solve and write all steps.
+def _new_steps(options: argparse.Namespace, case: Case, done: Sequence[StepResult] = ()) -> Iterator[StepResult]:
+    """Check the model, and return the steps after the steps `done`, which are computed when they are requested."""
+    from fastcontact.analysis.run import solve_steps
+
+    settings = {**case.solution, "linear_solver": options.linear or case.linear_solver}
+    return solve_steps(case.model, case.ramp, **settings, resume=done)
+
+
+def _solved(
+    options: argparse.Namespace, case: Case, output: Path, new: Iterator[StepResult] | None
+) -> tuple[int, list[str], Any, list[dict[str, Any]]]:
+    """Write all steps: `new`, or those that remain of a resumed run.
 
     Returns the number of earlier steps in a resumed file, their warnings, the last step, and the summaries of all steps.
     """
     from fastcontact.analysis.progress import Progress
     from fastcontact.analysis.restart import remaining
-    from fastcontact.analysis.run import solve_steps
     from fastcontact.cases.summary import of_step
     from fastcontact.results.writer import ResultWriter
 
@@ -149,8 +160,7 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int,
         total = len(steps) + len(remaining(case.ramp, last))
         progress = Progress(total, show=stderr_is_terminal() and not options.quiet, done=len(steps))
         try:
-            settings = {**case.solution, "linear_solver": options.linear or case.linear_solver}
-            for last in solve_steps(case.model, case.ramp, **settings, resume=writer.done):
+            for last in new or _new_steps(options, case, writer.done):
                 last = case.finished(last)
                 error = {ERROR_FIELD: estimate_error(case.model, last).cells} if fields else {}
                 writer.write(dataclasses.replace(last, cell_fields=error) if fields else last)
