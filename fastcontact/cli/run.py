@@ -57,12 +57,15 @@ def run(options: argparse.Namespace) -> int:
     check_outputs(files_of_case(options.case), [output, options.json, options.modes], [options.plot])
     with warnings_shown() as setup_warnings:
         case = read_case(options.case)
-    read_end = time.perf_counter()
-    with in_file(case_path(options.case)):  # an invalid model must not replace existing results
-        new = None if options.resume else _new_steps(options, case)
-        if new is None:
-            case.model.check(case.ramp)
-        setup_warnings += _checked_study(case)
+        read_end = time.perf_counter()
+        with in_file(case_path(options.case)):  # an invalid model must not replace existing results
+            new = None if options.resume else _new_steps(options, case)
+            if new is None:
+                case.model.check(case.ramp)
+            if case.deck is None and "study" in case.text:
+                from fastcontact.studies.checks import check_study
+
+                check_study(case)
     with warnings_shown() as caught:
         caught += setup_warnings
         n_done, stored_warnings, last, steps = _solved(options, case, output, new)
@@ -86,17 +89,6 @@ def run(options: argparse.Namespace) -> int:
         say(f"{len(failed)} of {len(numbers['checks'])} checks of the case failed: {', '.join(failed)}", error=True)
         return 3
     return 0
-
-
-def _checked_study(case: Case) -> list[str]:
-    """Return the warnings from a check of the table ``[study]`` of a case; an empty list without this table."""
-    if case.deck is not None or "study" not in case.text:
-        return []
-    from fastcontact.studies.checks import check_study
-
-    with warnings_shown() as caught:
-        check_study(case)
-    return caught
 
 
 def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
