@@ -8,6 +8,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,16 @@ from fastcontact.linear import choice as linear
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
+# The kernel that takes longest to compile, which the table of usual kernels does not contain.
+NONLINEAR = """
+import fastcontact as fc
+from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies
+
+model = fc.Model(fc.generate.block(), "plane_strain", strain="finite")
+model.add_material(fc.NeoHookean(E=1.0, nu=0.3))
+bodies = NonlinearBodies(model.mesh, "plane_strain", "finite", model.material_field())
+bodies.at(0.0 * model.mesh.points, bodies.beginning)
+"""
 
 # The same examples in every run, so that no change fails by chance; `--hypothesis-profile=long` looks further.
 settings.register_profile("fixed", max_examples=12, derandomize=True, deadline=None)
@@ -48,11 +59,12 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def prepare_workers(whole: bool) -> None:
-    """Give each worker one processor; where all tests run on an empty cache, compile the usual kernels once for them."""
+    """Give each worker one processor; where all tests run on an empty cache, compile kernels that both need."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     folder = cache.folder_of()
     if whole and folder and decorators.compiled() and not any(folder.glob("*.nbc")):
-        for process in ahead.start((), decorators.threads()):
+        nonlinear = subprocess.Popen([sys.executable, "-c", NONLINEAR], cwd=ROOT)
+        for process in (*ahead.start((), decorators.threads()), nonlinear):
             process.wait()
 
 

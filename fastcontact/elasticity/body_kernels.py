@@ -126,8 +126,12 @@ def _expanded(strain, N, cell, rise, finite, F, gradient):
     cofactor(U, inverse)
     ratio = determinant(U)
     inverse /= ratio
-    F[:] = F @ inverse
-    gradient[:] = np.ascontiguousarray(inverse.T) @ gradient
+    elastic, pulled_back = F @ inverse, np.ascontiguousarray(inverse.T) @ gradient
+    for i in range(3):  # assigning to a slice would compile its error message as well
+        for j in range(3):
+            F[i, j] = elastic[i, j]
+        for a in range(gradient.shape[1]):
+            gradient[i, a] = pulled_back[i, a]
     return ratio, U[2, 2]
 
 
@@ -167,12 +171,13 @@ def _respond_in_plane_stress(constants, D, bulk, finite, stretch_z, F, old, new,
 
     `stretch_z` is the thermal out-of-plane stretch. Returns the energy density, and whether the iteration converged.
     """
+    everywhere = np.bool_(True)  # for literals, Numba would compile the laws once more
     F[2, 2] = (1.0 + old[8]) / stretch_z if finite else 2.0 + old[8] - stretch_z
     for _ in range(MOST_ITERATIONS):
         J = _dilatation(F, finite, G)
         pressure = bulk * (J - 1.0)
         volumetric = (pressure, bulk, pressure if finite else 0.0)
-        energy = respond(constants, D, F, J, G, volumetric, True, old, new, P, A)
+        energy = respond(constants, D, F, J, G, volumetric, everywhere, old, new, P, A)
         if not A[8, 8] > 0.0:
             return energy, False
         if abs(P[2, 2]) <= TOLERANCE * A[8, 8]:
@@ -210,9 +215,11 @@ def _respond(
 def _subtract_elastic(constants, D, bulk, plane_stress, A):
     """Subtract the elastic tangent at small strains from A (18, 12), without the contribution of the projected dilatation."""
     no_history, new, P, G, elastic = np.zeros(9), np.empty(9), np.empty((3, 3)), np.empty((3, 3)), np.zeros((18, 12))
-    F = np.eye(3)
-    J = _dilatation(F, False, G)
-    _respond(constants, D, bulk, 0.0, 1.0, plane_stress, False, 2, True, F, J, G, no_history, new, P, elastic)
+    F, finite, everywhere, geometric = np.eye(3), np.bool_(False), np.bool_(True), np.int64(2)  # no literals, see above
+    J = _dilatation(F, finite, G)
+    _respond(
+        constants, D, bulk, 0.0, 1.0, plane_stress, finite, geometric, everywhere, F, J, G, no_history, new, P, elastic
+    )
     A -= elastic
 
 

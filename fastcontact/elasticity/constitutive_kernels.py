@@ -289,7 +289,8 @@ def _logarithmic(constants, F, everywhere, old, new, P, A):
     squared, axes = np.linalg.eigh(C)
     without_strain = old.copy()
     without_strain[:6] = 0.0
-    energy = _plastic(constants, (axes * (0.5 * np.log(squared))) @ axes.T, True, without_strain, new, T, D)
+    with_moduli = np.bool_(True)  # for a literal, Numba would compile the law once more
+    energy = _plastic(constants, (axes * (0.5 * np.log(squared))) @ axes.T, with_moduli, without_strain, new, T, D)
     slope, carried = np.empty((3, 3)), L @ axes
     _flow(carried, axes, old, new)
     for a in range(3):

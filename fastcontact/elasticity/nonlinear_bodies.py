@@ -323,4 +323,4 @@ def _at_points(numbers: Numbers, name: str) -> Numbers:
     """Return the number of the moduli of each quadrature point (n_cells, n_q), given the numbers of cells or points."""
     n_q = len(elements.get(name).quadrature[1])
     columns = numbers[:, None] if numbers.ndim == 1 else numbers
-    return np.ascontiguousarray(np.broadcast_to(columns, (len(columns), n_q)))
+    return np.array(np.broadcast_to(columns, (len(columns), n_q)), order="C")  # writable, also if n_q is 1

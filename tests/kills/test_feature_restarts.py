@@ -17,20 +17,22 @@ from fastcontact.results.reader import open_results
 pytestmark = pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
 
 
-def write(case, path, ramp=None, stop=None):
-    """Solve a case into a file; `stop`, a number of steps, abandons it there as a kill does."""
-    out = fc.ResultWriter(path, case.model, resume=stop is None and path.exists())
+def write(case, path, parts=None, stop=None):
+    """Solve a case into a file, and its first `stop` steps into the file `parts` as well, abandoned there as by a kill."""
+    out = fc.ResultWriter(path, case.model, resume=stop is None)
+    killed = fc.ResultWriter(parts, case.model) if stop else None
     steps = fc.solve_steps(
         case.model, case.ramp, criteria=case.criteria, linear_solver=case.linear_solver, resume=out.done
     )
     for step in steps:
         out.write(case.finished(step))
-        if stop is not None and step.index >= stop:
-            out._committed.ours = False  # nothing more reaches the file
-            out._file.close()
-            out._committed.close()
-            out._lock.release()
-            return
+        if stop is not None and step.index <= stop:
+            killed.write(case.finished(step))
+        if step.index == stop:
+            killed._committed.ours = False  # nothing more reaches the file
+            killed._file.close()
+            killed._committed.close()
+            killed._lock.release()
     out.close()
 
 
@@ -44,8 +46,7 @@ def plain(value):
 def test_a_killed_run_goes_on_with_the_same_bits(name: str, stop: int, tmp_path: Path):
     case = read_case(feature_cases.written(name, tmp_path))
     whole, parts = tmp_path / "whole.vtkhdf", tmp_path / "parts.vtkhdf"
-    write(case, whole)
-    write(case, parts, stop=stop)
+    write(case, whole, parts, stop)
     write(read_case(feature_cases.written(name, tmp_path)), parts)
     assert killing.differing(whole, parts) == []
     with open_results(whole) as one, open_results(parts) as other:

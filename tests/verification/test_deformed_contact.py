@@ -500,9 +500,9 @@ def test_load_steps_take_few_pairings_and_converge_quadratically(make, mesh, opt
     steps = fc.solve(model, ramp, criteria=whole, linear_solver="direct")
     counts = [step.iterations["geometry_updates"] + 1 for step in steps]
     assert max(counts) <= updates
-    # Increments of friction, and their last one that is solved again, take one or two pairings.
-    along = fc.solve(model, ramp, linear_solver="direct")
-    assert all(step.iterations["geometry_updates"] < count + 2 for step, count in zip(along, counts, strict=True))
+    if "friction" in options:  # increments, and their last one that is solved again, take one or two pairings
+        along = fc.solve(model, ramp, linear_solver="direct")
+        assert all(step.iterations["geometry_updates"] < count + 2 for step, count in zip(along, counts, strict=True))
     assert max(counts) > 2
     monkeypatch.setattr(geometry_loop, "SAFETY", np.inf)  # no Newton step is omitted
     for step in fc.solve(model, ramp, criteria=whole, linear_solver="direct")[-2:]:

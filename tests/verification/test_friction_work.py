@@ -222,13 +222,13 @@ def pressed_ball(solver="auto", steps=5, friction_while_touching=0.01, **changes
 def test_work_of_friction_does_not_depend_on_the_number_of_steps(formulation, element, kinematics):
     """Nodes that close in a step slide from where they touch on: few steps have the work and the shear of many."""
     options = {"element": element, "formulation": formulation, "kinematics": kinematics}
-    whole, fine, twenty, five, one = (
+    whole, fine, five, one = (
         pressed_ball(steps=n, friction_while_touching=fraction, **options)
-        for n, fraction in ((80, 1.0), (40, None), (20, None), (5, None), (1, None))
+        for n, fraction in ((40, 1.0), (20, None), (5, None), (1, None))
     )
     assert whole[-1].work["friction_work"] == pytest.approx(fine[-1].work["friction_work"], rel=0.1)
     shear, pressure = fine[-1].contact["ball"].shear, fine[-1].contact["ball"].pressure.max()
-    for steps, error in ((twenty, 0.05), (five, 0.05), (one, 0.1)):
+    for steps, error in ((five, 0.05), (one, 0.1)):
         assert steps[-1].work["friction_work"] == pytest.approx(fine[-1].work["friction_work"], rel=error)
         assert np.abs(steps[-1].contact["ball"].shear - shear).max() < 0.03 * 0.3 * pressure
         done = sum(step.contact["ball"].dissipation for step in steps)
