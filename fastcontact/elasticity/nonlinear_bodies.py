@@ -219,6 +219,42 @@ class NonlinearBodies:
 
         return DeformedBodies(assembled_tangent, force, history, stress, float(energy[0]), float(energy[1]))
 
+    def change_if_halved(
+        self, middle: Array, end: Array, before: Mapping[str, Array], bodies: DeformedBodies
+    ) -> tuple[float, float]:
+        """Return the Euclidean norm of the stresses at points that yield in a step, and its change if the step were halved.
+
+        The radial return is exact if the direction of the plastic flow does not change in the step.
+
+        Parameters
+        ----------
+        middle, end : ndarray (n_points, dim)
+            Displacements in the middle and at the end of the step [length].
+        before : mapping of str to ndarray (n_cells, n_q, 9)
+            History at the beginning of the step, by solid element type.
+        bodies : DeformedBodies
+            The response at the end of the step.
+
+        Returns
+        -------
+        size, change : float
+            Both are zero if no point yields, or if a cell is inverted in the middle [pressure].
+        """
+        yielding = {
+            name: bodies.history[name][..., PLASTIC_STRAIN] > old[..., PLASTIC_STRAIN] for name, old in before.items()
+        }
+        if not any(points.any() for points in yielding.values()):
+            return 0.0, 0.0
+        try:
+            halved = self.at(end, self.at(middle, before, tangent=False).history, tangent=False)
+        except ConvergenceError:
+            return 0.0, 0.0
+        stress, other = (
+            np.concatenate([response.stress[name][points].ravel() for name, points in yielding.items()])
+            for response in (bodies, halved)
+        )
+        return float(np.linalg.norm(stress)), float(np.linalg.norm(other - stress))
+
     def _failure(self, status: int, name: str, cell: int, displacement: Array) -> str:
         """Return the message for a status other than zero of `body_kernels.linearise`."""
         from fastcontact.elasticity import body_kernels
