@@ -96,7 +96,7 @@ def _end_of_step(
         instant=instant[1], rise=None if heated is None else heated.rise,
     )  # fmt: skip
     end = solution.terms.commit(u, end)
-    if problem.bodies is not None and problem.bodies.yields and load.rise is None:
+    if problem.bodies is not None and problem.bodies.flows_freely and load.rise is None:
         middle, before = start.extrapolation.midway(start.u, u), start.history or problem.bodies.beginning
         displacements = problem.displacement(middle), problem.displacement(u)
         flow = problem.bodies.change_if_halved(*displacements, before, solution.terms.bodies.at(u))

@@ -85,14 +85,8 @@ def result_warnings(
         warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
         warnings += [sag[name]] if name in sag else _unresolved(name, pair, contact, state)
         warnings += [*wavering(pair, contact), *_peak_at_edge(pair, last, contact), *_too_fast(name, pair, state)]
-    return [
-        *warnings,
-        *_unsettled(state),
-        *_loose(problem, last),
-        *_unbalanced(state),
-        *_slipping_before(state),
-        *_turning_flow(state),
-    ]
+    warnings += [*_unsettled(state), *_loose(problem, last), *_unbalanced(state), *_slipping_before(state)]
+    return [*warnings, *_turning_flow(state)]
 
 
 def _deep_penetration(pair: Formulation, contact: ContactResult, displacement: Array) -> Iterator[str]:
@@ -189,9 +183,9 @@ def _turning_flow(state: State) -> Iterator[str]:
     size, change = state.flow
     if change > NOTABLE * size:
         yield (
-            f"the plastic flow turns so much within a load step that stresses where bodies yield change by {change / size:.1%} "
-            "(root mean square) if the step is halved, and contact forces and displacements by up to three times as much: use "
-            "twice as many load steps, and compare"
+            f"the plastic flow turns so much in a load step that stresses of points that yield change by {change / size:.1%} "
+            "(root mean square) if the step is halved, and contact forces and displacements by up to three times as much: "
+            "compare with twice as many load steps"
         )
 
 

@@ -106,6 +106,11 @@ class NonlinearBodies:
         return any(isinstance(law, ElasticPlastic) for law in self._materials)
 
     @property
+    def flows_freely(self) -> bool:
+        """Whether `change_if_halved` applies: in plane stress, the strain across bends the path where yielding begins."""
+        return self.yields and self.kinematics != "plane_stress"
+
+    @property
     def _has_history(self) -> bool:
         """Whether the history may change."""
         return self.yields or self.kinematics == "plane_stress"
@@ -249,8 +254,9 @@ class NonlinearBodies:
             halved = self.at(end, self.at(middle, before, tangent=False).history, tangent=False)
         except ConvergenceError:
             return 0.0, 0.0
+        twice_shear = np.sqrt([1.0, 1.0, 1.0, 2.0, 2.0, 2.0][: 2 * self.mesh.dim])  # in the norm of a tensor
         stress, other = (
-            np.concatenate([response.stress[name][points].ravel() for name, points in yielding.items()])
+            np.concatenate([(response.stress[name][points] * twice_shear).ravel() for name, points in yielding.items()])
             for response in (bodies, halved)
         )
         return float(np.linalg.norm(stress)), float(np.linalg.norm(other - stress))
