@@ -177,8 +177,8 @@ def _unsettled(state: State) -> Iterator[str]:
 def _turning_flow(state: State) -> Iterator[str]:
     """Yield a warning where the plastic flow changes its direction notably within a load step.
 
-    Under a ball that is pressed in in 4, 8 and 16 steps, the stresses change by 1.9, 1.5 and 1.0 % if the last step is
-    halved, and the force is 6, 3 and 1.1 % too small; with kinematic hardening, by 0.8, 0.5 and 0.1 %, and less than 1 %.
+    Under a ball that is pressed in in 4, 8 and 16 steps, the stresses change by 2.1, 1.7 and 1.3 % if the last step is
+    halved, and the force is 6, 3 and 1.1 % too small. With kinematic hardening, both are below 1 %.
     """
     size, change = state.flow
     if change > NOTABLE * size:

@@ -152,7 +152,11 @@ def test_unloading_is_elastic_and_leaves_a_dent() -> None:
     # Twenty steps suffice. Two do not, and this is told after the ball has been lifted, also if that is another analysis.
     assert -pressed[-1].contact["ball"].force[1] < -0.97 * smaller[-2].contact["ball"].force[1]
     found = [steps, fc.solve(model, [0.5, 1.0, 1.2, 2.0], resume=pressed), smaller]
-    assert [any("the plastic flow turns" in text for text in last.warnings) for *_, last in found] == [True, True, False]
+    assert [any("the plastic flow turns" in text for text in last.warnings) for *_, last in found] == [
+        True,
+        True,
+        False,
+    ]
     assert not steps[-1].contact["ball"].active.any()
     assert steps[-1].displacement[:, 1].min() < -0.02
     assert abs(steps[-1].reaction[:, 1].sum()) <= 1e-9 * steps[1].reaction[:, 1].sum()

@@ -36,8 +36,8 @@ def below_a_ball(formulation: str, divisions: int, law=None) -> tuple[float, lis
 
 
 def test_pressures_overshoot_at_the_edge_past_yield() -> None:
-    fine, texts = below_a_ball("mortar", 24)
-    assert not texts
+    fine, (text,) = below_a_ball("mortar", 24)
+    assert text.startswith("the plastic flow turns")
     for formulation in ("continuous", "node_to_segment"):
         largest, texts = below_a_ball(formulation, 12)
         (match,) = [match for text in texts if (match := re.match(EDGE, text))]
