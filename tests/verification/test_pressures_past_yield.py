@@ -45,8 +45,8 @@ def test_pressures_overshoot_at_the_edge_past_yield() -> None:
         assert high == pytest.approx(largest, rel=1e-3)
         assert 1.05 * low < fine < 0.8 * high
         assert texts[0].endswith("use smaller facets, or formulation mortar")
-    largest, texts = below_a_ball("mortar", 12)
-    assert not texts
+    largest, (text,) = below_a_ball("mortar", 12)
+    assert text.startswith("the plastic flow turns")
     assert largest == pytest.approx(fine, rel=0.1)
     _, texts = below_a_ball("continuous", 12, fc.LinearElastic(200e3, 0.3))
     assert not any(re.match(EDGE, text) for text in texts)
