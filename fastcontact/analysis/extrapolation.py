@@ -78,6 +78,17 @@ class Extrapolation:
         """Return initial displacements (n,) as `displacement` does, but by the polynomial of the chosen degree."""
         return self._continued(min(self.degree, self._highest)) if self.ratio else u
 
+    def midway(self, begin: Array, u: Array) -> Array:
+        """Return displacements (n,) in the middle of the step from `begin` (n,) to u (n,) [length].
+
+        They lie on the parabola through both and the state before, and on a line if steps are not extrapolated.
+        """
+        middle, ratio = 0.5 * (begin + u), self.ratio
+        if not ratio:
+            return middle
+        curvature = ((u - begin) / ratio - (begin - self.states[-2][0])) / (1.0 + ratio)
+        return middle - 0.25 * ratio**2 * curvature
+
     @property
     def _highest(self) -> int:
         """Highest possible degree, negative without states: the number of last increments that are all extrapolated."""

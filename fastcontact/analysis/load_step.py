@@ -96,6 +96,12 @@ def _end_of_step(
         instant=instant[1], rise=None if heated is None else heated.rise,
     )  # fmt: skip
     end = solution.terms.commit(u, end)
+    deformed = solution.bodies
+    if problem.bodies is not None and deformed is not None and problem.bodies.flows_freely and load.rise is None:
+        middle, before = start.extrapolation.midway(start.u, u), start.history or problem.bodies.beginning
+        displacements = problem.displacement(middle), problem.displacement(u)
+        flow = problem.bodies.change_if_halved(*displacements, before, deformed)
+        end = replace(end, flow=max(start.flow, flow))
     contact: dict[str, ContactResult] = {}
     if settled is not None:
         end = save_contact_history(problem, start, load, settled, end)

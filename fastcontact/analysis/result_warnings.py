@@ -85,7 +85,8 @@ def result_warnings(
         warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
         warnings += [sag[name]] if name in sag else _unresolved(name, pair, contact, state)
         warnings += [*wavering(pair, contact), *_peak_at_edge(pair, last, contact), *_too_fast(name, pair, state)]
-    return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state), *_slipping_before(state)]
+    warnings += [*_unsettled(state), *_loose(problem, last), *_unbalanced(state), *_slipping_before(state)]
+    return [*warnings, *_turning_flow(state)]
 
 
 def _deep_penetration(pair: Formulation, contact: ContactResult, displacement: Array) -> Iterator[str]:
@@ -170,6 +171,21 @@ def _unsettled(state: State) -> Iterator[str]:
         yield (
             f"the contact geometry had not converged after the {update} updates requested: the last one changed the "
             f"displacement by {change:.1%} of its largest component. Allow more geometry_updates, or omit the option"
+        )
+
+
+def _turning_flow(state: State) -> Iterator[str]:
+    """Yield a warning where the plastic flow changes its direction notably within a load step.
+
+    Under a ball that is pressed in in 4, 8 and 16 steps, the stresses change by 2.1, 1.7 and 1.3 % if the last step is
+    halved, and the force is 6, 3 and 1.1 % too small. With kinematic hardening, both are below 1 %.
+    """
+    size, change = state.flow
+    if change > NOTABLE * size:
+        yield (
+            f"the plastic flow turns so much in a load step that stresses of points that yield change by {change / size:.1%} "
+            "(root mean square) if the step is halved, and contact forces and displacements by up to three times as much: "
+            "compare with twice as many load steps"
         )
 
 

@@ -84,6 +84,9 @@ class State:
         Rigid position of floating bodies in the last step.
     history : dict of str to ndarray (n_cells, n_q, 9)
         History variables of nonlinear bodies, by element type, see `constitutive_kernels`; empty before the first step.
+    flow : (float, float)
+        Norm of the stresses of all points that yielded in a step, and its change if the step were halved, in that of the
+        steps so far in which the norm was largest [pressure].
     rise : ndarray (n_points,), optional
         Temperature rise above the reference temperature, in models with conduction of heat [temperature].
     instant : float
@@ -116,6 +119,7 @@ class State:
     last_change: tuple[int, float] | None = None
     rigid: RigidPosition | None = None
     history: Mapping[str, Array] = field(default_factory=dict)
+    flow: tuple[float, float] = (0.0, 0.0)
     rise: Array | None = None
     instant: float = 0.0
     halved: int = 0
@@ -135,6 +139,7 @@ class State:
             "work": None if self.work is None else dataclasses.asdict(self.work),
             "forces": {name: vars(entry) for name, entry in self.forces.items()},
             "history": dict(self.history),
+            "flow": list(self.flow),
             **({} if self.rise is None else {"rise": self.rise.copy(), "instant": self.instant}),
             "active": dict(self.active),
             "pressure": dict(self.pressure),
@@ -170,6 +175,7 @@ class State:
             **{name: numbers[key] for key, name in NUMBERS.items()},
             **of_pairs,
             history=dict(data.get("history", {})),
+            flow=tuple(data.get("flow", (0.0, 0.0))),
             rise=data.get("rise"),
             instant=data.get("instant", 0.0),
             halved=int(numbers.get("halved", 0)),

@@ -106,6 +106,11 @@ class NonlinearBodies:
         return any(isinstance(law, ElasticPlastic) for law in self._materials)
 
     @property
+    def flows_freely(self) -> bool:
+        """Whether `change_if_halved` applies: in plane stress, the strain across bends the path where yielding begins."""
+        return self.yields and self.kinematics != "plane_stress"
+
+    @property
     def _has_history(self) -> bool:
         """Whether the history may change."""
         return self.yields or self.kinematics == "plane_stress"
@@ -218,6 +223,43 @@ class NonlinearBodies:
             return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
 
         return DeformedBodies(assembled_tangent, force, history, stress, float(energy[0]), float(energy[1]))
+
+    def change_if_halved(
+        self, middle: Array, end: Array, before: Mapping[str, Array], bodies: DeformedBodies
+    ) -> tuple[float, float]:
+        """Return the Euclidean norm of the stresses at points that yield in a step, and its change if the step were halved.
+
+        The radial return is exact if the direction of the plastic flow does not change in the step.
+
+        Parameters
+        ----------
+        middle, end : ndarray (n_points, dim)
+            Displacements in the middle and at the end of the step [length].
+        before : mapping of str to ndarray (n_cells, n_q, 9)
+            History at the beginning of the step, by solid element type.
+        bodies : DeformedBodies
+            The response at the end of the step.
+
+        Returns
+        -------
+        size, change : float
+            Both are zero if no point yields, or if a cell is inverted in the middle [pressure].
+        """
+        yielding = {
+            name: bodies.history[name][..., PLASTIC_STRAIN] > old[..., PLASTIC_STRAIN] for name, old in before.items()
+        }
+        if not any(points.any() for points in yielding.values()):
+            return 0.0, 0.0
+        try:
+            halved = self.at(end, self.at(middle, before, tangent=False).history, tangent=False)
+        except ConvergenceError:
+            return 0.0, 0.0
+        twice_shear = np.sqrt([1.0, 1.0, 1.0, 2.0, 2.0, 2.0][: 2 * self.mesh.dim])  # in the norm of a tensor
+        stress, other = (
+            np.concatenate([(response.stress[name][points] * twice_shear).ravel() for name, points in yielding.items()])
+            for response in (bodies, halved)
+        )
+        return float(np.linalg.norm(stress)), float(np.linalg.norm(other - stress))
 
     def _failure(self, status: int, name: str, cell: int, displacement: Array) -> str:
         """Return the message for a status other than zero of `body_kernels.linearise`."""

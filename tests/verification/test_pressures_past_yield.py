@@ -36,8 +36,8 @@ def below_a_ball(formulation: str, divisions: int, law=None) -> tuple[float, lis
 
 
 def test_pressures_overshoot_at_the_edge_past_yield() -> None:
-    fine, texts = below_a_ball("mortar", 24)
-    assert not texts
+    fine, (text,) = below_a_ball("mortar", 24)
+    assert text.startswith("the plastic flow turns")
     for formulation in ("continuous", "node_to_segment"):
         largest, texts = below_a_ball(formulation, 12)
         (match,) = [match for text in texts if (match := re.match(EDGE, text))]
@@ -45,8 +45,8 @@ def test_pressures_overshoot_at_the_edge_past_yield() -> None:
         assert high == pytest.approx(largest, rel=1e-3)
         assert 1.05 * low < fine < 0.8 * high
         assert texts[0].endswith("use smaller facets, or formulation mortar")
-    largest, texts = below_a_ball("mortar", 12)
-    assert not texts
+    largest, (text,) = below_a_ball("mortar", 12)
+    assert text.startswith("the plastic flow turns")
     assert largest == pytest.approx(fine, rel=0.1)
     _, texts = below_a_ball("continuous", 12, fc.LinearElastic(200e3, 0.3))
     assert not any(re.match(EDGE, text) for text in texts)

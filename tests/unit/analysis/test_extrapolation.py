@@ -24,6 +24,13 @@ def test_displacements_go_on_with_the_loads_but_not_far_and_not_back(factor, exp
     assert found.displacement(2.0 * np.ones(3)) == pytest.approx(expected * np.ones(3))
 
 
+def test_the_middle_of_a_step_is_on_a_parabola_or_on_a_line():
+    begin, end = 4.0 * np.ones(3), 9.0 * np.ones(3)
+    found = after_two_steps().to(np.zeros(3), 4.0 * np.arange(3.0))  # u = 1 at -1, 4 at 0 and 9 at 2
+    assert found.midway(begin, end) == pytest.approx((4.0 + 17.0 / 6.0 - 1.0 / 6.0) * np.ones(3))
+    assert found.to(np.zeros(3), 0.0 * np.arange(3.0)).midway(begin, end) == pytest.approx(6.5 * np.ones(3))
+
+
 def test_constraints_close_and_open_where_gaps_and_forces_change_sign():
     found = after_two_steps().to(np.zeros(3), 3.0 * np.arange(3.0))
     last = np.array([False, True, True, False])
