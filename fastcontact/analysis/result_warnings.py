@@ -168,8 +168,8 @@ def _unsettled(state: State) -> Iterator[str]:
     update, change = state.last_change or (0, 0.0)
     if change > NOTABLE:
         yield (
-            f"the contact geometry had not converged after the {update} updates requested: the last one changed the "
-            f"displacement by {change:.1%} of its largest component. Allow more geometry_updates, or omit the option"
+            f"the contact geometry had not converged after the requested number of updates, {update}: the last one changed "
+            f"the displacement by {change:.1%} of its largest component. Allow more geometry_updates, or omit the option"
         )
 
 

@@ -252,7 +252,7 @@ def _part_name(mesh: Mesh, rigid: RigidParts, number: int) -> str:
     if not len(hinges):
         return name
     part = _group_of(mesh, members) or f"around {mesh.points[members].mean(axis=0)}"
-    return f"{name}, the part {part} that hangs at {node_at(mesh, hinges[0])}"
+    return f"{name}, the part {part} that is connected at {node_at(mesh, hinges[0])}"
 
 
 def _null_space(A: Array) -> Array:
