@@ -4,7 +4,7 @@ The unknowns of a constraint are its normal force n and its k tangential forces 
 tangents belong to these forces. All values are scaled such that the compliance of each constraint is near one. Forces, gaps
 and slips then have the same unit, and ``n - g`` is meaningful. The solution is the zero of
 
-.. math:: n - [n - g]_+, \qquad t - P(t - s), \qquad P \text{ the projection on the disc of radius } \mu [n - g]_+
+.. math:: n - [n - g]_+, \qquad t - P(t - s), \qquad P \text{ the projection onto the disc of radius } \mu [n - g]_+
 
 (Alart and Curnier, 1991), where :math:`[x]_+ = \max(x, 0)`. These residuals are semismooth functions of n and t. A line
 search ensures that their norm decreases. Newton's method does not depend on how gaps and slips are computed from the contact
@@ -154,8 +154,8 @@ class Linearised(Protocol):
 
 
 def newton(
-    problem: Linearised, y: Array, gaps: Array, exact: float = ROUND_OFF, patience: int | None = None,
-    line_search: bool = True, least: int = 0,
+    problem: Linearised, y: Array, gaps: Array, tolerance: float = ROUND_OFF, max_iterations: int | None = None,
+    line_search: bool = True, min_iterations: int = 0,
 ) -> Forces:  # fmt: skip
     """Return the zero of the residual, or the best iterate.
 
@@ -164,28 +164,28 @@ def newton(
     problem : Linearised
     y, gaps : ndarray (1 + k, m)
         Initial forces, and the gaps and slips that belong to them.
-    exact : float
+    tolerance : float
         Tolerance of the residual, relative to the largest force [-].
-    patience : int, optional
+    max_iterations : int, optional
         Largest number of iterations; MAX_NEWTON_ITERATIONS by default.
     line_search : bool
         Whether a step is halved until the residual decreases. Otherwise full steps are taken.
-    least : int
+    min_iterations : int
         Smallest number of iterations.
     """
-    patience = MAX_NEWTON_ITERATIONS if patience is None else patience
+    max_iterations = MAX_NEWTON_ITERATIONS if max_iterations is None else max_iterations
     law = problem.law
     residual = law.residual(y, gaps)
     norm = float(np.linalg.norm(residual))
     best = y, gaps, np.inf
-    for iteration in range(patience + 1):
+    for iteration in range(max_iterations + 1):
         largest = float(np.abs(y).max())
         largest_residual = float(np.abs(residual).max())
         relative = largest_residual / largest if largest else float(largest_residual > problem.round_off)
         if relative < best[2]:
             best = y, gaps, relative
-        settled = iteration >= least and largest_residual <= exact * largest + problem.round_off
-        if settled or iteration == patience:
+        settled = iteration >= min_iterations and largest_residual <= tolerance * largest + problem.round_off
+        if settled or iteration == max_iterations:
             break
         trial, trial_gaps = problem.step(y, gaps, *law.state(y, gaps))
         step, change = trial - y, trial_gaps - gaps

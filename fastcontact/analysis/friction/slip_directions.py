@@ -1,8 +1,8 @@
 """Tangents along which supports allow no slip.
 
-At a constraint on a symmetry plane or on an axis, supports prevent slip along one tangent or along both. The functions detect
-such tangents by the compliance of each constraint, rotate the two tangents of a constraint in 3D so that one of them is the
-direction in which slip is prevented, and mark this tangent as idle.
+At a constraint on a symmetry plane or on an axis, supports prevent slip along one tangent or along both. Such a tangent is
+called held. The functions detect held tangents by the compliance of each constraint, and rotate the two tangents of a
+constraint in 3D so that one of them is the direction in which slip is prevented.
 
 The compliance of m constraints, without their coupling, is an array (1 + k, 1 + k, m): the changes of the gap and of the k
 slips of a constraint by its normal force and its k tangential forces [length / force], in this order.
@@ -19,10 +19,10 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 # Compliance of a prescribed slip relative to the compliance of its gap. It is negligible, but with it the equation of stick
 # has a solution. The force of this solution lies outside the friction cone, so that the constraint slides.
-GIVING = LENGTH_ROUND_OFF
+SLIP_COMPLIANCE = LENGTH_ROUND_OFF
 
 
-def own_compliance(F: Array, parts: int) -> Array:
+def compliance_of_each(F: Array, parts: int) -> Array:
     """Return the compliance (parts, parts, m) of each constraint, given the compliance F (parts m, parts m) of all.
 
     `parts` is 1 + k; F has the normal components of all constraints first, then the components along each tangent.
@@ -47,9 +47,9 @@ def compliance_of_rows(rows: tuple[csr_array, ...], unknown_compliance: Array) -
 
 
 def aligning(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array | None:
-    """Return the matrix that rotates the two tangents of each constraint in 3D so that one is idle if possible.
+    """Return the matrix that rotates the two tangents of each constraint in 3D so that one is held if possible.
 
-    If supports leave one slip direction free, both tangents may be oblique to it, and neither is idle before the rotation.
+    If supports leave one slip direction free, both tangents may be oblique to it, and neither is held before the rotation.
 
     Parameters
     ----------
@@ -89,12 +89,12 @@ def _to_axes(tangent: Array, second_tangent: Array) -> Array:
     return np.asarray(np.arctan2((aligned * second_tangent).sum(axis=1), (aligned * tangent).sum(axis=1)))
 
 
-def idle(compliance: Array) -> Mask:
-    """Return which tangents (k, m) are idle, given the `compliance` (1 + k, 1 + k, m) of each constraint.
+def held_tangents(compliance: Array) -> Mask:
+    """Return which tangents (k, m) are held, given the `compliance` (1 + k, 1 + k, m) of each constraint.
 
-    Along an idle tangent, supports allow no motion, or only a motion that is proportional to the change of the gap. The
-    equation of its slip would be empty or linearly dependent. This occurs on axes and in planes of symmetry. Compliances are
-    no more accurate than the solutions of iterative solvers.
+    Along a held tangent, supports allow no motion, or only a motion that is proportional to the change of the gap, so that
+    the equation of its slip would be empty or linearly dependent. The tolerance is that of iterative solvers, whose
+    solutions determine the compliance.
     """
     k = len(compliance) - 1
     of_slips, normal = compliance[np.arange(1, k + 1), np.arange(1, k + 1)], compliance[0, 0]

@@ -12,7 +12,12 @@ import fastcontact as fc
 from fastcontact.analysis import newton, step_halving
 from fastcontact.analysis.friction import cone_newton, dense
 from fastcontact.analysis.friction import solve as friction
-from fastcontact.analysis.friction.slip_directions import aligning, compliance_of_rows, idle, own_compliance
+from fastcontact.analysis.friction.slip_directions import (
+    aligning,
+    compliance_of_each,
+    compliance_of_rows,
+    held_tangents,
+)
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import normals, tangents
@@ -78,11 +83,11 @@ def test_tangents_turn_to_the_slip_that_supports_leave():
     held = [0, 3]
     K_inverse[held], K_inverse[:, held] = 0.0, 0.0
     F = R @ K_inverse @ R.T
-    assert not len(np.flatnonzero(idle(own_compliance(F, 3))))
-    Q = aligning(own_compliance(F, 3))
+    assert not len(np.flatnonzero(held_tangents(compliance_of_each(F, 3))))
+    Q = aligning(compliance_of_each(F, 3))
     np.testing.assert_allclose((Q @ Q.T).toarray(), np.eye(6), atol=1e-15)
-    np.testing.assert_array_equal(idle(own_compliance(Q @ (Q @ F).T, 3)), [[False, False], [True, True]])
-    assert aligning(own_compliance(R @ (A @ A.T) @ R.T, 3)) is None
+    np.testing.assert_array_equal(held_tangents(compliance_of_each(Q @ (Q @ F).T, 3)), [[False, False], [True, True]])
+    assert aligning(compliance_of_each(R @ (A @ A.T) @ R.T, 3)) is None
 
 
 def test_frames_of_eliminated_slips_do_not_depend_on_the_choice_of_tangents():
