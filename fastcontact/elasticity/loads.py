@@ -304,7 +304,7 @@ def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
         where = mesh.points[block[missing[0]]].mean(axis=0)
         raise ModelError(
             f"facets of '{group}' do not lie on the outside of a solid (number: {len(missing)} of {len(block)}, first near "
-            f"{where}), so a pressure has no side to act from: use add_traction there"
+            f"{where}), where a pressure has no direction: use add_traction there"
         )
     return np.ascontiguousarray(outer[rows])
 

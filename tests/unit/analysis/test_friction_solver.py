@@ -210,7 +210,7 @@ def test_compliance_of_rows_against_dense_products():
 
 
 @pytest.mark.parametrize(
-    ("push", "told"), [(0.58, "before it 97% of the friction that contact can bear is used"), (0.3, "")]
+    ("push", "told"), [(0.58, "before it 97% of the friction that contact can carry is used"), (0.3, "")]
 )
 def test_the_message_states_how_much_friction_is_used(monkeypatch, push, told):
     """A block under the pressure 0.3 on a plane with the friction 0.3 slides at a push of 0.18 on its side."""
@@ -231,7 +231,7 @@ def test_the_message_states_how_much_friction_is_used(monkeypatch, push, told):
     with pytest.raises(fc.ConvergenceError, match="no equilibrium") as failed:
         fc.solve(model, [1.0, 2.0, 3.0])
     assert told in str(failed.value)
-    assert bool(told) == ("friction that contact can bear" in str(failed.value))
+    assert bool(told) == ("friction that contact can carry" in str(failed.value))
 
 
 def test_a_verdict_about_a_diverged_iterate_does_not_end_the_analysis(monkeypatch):
