@@ -175,7 +175,7 @@ class Heat:
         if len(free):
             dim, free_A = self.model.mesh.dim, csr_array(A[free][:, free])
             solver = choice.make(self.linear_solver, dim=dim, n_dofs=len(free), tolerance=self.linear_tolerance)
-            # Sums of sparse matrices drop entries that cancel, also on one side of the diagonal only; factorisations need both.
+            # Sums of sparse matrices drop entries that cancel, also on one side of the diagonal only. Factors need both.
             free_A = csr_array(0.5 * (free_A + free_A.T))
             free_A.sort_indices()
             blocks = bsr_array((free_A.data[:, None, None], free_A.indices, free_A.indptr), shape=free_A.shape)

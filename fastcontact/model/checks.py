@@ -29,8 +29,7 @@ def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
     if len(motions.hinges):
         hinges = (
             f". Parts of bodies are connected only at nodes (number: {len(motions.hinges)}, first: "
-            f"{node_at(mesh, motions.hinges[0])}): merge whole facets there, or leave the parts separate and define the "
-            "contact"
+            f"{node_at(mesh, motions.hinges[0])}): merge whole facets, or leave the parts separate and define the contact"
         )
     listing = "; ".join(f"{name}: {', '.join(motions_of_body)}" for name, motions_of_body in motions.by_body().items())
     raise ModelError(

@@ -128,9 +128,7 @@ class Eliminated:
             compliance = self._compliance_of_rows(rows, unknown_compliance)
         held_slips = held_tangents(compliance)
         prescribed = held_slips & constraints.moved_past(np.arange(m), self._turn)
-        self._compliance[1:][prescribed] += np.broadcast_to(SLIP_COMPLIANCE * compliance[0, 0], held_slips.shape)[
-            prescribed
-        ]
+        self._compliance[1:] += np.where(prescribed, SLIP_COMPLIANCE * compliance[0, 0], 0.0)
         slip_rows = [scaled(T, np.where(is_held, 0.0, 1.0)) for T, is_held in zip(rows[1:], held_slips, strict=True)]
         self._rows = (rows[0], *slip_rows)
         self._free = np.vstack([free[0], np.where(held_slips & ~prescribed, 0.0, free[1:])])
