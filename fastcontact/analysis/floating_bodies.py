@@ -8,10 +8,9 @@ If the matrix is factorised, the linear response of the contact problem to the p
 the position at which the springs are slack. For the final contact state it takes one step, for any stiffness of the springs.
 
 Otherwise the springs are soft compared with the body, and the new position is that at which they would be slack without
-contact.
-This is the proximal point method for the minimum of the energy under the inequalities of contact (Rockafellar, 1976). If
-contact restrains the bodies, each solution reduces the forces of the springs by about the ratio of their stiffness to that
-of the contact.
+contact. This is the proximal point method for the minimum of the energy under the inequalities of contact (Rockafellar,
+1976). If contact restrains the bodies, each solution reduces the forces of the springs by about the ratio of their stiffness
+to that of the contact.
 """
 
 from __future__ import annotations
