@@ -149,7 +149,7 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int,
         total = len(steps) + len(remaining(case.ramp, last))
         progress = Progress(total, show=stderr_is_terminal() and not options.quiet, done=len(steps))
         try:
-            settings = {**case.solution, "linear_solver": options.linear or case.linear_solver}
+            settings = {**case.solve_arguments, "linear_solver": options.linear or case.linear_solver}
             for last in solve_steps(case.model, case.ramp, **settings, resume=writer.done):
                 last = case.finished(last)
                 error = {ERROR_FIELD: estimate_error(case.model, last).cells} if fields else {}
