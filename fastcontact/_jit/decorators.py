@@ -33,7 +33,7 @@ _cache_reported = False
 class _Compilations(event.Listener):  # type: ignore[misc]
     """Listener for compilations of kernels; Numba raises no event for kernels that are read from the cache.
 
-    Garbage collection is suspended during a compilation, of which its 60 collections would take a tenth of the time.
+    Garbage collection is suspended during a compilation, because 60 collections would take a tenth of its time.
     """
 
     depth = 0  # of nesting, since the compilation of a kernel includes that of the kernels it calls
@@ -93,7 +93,7 @@ def inlined_kernel(function: Callable[..., Any]) -> Any:
 def innermost_kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` like `kernel`, for innermost loops: LLVM inlines the machine code at each call.
 
-    Small arrays then stay in registers, where `inlined_kernel` leaves them in memory.
+    Small arrays then stay in registers, whereas `inlined_kernel` leaves them in memory.
     """
     return _compile(function, forceinline=True)
 
@@ -107,7 +107,7 @@ def _compile(function: Callable[..., Any], fastmath: set[str] = AS_WRITTEN, **in
     global _cache_reported
     if reason and not _cache_reported:
         _cache_reported = True
-        log.info("%s (set NUMBA_CACHE_DIR to one of your own): compiling in every process", reason)
+        log.info("%s (set NUMBA_CACHE_DIR to a folder of your own): compiling in every process", reason)
     return dispatcher
 
 

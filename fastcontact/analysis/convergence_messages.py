@@ -87,7 +87,7 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
 
 
 def friction_exceeded(bodies: FloatingBodies, factor: float, coefficients: Array) -> str:
-    """Return the message for loads beyond the friction cone, which `factor` times the `coefficients` would bear."""
+    """Return the message for loads beyond the friction cone, which `factor` times the `coefficients` would hold."""
     distinct = np.unique(coefficients[coefficients > 0.0])
     values = factor * distinct[0], distinct[0]
     digits = next((n for n in range(3, 12) if f"{values[0]:.{n}g}" != f"{values[1]:.{n}g}"), 12)
@@ -130,12 +130,12 @@ def limit_load(problem: Problem, state: State) -> str:
         return ""
     validity = (
         f", beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics are valid: "
-        "the model then bears smaller loads than the real body"
+        "the model then carries smaller loads than the real body"
         if strain > LARGEST_PLASTIC_STRAIN and problem.model.strain == "small"
         else ""
     )
     return (
-        f"; before it the largest plastic strain is {strain:.2g}{validity}. Bodies that yield may bear no larger forces: "
+        f"; before it the largest plastic strain is {strain:.2g}{validity}. Bodies that yield may not carry larger forces: "
         "prescribe displacements in their place to find the largest"
     )
 
@@ -151,7 +151,7 @@ def friction_used(problem: Problem, state: State) -> str:
     if not ratios or min(ratios) < NEARLY_SLIDING:
         return ""
     return (
-        f"; before it {min(ratios):.0%} of the friction that contact can bear is used, and more may not hold "
+        f"; before it {min(ratios):.0%} of the friction that contact can carry is used, and more may not hold "
         f"{', '.join(problem.floating_bodies.motions.by_body())}. Add a support, or prescribe displacements instead of forces"
     )
 

@@ -8,10 +8,9 @@ If the matrix is factorised, the linear response of the contact problem to the p
 the position at which the springs are slack. For the final contact state it takes one step, for any stiffness of the springs.
 
 Otherwise the springs are soft compared with the body, and the new position is that at which they would be slack without
-contact.
-This is the proximal point method for the minimum of the energy under the inequalities of contact (Rockafellar, 1976). If
-contact restrains the bodies, each solution reduces the forces of the springs by about the ratio of their stiffness to that
-of the contact.
+contact. This is the proximal point method for the minimum of the energy under the inequalities of contact (Rockafellar,
+1976). If contact restrains the bodies, each solution reduces the forces of the springs by about the ratio of their stiffness
+to that of the contact.
 """
 
 from __future__ import annotations
@@ -38,13 +37,13 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
-# Stiffness of soft springs relative to that of the softest body. With factors, springs are as stiff as that body, since soft
-# springs reduce the accuracy (with 1e-6, a wedge has an error of 3e-9; with 1e-3, displacements of plates scatter by 2e-11,
-# and with 1 by 1e-12). With multigrid they are soft, since stiff ones would cost more solutions: with 1e-3, 1e-2 and 1, a
-# stack with friction takes 4.1, 4.2 and 65 linear solutions, and a bolt 2.8, 5.3 and 27. Stiff springs also compensate the
-# negative stiffness that rotated bodies may have under load. The reference is the softest body, because a contact is not
-# stiffer than the softer one of its bodies (for a layer that is softer by 2e5, 100 positions did not suffice with the
-# stiffness of the other body).
+# Stiffness of soft springs relative to that of the softest body. With a direct solver, springs are as stiff as that body,
+# since soft springs reduce the accuracy (with 1e-6, a wedge has an error of 3e-9; with 1e-3, displacements of plates
+# scatter by 2e-11, and with 1 by 1e-12). With multigrid they are soft, since stiff ones would cost more solutions: with
+# 1e-3, 1e-2 and 1, a stack with friction takes 4.1, 4.2 and 65 linear solutions, and a bolt 2.8, 5.3 and 27. Stiff
+# springs also compensate the negative stiffness that rotated bodies may have under load. The reference is the softest
+# body, because a contact is not stiffer than the softer one of its bodies (for a layer that is softer by 2e5, 100
+# positions did not suffice with the stiffness of the other body).
 SOFT = 1e-3
 
 

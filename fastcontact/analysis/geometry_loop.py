@@ -110,7 +110,7 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
 
 
 def _linearises(problem: Problem) -> bool:
-    """Return whether Newton's method applies to the contact geometry: with factors, and without fluid pressure."""
+    """Return whether Newton's method applies to the contact geometry: with a direct solver, without fluid pressure."""
     fluid = any(pair.options.source is not None for pair in problem.pairs.values())
     return not (fluid or problem.solver.iterative)
 

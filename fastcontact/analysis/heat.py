@@ -208,7 +208,7 @@ class Heat:
         if len(cut_off):
             raise ConvergenceError(
                 f"no heat reaches body {body_name(self.model.mesh, self.body, cut_off[0])}: its contacts are open or conduct "
-                "nothing in this step, so that nothing determines its temperature; add a film, or a conductance by gap"
+                "nothing in this step, so that nothing determines its temperature; add a film, or a conductance across gaps"
             )
 
 

@@ -47,7 +47,7 @@ NEGLECTED = 0.1
 ROTATION = 0.3
 # Largest recommended factor on the number of steps. A larger factor indicates a wrong coefficient of wear.
 MANY_STEPS = 1000
-# Alternation of nodal pressures on quadratic lines above which a warning is given, see `wavering`; elsewhere ALTERNATING.
+# Alternation of nodal pressures on quadratic lines above which a warning is given, see `oscillating`; elsewhere ALTERNATING.
 ALTERNATING_ON_LINES = 0.15
 # Number of elements across the radius of a contact that resolve its pressure.
 ACROSS = 4
@@ -84,7 +84,7 @@ def result_warnings(
         undetermined = _undetermined_tractions(pair, contact, pair.undetermined(configuration))
         warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
         warnings += [sag[name]] if name in sag else _unresolved(name, pair, contact, state)
-        warnings += [*wavering(pair, contact), *_peak_at_edge(pair, last, contact), *_too_fast(name, pair, state)]
+        warnings += [*oscillating(pair, contact), *_peak_at_edge(pair, last, contact), *_too_fast(name, pair, state)]
     warnings += [*_unsettled(state), *_loose(problem, last), *_unbalanced(state), *_slipping_before(state)]
     return [*warnings, *_turning_flow(state)]
 
@@ -169,8 +169,8 @@ def _unsettled(state: State) -> Iterator[str]:
     update, change = state.last_change or (0, 0.0)
     if change > NOTABLE:
         yield (
-            f"the contact geometry had not converged after the {update} updates requested: the last one changed the "
-            f"displacement by {change:.1%} of its largest component. Allow more geometry_updates, or omit the option"
+            f"the contact geometry had not converged after the requested number of updates, {update}: the last one changed "
+            f"the displacement by {change:.1%} of its largest component. Allow more geometry_updates, or omit the option"
         )
 
 
@@ -412,7 +412,7 @@ def across(side: Surface, closed: Mask, excluded: Mask) -> int | None:
     return count
 
 
-def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
+def oscillating(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     """Yield a warning where pressures of nodes whose neighbours are all closed oscillate by a large fraction of their mean.
 
     The measure is the median difference from the mean of the neighbours, over the mean pressure. On rings of tri3 cells 4.6
@@ -441,7 +441,7 @@ def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
         return
     cells = f"quadrangles or hexahedra along '{pair.secondary.group}', or triangles or tetrahedra there about as deep as wide"
     yield (
-        f"contact '{contact.name}': nodal pressures waver from node to node, by {0.5 * size:.3g} above and below "
+        f"contact '{contact.name}': nodal pressures oscillate from node to node, by {0.5 * size:.3g} above and below "
         f"a mean of {mean:.3g}: trust means over neighbouring nodes, or use "
         f"{cells if pair.name == 'mortar' else 'formulation mortar'}"
     )

@@ -162,7 +162,7 @@ class Case:
     deck: Deck | None = None
 
     @property
-    def solution(self) -> dict[str, Any]:
+    def solve_arguments(self) -> dict[str, Any]:
         """Keyword arguments of `fastcontact.solve` that the case specifies."""
         return {
             "linear_solver": self.linear_solver,

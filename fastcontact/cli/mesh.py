@@ -28,7 +28,7 @@ def add_generators(parser: argparse.ArgumentParser) -> None:
         }
         options = (_option(generator, parameter) for parameter in inspect.signature(generator).parameters.values())
         declare(subparser, {**output, **dict(options)})
-        add_loudness(subparser, default=argparse.SUPPRESS)  # keeps -q and -v before the name of the generator
+        add_loudness(subparser, default=argparse.SUPPRESS)  # keeps -q and -v given before the name
 
 
 class _Raw(argparse.RawDescriptionHelpFormatter):

@@ -122,7 +122,7 @@ def _new_steps(options: argparse.Namespace, case: Case, done: Sequence[StepResul
     """Check the model, and return the steps after the steps `done`, which are computed when they are requested."""
     from fastcontact.analysis.run import solve_steps
 
-    settings = {**case.solution, "linear_solver": options.linear or case.linear_solver}
+    settings = {**case.solve_arguments, "linear_solver": options.linear or case.linear_solver}
     return solve_steps(case.model, case.ramp, **settings, resume=done)
 
 

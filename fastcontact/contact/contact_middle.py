@@ -219,7 +219,7 @@ def _radius_is_monotone(surface: Surface, coordinates: Array) -> bool:
 
 
 def symmetry_planes(pair: Formulation) -> list[tuple[int, Indices]]:
-    """Return the planes of symmetry at the ends of a surface, by the axis normal to each and the nodes of the surface on it.
+    """Return, for each plane of symmetry at an end of a surface, the axis normal to it and the nodes of the surface on it.
 
     Supports prescribe zero displacement along its normal, and the opposite body does not extend beyond the plane.
     """

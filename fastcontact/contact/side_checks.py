@@ -48,7 +48,7 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
         behind = -np.einsum("ijd,id->ij", difference, secondary_frames[1])[facing]
         inside = f", or do the bodies lie inside each other, by {behind.min():.4g} or more" if len(behind) else ""
         raise ContactError(
-            f"no facet of '{secondary.group}' faces '{primary.group}': the outer sides of the two groups look away from "
+            f"no facet of '{secondary.group}' faces '{primary.group}': the outer sides of the two groups face away from "
             f"each other; is one of them the wrong face of its body{inside}?"
         )
 

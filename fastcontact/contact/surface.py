@@ -210,8 +210,8 @@ def _outward(mesh: Mesh, group: str, name: str, block: Numbers, outer: Mapping[s
     if len(missing):
         where = mesh.points[block[missing[0]]].mean(axis=0)
         raise ContactError(
-            f"{len(missing)} of {len(block)} facets of '{group}' do not lie on the outside of a solid "
-            f"(first near {where}): give each body nodes of its own, which merge_points may have joined, and let boundary "
+            f"facets of '{group}' do not lie on the outside of a solid (number: {len(missing)} of {len(block)}, first near "
+            f"{where}): give each body nodes of its own, which merge_points may have joined, and let boundary "
             "facets share their nodes with solid cells"
         )
     return np.ascontiguousarray(candidates[np.unique(rows)])

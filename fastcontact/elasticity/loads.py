@@ -209,8 +209,8 @@ class NodalForce(Load):
             on_axis = np.intersect1d(mesh.points_of(self.group), axis_nodes(mesh))
             if len(on_axis):
                 raise ModelError(
-                    f"{self.name} has a radial component x at {len(on_axis)} points on the axis of symmetry (first: point "
-                    f"{on_axis[0]}), where the circle that it acts along has no length: leave the points at x = 0 out"
+                    f"{self.name} has a radial component x on the axis of symmetry (number of points: {len(on_axis)}, first: "
+                    f"point {on_axis[0]}), where the circle that it acts along has no length: leave the points at x = 0 out"
                 )
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
@@ -303,8 +303,8 @@ def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
     if len(missing):
         where = mesh.points[block[missing[0]]].mean(axis=0)
         raise ModelError(
-            f"{len(missing)} of {len(block)} facets of '{group}' do not lie on the outside of a solid (first near "
-            f"{where}), so a pressure has no side to act from: use add_traction there"
+            f"facets of '{group}' do not lie on the outside of a solid (number: {len(missing)} of {len(block)}, first near "
+            f"{where}), where a pressure has no direction: use add_traction there"
         )
     return np.ascontiguousarray(outer[rows])
 

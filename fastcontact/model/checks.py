@@ -28,8 +28,8 @@ def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
     total, hinges = len(motions), ""
     if len(motions.hinges):
         hinges = (
-            f". Parts of bodies hang together at {len(motions.hinges)} nodes only (first: {node_at(mesh, motions.hinges[0])}"
-            "): merge whole facets there, or leave the parts separate and define the contact"
+            f". Parts of bodies are connected only at nodes (number: {len(motions.hinges)}, first: "
+            f"{node_at(mesh, motions.hinges[0])}): merge whole facets, or leave the parts separate and define the contact"
         )
     listing = "; ".join(f"{name}: {', '.join(motions_of_body)}" for name, motions_of_body in motions.by_body().items())
     raise ModelError(
@@ -59,7 +59,7 @@ def check_forces(mesh: Mesh, forces: Array, related: Mask, name: str) -> None:
     loose = np.flatnonzero(forces.any(axis=1) & ~_carried(mesh, related))
     if len(loose):
         raise ModelError(
-            f"{name} acts on {len(loose)} points that belong to no solid cell (first: point {loose[0]}): "
+            f"{name} acts on points that belong to no solid cell (number: {len(loose)}, first: point {loose[0]}): "
             "name a group of the body, or tie the points to it with couple or relate"
         )
 
@@ -82,8 +82,8 @@ def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: Mas
         points = mesh.points_of(group)
         if not carried[points].any():
             raise ModelError(
-                f"{name} contains {len(points)} points that belong to no solid cell (first: point {points[0]}): name a group "
-                "of the body"
+                f"{name} contains only points that belong to no solid cell (number: {len(points)}, first: point "
+                f"{points[0]}): name a group of the body"
             )
 
 

@@ -91,9 +91,9 @@ def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Ite
             nodes = _common(sides.points, sides.secondary, secondary)
             if len(nodes) and len(_common(sides.points, sides.primary, primary)):
                 yield (
-                    f"contacts '{pair.name}' and '{other.name}' continue each other at {len(nodes)} common nodes of their "
-                    f"sides (first: point {nodes[0]}): the pressure near them is not unique; make one contact of both, "
-                    "with one group for each side"
+                    f"contacts '{pair.name}' and '{other.name}' continue each other at common nodes of their sides "
+                    f"(number: {len(nodes)}, first: point {nodes[0]}): the pressure near them is not unique; make one "
+                    "contact of both, with one group for each side"
                 )
 
 

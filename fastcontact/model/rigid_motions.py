@@ -93,7 +93,7 @@ class FreeMotions:
         return [(body, self._described(column, rows)) for body, rows in rows_of.items()]
 
     def _described(self, column: Array, rows: list[int]) -> str:
-        """Return the name of the motion of a body: a rotation about a point or line if possible, otherwise all its parts."""
+        """Return the name of the motion of a body: a rotation about a point or line if possible, else elementary ones."""
         labels = [self.labels[i] for i in rows]
         translation, rotation = np.zeros((2, 3))
         for i, label in zip(rows, labels, strict=True):
@@ -252,7 +252,7 @@ def _part_name(mesh: Mesh, rigid: RigidParts, number: int) -> str:
     if not len(hinges):
         return name
     part = _group_of(mesh, members) or f"around {mesh.points[members].mean(axis=0)}"
-    return f"{name}, the part {part} that hangs at {node_at(mesh, hinges[0])}"
+    return f"{name}, the part {part} that is connected at {node_at(mesh, hinges[0])}"
 
 
 def _null_space(A: Array) -> Array:

@@ -277,7 +277,7 @@ def fields_of(kind: type, result: dict[str, Any]) -> dict[str, Any]:
 
 def last_step(case: Case) -> StepResult:
     """Solve a case and return its last step, without keeping earlier steps in memory."""
-    return deque(solve_steps(case.model, case.ramp, **case.solution), maxlen=1).pop()
+    return deque(solve_steps(case.model, case.ramp, **case.solve_arguments), maxlen=1).pop()
 
 
 def profile(last: StepResult, pair: str | None) -> dict[str, list[float]]:

@@ -208,7 +208,10 @@ class Series:
         return split(self.values(quantity)[-1], limit, theory) if limit and theory else None
 
     def converges_to_theory(self, quantity: str) -> bool | None:
-        """Return whether the limit agrees with an exact theory within its error bar; None without an exact theory."""
+        """Return whether the limit is settled and agrees with an exact theory; None without an exact theory.
+
+        The admissible difference is the error bar of the limit, at least EXACT.
+        """
         split, limit = self.split(quantity), self.limits.get(quantity)
         if split is None or limit is None or not self.exact_theory:
             return None

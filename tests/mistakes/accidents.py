@@ -46,7 +46,7 @@ ACCIDENTS = [
      r"'.*old\.vtkhdf' is write-protected: remove the protection or name another file"),
     ("another run writes the result file", other_writer, ["run", "case.toml", "-o", "busy.vtkhdf"],
      r"'.*busy\.vtkhdf' is being written by process \d+: wait for it or name another file"),
-    ("the result file exists and is something else", other_results, ["run", "case.toml", "-o", "text.vtkhdf"],
+    ("the result file exists and is another kind of file", other_results, ["run", "case.toml", "-o", "text.vtkhdf"],
      r"'.*text\.vtkhdf' exists and is not a result file: name another file or remove it first"),
     ("the result file is a pipe", pipe, ["run", "case.toml", "-o", "pipe.vtkhdf"],
      r"'.*pipe\.vtkhdf' is a device or a pipe: name a regular file"),

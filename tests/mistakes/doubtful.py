@@ -102,11 +102,11 @@ def turned(angle):
 # fmt: off
 DOUBTS = [
     Doubt(
-        "too few geometry updates were asked for",
+        "too few geometry updates are requested",
         lambda: generate.half_spheres("tri3", size=5.0),
         of(STEEL, SPHERES, "[solve]\ngeometry_updates = 1\n", kinematics="axisymmetric"),
         (
-            r"the contact geometry had not converged after the 1 updates requested: the last one changed the displacement by \d\.\d% of its largest component\. Allow more geometry_updates, or omit the option",
+            r"the contact geometry had not converged after the requested number of updates, 1: the last one changed the displacement by \d\.\d% of its largest component\. Allow more geometry_updates, or omit the option",
         ),
     ),
     Doubt(

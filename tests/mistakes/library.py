@@ -154,11 +154,11 @@ MESH = [
             r"point 4 has coordinates \[inf 0\.5\]"),
     Mistake("coordinates in one dimension", lambda: fc.Mesh([[0.0], [1.0]], {}), fc.MeshError,
             r"points must have shape \(n_points, 2\) or \(n_points, 3\), not \(2, 1\)"),
-    Mistake("a cell names a point that is not there", lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 3]]}),
+    Mistake("a cell refers to a missing point", lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 3]]}),
             fc.MeshError, r"a cell of tri3 refers to point 3, but there are 3 points \(0-based\)"),
     Mistake("cells with a node too few", lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1]]}), fc.MeshError,
             r"cells of tri3 must have shape \(n_cells, 3\), not \(1, 2\)"),
-    Mistake("a group names a cell that is not there",
+    Mistake("a group refers to a missing cell",
             lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2]]}, {"A": [1]}), fc.MeshError,
             r"cell group 'A' contains cell 1, but there are 1 \(0-based\)"),
     Mistake("an inverted cell", lambda: of_square(cells=turned), fc.MeshError,
@@ -189,9 +189,9 @@ MESH = [
     Mistake("a fine mesh merged with a coarse one", lambda: solved(torn()), fc.FastcontactWarning,
             r"2 nodes lie on facets of their own body that they do not belong to \(first: point \d+ at \(0\.25, 1\), on the facet around \(0\.25, 1\)\): the body is torn there\. Let cells share whole facets, or leave the two meshes apart and tie them by a contact of kind 'tied'; if a slit is meant, define its contact"),
     Mistake("bodies connected at a single node", lambda: solved(hanging_together()), fc.ModelError,
-            r"1 rigid-body motion is not supported: body number 1 \(around \[.*\]\), the part 'B_BLOCK' that hangs at point \d+ at \(1, 1\): rotation about \(1, 1\)\. Fix or prescribe a displacement component that stops each, or let a load press the body against a contact\. Parts of bodies hang together at 1 nodes only \(first: point \d+ at \(1, 1\)\): merge whole facets there, or leave the parts separate and define the contact"),
+            r"1 rigid-body motion is not supported: body number 1 \(around \[.*\]\), the part 'B_BLOCK' that is connected at point \d+ at \(1, 1\): rotation about \(1, 1\)\. Fix or prescribe a displacement component that stops each, or let a load press the body against a contact\. Parts of bodies are connected only at nodes \(number: 1, first: point \d+ at \(1, 1\)\): merge whole facets, or leave the parts separate and define the contact"),
     Mistake("a support on a node of no cell", lambda: solved(with_orphan()), fc.ModelError,
-            r"the displacement x prescribed on 'LONE' contains 1 points that belong to no solid cell \(first: point 73\): name a group of the body"),
+            r"the displacement x prescribed on 'LONE' contains only points that belong to no solid cell \(number: 1, first: point 73\): name a group of the body"),
     Mistake("a cell with an angle near 180 degrees", lambda: solved(flat_cell()), fc.FastcontactWarning,
             r"cell \d+ \(tri3 .*\) is poor: it has an angle of 17\d\.\d degrees; move its nodes or remesh"),
     Mistake("a cell with a Jacobian near zero", lambda: solved(nearly_folded()), fc.FastcontactWarning,
@@ -315,7 +315,7 @@ SUPPORTS = [
             r"x = 0\.1 is prescribed at point \d+ on the axis of symmetry, where the radial displacement is zero: leave the points at x = 0 out of the group"),
     Mistake("a radial force on the axis of symmetry", lambda: on_axis(lambda model: model.add_force("TOP_LEFT", x=1.0)),
             fc.ModelError,
-            r"the nodal force on 'TOP_LEFT' has a radial component x at 1 points on the axis of symmetry \(first: point \d+\), where the circle that it acts along has no length: leave the points at x = 0 out"),
+            r"the nodal force on 'TOP_LEFT' has a radial component x on the axis of symmetry \(number of points: 1, first: point \d+\), where the circle that it acts along has no length: leave the points at x = 0 out"),
 ]
 # fmt: on
 
@@ -372,12 +372,12 @@ def corner_pushed():
 # fmt: off
 CONTACT = [
     Mistake("contact on the wrong face", lambda: pair_of("UPPER_TOP", "CONT_LOWER"), fc.ContactError,
-            r"no facet of 'UPPER_TOP' faces 'CONT_LOWER': the outer sides of the two groups look away from each other; is one of them the wrong face of its body\?"),
+            r"no facet of 'UPPER_TOP' faces 'CONT_LOWER': the outer sides of the two groups face away from each other; is one of them the wrong face of its body\?"),
     Mistake("contact of an empty group",
             lambda: blocks(empty_group("NONE"), contact=False).add_contact("pair", secondary="NONE", primary="CONT_LOWER"),
             fc.ContactError, r"group 'NONE' contains no facets \(cells of dimension 1\): name a boundary group"),
     Mistake("contact inside a body", lambda: inner_contact(), fc.ContactError,
-            r"1 of 1 facets of 'INNER' do not lie on the outside of a solid \(first near \[.*\]\): give each body nodes of its own, which merge_points may have joined, and let boundary facets share their nodes with solid cells"),
+            r"facets of 'INNER' do not lie on the outside of a solid \(number: 1 of 1, first near \[.*\]\): give each body nodes of its own, which merge_points may have joined, and let boundary facets share their nodes with solid cells"),
     Mistake("one group on both sides", lambda: pair_of("CONT_UPPER", "CONT_UPPER"), fc.ContactError,
             r"contact 'pair' has 'CONT_UPPER' on both sides: name the group of the other body as one of them; contact of a surface with itself is not available"),
     Mistake("sides that overlap", lambda: pair_of("UPPER_LEFT", "CONT_UPPER"), fc.ContactError,
@@ -388,19 +388,19 @@ CONTACT = [
     Mistake("two pairs over the same facets", lambda: pairs_overlap(), fc.ContactError,
             r"contact 'some' pairs facets of 'SOME' and 'CONT_LOWER' that contact 'pair' pairs already: 'SOME' and 'CONT_UPPER' share facets with 2 nodes \(first: point \d+\), 'CONT_LOWER' and 'CONT_LOWER' share facets, too\. Leave out one of the two contacts, or separate their groups"),
     Mistake("one surface in two groups with a contact each", lambda: solved(split_in_two()), fc.FastcontactWarning,
-            r"contacts 'left' and 'right' continue each other at 1 common nodes of their sides \(first: point \d+\): the pressure near them is not unique; make one contact of both, with one group for each side"),
+            r"contacts 'left' and 'right' continue each other at common nodes of their sides \(number: 1, first: point \d+\): the pressure near them is not unique; make one contact of both, with one group for each side"),
     Mistake("the same obstacle twice",
             lambda: with_obstacle(1.0).add_obstacle("again", secondary="TOP", obstacle=fc.obstacles.HalfSpace((2.0, 1.0), (0.0, -2.0)), motion={"y": -0.01} ),
             fc.ContactError,
             r"contact 'again' presses facets of 'TOP' on the same rigid obstacle as contact 'plane', with 3 nodes \(first: point \d+\): leave out one of the two"),
-    Mistake("two pairs of one name", lambda: blocks().add_contact("pair", secondary="UPPER_LEFT", primary="LOWER_RIGHT"),
+    Mistake("two pairs with one name", lambda: blocks().add_contact("pair", secondary="UPPER_LEFT", primary="LOWER_RIGHT"),
             fc.ContactError, r"there is already a contact pair 'pair': names must differ"),
     Mistake("supports that push one side into the other", lambda: solved(pushed_into_each_other()), fc.ModelError,
             r"supports push 7 of the 7 nodes of 'CONT_UPPER' into 'CONT_LOWER', contact 'pair', by up to 0\.02 \(point \d+ at \(0, 0\), instant 1\): contact forces cannot change what supports prescribe; prescribe other values, or the displacement of nodes that are not in contact"),
     Mistake("a support that pushes a corner into an obstacle", lambda: solved(corner_pushed()), fc.FastcontactWarning,
             r"supports push 1 of the 3 nodes of 'TOP' into the rigid obstacle, contact 'plane', by up to 0\.01 \(point \d+ at \(0, 1\), instant 1\): contact forces cannot change what supports prescribe; leave these nodes out of the support, or out of the contact \('excluded'\)"),
     Mistake("a penetration larger than an element", lambda: solved(blocks(changed(shift=-2.0))), fc.ContactError,
-            r"no facet of 'CONT_UPPER' faces 'CONT_LOWER': the outer sides of the two groups look away from each other; is one of them the wrong face of its body, or do the bodies lie inside each other, by 2 or more\?"),
+            r"no facet of 'CONT_UPPER' faces 'CONT_LOWER': the outer sides of the two groups face away from each other; is one of them the wrong face of its body, or do the bodies lie inside each other, by 2 or more\?"),
     Mistake("an obstacle that is inside out", lambda: solved(with_obstacle(1.0, (0.0, 1.0))), fc.ContactError,
             r"the rigid obstacle of contact 'plane' faces in the same direction as 'TOP', so that they cannot touch: reverse its normal or its facets, or name another face of the body"),
     Mistake("an obstacle deep in the body", lambda: solved(with_obstacle(0.2)), fc.ContactError,
@@ -489,7 +489,7 @@ def radial():
 
 # fmt: off
 RAMP = [
-    Mistake("no load step asked for", lambda: fc.linear_ramp(0), fc.ModelError,
+    Mistake("zero load steps", lambda: fc.linear_ramp(0), fc.ModelError,
             r"the number of load steps must be a positive whole number, not 0"),
     Mistake("a ramp that ends at zero", lambda: fc.linear_ramp(2, end=0.0), fc.ModelError,
             r"the ramp must end at a positive load factor, not 0\.0"),
@@ -515,7 +515,7 @@ def short_history():
 
 # fmt: off
 OPTIONS = [
-    Mistake("a linear solver that is not there", lambda: solved(blocks(), linear_solver="direkt"), fc.ModelError,
+    Mistake("an unknown linear solver", lambda: solved(blocks(), linear_solver="direkt"), fc.ModelError,
             r"unknown linear solver 'direkt': did you mean 'direct'"),
     Mistake("a tolerance that accepts everything", lambda: solved(blocks(), linear_tolerance=10.0), fc.ModelError,
             r"linear_tolerance = 10\.0 must be positive and at most 0\.001, such as 1e-10"),

@@ -22,7 +22,7 @@ OTHERWISE = {
     "no message: the material is assigned to no solid, or to elements without stiffness": ("material on lines",),
     "no message: the last definition is used": (
         "two materials for one body in a case", "two materials for one group", "a material for all hides one of a group",
-        "a key twice", "one pair twice in a case", "the same pair twice", "two pairs of one name",
+        "a key twice", "one pair twice in a case", "the same pair twice", "two pairs with one name",
     ),
     "no message: the pairs share the force arbitrarily, and each reports a part of the pressure": (
         "two pairs over the same facets", "the same obstacle twice", "one surface in two groups with a contact each",
@@ -62,7 +62,7 @@ OTHERWISE = {
         "unknown kinematics", "formulation misspelled", "unknown theory", "theory of no contact",
         "theory of a pair that was forgotten", "check of an unknown probe", "check of an unknown quantity",
         "unknown linear solver", "unknown command", "mesh generator misspelled", "unknown parameter of a sweep",
-        "a linear solver that is not there",
+        "an unknown linear solver",
     ),
     "an error in the assembly, or a third coordinate that is dropped silently": (
         "3D model of a plane mesh", "3D mesh for an axisymmetric model", "the file has a 3D mesh",
@@ -91,14 +91,14 @@ OTHERWISE = {
         "tied with a penalty",
     ),
     "nothing is computed, and the job ends successfully": (
-        "no load step", "negative load steps", "no load step asked for", "a ramp without instants", "no level asked for",
+        "no load step", "negative load steps", "zero load steps", "a ramp without instants", "zero levels",
         "a ramp that ends at zero",
     ),
     "no message: the last value is kept, or the curve is extrapolated": (
         "history that ends too early", "an instant beyond the table", "a history shorter than the analysis",
         "ramp runs backwards", "instants that do not ascend",
     ),
-    "no message: the load acts on no element and has no effect": (
+    "no message: the load or support has no effect": (
         "a force on an empty group", "a support on an empty group", "a support on a node of no cell",
         "a force where the displacement is prescribed",
     ),
@@ -115,7 +115,7 @@ OTHERWISE = {
         "a duplicate cell in the file", "a duplicate cell",
     ),
     "an invalid memory access: a crash, or arbitrary numbers": (
-        "a cell names a point that is not there", "a group names a cell that is not there",
+        "a cell refers to a missing point", "a group refers to a missing cell",
     ),
     "no message, or a line in a long list: the body has a crack": (
         "nodes that were not merged", "nodes were not merged", "nodes nearly coincide",
@@ -150,7 +150,7 @@ OTHERWISE = {
     "no message: stabilising springs carry part of the load": (
         "springs that regularise rigid motions carry load",
     ),
-    "the limit is reached, and the job continues or ends successfully": ("too few geometry updates were asked for",),
+    "the limit is reached, and the job continues or ends successfully": ("too few geometry updates are requested",),
     "no message: linear kinematics are used outside their range": (
         "strains are large", "plastic strains are large", "rotations are large",
     ),
@@ -164,8 +164,8 @@ OTHERWISE = {
         "the result file is write-protected", "the result file is a pipe",
     ),
     "no message: the file is overwritten": (
-        "two outputs of one name", "summary over the case file", "results over the mesh",
-        "the result file exists and is something else",
+        "two outputs with one name", "summary over the case file", "results over the mesh",
+        "the result file exists and is another kind of file",
     ),
     "two programs write into one file and damage it": ("another run writes the result file",),
     "the program stops with a damaged file": ("the disk is full",),

@@ -13,10 +13,11 @@ from spoilt import MESHES
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "mistakes.md"
 HEAD = """# Mistakes and their messages
 
-The following mistakes are reported before any computation, in one line that states the cause and the remedy. The
-command line then ends with exit code 1; the library raises one of its [errors](errors.md) with the same text. A doubtful but
-solvable model is solved, with a warning that states the size of the effect. The warning is shown on screen and stored
-in the log, in `--json` and in the result file (`open_results(path).warnings`); in Python it is a `FastcontactWarning`.
+The messages below are single lines that state the cause and the remedy. An error in the input is reported before any
+computation. The command line then ends with exit code 1; the library raises one of its [errors](errors.md) with the
+same text. A doubtful but solvable model is solved, with a warning that states the size of the effect. The warning is
+shown on screen and stored in the log, in `--json` and in the result file (`open_results(path).warnings`); in Python it
+is a `FastcontactWarning`.
 
 The tables are generated from tests, which make each mistake and compare the message. The last column describes a common
 response of finite-element programs to the same mistake; programs differ.

@@ -122,7 +122,7 @@ MISTAKES = [
             r"contact 'plane' cannot be tied to a rigid obstacle: prescribe the displacements of the group, or couple them"),
     Mistake("a number as a group of nodes", lambda: pair_of("CONT_UPPER", "CONT_LOWER", excluded=3), fc.ContactError,
             r"excluded = 3 of contact 'pair' must be a group or a list of groups"),
-    Mistake("a spring on an empty group", spring_nowhere, fc.ModelError, r"group 'NONE' is empty: no spring can be there"),
+    Mistake("a spring on an empty group", spring_nowhere, fc.ModelError, r"group 'NONE' is empty: no spring can act on it"),
     Mistake("a spring along a line of no length", spring_without_length, fc.ModelError,
             r"the spring between 'A' and 'B': points 0 and 9 coincide, and have no line between them: give x, y or z"),
     Mistake("moduli of unknown kinematics", lambda: fc.LinearElastic(E=1.0, nu=0.3).moduli("4d"), fc.ModelError,

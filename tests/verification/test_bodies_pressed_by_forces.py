@@ -87,7 +87,9 @@ def test_a_force_beyond_the_limit_load_is_told_as_such(strain: str) -> None:
     model.add_material(PERFECT)
     supported(model, BOTTOM="y", LEFT="x")
     model.add_traction("TOP", y=2.0 * PERFECT.yield_stress)
-    with pytest.raises(fc.ConvergenceError, match=r"largest plastic strain is .* may bear no larger forces: prescribe"):
+    with pytest.raises(
+        fc.ConvergenceError, match=r"largest plastic strain is .* may not carry larger forces: prescribe"
+    ):
         fc.solve(model, [0.5, 1.0])
 
 

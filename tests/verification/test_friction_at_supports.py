@@ -47,7 +47,7 @@ def sides(dim):
     return ("BOTTOM", "TOP", "LEFT", "RIGHT") if dim == 2 else ("ZMIN", "ZMAX", "XMIN", "XMAX")
 
 
-@pytest.mark.filterwarnings("ignore:.*nodal pressures waver")  # of node-to-segment on quadratic facets
+@pytest.mark.filterwarnings("ignore:.*nodal pressures oscillate")  # of node-to-segment on quadratic facets
 @pytest.mark.parametrize(("element", "dim"), [("quad4", 2), ("quad8", 2), ("tri3", 2), ("hex8", 3)])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("driven", ["upper", "lower"])
@@ -161,7 +161,7 @@ def flange(name, bottom):
     return prefixed(mesh, name)
 
 
-@pytest.mark.filterwarnings("ignore:.*nodal pressures waver", "ignore:.*across its radius")
+@pytest.mark.filterwarnings("ignore:.*nodal pressures oscillate", "ignore:.*across its radius")
 @pytest.mark.parametrize("friction", [None, 0.2])
 def test_bolted_flanges_held_at_the_same_edge_settle_and_mirror_each_other(friction):
     """Of the weighted gaps at the held edge, supports leave round-off, and later what strains of the neighbours bring in."""

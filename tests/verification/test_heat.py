@@ -396,7 +396,7 @@ def test_what_cannot_be_is_refused_by_its_name():
     for group, expansion in (("UPPER", 1.0), ("LOWER", None)):
         model.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=1.0, expansion=expansion), group)
     model.fix_temperature("UPPER_TOP", 1.0)
-    with refused(fc.errors.ModelError, match="heat expands some materials, but that with"):
+    with refused(fc.errors.ModelError, match="some materials have a coefficient of thermal expansion, but that with"):
         joined(model, conductance=2.0).check()
     model = bar(conductivity=1.0)
     for wrong in ("much", [(1.0, 2.0), (0.0, 3.0)], {"force": [(0.0, 1.0)]}, [(0.0, -1.0)]):

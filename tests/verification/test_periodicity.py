@@ -350,7 +350,7 @@ def test_ends_that_do_not_match_are_refused():
         model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=6)
     with pytest.raises(fc.ModelError, match=r"from the nearest node of .TOP., and the groups do not consist of facets"):
         model.add_cyclic_symmetry("LEFT", "TOP", sectors=5)
-    with pytest.raises(fc.ModelError, match="needs two sectors at least"):
+    with pytest.raises(fc.ModelError, match="needs at least two sectors"):
         model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=1)
     with pytest.raises(fc.ModelError, match=r"lies .* from the nearest node of 'RIGHT'"):
         model.add_periodicity("LEFT", "RIGHT")

@@ -80,7 +80,7 @@ LAME = 31.63190504403362
 
 
 def fitted(element, inner, outer, **options):
-    """Return the contact of a bush in a hub (Lame), and what was warned of wavering pressures."""
+    """Return the contact of a bush in a hub (Lame), and what was warned of oscillating pressures."""
     mesh = fc.generate.rings(
         element,
         inner_radius=20.0,
@@ -98,7 +98,7 @@ def fitted(element, inner, outer, **options):
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         contact = fc.solve(model, 1)[-1].contact["fit"]
-    return contact, [str(warning.message) for warning in told if "waver" in str(warning.message)]
+    return contact, [str(warning.message) for warning in told if "oscillate" in str(warning.message)]
 
 
 def test_thin_triangles_are_told_and_means_of_neighbours_are_right():
@@ -106,13 +106,13 @@ def test_thin_triangles_are_told_and_means_of_neighbours_are_right():
     pressure = contact.pressure[np.argsort(np.arctan2(*contact.coordinates.T))]
     assert np.abs(pressure / LAME - 1).max() > 0.15
     (text,) = told
-    assert "'fit': nodal pressures waver from node to node, by" in text
+    assert "'fit': nodal pressures oscillate from node to node, by" in text
     smooth = 0.25 * (pressure[:-2] + 2 * pressure[1:-1] + pressure[2:])
     assert np.abs(smooth / LAME - 1).max() < 0.55 * np.abs(pressure / LAME - 1).max()
 
 
 @pytest.mark.parametrize(("element", "inner", "outer"), [("tri3", (14, 36), (16, 28)), ("quad4", (4, 48), (4, 36))])
-def test_cells_as_deep_as_wide_and_quadrangles_waver_less(element, inner, outer):
+def test_cells_as_deep_as_wide_and_quadrangles_oscillate_less(element, inner, outer):
     contact, told = fitted(element, inner, outer)
     assert not told
     assert np.abs(contact.pressure / LAME - 1).max() < 0.13

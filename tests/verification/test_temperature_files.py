@@ -303,5 +303,5 @@ def test_a_grid_of_vtk_without_steps_has_one_instant(tmp_path):
     none = vtkhdf(tmp_path / "none.vtkhdf", mesh, [field_of(mesh)], [0.0])
     with h5py.File(none, "a") as file:
         file["VTKHDF/Steps"].attrs["NSteps"] = 0
-    with pytest.raises(fc.FileError, match="has no instant"):
+    with pytest.raises(fc.FileError, match="has no instants"):
         model.add_temperature_file(none, "TEMP")

@@ -6,7 +6,7 @@ The unknowns of a constraint are its normal force n and its k tangential forces 
 tangents belong to these forces. All values are scaled such that the compliance of each constraint is near one. Forces, gaps
 and slips then have the same unit, and ``n - g`` is meaningful. The solution is the zero of
 
-.. math:: n - [n - g]_+, \qquad t - P(t - s), \qquad P \text{ the projection on the disc of radius } \mu [n - g]_+
+.. math:: n - [n - g]_+, \qquad t - P(t - s), \qquad P \text{ the projection onto the disc of radius } \mu [n - g]_+
 
 (Alart and Curnier, 1991), where :math:`[x]_+ = \max(x, 0)`. These residuals are semismooth functions of n and t. A line
 search ensures that their norm decreases. Newton's method does not depend on how gaps and slips are computed from the contact
@@ -18,7 +18,7 @@ come from `PairOptions` through `Constraints`; parameters that are forces must b
 `Law`. `Law.state` and the formulations assume that a constraint without friction needs no tangents.
 
 At a constraint on a symmetry plane or on an axis, supports prevent slip along one tangent or along both. The functions at the
-end of this file detect such idle tangents by the compliance of each constraint, and rotate the two tangents of a constraint
+end of this file detect such held tangents by the compliance of each constraint, and rotate the two tangents of a constraint
 in 3D so that one of them is the direction in which slip is prevented. The compliance of m constraints, without their
 coupling, is an array (1 + k, 1 + k, m): the changes of the gap and of the k slips of a constraint by its normal force and its
 k tangential forces [length / force], in this order.
@@ -136,8 +136,8 @@ class Linearised(Protocol):
 
 
 def newton(
-    problem: Linearised, y: Array, gaps: Array, exact: float = ROUND_OFF, patience: int | None = None,
-    line_search: bool = True, least: int = 0,
+    problem: Linearised, y: Array, gaps: Array, tolerance: float = ROUND_OFF, max_iterations: int | None = None,
+    line_search: bool = True, min_iterations: int = 0,
 ) -> Forces:  # fmt: skip
     """Return the zero of the residual, or the best iterate.
 
@@ -146,28 +146,28 @@ def newton(
     problem : Linearised
     y, gaps : ndarray (1 + k, m)
         Initial forces, and the gaps and slips that belong to them.
-    exact : float
+    tolerance : float
         Tolerance of the residual, relative to the largest force [-].
-    patience : int, optional
+    max_iterations : int, optional
         Largest number of iterations; MAX_NEWTON_ITERATIONS by default.
     line_search : bool
         Whether a step is halved until the residual decreases. Otherwise full steps are taken.
-    least : int
+    min_iterations : int
         Smallest number of iterations.
     """
-    patience = MAX_NEWTON_ITERATIONS if patience is None else patience
+    max_iterations = MAX_NEWTON_ITERATIONS if max_iterations is None else max_iterations
     law = problem.law
     residual = law.residual(y, gaps)
     norm = float(np.linalg.norm(residual))
     best = y, gaps, np.inf
-    for iteration in range(patience + 1):
+    for iteration in range(max_iterations + 1):
         largest = float(np.abs(y).max())
         largest_residual = float(np.abs(residual).max())
         relative = largest_residual / largest if largest else float(largest_residual > problem.round_off)
         if relative < best[2]:
             best = y, gaps, relative
-        settled = iteration >= least and largest_residual <= exact * largest + problem.round_off
-        if settled or iteration == patience:
+        settled = iteration >= min_iterations and largest_residual <= tolerance * largest + problem.round_off
+        if settled or iteration == max_iterations:
             break
         trial, trial_gaps = problem.step(y, gaps, *law.state(y, gaps))
         step, change = trial - y, trial_gaps - gaps
@@ -191,10 +191,10 @@ def newton(
 
 # Compliance of a prescribed slip relative to the compliance of its gap. It is negligible, but with it the equation of stick
 # has a solution. The force of this solution lies outside the friction cone, so that the constraint slides.
-GIVING = LENGTH_ROUND_OFF
+SLIP_COMPLIANCE = LENGTH_ROUND_OFF
 
 
-def own_compliance(F: Array, parts: int) -> Array:
+def compliance_of_each(F: Array, parts: int) -> Array:
     """Return the compliance (parts, parts, m) of each constraint, given the compliance F (parts m, parts m) of all.
 
     `parts` is 1 + k; F has the normal components of all constraints first, then the components along each tangent.
@@ -219,9 +219,9 @@ def compliance_of_rows(rows: tuple[csr_array, ...], unknown_compliance: Array) -
 
 
 def aligning(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array | None:
-    """Return the matrix that rotates the two tangents of each constraint in 3D so that one is idle if possible.
+    """Return the matrix that rotates the two tangents of each constraint in 3D so that one is held if possible.
 
-    If supports leave one slip direction free, both tangents may be oblique to it, and neither is idle before the rotation.
+    If supports leave one slip direction free, both tangents may be oblique to it, and neither is held before the rotation.
 
     Parameters
     ----------
@@ -261,12 +261,12 @@ def _to_axes(tangent: Array, second_tangent: Array) -> Array:
     return np.asarray(np.arctan2((aligned * second_tangent).sum(axis=1), (aligned * tangent).sum(axis=1)))
 
 
-def idle(compliance: Array) -> Mask:
-    """Return which tangents (k, m) are idle, given the `compliance` (1 + k, 1 + k, m) of each constraint.
+def held_tangents(compliance: Array) -> Mask:
+    """Return which tangents (k, m) are held, given the `compliance` (1 + k, 1 + k, m) of each constraint.
 
-    Along an idle tangent, supports allow no motion, or only a motion that is proportional to the change of the gap. The
-    equation of its slip would be empty or linearly dependent. This occurs on axes and in planes of symmetry. Compliances are
-    no more accurate than the solutions of iterative solvers.
+    Along a held tangent, supports allow no motion, or only a motion that is proportional to the change of the gap, so that
+    the equation of its slip would be empty or linearly dependent. The tolerance is that of iterative solvers, whose
+    solutions determine the compliance.
     """
     k = len(compliance) - 1
     of_slips, normal = compliance[np.arange(1, k + 1), np.arange(1, k + 1)], compliance[0, 0]

@@ -82,7 +82,7 @@ def solve(
         for start, line_search in problem.starts(closed, guess):
             # At least one iteration: the residual of forces of an earlier geometry update may be below the round-off bound,
             # which is common to all constraints, although gaps of constraints with a large compliance are not closed.
-            forces = newton(problem, start, problem.gaps(start), line_search=line_search, least=1)
+            forces = newton(problem, start, problem.gaps(start), line_search=line_search, min_iterations=1)
             iterations += 1 + forces.iterations
             if best is None or forces.residual < best.residual:
                 best, elastic_slip = forces, compliance * float(np.abs(forces.y.ravel()[regularised]).max(initial=0.0))
@@ -161,7 +161,7 @@ class _Problem:
         compliance, last, halvings = NOTABLE, 1.0, 0
         while compliance > ROUND_OFF and halvings <= HALVINGS:
             softened = _Problem(self.F + compliance * np.eye(len(self.F)), self.free, self.law)
-            forces = newton(softened, y, softened.gaps(y), least=1)
+            forces = newton(softened, y, softened.gaps(y), min_iterations=1)
             if forces.settled:
                 y, last, compliance, halvings = forces.y, compliance, NOTABLE * compliance, 0
             else:

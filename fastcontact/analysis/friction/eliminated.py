@@ -15,7 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
-from fastcontact.analysis.friction.cone_newton import GIVING, Law, aligning, compliance_of_rows, idle, newton
+from fastcontact.analysis.friction.cone_newton import (
+    SLIP_COMPLIANCE,
+    Law,
+    aligning,
+    compliance_of_rows,
+    held_tangents,
+    newton,
+)
 from fastcontact.analysis.solution import Accuracy, Forces
 from fastcontact.analysis.tolerances import RESIDUAL
 from fastcontact.arrays import Array, Indices, Mask, largest
@@ -125,13 +132,13 @@ class Eliminated:
             rows = tuple(turned[a * m : (a + 1) * m] for a in range(3))
             free = (self._turn @ free.ravel()).reshape(free.shape)
             compliance = self._compliance_of_rows(rows, unknown_compliance)
-        idle_slips = idle(compliance)
-        prescribed = idle_slips & constraints.moved_past(np.arange(m), self._turn)
-        self._compliance[1:][prescribed] += np.broadcast_to(GIVING * compliance[0, 0], idle_slips.shape)[prescribed]
-        slip_rows = [scaled(T, np.where(is_idle, 0.0, 1.0)) for T, is_idle in zip(rows[1:], idle_slips, strict=True)]
+        held_slips = held_tangents(compliance)
+        prescribed = held_slips & constraints.moved_past(np.arange(m), self._turn)
+        self._compliance[1:] += np.where(prescribed, SLIP_COMPLIANCE * compliance[0, 0], 0.0)
+        slip_rows = [scaled(T, np.where(is_held, 0.0, 1.0)) for T, is_held in zip(rows[1:], held_slips, strict=True)]
         self._rows = (rows[0], *slip_rows)
-        self._free = np.vstack([free[0], np.where(idle_slips & ~prescribed, 0.0, free[1:])])
-        self._slips = ~idle_slips | prescribed
+        self._free = np.vstack([free[0], np.where(held_slips & ~prescribed, 0.0, free[1:])])
+        self._slips = ~held_slips | prescribed
         normal, softer = compliance[0, 0], SOFTER / np.sqrt(max(1.0, loaded.contrast / MILD))
         self._unit = np.sqrt(1.0 / (np.where(normal > 0.0, normal, 1.0) / softer + self._compliance[0]))
         self.law = Law(np.where(usable, mu, 0.0), constraints.equality & usable)
@@ -141,7 +148,7 @@ class Eliminated:
     def _compliance_of_rows(self, rows: tuple[csr_array, ...], unknown_compliance: Array) -> Array:
         """Return the sum of `compliance_of_rows` and the tangential compliance of the constraints themselves.
 
-        Tangents with such a compliance are thus not idle.
+        Tangents with such a compliance are thus not held.
         """
         compliance = compliance_of_rows(rows, unknown_compliance)
         slips = np.arange(1, len(rows))

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction import dense, eliminated
-from fastcontact.analysis.friction.cone_newton import GIVING, Law, aligning, idle, own_compliance
+from fastcontact.analysis.friction.cone_newton import SLIP_COMPLIANCE, Law, aligning, compliance_of_each, held_tangents
 from fastcontact.analysis.solution import Accuracy, Forces, Path, Response, Slid, Solution, in_increments, response
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
@@ -148,12 +148,12 @@ def _with_chosen(
     at_rest = constraints.gaps_at_rest()
     free, F = loaded.delassus(R)
     slips = np.arange(len(rows), len(F))
-    # This compliance is added before idle tangents are detected, since compliant tangents are not idle.
+    # This compliance is added before held tangents are detected, since compliant tangents are not held.
     F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
-    Q = aligning(own_compliance(F, 3)) if k == 2 else None
-    C = own_compliance(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k)
-    idle_slips = idle(C)
-    idle_rows = np.flatnonzero(idle_slips) + len(rows)
+    Q = aligning(compliance_of_each(F, 3)) if k == 2 else None
+    C = compliance_of_each(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k)
+    held_slips = held_tangents(C)
+    held_rows = np.flatnonzero(held_slips) + len(rows)
     _add_compliance(F, constraints, rows)
     free = free.reshape(1 + k, -1) + at_rest[:, rows]
     guess = None if forces is None else forces[:, rows]
@@ -164,12 +164,12 @@ def _with_chosen(
         F = np.asarray(Q @ (Q @ F).T)
         free, y0, closing = ((Q @ values.ravel()).reshape(free.shape) for values in (free, y0, closing))
         guess = None if guess is None else (Q @ guess.ravel()).reshape(free.shape)
-    if len(idle_rows):
-        prescribed = idle_slips & constraints.moved_past(rows, Q)
-        F[idle_rows], F[:, idle_rows] = 0.0, 0.0
-        F[idle_rows, idle_rows] = np.where(prescribed, GIVING * C[0, 0], np.diag(F).max())[idle_slips]
-        free[1:][idle_slips & ~prescribed] = 0.0
-        y0[1:][idle_slips], closing[1:][idle_slips] = 0.0, 0.0
+    if len(held_rows):
+        prescribed = held_slips & constraints.moved_past(rows, Q)
+        F[held_rows], F[:, held_rows] = 0.0, 0.0
+        F[held_rows, held_rows] = np.where(prescribed, SLIP_COMPLIANCE * C[0, 0], np.diag(F).max())[held_slips]
+        free[1:][held_slips & ~prescribed] = 0.0
+        y0[1:][held_slips], closing[1:][held_slips] = 0.0, 0.0
     mu, equations = constraints.friction[rows], constraints.equality[rows]
     if path is None:
         result, before = dense.solve(F, free, mu, closed[rows], guess, equations), None
@@ -189,19 +189,19 @@ def _with_chosen(
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = result.closed, result.sticking
 
-    # Constraints that are equations have no friction, and slips along idle tangents do not vary.
+    # Constraints that are equations have no friction, and slips along held tangents do not vary.
     mu = np.where(equations, 0.0, mu)
     at_end = replace(result, sticking=result.sticking & ~equations)
     return Solution(
         u, all_forces[0], gaps[0], active, active, result.settled, result.iterations, all_forces[1:].T, gaps[1:].T,
         sticking, result.residual, constraints.directions,
         slid=None if before is None else _slid(before, Q, rows, constraints),
-        response=partial(_response, loaded, (R, rows, Q), idle_slips, (F, Law(mu, equations), at_end)),
+        response=partial(_response, loaded, (R, rows, Q), held_slips, (F, Law(mu, equations), at_end)),
     )  # fmt: skip
 
 
 def _response(
-    loaded: Loaded, among: tuple[csr_array, Indices, csr_array | None], idle_slips: Mask,
+    loaded: Loaded, among: tuple[csr_array, Indices, csr_array | None], held_slips: Mask,
     forces: tuple[Array, Law, Forces],
 ) -> Response:  # fmt: skip
     """Return the linear response of a solution to additional forces and gaps.
@@ -211,7 +211,7 @@ def _response(
     loaded : Loaded
     among : (csr_array ((1 + k) q, n), ndarray of int (q,), csr_array or None)
         R, and the numbers of its q constraints; rotation Q of their tangents.
-    idle_slips : ndarray of bool (k, q)
+    held_slips : ndarray of bool (k, q)
         Idle tangents, along which slips do not vary.
     forces : tuple
         Arguments of `dense.response`.
@@ -219,8 +219,8 @@ def _response(
     (R, rows, Q), varied = among, dense.response(*forces)
 
     def forces_of(values: Array) -> Array:
-        values = (values if Q is None else Q @ values).reshape(1 + len(idle_slips), len(rows))
-        values[1:][idle_slips] = 0.0
+        values = (values if Q is None else Q @ values).reshape(1 + len(held_slips), len(rows))
+        values[1:][held_slips] = 0.0
         change = varied(values).ravel()
         return change if Q is None else np.asarray(Q.T @ change)
 

@@ -78,8 +78,8 @@ class MeshedSurface:
         shared = shared[solid[shared]]
         if len(shared):
             raise ContactError(
-                f"{len(shared)} points of the rigid surface '{self.group}' belong to solid cells of the model (first: "
-                f"point {shared[0]}): a rigid surface must be separate, so give it separate points or a separate mesh"
+                f"points of the rigid surface '{self.group}' belong to solid cells of the model (number: {len(shared)}, "
+                f"first: point {shared[0]}): a rigid surface must be separate, so give it separate points or a separate mesh"
             )
 
     def distance(self, points: Array) -> tuple[Array, Array]:

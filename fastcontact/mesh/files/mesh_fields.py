@@ -228,7 +228,7 @@ def read_file_field(path: PathLike, name: str, over: str) -> FileField:
         single = f"a field with a single number per {over.removesuffix('s')} is needed"
         raise FileError(f"field '{name}' of '{path}' has {count} components: {single}")
     if not len(field):
-        raise FileError(f"field '{name}' of '{path}' has no instant")
+        raise FileError(f"field '{name}' of '{path}' has no instants")
     return FileField(times, np.asarray(field, np.float64).reshape(field.shape[:2]), positions)
 
 

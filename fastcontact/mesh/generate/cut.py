@@ -120,8 +120,8 @@ def _moved(mesh: Mesh, group: str, sides: _Sides, touched: Mask, direction: Arra
     n_invalid = int((count[section] != 2).sum())
     if n_invalid:
         raise MeshError(
-            f"{n_invalid} of {len(section)} facets of '{group}' do not lie between two solids that share their nodes: a cut "
-            "needs facets inside a body"
+            f"facets of '{group}' do not lie between two solids that share their nodes (number: {n_invalid} of "
+            f"{len(section)}): a cut needs facets inside a body"
         )
     pairs = solid[order[(np.cumsum(count) - count)[count == 2][:, None] + [0, 1]]]
     divided = np.isin(np.flatnonzero(count == 2), section)

@@ -90,7 +90,7 @@ class ModelConnections(ModelInitialStates):
         bolt = pretension(self.mesh, name, section, opposite, normal, (force, shortening, locked_from), table)
         for other in self.pretensions:
             if np.isin(bolt.nodes, [other.nodes, other.opposite]).any():
-                raise ModelError(f"{bolt.name} and {other.name} are in one section, which has one force")
+                raise ModelError(f"{bolt.name} and {other.name} act on the same section, which has one force")
         self.pretensions.append(bolt)
         self.relations.extend(bolt.relations(self.n_dofs))
         if force is not None:
@@ -292,8 +292,8 @@ class ModelConnections(ModelInitialStates):
         valid_axis = len(point) == self.mesh.dim and len(axis) == 3 and any(axis)
         if sectors < 2 or sectors != int(sectors) or not valid_axis:
             raise ModelError(
-                f"{name} needs two sectors at least, a whole number, an origin of {self.mesh.dim} numbers and a direction of "
-                f"three, not {sectors}, {point} and {axis}"
+                f"{name} needs at least two sectors, a whole number, an origin of {self.mesh.dim} numbers, and a direction "
+                f"of three numbers, not {sectors}, {point} and {axis}"
             )
         relations, interface = cyclic(self.mesh, (first, second), sectors, point, axis)
         self.relations.extend(relations)
@@ -456,16 +456,16 @@ class ModelConnections(ModelInitialStates):
         nodes, opposite = self._nodes(group), None if to is None else self._nodes(to)
         for end, points in ((group, nodes), (to, opposite)):
             if points is not None and not len(points):
-                raise ModelError(f"group '{end}' is empty: no spring can be there")
+                raise ModelError(f"group '{end}' is empty: no spring can act on it")
         if opposite is None:
             if translation is not None:
-                raise ModelError(f"{name} goes to the ground: leave out the translation, or name the group to join")
+                raise ModelError(f"{name} acts on the ground: leave out the translation, or name the group to connect")
             self.springs.append(grounded(name, nodes, axes, self.n_dofs, self.mesh.dim, along, vector))
             return
         if len(nodes) > 1 < len(opposite):
             match = matched(self.mesh, (str(group), nodes), (str(to), opposite), translation)
             opposite = opposite[match]
         elif translation is not None:
-            raise ModelError(f"{name} joins all nodes with a single one: leave out the translation")
+            raise ModelError(f"{name} connects all nodes with a single one: leave out the translation")
         first, second = np.broadcast_arrays(nodes, opposite)
         self.springs.append(joined(name, self.mesh.points, (first, second), axes, along, vector))

@@ -346,7 +346,7 @@ class ModelContact(ModelConnections):
             )
         if options.kind != "unilateral" or options.cohesion is not None:
             raise ContactError(
-                f"contact '{pair.name}' is {'glued' if options.cohesion else options.kind}, which lets no fluid in: name "
+                f"contact '{pair.name}' is {'glued' if options.cohesion else options.kind}, which no fluid can enter: name "
                 "another pair"
             )
         return mask

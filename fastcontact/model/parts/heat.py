@@ -42,9 +42,9 @@ class ModelHeat(ModelBase):
         ramp : Ramp or iterable of (float, float), optional
             History of the rise above `Model.reference_temperature`; by default that of the analysis.
         begins, ends : float, optional
-            Load factors between which the temperature is prescribed; both must be ends of load steps. By default it is
-            prescribed in all steps [-]. A temperature that begins later changes linearly from the current values to the
-            next point of its `ramp`.
+            Load factors [-] between which the temperature is prescribed; both must be ends of load steps. By default it is
+            prescribed in all steps. A temperature that begins later changes linearly from the current values to the next
+            point of its `ramp`.
 
         Examples
         --------
@@ -214,13 +214,13 @@ class ModelHeat(ModelBase):
         if self.temperatures:
             raise ModelError("temperatures are both given by add_temperature and conducted: use fix_temperature")
         if self.interpolated:
-            raise ModelError(f"{self.interpolated[0]} joins meshes that differ, which no heat crosses: mesh both alike")
+            raise ModelError(f"{self.interpolated[0]} connects different meshes and conducts no heat: use equal ones")
         self.conduction().check()
         without_expansion = [material for material, _ in self.materials if material.expansion is None]
         if self.expands and without_expansion:
             raise ModelError(
-                f"heat expands some materials, but that with {without_expansion[0].described} has no coefficient of thermal "
-                "expansion: give it expansion=..., 0.0 if it does not expand"
+                "some materials have a coefficient of thermal expansion, but that with "
+                f"{without_expansion[0].described} has none: give it expansion=..., 0.0 if it does not expand"
             )
         determined, _ = self.fixed_temperatures()
         for load in self.heat_loads:

@@ -509,7 +509,7 @@ def animate(
     if not len(steps):
         raise FastcontactError("there are no steps to animate")
     if pictures_per_second < 1:
-        raise FastcontactError(f"pictures_per_second = {pictures_per_second}: one or more a second can be shown")
+        raise FastcontactError(f"pictures_per_second = {pictures_per_second} must be at least 1")
     target, scale = checked_target(path), scale_of(scale, mesh, steps)
     projection, size = None if mesh.dim == 2 else "3d", (6.4, 6.0)
     if mesh.dim == 2:
@@ -543,7 +543,7 @@ def writer_of(path: Path, pictures_per_second: int) -> Any:
 
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise FastcontactError(f"'{path}' does not have a suffix of animations: use {', '.join(SUFFIXES)}")
+        raise FastcontactError(f"'{path}' has a suffix that is not an animation format: use {', '.join(SUFFIXES)}")
     if suffix == ".gif":
         return PillowWriter(fps=pictures_per_second)
     if not FFMpegWriter.isAvailable():

@@ -12,7 +12,7 @@ import fastcontact as fc
 from fastcontact.analysis import newton, step_halving
 from fastcontact.analysis.friction import cone_newton, dense
 from fastcontact.analysis.friction import solve as friction
-from fastcontact.analysis.friction.cone_newton import aligning, compliance_of_rows, idle, own_compliance
+from fastcontact.analysis.friction.cone_newton import aligning, compliance_of_each, compliance_of_rows, held_tangents
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import normals, tangents
@@ -78,11 +78,11 @@ def test_tangents_turn_to_the_slip_that_supports_leave():
     held = [0, 3]
     K_inverse[held], K_inverse[:, held] = 0.0, 0.0
     F = R @ K_inverse @ R.T
-    assert not len(np.flatnonzero(idle(own_compliance(F, 3))))
-    Q = aligning(own_compliance(F, 3))
+    assert not len(np.flatnonzero(held_tangents(compliance_of_each(F, 3))))
+    Q = aligning(compliance_of_each(F, 3))
     np.testing.assert_allclose((Q @ Q.T).toarray(), np.eye(6), atol=1e-15)
-    np.testing.assert_array_equal(idle(own_compliance(Q @ (Q @ F).T, 3)), [[False, False], [True, True]])
-    assert aligning(own_compliance(R @ (A @ A.T) @ R.T, 3)) is None
+    np.testing.assert_array_equal(held_tangents(compliance_of_each(Q @ (Q @ F).T, 3)), [[False, False], [True, True]])
+    assert aligning(compliance_of_each(R @ (A @ A.T) @ R.T, 3)) is None
 
 
 def test_frames_of_eliminated_slips_do_not_depend_on_the_choice_of_tangents():
@@ -205,7 +205,7 @@ def test_compliance_of_rows_against_dense_products():
 
 
 @pytest.mark.parametrize(
-    ("push", "told"), [(0.58, "before it 97% of the friction that contact can bear is used"), (0.3, "")]
+    ("push", "told"), [(0.58, "before it 97% of the friction that contact can carry is used"), (0.3, "")]
 )
 def test_the_message_states_how_much_friction_is_used(monkeypatch, push, told):
     """A block under the pressure 0.3 on a plane with the friction 0.3 slides at a push of 0.18 on its side."""
@@ -226,7 +226,7 @@ def test_the_message_states_how_much_friction_is_used(monkeypatch, push, told):
     with pytest.raises(fc.ConvergenceError, match="no equilibrium") as failed:
         fc.solve(model, [1.0, 2.0, 3.0])
     assert told in str(failed.value)
-    assert bool(told) == ("friction that contact can bear" in str(failed.value))
+    assert bool(told) == ("friction that contact can carry" in str(failed.value))
 
 
 def test_a_verdict_about_a_diverged_iterate_does_not_end_the_analysis(monkeypatch):

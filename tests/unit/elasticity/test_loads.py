@@ -290,7 +290,7 @@ def test_a_pressure_inside_the_solid_is_refused():
     lines = np.vstack([mesh.cells["line2"], inner])
     inside = fc.Mesh(mesh.points, {"quad4": mesh.cells["quad4"], "line2": lines}, {"INNER": [2 + len(lines) - 1]})
     model = elastic_model(inside, "plane_strain")
-    with pytest.raises(fc.ModelError, match=r"1 of 1 facets of 'INNER' do not lie on the outside.*add_traction"):
+    with pytest.raises(fc.ModelError, match=r"facets of 'INNER' do not lie on the outside.*1 of 1, .*add_traction"):
         model.add_pressure("INNER", 1.0)
     model.add_traction("INNER", x=2.0)
     assert total(model)[:, 0].sum() == pytest.approx(2.0)
@@ -302,7 +302,7 @@ def test_a_force_on_a_point_outside_all_solids_is_refused(model):
     lone = elastic_model(mesh, "plane_strain")
     lone.fix("BOTTOM", "xy")
     lone.add_force("REFERENCE", y=-1.0)
-    with pytest.raises(fc.ModelError, match=r"nodal force on 'REFERENCE' acts on 1 points"):
+    with pytest.raises(fc.ModelError, match=r"nodal force on 'REFERENCE' acts on points .*number: 1"):
         lone.check()
     for node in mesh.points_of("TOP"):
         lone.relate([(int(node), "y", 1.0), ("REFERENCE", "y", -1.0)])
