@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 from numpy.linalg import LinAlgError
-from scipy.linalg import null_space, qr
+from scipy.linalg import qr
 from scipy.sparse import bsr_array
 
 from fastcontact.analysis.active_dofs import ActiveDofs
@@ -46,6 +46,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION,
 # stiffer than the softer one of its bodies (for a layer that is softer by 2e5, 100 positions did not suffice with the
 # stiffness of the other body).
 SOFT = 1e-3
+# Singular value of `stretched`, about 1 for motions that contact restrains, up to which only the turning of friction with the
+# direction of slip restrains a motion (without this, a box that rides on a driven one is not found in 3D).
+WEAK = 1e-2
 
 
 @dataclass(frozen=True)
@@ -108,12 +111,17 @@ class Freed:
         springs, or move by the elongations and until the first gap of the `solution` closes. The largest remaining
         elongation is returned as well.
         """
-        relaxed = self._inverse @ elongation
+        relaxed, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
         remaining = largest(elongation - self.stretched @ relaxed)
         unrestrained = remaining > SINGLE_PRECISION * largest(elongation)
-        sliding = solution.active & ~solution.sticking
-        if unrestrained and (slide := self._slide(elongation, solution, sliding)).any():
-            return slide, remaining
+        moved, slip = (np.hypot.reduce(s) for s in (self.relative[1:, sliding] @ relaxed, solution.slip[sliding].T))
+        # The linear response is not valid for motions that reverse slips.
+        if unrestrained or largest(moved) > largest(slip):
+            U, s, V = np.linalg.svd(self.stretched)
+            firm = s > WEAK
+            slide = self._slide(V[~firm].T, elongation, solution, sliding)
+            if slide.any():
+                return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), remaining
         change = -relaxed
         if unrestrained:
             motion = elongation - self._inverse @ (self.stretched @ elongation)
@@ -124,14 +132,13 @@ class Freed:
             change += motion
         return change, remaining
 
-    def _slide(self, elongation: Array, solution: Solution, sliding: Mask) -> Array:
+    def _slide(self, motions: Array, elongation: Array, solution: Solution, sliding: Mask) -> Array:
         """Return the change (k,) of positions until friction at the `sliding` constraints (m,) balances the springs [length].
 
-        The bodies are rigid, gaps of closed constraints and normal forces constant. The change minimises the work of
-        friction less that of the loads, by iteratively reweighted least squares. It is zero if friction cannot balance the
+        The change, a combination of `motions` (k, z) of rigid bodies, minimises the work of friction under constant normal
+        forces, less that of the loads, by iteratively reweighted least squares. It is zero if friction cannot balance the
         springs.
         """
-        motions = null_space(self.relative[0, solution.active], rcond=SINGLE_PRECISION)
         rates, slip = self.relative[1:, sliding] @ motions, solution.slip[sliding].T
         limit, length = np.linalg.norm(solution.tangential[sliding], axis=1), np.hypot.reduce(slip)
         load = self.stiffness * (motions.T @ elongation)
