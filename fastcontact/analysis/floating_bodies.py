@@ -35,7 +35,7 @@ from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
-from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION, TINY
 
 # Stiffness of soft springs relative to that of the softest body. With a direct solver, springs are as stiff as that body,
 # since soft springs reduce the accuracy (with 1e-6, a wedge has an error of 3e-9; with 1e-3, displacements of plates
@@ -45,6 +45,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 # body, because a contact is not stiffer than the softer one of its bodies (for a layer that is softer by 2e5, 100
 # positions did not suffice with the stiffness of the other body).
 SOFT = 1e-3
+# Singular value of `stretched`, about 1 for motions that contact restrains, up to which only the turning of friction with the
+# direction of slip restrains a motion (without this, a box that rides on a driven one is not found in 3D).
+WEAK = 1e-2
 
 
 @dataclass(frozen=True)
@@ -86,31 +89,66 @@ class Freed:
         Change of the elongations of the springs for each position [-].
     springs : ndarray of int (k,)
         Numbers of the unknowns at springs.
-    approach : ndarray (m, k)
-        Change of the gaps of all constraints in the rigid-body motion of each position [-].
+    relative : ndarray (1 + d, m, k)
+        Change of the gaps of all m constraints, and of their slips along d tangents, in the rigid-body motion of each
+        position [-].
+    stiffness : float
+        Stiffness of each spring [force / length].
     """
 
     held: Response
     moved: Array
     stretched: Array
     springs: Indices
-    approach: Array
+    relative: Array
+    stiffness: float
 
-    def slackened(self, elongation: Array, gap: Array) -> tuple[Array, float]:
+    def slackened(self, elongation: Array, solution: Solution) -> tuple[Array, float]:
         """Return the change (k,) of the positions that makes springs with an `elongation` (k,) slack [length].
 
-        In motions that contact does not restrain, elongations do not relax: the bodies move until the first of the gaps
-        `gap` (m,) [length] closes, and by the elongations. The largest remaining elongation is returned as well.
+        In motions that contact does not restrain, elongations do not relax: bodies slide until friction balances the
+        springs, or move by the elongations and until the first gap of the `solution` closes. The largest remaining
+        elongation is returned as well.
         """
-        change = elongation - self._inverse @ (elongation + self.stretched @ elongation)
-        free = elongation - self.stretched @ (self._inverse @ elongation)
-        remaining = largest(free)
-        if remaining > SINGLE_PRECISION * largest(elongation):
-            approach = -self.approach @ free
-            closing = (gap > 0.0) & (approach > LENGTH_ROUND_OFF * remaining)
-            if closing.any():
-                change += free * np.min(gap[closing] / approach[closing])
+        relaxed, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
+        remaining = largest(elongation - self.stretched @ relaxed)
+        unrestrained = remaining > SINGLE_PRECISION * largest(elongation)
+        moved, slip = (np.hypot.reduce(s) for s in (self.relative[1:, sliding] @ relaxed, solution.slip[sliding].T))
+        # The linear response is not valid for motions that reverse slips.
+        if unrestrained or largest(moved) > largest(slip):
+            U, s, V = np.linalg.svd(self.stretched)
+            firm = s > WEAK
+            slide = self._slide(V[~firm].T, elongation, solution, sliding)
+            if slide.any():
+                return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), remaining
+        change = -relaxed
+        if unrestrained:
+            motion = elongation - self._inverse @ (self.stretched @ elongation)
+            approach, threshold = -self.relative[0] @ motion, LENGTH_ROUND_OFF * remaining
+            closing = (solution.gap > 0.0) & (approach > threshold)
+            if closing.any() and largest(self.relative[1:, sliding] @ motion) <= threshold:
+                change += motion * np.min(solution.gap[closing] / approach[closing])
+            change += motion
         return change, remaining
+
+    def _slide(self, motions: Array, elongation: Array, solution: Solution, sliding: Mask) -> Array:
+        """Return the change (k,) of positions until friction at the `sliding` constraints (m,) balances the springs [length].
+
+        The change, a combination of `motions` (k, z) of rigid bodies, minimises the work of friction under constant normal
+        forces, less that of the loads, by iteratively reweighted least squares. It is zero if friction cannot balance the
+        springs.
+        """
+        rates, slip = self.relative[1:, sliding] @ motions, solution.slip[sliding].T
+        limit, length = np.linalg.norm(solution.tangential[sliding], axis=1), np.hypot.reduce(slip)
+        load = self.stiffness * (motions.T @ elongation)
+        load += np.einsum("dmz,m,dm", rates, limit / np.maximum(length, TINY), slip)
+        left, amplitudes = slip, np.zeros(motions.shape[1])
+        for _ in range(MAX_NEWTON_ITERATIONS):
+            weights = limit / np.maximum(np.hypot.reduce(left), SINGLE_PRECISION * largest(length) + TINY)
+            matrix = np.einsum("dmz,m,dmy", rates, weights, rates)
+            amplitudes = np.linalg.pinv(matrix, hermitian=True) @ (load - np.einsum("dmz,m,dm", rates, weights, slip))
+            left = slip + rates @ amplitudes
+        return motions @ amplitudes if largest(np.hypot.reduce(left)) <= largest(length) else np.zeros_like(elongation)
 
     def respond(self, force: Array, gaps: Array) -> Array:
         """Return the `Response` with springs that stay slack."""
@@ -121,7 +159,7 @@ class Freed:
     def _inverse(self) -> Array:
         """Pseudoinverse (k, k) of `stretched`, whose singular values are about 1, or 0 in motions without restraint."""
         U, s, V = np.linalg.svd(self.stretched)
-        return np.asarray((V.T * np.divide(1.0, s, out=np.zeros_like(s), where=s > LENGTH_ROUND_OFF)) @ U.T)
+        return np.asarray((V.T * np.divide(1.0, s, out=np.zeros_like(s), where=s > SINGLE_PRECISION)) @ U.T)
 
 
 class FloatingBodies:
@@ -188,7 +226,7 @@ class FloatingBodies:
         rigid = np.stack([dofs.unknowns(mode, zero_lift) for mode in modes.T], axis=1)
         unloaded = np.zeros(len(rigid))
         strained = np.stack([respond(unloaded, gaps) for gaps in np.moveaxis(changes, -1, 0)], axis=1)
-        return Freed(respond, rigid + strained, strained[springs], springs, changes[0])
+        return Freed(respond, rigid + strained, strained[springs], springs, changes, self.stiffness)
 
     def report(self, rigid: RigidPosition, load: float) -> dict[str, Any]:
         """Return a report of the regularisation, as a dict of numbers and strings.
@@ -310,7 +348,7 @@ class FloatingBodies:
                 mixing.restart()
             elif freed is not None and state.response is not None:
                 with suppress(LinAlgError):  # the constraints are linearly dependent
-                    step = freed(state.response()).slackened(elongation, state.gap)
+                    step = freed(state.response()).slackened(elongation, state)
             # Without Newton's method positions are accelerated, because parts much softer than the springs, such as a
             # peeling layer, approach equilibrium slowly.
             position = mixing.mixed(position, position + elongation) if step is None else position + step[0]
