@@ -96,11 +96,11 @@ def _end_of_step(
         instant=instant[1], rise=None if heated is None else heated.rise,
     )  # fmt: skip
     end = solution.terms.commit(u, end)
-    deformed = solution.bodies
-    if problem.bodies is not None and deformed is not None and problem.bodies.flows_freely and load.rise is None:
+    bodies = None if solution.terms.bodies is None else solution.terms.bodies.at(u)
+    if problem.bodies is not None and bodies is not None and problem.bodies.flows_freely and load.rise is None:
         middle, before = start.extrapolation.midway(start.u, u), start.history or problem.bodies.beginning
         displacements = problem.displacement(middle), problem.displacement(u)
-        flow = problem.bodies.change_if_halved(*displacements, before, deformed)
+        flow = problem.bodies.change_if_halved(*displacements, before, bodies)
         end = replace(end, flow=max(start.flow, flow))
     contact: dict[str, ContactResult] = {}
     if settled is not None:
@@ -122,7 +122,6 @@ def _end_of_step(
             free = problem.floating_bodies.undetermined(*forces, u, end.largest_rigid_force, balance.residual)
             iterations["regularised"]["undetermined"] = free
     end = replace(end, solver=problem.solver.snapshot())
-    bodies = None if solution.terms.bodies is None else solution.terms.bodies.at(u)
     result = recover(problem, end, contact, balance.reaction, iterations, instant, bodies)
     return end, result if heated is None else heated.completed(problem, result)
 
