@@ -70,7 +70,7 @@ def test_newton_steps_that_overshoot_are_halved(start):
         return dataclasses.replace(solution(-stretch), response=lambda: None)
 
     def freed(held):
-        return Freed(held, np.eye(1), np.array([[-slopes[-1]]]), DOFS, np.zeros((0, 1)))
+        return Freed(held, np.eye(1), np.array([[-slopes[-1]]]), DOFS, np.zeros((1, 1, 1)), 1.0)
 
     found = bodies_at(DOFS).settle(solve_at, freed, DOFS, np.array([start]), 1.0, 0.0, 0.0)
     assert found.slack
@@ -89,12 +89,18 @@ def test_a_body_moves_on_to_the_gap_that_stops_it():
         )  # a spring of stiffness 1 bears the load 1, with contact of `stiffness` beside it
         elongation = (1.0 - stiffness * (position[0] - gap) * pressed) / (1.0 + stiffness * pressed)
         gaps = np.array([max(gap - position[0] - elongation, 0.0), 5.0])
-        return dataclasses.replace(solution(elongation), gap=gaps, response=lambda: None)
+        open_gaps = {
+            "active": np.zeros(2, bool),
+            "sticking": np.zeros(2, bool),
+            "slip": np.zeros((2, 0)),
+            "tangential": np.zeros((2, 0)),
+        }
+        return dataclasses.replace(solution(elongation), gap=gaps, response=lambda: None, **open_gaps)
 
     def freed(held):
         closed = calls[-1] + 1.0 > gap
         stretched = np.array([[-stiffness / (1.0 + stiffness) if closed else 0.0]])
-        return Freed(held, np.eye(1), stretched, DOFS, np.array([[-1.0], [1.0]]))
+        return Freed(held, np.eye(1), stretched, DOFS, np.array([[[-1.0], [1.0]]]), 1.0)
 
     found = bodies_at(DOFS).settle(solve_at, freed, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
     assert found.slack
@@ -170,3 +176,46 @@ def test_slack_is_in_units_of_the_contact_forces(force):
     found = bodies_at(DOFS).settle(solve_at, None, DOFS, np.zeros(1), load=0.0, noise=0.0, round_off=0.0)
     assert found.slack == (force > 0.0)
     assert found.position[0] > 0.5
+
+
+def carried(dim, options):
+    """A box on a wider one, which is driven sideways by much more than it deforms."""
+    box = fc.generate.block if dim == 2 else fc.generate.box
+    sizes, divisions = ((60.0, 20.0), (40.0, 20.0)), ((6, 2), (5, 3))
+    if dim == 3:
+        sizes, divisions = ((60.0, 50.0, 20.0), (40.0, 36.0, 20.0)), ((6, 5, 2), (5, 4, 2))
+    corner = (8.0, 20.0) if dim == 2 else (8.0, 6.0, 20.0)
+    lower = box(sizes[0], divisions[0])
+    upper = box(sizes[1], divisions[1], "quad4" if dim == 2 else "hex8", corner)
+    boxes = [
+        fc.generate.renamed(mesh, {name: f"{body}_{name}" for name in mesh.group_names})
+        for body, mesh in (("A", lower), ("B", upper))
+    ]
+    mesh = fc.generate.union(*boxes)
+    low, high = ("BOTTOM", "TOP") if dim == 2 else ("ZMIN", "ZMAX")
+    model = elastic_model(mesh, "plane_strain" if dim == 2 else "3d", E=210e3)
+    model.add_pressure(f"B_{high}", 0.1, ramp=[(0, 0), (1, 1), (2, 1)])
+    model.prescribe(f"A_{low}", x=0.5, **dict.fromkeys("yz"[: dim - 1], 0.0), ramp=[(0, 0), (1, 0), (2, 1)])
+    model.add_contact("AB", secondary=f"B_{low}", primary=f"A_{high}", **{"friction": 0.3, **options})
+    return model
+
+
+@pytest.mark.parametrize(
+    ("dim", "options"),
+    [
+        (2, {}),
+        (2, {"formulation": "node_to_segment"}),
+        (2, {"formulation": "continuous"}),
+        (2, {"multipliers": "standard"}),
+        (2, {"friction": 0.9}),
+        (3, {}),
+    ],
+)
+def test_a_box_rides_on_a_driven_one(dim, options):
+    """Friction carries a box that nothing else holds: it moves as far as the box below, and no shear remains."""
+    model = carried(dim, options)
+    step = fc.solve(model, [1.0, 2.0])[-1]
+    moved = step.displacement[model.mesh.points_of(f"B_{'TOP' if dim == 2 else 'ZMAX'}"), 0]
+    np.testing.assert_allclose(moved, 0.5, atol=1e-4)
+    force = step.contact["AB"].force
+    assert np.abs(force[:-1]).max() < 1e-8 * force[-1]
