@@ -30,6 +30,7 @@ from fastcontact.elasticity.mass import portions
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.elasticity.recovery import BATCH
+from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies
@@ -45,6 +46,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 NEGLECTED = 0.1
 # Rotation [radian] beyond which linear kinematics give a warning: they neglect a strain of half its square.
 ROTATION = 0.3
+# Error of the moment of friction above which a warning is given. Where bodies rotate, linear kinematics apply forces at
+# undeformed positions, by which moments are out of balance by about the angle divided by the coefficient of friction.
+OUT_OF_BALANCE = 0.03
 # Largest recommended factor on the number of steps. A larger factor indicates a wrong coefficient of wear.
 MANY_STEPS = 1000
 # Alternation of nodal pressures on quadratic lines above which a warning is given, see `wavering`; elsewhere ALTERNATING.
@@ -287,7 +291,7 @@ def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterato
             f"the largest rotation is {angle:.3f} radian, near {np.array2string(where, precision=4)}: linear kinematics "
             f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
         )
-    elif angle > 2.0 * NOTABLE:  # linear kinematics neglect half the angle of the displacement by a rotation
+    elif angle > OUT_OF_BALANCE * min((pair.friction for pair in problem.pairs.values() if pair.friction), default=0.1):
         yield from neglected_rotation(problem, last, angle)
 
 
@@ -481,6 +485,45 @@ def neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Iter
             f"rotations of up to {angle:.2g} radian matter in body {name}: on the strains that linear kinematics neglect its "
             f"stresses would do {ratio[worst]:.0%} of their work on strains. Solve the model with strain='finite'"
         )
+        return
+    capacity = _frictional_capacity(problem, last)
+    # The moment out of balance does twice the neglected work in a rotation. The neglected strain also changes pressures.
+    error = ratio + np.divide(2.0 * np.abs(neglected), capacity, out=np.zeros(len(capacity)), where=capacity > 0.0)
+    worst = int(np.argmax(np.where(capacity > 0.0, error, 0.0)))
+    if capacity[worst] > 0.0 and error[worst] > OUT_OF_BALANCE:
+        name = body_name(mesh, bodies(mesh)[1], worst)
+        yield (
+            f"the moments of friction on body {name} may be wrong by {error[worst]:.1%}: it rotates by up to {angle:.2g} radian, "
+            "and linear kinematics apply forces at undeformed positions. Solve the model with strain='finite'"
+        )
+
+
+def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
+    """Return the largest work (n_bodies,) of contact forces with friction in the rigid-body motion of each body [energy].
+
+    It is zero for bodies that deform more than they rotate.
+    """
+    mesh, dim, capacity = problem.model.mesh, problem.model.mesh.dim, np.zeros(bodies(problem.model.mesh)[0])
+    motion, rotation = np.zeros((2, *mesh.points.shape))
+    rotating = np.zeros(mesh.n_points, bool)
+    body = bodies(mesh)[1]
+    for number in range(len(capacity)):
+        nodes = np.flatnonzero(body == number)
+        modes, u = rigid_modes(mesh.points[nodes], problem.model.kinematics), last.displacement[nodes].ravel()
+        amplitude = np.linalg.lstsq(modes, u)[0]
+        rotation[nodes] = (modes[:, dim:] @ amplitude[dim:]).reshape(-1, dim)
+        motion[nodes] = (modes @ amplitude).reshape(-1, dim)
+        rotating[nodes] = np.linalg.norm(u - motion[nodes].ravel()) < 0.5 * np.linalg.norm(rotation[nodes])
+    for name, pair in problem.pairs.items():
+        contact, friction = last.contact[name], pair.friction or 0.0
+        sides = (contact.points, contact.force_vectors), (contact.primary_points, contact.primary_force_vectors)
+        for points, force in sides if friction else ():
+            arm = np.maximum(np.linalg.norm(motion[points], axis=1), np.linalg.norm(rotation[points], axis=1))
+            work = np.maximum(
+                friction * np.linalg.norm(force, axis=1) * arm, np.abs((force * motion[points]).sum(axis=1))
+            )
+            np.add.at(capacity, body[points], rotating[points] * work)
+    return capacity
 
 
 def _works_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
