@@ -291,7 +291,7 @@ def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterato
             f"the largest rotation is {angle:.3f} radian, near {np.array2string(where, precision=4)}: linear kinematics "
             f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
         )
-    elif angle > OUT_OF_BALANCE * min((pair.friction for pair in problem.pairs.values() if pair.friction), default=0.1):
+    elif angle > 0.5 * OUT_OF_BALANCE * min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0):
         yield from neglected_rotation(problem, last, angle)
 
 
@@ -493,7 +493,7 @@ def neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Iter
     if capacity[worst] > 0.0 and error[worst] > OUT_OF_BALANCE:
         name = body_name(mesh, bodies(mesh)[1], worst)
         yield (
-            f"the moments of friction on body {name} may be wrong by {error[worst]:.1%}: it rotates by up to {angle:.2g} radian, "
+            f"moments of friction on body {name} are wrong by up to {error[worst]:.1%}: it rotates by {angle:.2g} radian, "
             "and linear kinematics apply forces at undeformed positions. Solve the model with strain='finite'"
         )
 
