@@ -88,7 +88,11 @@ def result_warnings(
         undetermined = _undetermined_tractions(pair, contact, pair.undetermined(configuration))
         warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
         warnings += [sag[name]] if name in sag else _unresolved(name, pair, contact, state)
-        warnings += [*wavering(pair, contact), *_peak_at_edge(pair, last, contact), *_too_fast(name, pair, state)]
+        warnings += [
+            *wavering(pair, contact, problem.model.mesh),
+            *_peak_at_edge(pair, last, contact),
+            *_too_fast(name, pair, state),
+        ]
     return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state), *_slipping_before(state)]
 
 
@@ -99,7 +103,8 @@ def _deep_penetration(pair: Formulation, contact: ContactResult, displacement: A
     if isinstance(penalty, float) and depth > NOTABLE * size:
         yield (
             f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "
-            f"raise its penalty from {penalty:.4g} to about {penalty * depth / (NOTABLE * size):.2g}, or omit it"
+            f"raise its penalty from {penalty:.4g} to about {penalty * depth / (NOTABLE * size):.2g}, or omit it. If it is "
+            f"the stiffness of a layer, such as a gasket, give it as a table: penalty=[(0, 0), (1, {penalty:.4g})]"
         )
 
 
@@ -400,7 +405,7 @@ def across(side: Surface, closed: Mask, excluded: Mask) -> int | None:
     return count
 
 
-def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
+def wavering(pair: Formulation, contact: ContactResult, mesh: Mesh) -> Iterator[str]:
     """Yield a warning where pressures of nodes whose neighbours are all closed oscillate by a large fraction of their mean.
 
     The measure is the median difference from the mean of the neighbours, over the mean pressure. On rings of tri3 cells 4.6
@@ -427,7 +432,9 @@ def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     limit = ALTERNATING_ON_LINES if side.order == 2 and pair.points.shape[1] == 2 else ALTERNATING
     if not size > limit * mean > 0.0:
         return
-    cells = f"quadrangles or hexahedra along '{pair.secondary.group}', or triangles or tetrahedra there about as deep as wide"
+    cells = f"quadrangles or hexahedra along '{side.group}', or triangles or tetrahedra there about as deep as wide"
+    if all(name[:3] in ("qua", "hex") for name, block in mesh.solids.items() if np.isin(block, side.points).any()):
+        cells = f"facets of '{side.group}' that are at most as large as the opposite ones"
     yield (
         f"contact '{contact.name}': nodal pressures waver from node to node, by {0.5 * size:.3g} above and below "
         f"a mean of {mean:.3g}: trust means over neighbouring nodes, or use "
