@@ -26,6 +26,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.model import gaps_at_rest
+from fastcontact.model.pretension import loose_bolts
 from fastcontact.model.rigid_motions import generalised, grouped, needed_friction, resisting, stopped_at
 from fastcontact.round_off import SINGLE_PRECISION
 
@@ -265,6 +266,7 @@ def _with_floating_bodies(
     def failure(text: str, **options: bool) -> ConvergenceError:
         coefficient = needed_friction(constraints, modes, iterate.u, *loads)
         text = text if coefficient is None else friction_exceeded(bodies, coefficient, constraints.friction)
+        text += loose_bolts(problem.model.pretensions, modes, step.load.force.reshape(problem.shape))
         return ConvergenceError(text, iterate.history, **options)
 
     start, modes = iterate.u[bodies.dofs], bodies.motions.displacement

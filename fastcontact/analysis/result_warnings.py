@@ -30,6 +30,7 @@ from fastcontact.elasticity.mass import portions
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.elasticity.recovery import BATCH
+from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies
@@ -45,6 +46,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 NEGLECTED = 0.1
 # Rotation [radian] beyond which linear kinematics give a warning: they neglect a strain of half its square.
 ROTATION = 0.3
+# Error of the moment of friction above which a warning is given. Where bodies rotate, linear kinematics apply forces at
+# undeformed positions, by which moments are out of balance by about the angle divided by the coefficient of friction.
+OUT_OF_BALANCE = 0.03
 # Largest recommended factor on the number of steps. A larger factor indicates a wrong coefficient of wear.
 MANY_STEPS = 1000
 # Alternation of nodal pressures on quadratic lines above which a warning is given, see `oscillating`; elsewhere ALTERNATING.
@@ -84,7 +88,11 @@ def result_warnings(
         undetermined = _undetermined_tractions(pair, contact, pair.undetermined(configuration))
         warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
         warnings += [sag[name]] if name in sag else _unresolved(name, pair, contact, state)
-        warnings += [*oscillating(pair, contact), *_peak_at_edge(pair, last, contact), *_too_fast(name, pair, state)]
+        warnings += [
+            *oscillating(pair, contact, problem.model.mesh),
+            *_peak_at_edge(pair, last, contact),
+            *_too_fast(name, pair, state),
+        ]
     warnings += [*_unsettled(state), *_loose(problem, last), *_unbalanced(state), *_slipping_before(state)]
     return [*warnings, *_turning_flow(state)]
 
@@ -96,7 +104,8 @@ def _deep_penetration(pair: Formulation, contact: ContactResult, displacement: A
     if isinstance(penalty, float) and depth > NOTABLE * size:
         yield (
             f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "
-            f"raise its penalty from {penalty:.4g} to about {penalty * depth / (NOTABLE * size):.2g}, or omit it"
+            f"raise its penalty from {penalty:.4g} to about {penalty * depth / (NOTABLE * size):.2g}, or omit it. If it is "
+            f"the stiffness of a layer, such as a gasket, give it as a table: penalty=[(0, 0), (1, {penalty:.4g})]"
         )
 
 
@@ -303,7 +312,7 @@ def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterato
             f"the largest rotation is {angle:.3f} radian, near {np.array2string(where, precision=4)}: linear kinematics "
             f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
         )
-    elif angle > 2.0 * NOTABLE:  # linear kinematics neglect half the angle of the displacement by a rotation
+    elif angle > 0.5 * OUT_OF_BALANCE * min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0):
         yield from neglected_rotation(problem, last, angle)
 
 
@@ -412,7 +421,7 @@ def across(side: Surface, closed: Mask, excluded: Mask) -> int | None:
     return count
 
 
-def oscillating(pair: Formulation, contact: ContactResult) -> Iterator[str]:
+def oscillating(pair: Formulation, contact: ContactResult, mesh: Mesh) -> Iterator[str]:
     """Yield a warning where pressures of nodes whose neighbours are all closed oscillate by a large fraction of their mean.
 
     The measure is the median difference from the mean of the neighbours, over the mean pressure. On rings of tri3 cells 4.6
@@ -439,7 +448,9 @@ def oscillating(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     limit = ALTERNATING_ON_LINES if side.order == 2 and pair.points.shape[1] == 2 else ALTERNATING
     if not size > limit * mean > 0.0:
         return
-    cells = f"quadrangles or hexahedra along '{pair.secondary.group}', or triangles or tetrahedra there about as deep as wide"
+    cells = f"quadrangles or hexahedra along '{side.group}', or triangles or tetrahedra there about as deep as wide"
+    if all(name[:3] in ("qua", "hex") for name, block in mesh.solids.items() if np.isin(block, side.points).any()):
+        cells = f"facets of '{side.group}' that are at most as large as the opposite ones"
     yield (
         f"contact '{contact.name}': nodal pressures oscillate from node to node, by {0.5 * size:.3g} above and below "
         f"a mean of {mean:.3g}: trust means over neighbouring nodes, or use "
@@ -497,6 +508,45 @@ def neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Iter
             f"rotations of up to {angle:.2g} radian matter in body {name}: on the strains that linear kinematics neglect its "
             f"stresses would do {ratio[worst]:.0%} of their work on strains. Solve the model with strain='finite'"
         )
+        return
+    capacity = _frictional_capacity(problem, last)
+    # The moment out of balance does twice the neglected work in a rotation. The neglected strain also changes pressures.
+    error = ratio + np.divide(2.0 * np.abs(neglected), capacity, out=np.zeros(len(capacity)), where=capacity > 0.0)
+    worst = int(np.argmax(np.where(capacity > 0.0, error, 0.0)))
+    if capacity[worst] > 0.0 and error[worst] > OUT_OF_BALANCE:
+        name = body_name(mesh, bodies(mesh)[1], worst)
+        yield (
+            f"moments of friction on body {name} are wrong by up to {error[worst]:.1%}: it rotates by {angle:.2g} radian, "
+            "and linear kinematics apply forces at undeformed positions. Solve the model with strain='finite'"
+        )
+
+
+def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
+    """Return the largest work (n_bodies,) of contact forces with friction in the rigid-body motion of each body [energy].
+
+    It is zero for bodies that deform more than they rotate.
+    """
+    mesh, dim, capacity = problem.model.mesh, problem.model.mesh.dim, np.zeros(bodies(problem.model.mesh)[0])
+    motion, rotation = np.zeros((2, *mesh.points.shape))
+    rotating = np.zeros(mesh.n_points, bool)
+    body = bodies(mesh)[1]
+    for number in range(len(capacity)):
+        nodes = np.flatnonzero(body == number)
+        modes, u = rigid_modes(mesh.points[nodes], problem.model.kinematics), last.displacement[nodes].ravel()
+        amplitude = np.linalg.lstsq(modes, u)[0]
+        rotation[nodes] = (modes[:, dim:] @ amplitude[dim:]).reshape(-1, dim)
+        motion[nodes] = (modes @ amplitude).reshape(-1, dim)
+        rotating[nodes] = np.linalg.norm(u - motion[nodes].ravel()) < 0.5 * np.linalg.norm(rotation[nodes])
+    for name, pair in problem.pairs.items():
+        contact, friction = last.contact[name], pair.friction or 0.0
+        sides = (contact.points, contact.force_vectors), (contact.primary_points, contact.primary_force_vectors)
+        for points, force in sides if friction else ():
+            arm = np.maximum(np.linalg.norm(motion[points], axis=1), np.linalg.norm(rotation[points], axis=1))
+            work = np.maximum(
+                friction * np.linalg.norm(force, axis=1) * arm, np.abs((force * motion[points]).sum(axis=1))
+            )
+            np.add.at(capacity, body[points], rotating[points] * work)
+    return capacity
 
 
 def _works_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -400,35 +401,38 @@ def _theories(
 ) -> tuple[dict[str, dict[str, Any]], dict[str, float]]:
     """Return the theories of the tables ``[theory.PAIR]`` and ``[theory.PAIR.mesh_converged]``, and the approaches [length].
 
-    Both are in the form of `Case.theories` and `Case.approach`. Raises CaseError if `pairs` is given and does not contain the
-    pair of a theory.
+    Both are in the form of `Case.theories` and `Case.approach`. Plane theories have the kinematics of the case by default.
+    Raises CaseError if `pairs` is given and does not contain the pair of a theory.
     """
     theories: dict[str, dict[str, Any]] = {}
-    approach = {}
+    approach, kinematics = {}, str(data.get("kinematics", ""))
     for pair, entry in data.get("theory", {}).items():
         if pairs is not None and pair not in pairs:
             raise CaseError("'theory': " + unknown("contact pair", pair, pairs))
         if not isinstance(entry, dict):
             raise CaseError(f"'theory.{pair}' must be a table with the key 'kind', not {entry!r:.80}")
         constants = {key: value for key, value in entry.items() if key not in ("mesh_converged", "share")}
-        theories[pair] = {"theory": _theory(f"theory.{pair}", constants), "share": entry.get("share", 1.0)}
+        theories[pair] = {"theory": _theory(f"theory.{pair}", constants, kinematics), "share": entry.get("share", 1.0)}
         check_keys(f"theory.{pair}", {"share": theories[pair]["share"]}, {"share": NUMBER})
         if not 0.0 < theories[pair]["share"] <= 1.0:
             text = "must be more than 0 and at most 1: 0.25 for a quarter of the contact"
             raise CaseError(f"theory.{pair}.share = {entry['share']:g} {text}")
         if "mesh_converged" in entry:
-            theories[pair]["mesh_converged"] = _theory(f"theory.{pair}.mesh_converged", entry["mesh_converged"])
+            converged = _theory(f"theory.{pair}.mesh_converged", entry["mesh_converged"], kinematics)
+            theories[pair]["mesh_converged"] = converged
         if "approach" in constants:
             approach[pair] = float(constants["approach"])
     return theories, approach
 
 
-def _theory(where: str, data: dict[str, Any]) -> Any:
+def _theory(where: str, data: dict[str, Any], kinematics: str) -> Any:
     """Return the object of `fastcontact.analytic` that a table describes by its kind and its arguments."""
     if not isinstance(data, dict) or "kind" not in data:
         raise CaseError(f"'{where}' needs the key 'kind', one of {', '.join(analytic.THEORIES)}")
     kind, arguments = data["kind"], {key: value for key, value in data.items() if key != "kind"}
     check_known(f"{where}.kind", kind, analytic.THEORIES, CaseError)
+    if kinematics.startswith("plane_") and "kinematics" in inspect.signature(analytic.THEORIES[kind]).parameters:
+        arguments = {"kinematics": kinematics, **arguments}
     return called(where, analytic.THEORIES[kind], arguments)
 
 

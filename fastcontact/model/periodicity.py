@@ -13,15 +13,15 @@ from scipy.sparse.csgraph import connected_components
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.contact.obstacles.rigid_side import Rotation
-from fastcontact.contact.projection import closest_of_kinds, places
-from fastcontact.contact.surface import surface
+from fastcontact.contact.projection import Closest, closest_of_kinds, places
+from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows, shapes_at
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table
-from fastcontact.model.relation_rows import less_first, matched
-from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
+from fastcontact.model.relation_rows import coincident, less_first, matched, to_facets
+from fastcontact.round_off import ROUND_OFF
 
 # Largest distance of the rotated nodes of one end from the facets of the other end, and beyond their edges, in facet sizes.
 # Facets of curved ends with different meshes deviate from each other by less.
@@ -122,11 +122,13 @@ def cyclic(
     if not len(first) or not len(second):
         raise ModelError(f"{name}: one of the groups is empty")
     rotation = Rotation(tuple(map(float, origin)), tuple(map(float, direction)), 2.0 * math.pi / sectors)  # type: ignore[arg-type]
-    turns = [_nearest_after(mesh, first, second, rotation, sign) for sign in (1.0, -1.0)]
-    distance, match, turn = min(turns, key=lambda candidate: float(candidate[0].max()))
-    size = float(np.ptp(mesh.points[first], axis=0).max())
+    turn, shift = min(
+        (_motion(rotation, sign) for sign in (1.0, -1.0)),
+        key=lambda motion: float(nearest(mesh.points[second], mesh.points[first] @ motion[0].T + motion[1])[0].max()),
+    )
+    match, distance, tolerance = coincident(mesh, (ends[0], first), (ends[1], second), turn, shift)
     far = int(np.argmax(distance))
-    if len(first) == len(second) == len(np.unique(match)) and distance[far] <= SINGLE_PRECISION * size:
+    if len(first) == len(second) == len(np.unique(match)) and distance[far] <= tolerance:
         interface = PeriodicInterface(first, second[match], turn, rotation, sectors)
         relation = MultiPointConstraint(name, turned_rows(interface, 1.0, mesh))
         return [relation], interface._replace(relation=relation)
@@ -158,9 +160,9 @@ def _rows_to_facets(mesh: Mesh, dependent: str, facets: str, rotation: Rotation,
     Returns None if the rotated nodes do not lie on these facets. Linear fields satisfy the rows exactly.
     """
     other, nodes = surface(mesh, facets), mesh.points_of(dependent).astype(np.intp)
-    turn, centre = rotation.matrix(sign * rotation.angle), np.array(rotation.centre)
+    turn, shift = _motion(rotation, sign)
     corners = other.corners(mesh.points)
-    near = closest_of_kinds((mesh.points[nodes] - centre) @ turn.T + centre, corners)
+    near = _projected(mesh.points[nodes] @ turn.T + shift, to_facets(mesh, nodes) @ turn.T, other, corners)
     sizes = np.concatenate([np.ptp(block, axis=1).max(axis=1) for block in corners])
     if (near.distance > LARGEST_DISTANCE * sizes[near.facet]).any() or (near.overhang > LARGEST_DISTANCE).any():
         return None
@@ -170,20 +172,35 @@ def _rows_to_facets(mesh: Mesh, dependent: str, facets: str, rotation: Rotation,
     return csr_array(kron(identity, turn) - kron(weights, np.eye(dim)))
 
 
+def _motion(rotation: Rotation, sign: float) -> tuple[Array, Array]:
+    """Return the matrix (dim, dim) [-] and the translation (dim,) [length] of the rotation by one sector, or back."""
+    turn, centre = rotation.matrix(sign * rotation.angle), np.array(rotation.centre)
+    return turn, centre - turn @ centre
+
+
+def _projected(positions: Array, inward: Array, other: Surface, corners: list[Array]) -> Closest:
+    """Project positions (n, dim) [length] on the closest facets of a surface, whose nodes are at `corners`.
+
+    Where bodies are in contact, a position lies on facets of both. It belongs to that toward which `inward` (n, dim) points.
+    """
+    near, inside = (closest_of_kinds(positions + shift, corners) for shift in (0.0, LARGEST_DISTANCE * inward))
+    nodes, nodes_inside = (places(other, found.facet, found.xi).nodes for found in (near, inside))
+    first = np.cumsum([0] + [len(block) for block in corners])
+    for row in np.flatnonzero((nodes[:, :, None] != nodes_inside[:, None]).all(axis=(1, 2))):
+        kind = int(np.searchsorted(first, inside.facet[row], side="right")) - 1
+        on_facet = closest_of_kinds(positions[[row]], [corners[kind][[inside.facet[row] - first[kind]]]])
+        for values, value in zip(near, on_facet, strict=True):
+            values[row] = value[0]
+        near.facet[row] = inside.facet[row]
+    return near
+
+
 def _without_zeros(rows: csr_array) -> csr_array:
     """Return rows without entries below round-off, and without the rows that then are empty."""
     rows.sum_duplicates()
     rows.data[np.abs(rows.data) < ROUND_OFF] = 0.0
     rows.eliminate_zeros()
     return csr_array(rows[np.diff(rows.indptr) > 0])
-
-
-def _nearest_after(
-    mesh: Mesh, first: Indices, second: Indices, rotation: Rotation, sign: float
-) -> tuple[Array, Indices, Array]:
-    """Return the distances of rotated first nodes to the nearest second nodes [length], their indices, and the matrix."""
-    turn, centre = rotation.matrix(sign * rotation.angle), np.array(rotation.centre)
-    return *nearest(mesh.points[second], (mesh.points[first] - centre) @ turn.T + centre), turn
 
 
 def _rows(interface: PeriodicInterface, at_second: AnyArray, at_first: AnyArray, mesh: Mesh) -> csr_array:

@@ -238,6 +238,18 @@ def locked_lengths(
     return {bolt.label: stored[bolt.label] if bolt.label in stored else bolt.shortened(displacement) for bolt in locked}
 
 
+def loose_bolts(sections: Sequence[Pretension], modes: Array, force: Array) -> str:
+    """Return a remark about sections without a force whose shortening is free in rigid-body motions, to append to a message.
+
+    `modes` (n_dofs, k) are the displacements in these motions, and `force` (n_points, dim) are the loads [force].
+    """
+    free = [bolt for bolt in sections if np.abs(bolt.row(len(modes)) @ modes).max(initial=0.0) > SINGLE_PRECISION]
+    loose = " and ".join(bolt.name for bolt in free if not force[bolt.nodes].any())
+    if not loose:
+        return ""
+    return f". The force of {loose} is 0: give a loose bolt a small one from the beginning, such as 0.001 of the full force"
+
+
 def check_locks(sections: Sequence[Pretension], instants: Sequence[float]) -> None:
     """Raise ModelError if a section is locked within a load step, or from the beginning."""
     for bolt in sections:

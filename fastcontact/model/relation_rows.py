@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from fastcontact._tools.argument_types import finite_vector
-from fastcontact._tools.neighbours import nearest
+from fastcontact._tools.neighbours import nearest, pairs_within
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import FacetBlock, Surface
@@ -16,6 +17,7 @@ from fastcontact.elasticity.loads import facets_of, outward
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import bodies, outer_facets
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
 NORMAL = "normal"
@@ -68,7 +70,7 @@ def matched(
     Raises
     ------
     ModelError
-        If the groups have different numbers of nodes, or do not coincide.
+        If the groups have different numbers of nodes, or do not coincide, or if nodes at one place cannot be told apart.
     """
     (name, nodes), (other, opposite) = first, second
     if len(nodes) != len(opposite):
@@ -79,12 +81,76 @@ def matched(
         shift = finite_vector(translation, mesh.dim)
     if shift is None:
         raise ModelError(f"the translation {translation} of '{name}' must be {mesh.dim} numbers")
-    distance, match = nearest(target, x + shift)
-    size = max(float(np.ptp(x, axis=0).max()), 1e-3 * float(np.ptp(mesh.points, axis=0).max()))
-    worst = int(np.argmax(distance))
-    if distance[worst] > SINGLE_PRECISION * size or len(np.unique(match)) < len(match):
+    found = coincident(mesh, first, second, np.eye(mesh.dim), shift)
+    worst = int(np.argmax(found.distance))
+    if found.distance[worst] > found.tolerance:
         raise ModelError(
-            f"point {nodes[worst]} of '{name}', moved by {shift}, lies {distance[worst]:.3g} from the nearest node of "
+            f"point {nodes[worst]} of '{name}', moved by {shift}, lies {found.distance[worst]:.3g} from the nearest node of "
             f"'{other}': groups are joined node by node; give the translation between them, or use another mesh"
         )
-    return match
+    if len(np.unique(found.rows)) < len(nodes):
+        raise ModelError(
+            f"several nodes of '{name}', moved by {shift}, meet one node of '{other}': groups are joined node by node"
+        )
+    return found.rows
+
+
+class Coincident(NamedTuple):
+    """For each of n moved nodes, the row of the coincident, or the nearest, node of the other group."""
+
+    rows: Indices  # (n,)
+    distance: Array  # (n,): distance to it [length]
+    tolerance: float  # largest distance of coincident nodes [length]
+
+
+def coincident(
+    mesh: Mesh, first: tuple[str, Indices], second: tuple[str, Indices], turn: Array, shift: Array
+) -> Coincident:
+    """Return the nodes of the second group that lie at those of the first one, turned by `turn` and moved by `shift`.
+
+    Each group is given as (name, nodes). Several nodes of a group may lie at one place, those of bodies in contact or of the
+    sides of a crack. The facets of the group on which they lie tell them apart, or else their bodies.
+
+    Raises
+    ------
+    ModelError
+        If neither tells them apart.
+    """
+    (name, nodes), (other, opposite) = first, second
+    x, target = mesh.points[nodes] @ turn.T + shift, mesh.points[opposite]
+    size = max(float(np.ptp(x, axis=0).max()), 1e-3 * float(np.ptp(mesh.points, axis=0).max()))
+    tolerance = SINGLE_PRECISION * size
+    distance, rows = nearest(target, x)
+    candidate, row = pairs_within(target, x, np.full(len(x), tolerance))
+    if len(row) > len(np.unique(row)):
+        body = bodies(mesh)[1]
+        deviation = to_facets(mesh, nodes)[row] @ turn.T - to_facets(mesh, opposite)[candidate]
+        other_body = body[nodes[row]] != body[opposite[candidate]]
+        mismatch = np.linalg.norm(deviation, axis=1) + 4.0 * tolerance * other_body
+        order = np.lexsort((mismatch, row))
+        candidate, row, mismatch = candidate[order], row[order], mismatch[order]
+        best = np.insert(np.diff(row) > 0, 0, True)
+        rows[row[best]] = candidate[best]
+        alike = np.flatnonzero(~best[1:] & best[:-1] & (np.diff(mismatch) <= tolerance))
+        if len(alike):
+            node, two = nodes[row[alike[0]]], opposite[candidate[alike[0] : alike[0] + 2]]
+            raise ModelError(
+                f"points {two[0]} and {two[1]} of '{other}' lie at one place, and neither the facets nor the bodies of the "
+                f"groups tell which of them point {node} of '{name}' meets: join groups of one body at a time"
+            )
+    return Coincident(rows, distance, tolerance)
+
+
+def to_facets(mesh: Mesh, nodes: Indices) -> Array:
+    """Return the vectors (n, dim) from nodes (n,) to the mean centre of the outer facets that consist of such nodes [length].
+
+    They are zero for nodes without such a facet.
+    """
+    inside, total, count = np.zeros(mesh.n_points, bool), np.zeros_like(mesh.points), np.zeros(mesh.n_points)
+    inside[nodes] = True
+    for facets in outer_facets(mesh).values():
+        own = facets[inside[facets].all(axis=1)]
+        np.add.at(total, own, mesh.points[own].mean(axis=1)[:, None])
+        np.add.at(count, own, 1.0)
+    total, count = total[nodes], count[nodes, None]
+    return np.where(count > 0.0, total / np.maximum(count, 1.0) - mesh.points[nodes], 0.0)

@@ -208,8 +208,9 @@ class Sweep(Report):
         return self.framed(numbers)
 
     def table(self) -> AnyArray:
-        """Return a structured array (n_points,) with a row for each point, as ``--csv`` writes it.
+        """Return a structured array (n_points,) with a row for each solved point, as ``--csv`` writes it.
 
+        Points that could not be solved are in `failed` and have no row, also in `to_pandas`.
         The fields are the parameters, ``h`` [length] if known, ``n_dofs``, ``seconds`` [s] and, for each quantity, its value
         [unit of the quantity] and, if known, the relative differences ``..._from_theory``, ``..._from_theory_at_equal_force``
         and ``..._from_reference`` [-]. A result that has the name of a parameter, such as ``force``, is in the field

@@ -74,7 +74,7 @@ def test_a_locked_bar_keeps_its_length_and_cools():
 SOLVERS = ("direct", "amg")
 
 
-def joint(pull, formulation="mortar", locked_from=1.0, first=1.0):
+def joint(pull, formulation="mortar", locked_from=1.0, first=1.0, tight=1.0):
     """Return a bolt (1 wide) beside clamped plates (2 wide), all of height L, their tops moving as one.
 
     The plates' lower half stands on the ground and touches the upper one at the middle; the bolt stands on the ground.
@@ -98,7 +98,7 @@ def joint(pull, formulation="mortar", locked_from=1.0, first=1.0):
     model.couple("HEAD", "y")
     model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", formulation=formulation)
     model.add_pretension(
-        "bolt", "CUT", force=FORCE, locked_from=locked_from, ramp=[(0.0, 0.0), (first, 1.0), (2.0, 1.0)]
+        "bolt", "CUT", force=FORCE, locked_from=locked_from, ramp=[(0.0, 0.0), (first, tight), (2.0, 1.0)]
     )
     model.add_traction("HEAD", y=pull / 3.0, ramp=[(0.0, 0.0), (first, 0.0), (2.0, 1.0)])
     return model
@@ -122,6 +122,19 @@ def test_a_bolted_joint_is_two_springs(pull, formulation, solver):
     clamped = max(FORCE - pull * 2.0 / 3.0, 0.0)
     assert pulled.pretension["bolt"]["force"] == pytest.approx(clamped + pull, rel=1e-8)
     assert pulled.contact["joint"].force[1] == pytest.approx(clamped, rel=1e-8, abs=1e-12)
+
+
+def test_a_bolt_without_a_force_is_loose_and_finger_tight_it_holds():
+    """A bolt that is tightened after others, as in a flange, holds nothing before."""
+    history = [(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)]
+    loose, held = (joint(0.0, locked_from=2.0, tight=tight) for tight in (0.0, 0.02))
+    for model in (loose, held):
+        model.add_force("HEAD", y=0.01 * FORCE, ramp=history)
+    with pytest.raises(fc.ConvergenceError, match=r"pull bodies away.*pretension 'bolt' is 0: .* 0\.001 of the full"):
+        fc.solve(loose, [1.0, 2.0])
+    finger_tight, tight = fc.solve(held, [1.0, 2.0])
+    assert finger_tight.contact["joint"].force[1] == pytest.approx(0.01 * FORCE, rel=1e-8)
+    assert tight.contact["joint"].force[1] == pytest.approx(0.99 * FORCE, rel=1e-8)
 
 
 def test_without_a_lock_the_force_stays():

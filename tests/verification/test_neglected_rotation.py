@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from pairwise import first_of
 
 import fastcontact as fc
 
@@ -46,3 +47,84 @@ def test_bending_stresses_do_no_work_on_neglected_strains(kinematics):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         fc.solve(model, 1)
+
+
+def rings(dim):
+    """A quarter of two rings in 2D, or a twelfth in 3D; groups BORE, RIM, CONT_INNER, CONT_OUTER, FIRST and SECOND."""
+    parts = []
+    for name, inside, outside, sides in (
+        ("A", 10.0, 25.0, ("BORE", "CONT_INNER")),
+        ("B", 25.0, 50.0, ("CONT_OUTER", "RIM")),
+    ):
+        block = (
+            fc.generate.block((1.0, 1.0), (6, 16), "quad8")
+            if dim == 2
+            else fc.generate.box((1.0,) * 3, (4, 4, 1), "hex20")
+        )
+        x = block.points
+        radius, angle = inside + (outside - inside) * x[:, 0], (np.pi / 2 if dim == 2 else np.pi / 6) * x[:, 1]
+        block = block.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 4.0 * x[:, 2:]]))
+        old = ("LEFT", "RIGHT", "BOTTOM", "TOP") if dim == 2 else ("XMIN", "XMAX", "YMIN", "YMAX")
+        new = dict(zip(old, (*sides, f"{name}_FIRST", f"{name}_SECOND"), strict=True))
+        parts.append(
+            fc.generate.renamed(block, {group: new.get(group, f"{name}_{group}") for group in block.group_names})
+        )
+    mesh = fc.generate.union(*parts)
+    for end in ("FIRST", "SECOND"):
+        mesh = mesh.merged_groups(end, [f"A_{end}", f"B_{end}"])
+    return mesh
+
+
+def torque(dim, turned, angle, strain="small", **options):
+    """Return the torque that turns the rim or bore of a press fit until it slips all around, and the warnings."""
+    mesh = rings(dim)
+    model = fc.Model(mesh, "plane_stress" if dim == 2 else "3d", strain=strain)
+    model.add_material(fc.LinearElastic(E=210e3, nu=0.3))
+    model.add_cyclic_symmetry("FIRST", "SECOND", sectors=4 if dim == 2 else 12)
+    for group, radius in (("RIM", 50.0), ("BORE", 10.0)):
+        turn = angle * radius * (group == turned)
+        model.prescribe(group, y=turn, axes=fc.CylindricalAxes(), ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
+    for group in ("A_ZMIN", "B_ZMIN") if dim == 3 else ():
+        model.fix(group, "z")
+    model.add_contact("fit", secondary="CONT_OUTER", primary="CONT_INNER", clearance=-0.03, friction=0.15, **options)
+    last = fc.solve(model, [1.0, 1.5, 2.0])[-1]
+    held = mesh.points_of(turned)
+    x, force = mesh.points[held] + (strain == "finite") * last.displacement[held], last.reaction[held]
+    return abs(float((x[:, 0] * force[:, 1] - x[:, 1] * force[:, 0]).sum())), last.warnings
+
+
+@pytest.mark.filterwarnings("ignore:moments of friction", "ignore:.*across its radius")
+@pytest.mark.parametrize(
+    ("dim", "turned", "angle", "options", "error"),
+    first_of(3, [
+        (2, "RIM", 0.0025, {}, 0.019),
+        (2, "RIM", 0.006, {}, 0.055),
+        (3, "RIM", 0.006, {}, 0.055),
+        (2, "RIM", 0.012, {"formulation": "continuous"}, 0.136),
+        (2, "BORE", 0.006, {}, 0.055),
+    ]),
+)  # fmt: skip
+def test_the_torque_of_a_press_fit_that_turns(dim, turned, angle, options, error):
+    """The torque of Coulomb's law does not depend on the angle. Small strains deviate by about angle / friction and a warning
+    says so from about 3 % on."""
+    exact = torque(dim, turned, angle, "finite", **options)[0]
+    small, warned = torque(dim, turned, angle, **options)
+    assert abs(small / exact - 1.0) == pytest.approx(error, abs=0.01)
+    assert len(warned) == (error > 0.03)
+    if warned:
+        stated = float(warned[0].split("up to ")[1].split("%")[0]) / 100.0
+        assert 0.75 * error < stated < 1.5 * error
+
+
+@pytest.mark.filterwarnings("ignore:the energy of these load steps")
+def test_a_block_that_slides_far_needs_no_finite_strains():
+    mesh = fc.generate.block_on_block(shift=-1.0)
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.add_pressure("UPPER_TOP", 1.0, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)])
+    model.prescribe("UPPER_TOP", x=1.0, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
+    model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.1)
+    last = fc.solve(model, [1.0, 1.5, 2.0])[-1]
+    assert last.contact["c"].shear.any()
+    assert not [text for text in last.warnings if "moments of friction" in text]

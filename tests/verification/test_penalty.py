@@ -64,6 +64,10 @@ def test_a_soft_penalty_is_told_with_a_number():
     with pytest.warns(fc.FastcontactWarning, match=r"pair' penetrates by 0.00198.*, which is 9.9%.*from 1000 to about"):
         last = fc.solve(model, fc.linear_ramp(1))[-1]
     assert "raise its penalty" in last.warnings[0]
+    assert last.warnings[0].endswith("give it as a table: penalty=[(0, 0), (1, 1000)]")
+    layer = fc.solve(touching(held(blocks()), "node_to_segment", penalty=[(0, 0), (1, 1e3)]), 1)[-1]
+    assert not layer.warnings
+    assert layer.displacement == pytest.approx(last.displacement, abs=1e-9)
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)

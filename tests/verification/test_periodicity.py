@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from images import Image, image_of
 from pairwise import first_of
 
 import fastcontact as fc
@@ -361,3 +362,119 @@ def test_ends_that_do_not_match_are_refused():
     axisymmetric = fc.Model(block(), "axisymmetric")
     with pytest.raises(fc.ModelError, match="is the whole ring already"):
         axisymmetric.add_cyclic_symmetry("LEFT", "RIGHT", sectors=4)
+
+
+def two_bodies(dim, elements, ends, wind, seed=None):
+    """A sector of two rings that touch with coincident nodes, which are renumbered; `ends` grades one end radially."""
+    parts = []
+    for name, inside, element in (("IN", 1.0, elements[0]), ("OUT", 2.0, elements[1])):
+        mesh = block((1.0, 1.0), (4, 4), element) if dim == 2 else box((1.0, 1.0, 1.0), (3, 3, 2), element)
+        s, t = mesh.points[:, :2].T
+        radius = inside + s + ends * t * np.sin(2.0 * np.pi * s) / (2.0 * np.pi)
+        angle = 2.0 * np.pi / 12.0 * t + wind * (radius - 2.0)
+        points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), mesh.points[:, 2:]])
+        names = dict(zip(("LEFT", "RIGHT", "BOTTOM", "TOP") if dim == 2 else ("XMIN", "XMAX", "YMIN", "YMAX"), "IOFS"))
+        mesh = mesh.replace(points=points)
+        parts.append(renamed(mesh, {group: f"{name}_{names.get(group, group)}" for group in mesh.group_names}))
+    mesh = union(*parts).merged_groups("F", ["IN_F", "OUT_F"]).merged_groups("S", ["IN_S", "OUT_S"])
+    return mesh if seed is None else image_of(mesh, Image(seed=seed))[0]
+
+
+@pytest.mark.filterwarnings("ignore:.*across its radius", "ignore:.*facets", "ignore:.*stiff", "ignore:.*oscillate")
+@pytest.mark.parametrize(
+    ("dim", "elements", "wind", "seed", "ends", "swapped", "options"),
+    first_of(3, [
+        (2, ("quad8", "quad8"), 0.0, None, 0.0, False, {}),
+        (3, ("hex8", "tet4"), 0.0, 2, 0.0, True, {"friction": 0.1}),
+        (3, ("hex8", "hex8"), 0.0, 2, 0.5, False, {}),
+        (2, ("quad4", "tri6"), 0.3, 1, 0.0, True, {"friction": 0.1}),
+        (2, ("quad8", "quad8"), 0.0, 4, 0.5, True, {"formulation": "continuous"}),
+        (2, ("tri3", "quad4"), 0.3, 3, 0.0, False, {"formulation": "node_to_segment"}),
+    ]),
+)  # fmt: skip
+def test_one_symmetry_of_two_bodies_is_one_of_each(dim, elements, wind, seed, ends, swapped, options):
+    """The nodes of two bodies at one place were mixed up; `ends` are meshes that do not match at the ends."""
+    mesh, pressures = two_bodies(dim, elements, ends, wind, seed), []
+    for groups in ([("F", "S")], [("IN_F", "IN_S"), ("OUT_F", "OUT_S")]):
+        model = ring(mesh, "plane_stress" if dim == 2 else "3d")
+        for pair in groups:
+            model.add_cyclic_symmetry(*(pair[::-1] if swapped else pair), sectors=12)
+        for group in ("IN_I", "OUT_O"):
+            model.fix(group, "y", axes=fc.CylindricalAxes())
+        for group in ("IN_ZMIN", "OUT_ZMIN") if dim == 3 else ():
+            model.fix(group, "z")
+        sides = ("IN_O", "OUT_I")[:: -1 if swapped else 1]
+        model.add_contact("fit", secondary=sides[0], primary=sides[1], clearance=-0.05, **options)
+        pressures.append(fc.solve(model, 1)[-1].contact["fit"].pressure)
+    assert pressures[0] == pytest.approx(pressures[1], rel=1e-6, abs=1e-6 * pressures[1].max())
+    assert pressures[0].mean() == pytest.approx(0.05 * E / (2.0 * (5.0 / 3.0 + 13.0 / 5.0)), rel=0.15)
+
+
+def layers(seed=None):
+    """Two layers with coincident nodes at the interface, which reaches the ends L and R."""
+    mesh = fc.generate.block_on_block("quad4", divisions_lower=(8, 4), divisions_upper=(8, 4))
+    for side in ("L", "R"):
+        name = {"L": "LEFT", "R": "RIGHT"}[side]
+        mesh = mesh.merged_groups(side, [f"LOWER_{name}", f"UPPER_{name}"])
+    return mesh if seed is None else image_of(mesh, Image(seed=seed))[0]
+
+
+@pytest.mark.parametrize("joined", ["periodic", "related", "nodes"])
+def test_one_period_of_two_layers_in_contact(joined):
+    mesh = layers(None if joined == "related" else 5)
+    if joined == "nodes":  # without facets, nodes at one place belong to different bodies
+        mesh = mesh.with_groups(points={side: mesh.points_of(side) for side in "LR"})
+    model = ring(mesh)
+    if joined == "related":
+        model.relate_groups("L", "R", "xy")
+    else:
+        model.add_periodicity("L", "R")
+    model.fix("LOWER_BOTTOM", "xy")
+    model.prescribe("UPPER_TOP", x=0.0, y=-0.02)
+    model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER")
+    step = fc.solve(model, 1)[-1]
+    exact = 0.002 * E * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU))
+    assert step.contact["c"].pressure == pytest.approx(np.full(9, exact), rel=1e-6)
+    assert step.displacement[:, 0] == pytest.approx(np.zeros(mesh.n_points), abs=1e-9)
+
+
+def test_a_crack_that_reaches_both_ends():
+    """Its sides belong to one body. The facets of the ends tell them apart, and single nodes are refused."""
+    mesh = layers()
+    middle = np.flatnonzero((np.abs(mesh.points[:, 1]) < 1e-9) & (np.abs(mesh.points[:, 0] - 5.0) < 2.0))
+    joined = np.arange(mesh.n_points)
+    joined[middle] = [middle[(mesh.points[middle] == mesh.points[node]).all(axis=1)][0] for node in middle]
+    mesh = mesh.replace(cells={name: joined[block] for name, block in mesh.cells.items()})
+    assert fc.mesh.topology.bodies(mesh)[0] == 1
+    model = ring(mesh)
+    model.add_periodicity("L", "R")
+    first, second = model.periodic_interfaces[0][:2]
+    for side in ("CONT_LOWER", "CONT_UPPER"):
+        crack = mesh.points_of(side)
+        assert np.isin(first, crack).sum() == 1
+        assert np.isin(second, crack).tolist() == np.isin(first, crack).tolist()
+    row = np.abs(mesh.points[:, 1]) < 1e-9
+    ends = {name: np.flatnonzero(row & (mesh.points[:, 0] == x)) for name, x in (("A", 0.0), ("B", 10.0))}
+    model = ring(mesh.with_groups(points=ends))
+    with pytest.raises(
+        fc.ModelError, match=r"of 'B' lie at one place, and neither .* join groups of one body at a time"
+    ):
+        model.add_periodicity("A", "B")
+
+
+def test_pretension_of_two_bodies_cut_in_one_plane():
+    parts = [box((1.0, 1.0, 2.0), (1, 1, 2), origin=(x, 0.0, 0.0)) for x in (0.0, 1.0)]
+    parts = [renamed(part, {end: f"{name}_{end}" for end in ("ZMIN", "ZMAX")}) for name, part in zip("AB", parts)]
+    mesh = image_of(union(*parts), Image(seed=3))[0]
+    mesh = mesh.with_facet_group("CUT", lambda x: abs(x[:, 2] - 1.0) < 1e-9, between=True)
+    model = ring(fc.generate.cut(mesh, "CUT"), "3d")
+    for name in "AB":
+        model.fix(f"{name}_ZMIN", "xyz")
+        model.fix(f"{name}_ZMAX", "xyz")
+    model.add_pretension("both", "CUT", shortening=0.01)
+    section = model.pretensions[0]
+    body = fc.mesh.topology.bodies(model.mesh)[1]
+    ends = [body[model.mesh.points_of(f"{name}_{end}")[0]] for name in "AB" for end in ("ZMIN", "ZMAX")]
+    partner = dict([ends[:2], ends[2:]])
+    partner.update({upper: lower for lower, upper in partner.items()})
+    assert [partner[b] for b in body[section.nodes]] == body[section.opposite].tolist()

@@ -137,3 +137,34 @@ def test_quadratic_facets_with_accurate_pressures_are_not_told(element, inner, o
     contact, told = fitted(element, inner, outer, formulation=formulation)
     assert not told
     assert np.abs(contact.pressure / LAME - 1).max() < 0.1
+
+
+@pytest.mark.parametrize(
+    ("element", "count", "remedy"),
+    [
+        ("quad8", 8, "or use facets of 'SEAT' that are at most as large as the opposite ones"),
+        ("tri6", 8, "or use quadrangles or hexahedra along 'SEAT'"),
+        ("quad8", 16, None),
+    ],
+)
+def test_the_remedy_for_oscillating_pressures_suits_the_cells_there(element, count, remedy):
+    """The head of a bolt, pulled by its shank, on a plate of quadrangles with facets of length 1."""
+    head = fc.generate.block((16.0, 6.0), (count, 3), element, (-8.0, 0.0), name="HEAD")
+    plate = fc.generate.block((40.0, 10.0), (40, 10), "quad8", (-20.0, -10.0), name="PLATE")
+    head = fc.generate.renamed(head, {group: f"H_{group}" for group in head.group_names})
+    mesh = fc.generate.union(head, fc.generate.renamed(plate, {group: f"P_{group}" for group in plate.group_names}))
+    for group, sign in (("SEAT", 1.0), ("SHANK", -1.0)):
+        mesh = mesh.with_facet_group(
+            group, lambda x, sign=sign: (x[:, 1] == 0.0) & (sign * (abs(x[:, 0]) - 4.0) > -1e-9), of="H_HEAD"
+        )
+    model = fc.Model(mesh, "plane_stress")
+    model.add_material(fc.LinearElastic(E=210e3, nu=0.3))
+    model.fix("P_BOTTOM", "xy")
+    model.fix("SHANK", "x")
+    model.add_traction("SHANK", y=-500.0)
+    model.add_contact("seat", secondary="SEAT", primary="P_TOP")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        told = [text for text in fc.solve(model, 1)[-1].warnings if "oscillate" in text]
+    assert len(told) == (remedy is not None)
+    assert remedy is None or remedy in told[0]

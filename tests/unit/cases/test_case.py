@@ -53,6 +53,42 @@ def test_theories_out_of_the_range_of_numbers_are_told(value, said, write):
         read_case(write(GOOD.replace("approach = 4.0", f"approach = {value}")))
 
 
+FIT = """
+title = "fit"
+kinematics = "plane_stress"
+[mesh]
+generator = "rings"
+[[material]]
+E = 210e3
+nu = 0.3
+[contact.fit]
+secondary = "CONT_OUTER"
+primary = "CONT_INNER"
+[theory.fit]
+kind = "press_fit_cylinders"
+E_inner = 210e3
+nu_inner = 0.3
+E_outer = 210e3
+nu_outer = 0.3
+interface_radius = 50.0
+outer_radius = 100.0
+interference = 0.05
+"""
+
+
+@pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress"])
+def test_a_plane_theory_has_the_kinematics_of_the_case_unless_others_are_given(kinematics, write):
+    def pressure(text):
+        return read_case(write(text)).theories["fit"]["theory"].pressure
+
+    of_case = pressure(FIT.replace("plane_stress", kinematics))
+    constants = {f"{key}_{body}": value for body in ("inner", "outer") for key, value in (("E", 210e3), ("nu", 0.3))}
+    radii = {"interface_radius": 50.0, "outer_radius": 100.0, "interference": 0.05}
+    exact = fc.analytic.press_fit_cylinders(**constants, **radii, kinematics=kinematics).pressure
+    assert of_case == pytest.approx(exact, rel=1e-12)
+    assert pressure(FIT + f'kinematics = "{kinematics}"\n') == pytest.approx(exact, rel=1e-12)
+
+
 def test_a_table_alone_sets_the_end_of_the_ramp(write):
     case = read_case(write(GOOD.replace("steps = 2", "steps = 4\ntable = [[0.0, 0.0], [2.0, 1.0]]")))
     assert case.ramp.instants == (0.5, 1.0, 1.5, 2.0)
