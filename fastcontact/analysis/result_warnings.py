@@ -8,7 +8,7 @@ matters. It vanishes for a beam in bending, whose stresses cancel over the thick
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -59,11 +59,13 @@ MANY = 10
 
 
 def result_warnings(
-    problem: Problem, state: State, last: StepResult, free: tuple[int, dict[str, list[str]]] | None = None
-) -> list[str]:
+    problem: Problem, state: State, last: StepResult, free: tuple[int, dict[str, list[str]]] | None = None,
+    peaks: Mapping[str, tuple[int, ContactResult]] | None = None,
+) -> list[str]:  # fmt: skip
     """Return the warnings about an analysis whose `last` step ended in a state.
 
-    `free` is the number of the first step in which nothing determines the position of bodies, and their free motions.
+    `free` is the number of the first step in which nothing determines the position of bodies, and their free motions;
+    `peaks` are, for each pair, the number and the contact result of the step with its largest normal force.
     """
     warnings = [*interpenetration(problem, state, last), *_carrying_springs(problem, state), *_undetermined(last, free)]
     if problem.model.strain == "small":
@@ -84,8 +86,12 @@ def result_warnings(
         configuration = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
         undetermined = _undetermined_tractions(pair, contact, pair.undetermined(configuration))
         warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
-        warnings += [sag[name]] if name in sag else _unresolved(name, pair, contact, state)
-        warnings += [*wavering(pair, contact), *_peak_at_edge(pair, last, contact), *_too_fast(name, pair, state)]
+        pressures = [*([sag[name]] if name in sag else _unresolved(pair, contact, state)), *wavering(pair, contact)]
+        index, largest_contact = (peaks or {}).get(name, (last.index, contact))
+        if not pressures and index != last.index:
+            texts = [*_unresolved(pair, largest_contact, state), *wavering(pair, largest_contact)]
+            pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
+        warnings += [*pressures, *_peak_at_edge(pair, last, contact), *_too_fast(name, pair, state)]
     return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state), *_slipping_before(state)]
 
 
@@ -359,15 +365,15 @@ def _depth_of_primary(problem: Problem, pair: Formulation, last: StepResult) -> 
     return max((float(depth.max(initial=0.0)) for depth in inside), default=0.0)
 
 
-def _unresolved(name: str, pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:
+def _unresolved(pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:
     """Yield a warning where too few elements lie across the radius of a contact that carries a force."""
     if pair.options.always_closed or largest(contact.force_vectors) <= SINGLE_PRECISION * state.largest_force:
         return
     count = across(pair.secondary, contact.active, pair.options.excluded_nodes(pair.secondary))
     if count is not None and count < ACROSS:
         yield (
-            f"contact '{name}' has only {count} {'elements' if count > 1 else 'element'} across its radius: its pressure "
-            f"needs {ACROSS} or more; refine '{pair.secondary.group}'"
+            f"contact '{contact.name}' has only {count} {'elements' if count > 1 else 'element'} across its radius: its "
+            f"pressure needs {ACROSS} or more; refine '{pair.secondary.group}'"
         )
 
 

@@ -21,7 +21,7 @@ from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
 from fastcontact.model.ramp import Ramp, RampLike, ramp_of
-from fastcontact.results.step import StepResult, Steps
+from fastcontact.results.step import ContactResult, StepResult, Steps
 
 
 @typed(ModelError)
@@ -189,6 +189,7 @@ def _solved_steps(
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
     begin, last_index = problem.ramp.table[0][0], 0
     free: tuple[int, dict[str, list[str]]] | None = None  # first step in which nothing determines positions
+    peaks: dict[str, tuple[int, ContactResult]] = {}  # step with the largest normal force of each pair
     if last is not None:
         begin, last_index, last = last.load_factor, last.index, None  # to free the memory of the step
     for index, instant in enumerate(instants, start=last_index + 1):
@@ -196,7 +197,10 @@ def _solved_steps(
         state, step = step_halving.advance(problem, state, index, begin, instant)
         free = free or (index, step.iterations.get("regularised", {}).get("undetermined", {}))
         free = free if free[1] else None
-        warnings = result_warnings(problem, state, step, free) if instant == instants[-1] else []
+        for name, contact in step.contact.items():
+            if name not in peaks or contact.normal_force > peaks[name][1].normal_force:
+                peaks[name] = index, contact
+        warnings = result_warnings(problem, state, step, free, peaks) if instant == instants[-1] else []
         for text in warnings:
             warn(text)
         warned = (*doubtful * (index == 1), *warnings)
