@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.criteria import NOTABLE, Criteria
 from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
 from fastcontact.analysis.locking import ALTERNATING, locking_warning, nonlinear_scatter_warnings, scatter_warnings
@@ -92,7 +92,13 @@ def result_warnings(
             texts = [*_unresolved(pair, largest_contact, state), *wavering(pair, largest_contact)]
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
         warnings += [*pressures, *_peak_at_edge(pair, last, contact), *_too_fast(name, pair, state)]
-    return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state), *_slipping_before(state)]
+    return [
+        *warnings,
+        *_unsettled(state),
+        *_loose(problem, last),
+        *_unbalanced(state),
+        *_slipping_before(problem.criteria, state),
+    ]
 
 
 def _deep_penetration(pair: Formulation, contact: ContactResult, displacement: Array) -> Iterator[str]:
@@ -153,7 +159,7 @@ def _unbalanced(state: State) -> Iterator[str]:
         )
 
 
-def _slipping_before(state: State) -> Iterator[str]:
+def _slipping_before(criteria: Criteria, state: State) -> Iterator[str]:
     """Yield a warning where nodes that close and slide in one step do much of the frictional work.
 
     This part must also exceed the energy of a notable error of the displacement, NOTABLE squared times the strain energy.
@@ -163,10 +169,11 @@ def _slipping_before(state: State) -> Iterator[str]:
     work = state.work
     if work is not None and work.touching > max(NEGLECTED * work.friction, NOTABLE**2 * work.strain_energy, 0.0):
         share = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
+        remedy = ", or Criteria(friction_while_touching=0.01)" if criteria.friction_while_touching is None else ""
         yield (
             f"{share:.0%} of the work of friction is done at nodes in the load step in which they "
-            "close, where slip counts from the beginning of the step instead of first contact: the work is too large and "
-            "the shear inaccurate. Use more load steps, or Criteria(friction_while_touching=0.01)"
+            "close, where slip counts from the beginning of the step instead of first contact: the work and the shear are "
+            f"inaccurate. Use more load steps{remedy}"
         )
 
 

@@ -198,10 +198,12 @@ def contact_work(
     work = np.where(normal != 0.0, (1.0 + ratio) * work_at_end, np.maximum(work_at_begin, 0.0))
     closing = pressure == 0.0
     if work_at_end[closing].any():
-        # The secondary nodes nearest to these constraints were open at the beginning of the step.
+        # The nearest of the secondary nodes that faced the other side at the beginning of the step were open.
         gap = pair.nodal_gap(replace(configuration, displacement=configuration.start, pose=configuration.pose_start))[0]
-        open_before = gap > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
-        closing &= open_before[nearest(pair.points[pair.secondary.points], constraints.positions)[1]]
+        faced = np.isfinite(gap)
+        if faced.any():
+            open_before = gap[faced] > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
+            closing &= open_before[nearest(pair.points[pair.secondary.points[faced]], constraints.positions)[1]]
     touching = float(work_at_end[closing].sum())
     if solution.work is not None:
         work, touching = solution.work[rows], 0.0
