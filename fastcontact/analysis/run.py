@@ -11,12 +11,12 @@ from fastcontact._jit import ahead
 from fastcontact._tools.argument_types import typed
 from fastcontact.analysis import restart, step_halving
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.problem import Problem, prepare
+from fastcontact.analysis.problem import Problem, prepare, quadratic_and_linear
 from fastcontact.analysis.progress import Progress
 from fastcontact.analysis.result_warnings import result_warnings
 from fastcontact.analysis.stages import next_stage, stage_of
 from fastcontact.errors import ModelError, warn
-from fastcontact.linear.choice import DIRECT_UP_TO, check_tolerance
+from fastcontact.linear.choice import check_tolerance, chosen
 from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
@@ -159,7 +159,8 @@ def solve_steps(
 def _kernel_sets(model: Model, linear_solver: str) -> list[str]:
     """Return the keys of the table in `_jit.ahead` that lists the kernels to compile in advance for a model."""
     dim = model.mesh.dim
-    multigrid = linear_solver == "amg" or (linear_solver == "auto" and model.mesh.n_points * dim > DIRECT_UP_TO[dim])
+    default = chosen(dim, model.mesh.n_points * dim, quadratic=quadratic_and_linear(model))[0]
+    multigrid = "amg" in (linear_solver, default if linear_solver == "auto" else "")
     return [f"{dim}d", *([f"{dim}d amg"] if multigrid else [])]
 
 
