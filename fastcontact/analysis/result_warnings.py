@@ -74,7 +74,8 @@ def result_warnings(
         warnings += locking_warning(problem, state.u) or scatter_warnings(problem, last)
     else:
         warnings += nonlinear_scatter_warnings(problem, state, last)
-    warnings += [problem.solver.gave_up] if problem.solver.gave_up else []
+    if problem.solver.gave_up:
+        warnings.append(f'{problem.solver.gave_up}. With linear_solver="direct" the factorisation comes first')
     load = problem.load_at(last.load_factor)
     loaded, sag = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)
     clearances = _clearances(problem, state)
