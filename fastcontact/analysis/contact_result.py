@@ -14,7 +14,7 @@ from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
-from fastcontact.contact.contact_middle import contact_middle
+from fastcontact.contact.contact_middle import ContactMiddle, contact_middle
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import NO_AREA, lumped_areas
 from fastcontact.contact.obstacles.rigid_side import RigidSide
@@ -122,7 +122,7 @@ def contact_result(
         normal=normal,
         active=closed,
         force=total,
-        radius=half_width(place, active, across),
+        radius=_radius(pair, middle, (place, across), active, closed),
         shear=shear,
         sticking=closed & sticking,
         middle=middle.position,
@@ -133,6 +133,23 @@ def contact_result(
         fluid_pressure=fluid,
         **obstacle_results,
     )
+
+
+def _radius(
+    pair: Formulation, middle: ContactMiddle, distances: tuple[Array, Array], active: Mask, closed: Mask
+) -> tuple[float, float]:
+    """Return `ContactResult.radius` from `distances` of the constraints from the middle, and the closed nodes (n_nodes,).
+
+    In 3D the radius may depend on the direction, and closed nodes carry facets that are only partly in contact.
+    """
+    low, high = half_width(distances[0], active, distances[1])
+    side = pair.secondary
+    place = middle.places(pair.points[side.points])
+    if pair.points.shape[1] == 3 and closed[place.argmin()]:  # not a ring around an open middle
+        free = ~closed & ~pair.options.excluded_nodes(side)
+        low = min(low, float(place[closed & (side.beside @ free > 0)].min(initial=np.inf)))
+        high = max(high, float(place[free & (side.beside @ closed > 0)].max(initial=0.0)))
+    return low, high
 
 
 def _forces(

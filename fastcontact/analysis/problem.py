@@ -36,6 +36,7 @@ from fastcontact.errors import ContactError
 from fastcontact.linear import choice
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 from fastcontact.linear.sparse_rows import stacked_rows, sum_of_blocks
+from fastcontact.mesh import elements
 from fastcontact.model.contact_pair import angle_at
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.model import Model
@@ -275,6 +276,11 @@ class Problem:
         return State(zero, round_off, solver=self.solver_at_rest, work=Work(), instant=instant)
 
 
+def quadratic_and_linear(model: Model) -> bool:
+    """Return whether a model of linear bodies has quadratic cells; see `linear.choice.make`."""
+    return not model.nonlinear and any(elements.get(name).order == 2 for name in model.mesh.solids)
+
+
 @parallel.on_one_blas_thread
 def prepare(
     model: Model, ramp: Ramp, criteria: Criteria, *, linear_solver: str = "auto", linear_tolerance: float = TOLERANCE,
@@ -303,7 +309,7 @@ def prepare(
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,
         tolerance=choice.tight_enough(linear_tolerance, criteria.relative),
-        columns=not all(pair.eliminable for pair in pairs.values()),
+        columns=not all(pair.eliminable for pair in pairs.values()), quadratic=quadratic_and_linear(model),
     )  # fmt: skip
     field = model.material_field()
     solver.contrast = field.contrast

@@ -8,13 +8,13 @@ matters. It vanishes for a beam in bending, whose stresses cancel over the thick
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.criteria import NOTABLE, Criteria
 from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
 from fastcontact.analysis.locking import ALTERNATING, locking_warning, nonlinear_scatter_warnings, scatter_warnings
@@ -23,6 +23,7 @@ from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import too_fast
 from fastcontact.arrays import Array, Mask, largest
 from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.integration import lumped_areas
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.energy import gradients_at
@@ -41,7 +42,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
 # Limit of several ratios above which a warning is given: frictional work of nodes while they close to all frictional work,
 # work of the stresses on neglected strains to that on strains, wear depth to the size of the model, equivalent strain, and
-# excess of the largest pressure at the edge of a contact over the largest one inside where bodies yield.
+# excess of the largest nodal pressure near the edge over means of neighbouring facets where bodies yield.
 # The fraction of a strain that linear kinematics neglect is about as large as the strain.
 NEGLECTED = 0.1
 # Rotation [radian] beyond which linear kinematics give a warning: they neglect a strain of half its square.
@@ -62,11 +63,13 @@ MANY = 10
 
 
 def result_warnings(
-    problem: Problem, state: State, last: StepResult, free: tuple[int, dict[str, list[str]]] | None = None
-) -> list[str]:
+    problem: Problem, state: State, last: StepResult, free: tuple[int, dict[str, list[str]]] | None = None,
+    peaks: Mapping[str, tuple[int, ContactResult]] | None = None,
+) -> list[str]:  # fmt: skip
     """Return the warnings about an analysis whose `last` step ended in a state.
 
-    `free` is the number of the first step in which nothing determines the position of bodies, and their free motions.
+    `free` is the number of the first step in which nothing determines the position of bodies, and their free motions;
+    `peaks` are, for each pair, the number and the contact result of the step with its largest normal force.
     """
     warnings = [*interpenetration(problem, state, last), *_carrying_springs(problem, state), *_undetermined(last, free)]
     if problem.model.strain == "small":
@@ -75,7 +78,8 @@ def result_warnings(
         warnings += locking_warning(problem, state.u) or scatter_warnings(problem, last)
     else:
         warnings += nonlinear_scatter_warnings(problem, state, last)
-    warnings += [problem.solver.gave_up] if problem.solver.gave_up else []
+    if problem.solver.gave_up:
+        warnings.append(f'{problem.solver.gave_up}. With linear_solver="direct" the factorisation comes first')
     load = problem.load_at(last.load_factor)
     loaded, sag = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)
     clearances = _clearances(problem, state)
@@ -87,14 +91,24 @@ def result_warnings(
         configuration = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
         undetermined = _undetermined_tractions(pair, contact, pair.undetermined(configuration))
         warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
-        warnings += [sag[name]] if name in sag else _unresolved(name, pair, contact, state)
-        warnings += [
-            *oscillating(pair, contact, problem.model.mesh),
-            *_peak_at_edge(pair, last, contact),
-            *_too_fast(name, pair, state),
+        mesh = problem.model.mesh
+        pressures = [
+            *([sag[name]] if name in sag else _unresolved(pair, contact, state)),
+            *oscillating(pair, contact, mesh),
         ]
-    warnings += [*_unsettled(state), *_loose(problem, last), *_unbalanced(state), *_slipping_before(state)]
-    return [*warnings, *_turning_flow(state)]
+        index, largest_contact = (peaks or {}).get(name, (last.index, contact))
+        if not pressures and index != last.index:
+            texts = [*_unresolved(pair, largest_contact, state), *oscillating(pair, largest_contact, mesh)]
+            pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
+        warnings += [*pressures, *_peak_at_edge(pair, last, contact), *_too_fast(name, pair, state)]
+    return [
+        *warnings,
+        *_unsettled(state),
+        *_loose(problem, last),
+        *_unbalanced(state),
+        *_slipping_before(problem.criteria, state),
+        *_turning_flow(state),
+    ]
 
 
 def _deep_penetration(pair: Formulation, contact: ContactResult, displacement: Array) -> Iterator[str]:
@@ -156,7 +170,7 @@ def _unbalanced(state: State) -> Iterator[str]:
         )
 
 
-def _slipping_before(state: State) -> Iterator[str]:
+def _slipping_before(criteria: Criteria, state: State) -> Iterator[str]:
     """Yield a warning where nodes that close and slide in one step do much of the frictional work.
 
     This part must also exceed the energy of a notable error of the displacement, NOTABLE squared times the strain energy.
@@ -166,10 +180,11 @@ def _slipping_before(state: State) -> Iterator[str]:
     work = state.work
     if work is not None and work.touching > max(NEGLECTED * work.friction, NOTABLE**2 * work.strain_energy, 0.0):
         share = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
+        remedy = ", or Criteria(friction_while_touching=0.01)" if criteria.friction_while_touching is None else ""
         yield (
             f"{share:.0%} of the work of friction is done at nodes in the load step in which they "
-            "close, where slip counts from the beginning of the step instead of first contact: the work is too large and "
-            "the shear inaccurate. Use more load steps, or Criteria(friction_while_touching=0.01)"
+            "close, where slip counts from the beginning of the step instead of first contact: the work and the shear are "
+            f"inaccurate. Use more load steps{remedy}"
         )
 
 
@@ -383,15 +398,15 @@ def _depth_of_primary(problem: Problem, pair: Formulation, last: StepResult) -> 
     return max((float(depth.max(initial=0.0)) for depth in inside), default=0.0)
 
 
-def _unresolved(name: str, pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:
+def _unresolved(pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:
     """Yield a warning where too few elements lie across the radius of a contact that carries a force."""
     if pair.options.always_closed or largest(contact.force_vectors) <= SINGLE_PRECISION * state.largest_force:
         return
     count = across(pair.secondary, contact.active, pair.options.excluded_nodes(pair.secondary))
     if count is not None and count < ACROSS:
         yield (
-            f"contact '{name}' has only {count} {'elements' if count > 1 else 'element'} across its radius: its pressure "
-            f"needs {ACROSS} or more; refine '{pair.secondary.group}'"
+            f"contact '{contact.name}' has only {count} {'elements' if count > 1 else 'element'} across its radius: its "
+            f"pressure needs {ACROSS} or more; refine '{pair.secondary.group}'"
         )
 
 
@@ -459,24 +474,28 @@ def oscillating(pair: Formulation, contact: ContactResult, mesh: Mesh) -> Iterat
 
 
 def _peak_at_edge(pair: Formulation, last: StepResult, contact: ContactResult) -> Iterator[str]:
-    """Yield a warning where bodies yield and the largest nodal pressure is due to a facet that is only partly in contact.
+    """Yield a warning where bodies yield and the largest nodal pressure overshoots near the edge of the contact.
 
     In elastic bodies without corners, the pressure decreases towards the edge of the contact. Past yield it does not, but
-    drops within a facet, where the nodal pressures overshoot. Below a ball, with 8, 16 and 32 nodes across the radius, the
-    largest one was 1201, 1020 and 998 with the continuous formulation, and 845, 920 and 940 with mortar.
+    drops within a facet, where the nodal pressures overshoot, and undershoot and overshoot again on the next two facets.
+    Below a ball, with 8, 16 and 32 nodes across the radius, the largest one was 1201, 1020 and 998 with the continuous
+    formulation, and 845, 920 and 940 with mortar. Means over neighbouring facets do not overshoot.
     """
-    plastic = last.cell_fields.get("plastic_strain")
+    plastic, side = last.cell_fields.get("plastic_strain"), pair.secondary
     if plastic is None or plastic.max(initial=0.0) < NOTABLE or pair.options.always_closed:
         return
-    near_open = pair.secondary.near @ (~contact.active & ~pair.options.excluded_nodes(pair.secondary)) > 0
-    inside = float(contact.pressure[contact.active & ~near_open].max(initial=0.0))
-    if contact.pressure_max > (1.0 + NEGLECTED) * inside > 0.0:
+    near_open = side.near @ (~contact.active & ~pair.options.excluded_nodes(side)) > 0
+    weight = np.where(contact.active, lumped_areas(side, pair.points, pair.axisymmetric), 0.0)
+    inside = contact.active & ~near_open
+    means = (side.near[inside] @ (weight * contact.pressure)) / (side.near[inside] @ weight)
+    mean, peak = float(means.max(initial=0.0)), contact.pressure.argmax()
+    if (side.near @ near_open)[peak] and contact.pressure_max > (1.0 + NEGLECTED) * mean > 0.0:
         remedy = ", or formulation mortar" if pair.name != "mortar" and not isinstance(pair.primary, Surface) else ""
         yield (
-            f"contact '{contact.name}': the largest nodal pressure, {contact.pressure_max:.4g}, is within two facets of open "
-            f"nodes, and pressures inside are at most {inside:.4g}. Where bodies yield, nodal pressures overshoot on facets "
-            "that are only partly in contact. Unless the contact ends at a corner, the true maximum is between both: use "
-            f"smaller facets{remedy}"
+            f"contact '{contact.name}': the largest nodal pressure, {contact.pressure_max:.4g}, is within four facets of "
+            f"open nodes, and means over neighbouring facets are at most {mean:.4g}. Where bodies yield, nodal pressures "
+            "overshoot near the edge of the contact. Unless the contact ends at a corner, the true maximum is between both: "
+            f"use smaller facets{remedy}"
         )
 
 

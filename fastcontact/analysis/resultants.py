@@ -85,7 +85,8 @@ class ContactResultants:
     area : float
         Contact area: sum of the tributary areas of the closed nodes, in finite strain on the deformed facets; in the
         plane a length times unit thickness, in axisymmetry over the full circle [length^2]. Accurate to a row of
-        facets at the edge. Mortar contact between bodies leaves out the parts of facets without an opposite side.
+        facets at the edge, mostly too large: by 6 to 18 % in 3D with 9 to 4 facets across the radius. Mortar contact between
+        bodies leaves out the parts of facets without an opposite side.
     centre : ndarray (dim,)
         Centre of pressure of the normal forces; NaN without contact [length]. In axisymmetry it lies on the axis, and its
         radial component is NaN.

@@ -11,17 +11,17 @@ from fastcontact._jit import ahead
 from fastcontact._tools.argument_types import typed
 from fastcontact.analysis import restart, step_halving
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.problem import Problem, prepare
+from fastcontact.analysis.problem import Problem, prepare, quadratic_and_linear
 from fastcontact.analysis.progress import Progress
 from fastcontact.analysis.result_warnings import result_warnings
 from fastcontact.analysis.stages import next_stage, stage_of
 from fastcontact.errors import ModelError, warn
-from fastcontact.linear.choice import DIRECT_UP_TO, check_tolerance
+from fastcontact.linear.choice import check_tolerance, chosen
 from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
 from fastcontact.model.ramp import Ramp, RampLike, ramp_of
-from fastcontact.results.step import StepResult, Steps
+from fastcontact.results.step import ContactResult, StepResult, Steps
 
 
 @typed(ModelError)
@@ -159,7 +159,8 @@ def solve_steps(
 def _kernel_sets(model: Model, linear_solver: str) -> list[str]:
     """Return the keys of the table in `_jit.ahead` that lists the kernels to compile in advance for a model."""
     dim = model.mesh.dim
-    multigrid = linear_solver == "amg" or (linear_solver == "auto" and model.mesh.n_points * dim > DIRECT_UP_TO[dim])
+    default = chosen(dim, model.mesh.n_points * dim, quadratic=quadratic_and_linear(model))[0]
+    multigrid = "amg" in (linear_solver, default if linear_solver == "auto" else "")
     return [f"{dim}d", *([f"{dim}d amg"] if multigrid else [])]
 
 
@@ -189,6 +190,7 @@ def _solved_steps(
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
     begin, last_index = problem.ramp.table[0][0], 0
     free: tuple[int, dict[str, list[str]]] | None = None  # first step in which nothing determines positions
+    peaks: dict[str, tuple[int, ContactResult]] = {}  # step with the largest normal force of each pair
     if last is not None:
         begin, last_index, last = last.load_factor, last.index, None  # to free the memory of the step
     for index, instant in enumerate(instants, start=last_index + 1):
@@ -196,7 +198,10 @@ def _solved_steps(
         state, step = step_halving.advance(problem, state, index, begin, instant)
         free = free or (index, step.iterations.get("regularised", {}).get("undetermined", {}))
         free = free if free[1] else None
-        warnings = result_warnings(problem, state, step, free) if instant == instants[-1] else []
+        for name, contact in step.contact.items():
+            if name not in peaks or contact.normal_force > peaks[name][1].normal_force:
+                peaks[name] = index, contact
+        warnings = result_warnings(problem, state, step, free, peaks) if instant == instants[-1] else []
         for text in warnings:
             warn(text)
         warned = (*doubtful * (index == 1), *warnings)

@@ -197,10 +197,12 @@ def contact_work(
     if solution.work is not None:  # the work of all increments, in which constraints carry no force before they close
         work, closing = solution.work[rows], np.zeros_like(closing)
     elif work_at_end[closing].any():
-        # The secondary nodes nearest to these constraints were open at the beginning of the step.
+        # The nearest of the secondary nodes that faced the other side at the beginning of the step were open.
         gap = pair.nodal_gap(replace(configuration, displacement=configuration.start, pose=configuration.pose_start))[0]
-        open_before = gap > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
-        closing &= open_before[nearest(pair.points[pair.secondary.points], constraints.positions)[1]]
+        faced = np.isfinite(gap)
+        if faced.any():
+            open_before = gap[faced] > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
+            closing &= open_before[nearest(pair.points[pair.secondary.points[faced]], constraints.positions)[1]]
     touching, friction, mu = float(work_at_end[closing].sum()), float(work.sum()), constraints.friction
     over_slip = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(slips, axis=1)
     np.divide(work, mu, out=over_slip, where=mu > 0.0)

@@ -26,10 +26,13 @@ LOOSEST = 1e-3
 # bench/README.md). If constraints need columns of K^-1, the limit is AFFORDABLE, because multigrid needs one solution for
 # each column.
 DIRECT_UP_TO = {2: AFFORDABLE[2], 3: 15_000}
+# The same in 3D for quadratic cells, with which multigrid takes some ten times as many iterations.
+QUADRATIC_UP_TO = 50_000
 
 
 def make(
-    name: str, *, dim: int, n_dofs: int, tolerance: float = TOLERANCE, precision: str | None = None, columns: bool = False
+    name: str, *, dim: int, n_dofs: int, tolerance: float = TOLERANCE, precision: str | None = None, columns: bool = False,
+    quadratic: bool = False,
 ) -> LinearSolver:  # fmt: skip
     """Return a linear solver by name.
 
@@ -50,6 +53,8 @@ def make(
     columns : bool
         Whether there are constraints that cannot be eliminated and need columns of ``K^-1``, such as those with a full
         compliance matrix; for the choice by ``"auto"``.
+    quadratic : bool
+        Whether there are quadratic cells; for the choice by ``"auto"``.
 
     Raises
     ------
@@ -58,7 +63,7 @@ def make(
     """
     check_tolerance(tolerance)
     if name == "auto":
-        name, reason = chosen(dim, n_dofs, columns)
+        name, reason = chosen(dim, n_dofs, columns, quadratic)
         log.info("linear solver: %s, %s", name, reason)
     if name in OPTIONAL and name not in SOLVERS:
         package, extra = OPTIONAL[name]
@@ -85,9 +90,10 @@ def tight_enough(tolerance: float, relative: float) -> float:
     return tolerance
 
 
-def chosen(dim: int, n_dofs: int, columns: bool = False) -> tuple[str, str]:
+def chosen(dim: int, n_dofs: int, columns: bool = False, quadratic: bool = False) -> tuple[str, str]:
     """Return the name of the solver that ``"auto"`` selects, and the reason; for parameters see `make`."""
     limit = (AFFORDABLE if columns else DIRECT_UP_TO)[dim]
+    limit = max(limit, QUADRATIC_UP_TO) if quadratic and dim == 3 else limit
     if n_dofs <= limit:
         return "direct", f"for {n_dofs} unknowns in {dim}D a factorisation is cheapest (up to {limit})"
     return "amg", f"for {n_dofs} unknowns in {dim}D a factorisation costs more than multigrid (above {limit})"

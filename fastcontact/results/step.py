@@ -173,7 +173,9 @@ class ContactResult(Suggesting):
     radius : (float, float)
         Lower and upper bound of the contact radius, in 2D of the half-width along the `tangent`: the distances from the
         `middle` to the outermost closed node and to the first open node beyond it, in finite strain in the deformed
-        configuration [length]; NaN without contact.
+        configuration [length]; NaN without contact. In 3D they are the smallest
+        distance of a closed node and the largest of an open one that have a facet in common, so that all semi-axes of an
+        elliptic contact are between the bounds. On a ring around an open middle, both belong to its outer edge.
     shear : ndarray (m, dim)
         Tangential traction on the secondary side, zero in frictionless contact [pressure].
     sticking : ndarray of bool (m,)
@@ -334,7 +336,7 @@ class ContactResult(Suggesting):
 
     @property
     def stick_radius(self) -> tuple[float, float]:
-        """Lower and upper bound of the radius of the stick zone, defined like `radius` [length]; NaN if no node sticks."""
+        """Distances from the middle to the outermost sticking node and to the next node [length]; NaN if no node sticks."""
         return half_width(self.place, self.active & self.sticking, self.across)
 
     @property

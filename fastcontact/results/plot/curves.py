@@ -444,6 +444,8 @@ def contact_zones(
 ) -> Axes:
     """Plot at every load step which secondary nodes are open, closed or, with friction, sticking or sliding.
 
+    Positions in all steps are relative to the middle of the contact in the first step in which a node is closed.
+
     Parameters
     ----------
     steps : sequence of StepResult
@@ -478,7 +480,8 @@ def contact_zones(
     contacts, axes = contacts_of(steps, pair), new_axes(ax, (6.4, 4.8))
     units = units_of(units, steps[-1])
     x = np.concatenate([np.full(len(c.points), step.load_factor) for step, c in zip(steps, contacts, strict=True)])
-    y = np.concatenate([c.place for c in contacts])
+    first = next((c for c in contacts if c.active.any()), contacts[-1])
+    y = np.tile(first.place, len(contacts))
     closed = np.concatenate([c.active for c in contacts])
     sliding = closed & ~np.concatenate([c.sticking for c in contacts])
     closed_state = "sticking" if sliding.any() or any(c.shear.any() for c in contacts) else "closed"
@@ -492,7 +495,7 @@ def contact_zones(
     reach, farthest = 1.5 * np.abs(y[closed]).max(initial=0.0), np.abs(y).max(initial=0.0)
     top = reach if 0.0 < reach < farthest else None
     axes.set_ylim((-top if top else None) if y.min(initial=0.0) < 0 else 0.0, top)
-    start = "axis" if contacts[-1].measured_from_axis else "middle of the contact"
+    start = "axis" if first.measured_from_axis else "middle of the first contact"
     distance = labelled(f"distance from the {start}", units, "length")
     axes.set(xlabel="load factor (above: closed nodes)", ylabel=distance)
     axes.set_title(title or f"Contact '{pair}' against the load", pad=16, fontsize="medium")

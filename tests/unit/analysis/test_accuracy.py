@@ -1,6 +1,7 @@
 """Forces balance to the criterion with every linear solver, and results of a load step agree with its solution."""
 
 import logging
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -218,6 +219,27 @@ def test_bodies_that_come_apart_have_no_forces_that_multigrid_balances_in_vain(o
     assert np.abs(moved - rigid).max() < 1e-11 * DEPTH
     assert not steps[1].contact["c"].active.any()
     assert all(out_of_balance(model, steps[k]) < 1e-6 for k in (0, 2))
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("at_end", [-0.1, 0.1])
+def test_a_coarse_contact_that_has_opened_is_told_for_the_step_with_its_largest_force(dim, formulation, at_end):
+    """With 0.1 the obstacle has not left; the warning is then about the last step."""
+    mesh = fc.generate.block((4.0, 2.0), (8, 4)) if dim == 2 else fc.generate.box((4.0, 4.0, 2.0), (8, 8, 4))
+    bottom, top, axis = ("BOTTOM", "TOP", "y") if dim == 2 else ("ZMIN", "ZMAX", "z")
+    model = elastic_model(mesh, "plane_strain" if dim == 2 else "3d", **{bottom: "xy" if dim == 2 else "xyz"})
+    centre = (2.0, 7.0) if dim == 2 else (2.0, 2.0, 7.0)
+    ball = fc.obstacles.Sphere(centre, 5.0)
+    options = {"motion": {axis: -0.1}, "ramp": [(0.0, 0.0), (2.0, 1.0), (4.0, at_end)], "formulation": formulation}
+    model.add_obstacle("ball", secondary=top, obstacle=ball, **options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fc.FastcontactWarning)
+        texts = fc.solve(model, [1.0, 2.0, 3.0, 4.0])[-1].warnings
+    (text,) = [text for text in texts if "across its radius" in text]
+    assert text.startswith(
+        "in load step 2, where its force is largest, contact 'ball' has" if at_end < 0.0 else "contact"
+    )
 
 
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")

@@ -79,6 +79,8 @@ def test_auto_chooses_by_dimension_and_size():
     assert linear.make("auto", dim=2, n_dofs=1000).name == "direct"
     assert linear.make("auto", dim=3, n_dofs=1_000_000).name == "amg"
     assert linear.make("auto", dim=3, n_dofs=40_000).name == "amg"
+    assert linear.make("auto", dim=3, n_dofs=40_000, quadratic=True).name == "direct"
+    assert linear.make("auto", dim=3, n_dofs=60_000, quadratic=True).name == "amg"
     assert linear.make("auto", dim=2, n_dofs=2_000_000).name == "direct"
     assert linear.make("auto", dim=2, n_dofs=4_000_000).name == "amg"
     assert linear.make("auto", dim=3, n_dofs=140_000, columns=True).name == "direct"
@@ -102,6 +104,16 @@ def test_auto_looks_at_what_the_contact_asks_of_a_solver(options, solver, monkey
     model.prescribe("UPPER_TOP", x=0.0, y=-1e-3)
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
     assert Stepping(model, "auto", 1e-10, Criteria()).solver.name == solver
+
+
+@pytest.mark.parametrize(
+    ("element", "name"), [("hex8", "amg"), ("hex20", "direct"), ("tet4", "amg"), ("tet10", "direct")]
+)
+def test_auto_looks_at_the_order_of_cells(element, name):
+    divisions = {"hex8": 17, "tet4": 17, "hex20": 11, "tet10": 9}[element]
+    model = elastic_model(fc.generate.box((1.0, 1.0, 1.0), (divisions,) * 3, element), "3d", E=1.0, ZMIN="xyz")
+    assert Stepping(model, "auto", 1e-10, Criteria()).solver.name == name
+    assert 15_000 < 3 * model.mesh.n_points < 25_000
 
 
 def test_auto_says_why(caplog):

@@ -183,3 +183,17 @@ def test_pictures_of_contacts_and_modes_show_the_units_of_the_model():
     ax = fc.plot.deformed_shape(model.mesh, mode, field="displacement")
     assert [ax.get_xlabel(), ax.figure.axes[1].get_ylabel()] == ["x [mm]", "displacement"]  # a mode has no scale
     assert "mm" not in repr(mode)
+
+
+def test_nodes_of_contact_zones_stay_in_place_when_the_contact_moves():
+    model = fc.Model(fc.generate.block((4.0, 2.0), (32, 8), origin=(-2.0, -2.0)), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("BOTTOM", "y")
+    model.prescribe("BOTTOM", x=-0.3, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
+    down = {"motion": {"y": -0.04}, "ramp": [(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)]}
+    model.add_obstacle("ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, 5.0), 5.0), **down)
+    steps = fc.solve(model, [1.0, 2.0])
+    assert abs(steps[1].contact["ball"].middle[0]) > 0.1
+    ax = fc.plot.contact_zones(steps, "ball")
+    x, y = np.concatenate([line.get_xydata() for line in ax.lines]).T
+    assert np.sort(y[x == 1.0]) == pytest.approx(np.sort(y[x == 2.0]), abs=1e-12)
