@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import functools
 import gc
 import os
@@ -59,11 +60,12 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def prepare_workers(whole: bool) -> None:
-    """Give each worker one processor; where all tests run on an empty cache, compile kernels that both need."""
+    """Give each worker one processor; where all tests run on an empty cache, compile kernels that all workers need."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     folder = cache.folder_of()
     if whole and folder and decorators.compiled() and not any(folder.glob("*.nbc")):
         nonlinear = subprocess.Popen([sys.executable, "-c", NONLINEAR], cwd=ROOT)
+        atexit.register(nonlinear.kill)
         for process in (*ahead.start((), decorators.threads()), nonlinear):
             process.wait()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -16,7 +16,7 @@ from fastcontact.analysis.progress import Progress
 from fastcontact.analysis.result_warnings import result_warnings
 from fastcontact.analysis.stages import next_stage, stage_of
 from fastcontact.errors import ModelError, warn
-from fastcontact.linear.choice import check_tolerance, chosen
+from fastcontact.linear.choice import check_solver, check_tolerance, chosen
 from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
@@ -123,7 +123,7 @@ def solve_steps(
 ) -> Iterator[StepResult]:
     """Solve a model step by step: compute each step when it is requested, and keep none in memory.
 
-    `solve` keeps all steps, which take 80 bytes per point and step in 2D and 120 bytes in 3D. With `solve_steps`, only the
+    `solve` keeps all steps, which take 80 bytes per point and step in 2D and 112 bytes in 3D. With `solve_steps`, only the
     steps that the caller keeps stay in memory, and the caller may stop the analysis after any step. Parameters, errors and
     warnings are those of `solve`. An invalid model raises its error in the call itself, before the first step is requested.
 
@@ -138,6 +138,7 @@ def solve_steps(
     ...     out.write(step)
     """
     ramp, criteria = ramp_of(ramp), criteria or Criteria()
+    check_solver(linear_solver)
     check_tolerance(linear_tolerance)
     case = restart.identity(model, ramp, criteria)
     last = resume[-1] if len(resume) else None
@@ -152,8 +153,8 @@ def solve_steps(
         prepare, ramp=ramp, criteria=criteria, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
         linear_precision=linear_precision,
     )  # fmt: skip
-    touched = _touched(resume)
-    return _solved_steps(model, ramp, prepare_model, instants, case, last, touched)
+    earlier = _touched(resume), _peaks(resume)
+    return _solved_steps(model, ramp, prepare_model, instants, case, last, earlier)
 
 
 def _kernel_sets(model: Model, linear_solver: str) -> list[str]:
@@ -175,11 +176,23 @@ def _touched(steps: Sequence[StepResult]) -> frozenset[str]:
     return frozenset(touched)
 
 
+def _peaks(
+    steps: Iterable[StepResult], earlier: Mapping[str, tuple[int, ContactResult]] | None = None
+) -> dict[str, tuple[int, ContactResult]]:
+    """Return, for each contact pair, the number and the result of the step with its largest normal force."""
+    peaks = dict(earlier or {})
+    for step in steps:
+        for name, contact in step.contact.items():
+            if name not in peaks or contact.normal_force > peaks[name][1].normal_force:
+                peaks[name] = step.index, contact
+    return peaks
+
+
 def _solved_steps(
     model: Model, ramp: Ramp, prepare_model: Callable[[Model], Problem], instants: list[float], case: dict[str, Any],
-    last: StepResult | None, touched: frozenset[str],
+    last: StepResult | None, earlier: tuple[frozenset[str], dict[str, tuple[int, ContactResult]]],
 ) -> Iterator[StepResult]:  # fmt: skip
-    """Yield the steps at `instants`, which follow the step `last`; `touched` are the pairs that were closed before."""
+    """Yield the steps at `instants`, which follow the step `last`; `earlier` are `_touched` and `_peaks` of earlier steps."""
     doubtful = model_warnings(model, ramp)
     for text in doubtful if last is None else ():
         warn(text)
@@ -187,10 +200,10 @@ def _solved_steps(
     for text in problem.doubtful if last is None else ():  # before the first step: the warning may explain its failure
         warn(text)
     doubtful += problem.doubtful
+    touched, peaks = earlier
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
     begin, last_index = problem.ramp.table[0][0], 0
     free: tuple[int, dict[str, list[str]]] | None = None  # first step in which nothing determines positions
-    peaks: dict[str, tuple[int, ContactResult]] = {}  # step with the largest normal force of each pair
     if last is not None:
         begin, last_index, last = last.load_factor, last.index, None  # to free the memory of the step
     for index, instant in enumerate(instants, start=last_index + 1):
@@ -198,9 +211,7 @@ def _solved_steps(
         state, step = step_halving.advance(problem, state, index, begin, instant)
         free = free or (index, step.iterations.get("regularised", {}).get("undetermined", {}))
         free = free if free[1] else None
-        for name, contact in step.contact.items():
-            if name not in peaks or contact.normal_force > peaks[name][1].normal_force:
-                peaks[name] = index, contact
+        peaks = _peaks([step], peaks)
         warnings = result_warnings(problem, state, step, free, peaks) if instant == instants[-1] else []
         for text in warnings:
             warn(text)

@@ -54,25 +54,30 @@ def make(
         Whether there are constraints that cannot be eliminated and need columns of ``K^-1``, such as those with a full
         compliance matrix; for the choice by ``"auto"``.
     quadratic : bool
-        Whether there are quadratic cells; for the choice by ``"auto"``.
+        Whether there are quadratic cells in linear bodies; for the choice by ``"auto"``.
 
     Raises
     ------
     ModelError
         If the name is unknown, if a package that the solver needs is missing, or if the tolerance is out of range.
     """
+    check_solver(name)
     check_tolerance(tolerance)
     if name == "auto":
         name, reason = chosen(dim, n_dofs, columns, quadratic)
         log.info("linear solver: %s, %s", name, reason)
-    if name in OPTIONAL and name not in SOLVERS:
-        package, extra = OPTIONAL[name]
-        raise ModelError(f"linear solver '{name}' needs the package {package}: pip install 'fastcontact[{extra}]'")
-    if name not in SOLVERS:
-        raise ModelError(unknown("linear solver", name, [*SOLVERS, "auto"]))
     options = {} if precision is None or name != "amg" else {"precision": precision}
     solver: LinearSolver = importlib.import_module(f"{solvers.__name__}.{name}").SOLVER(tolerance, **options)
     return solver
+
+
+def check_solver(name: str) -> None:
+    """Raise a ModelError if the name of a linear solver is unknown, or if a package that it needs is missing."""
+    if name in OPTIONAL and name not in SOLVERS:
+        package, extra = OPTIONAL[name]
+        raise ModelError(f"linear solver '{name}' needs the package {package}: pip install 'fastcontact[{extra}]'")
+    if name not in (*SOLVERS, "auto"):
+        raise ModelError(unknown("linear solver", name, [*SOLVERS, "auto"]))
 
 
 def check_tolerance(tolerance: float) -> None:

@@ -126,7 +126,7 @@ def test_the_page_names_every_module_that_its_example_runs(root, monkeypatch):
     named = set(re.findall(r"fastcontact/[\w/]+\.py", text))
     assert sorted(modules - named) == []
     assert all((package.parent / name).is_file() for name in named)
-    assert len(modules) > 30
+    assert len(modules) > 40
 
 
 NOTEBOOKS = sorted((pages.DOCS / "notebooks").glob("*.ipynb"))

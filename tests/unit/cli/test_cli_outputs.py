@@ -69,6 +69,14 @@ def test_no_command_replaces_what_it_reads(command, option, source, by, files, m
     assert {path: path.read_bytes() for path in files.iterdir()} == before
 
 
+def test_an_unknown_linear_solver_leaves_earlier_results_as_they_are(files, monkeypatch, capsys):
+    monkeypatch.chdir(files)
+    Path("earlier.vtkhdf").write_bytes(b"earlier")
+    assert main(["run", "case.toml", "-o", "earlier.vtkhdf", "--linear", "direkt"]) == 1
+    assert "unknown linear solver 'direkt'" in capsys.readouterr().err
+    assert Path("earlier.vtkhdf").read_bytes() == b"earlier"
+
+
 @pytest.mark.parametrize("name", WRITERS)
 def test_two_outputs_need_two_files(name, files, monkeypatch, capsys):
     monkeypatch.chdir(files)
