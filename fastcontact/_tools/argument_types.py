@@ -158,8 +158,7 @@ def types_of(call: Callable[..., Any]) -> dict[str, Any]:
     namespace = vars(sys.modules[call.__module__])
     for name, text in inspect.get_annotations(call).items():
         try:
-            text = getattr(text, "__forward_arg__", text)  # of fields of a NamedTuple or a TypedDict
-            annotations[name] = eval(text, namespace) if isinstance(text, str) else text
+            annotations |= typing.get_type_hints(types.SimpleNamespace(__annotations__={name: text}), namespace)
         except (NameError, TypeError):  # a name that only type checkers import, or not the annotation of an argument
             continue
     return annotations

@@ -35,7 +35,7 @@ from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
-from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION, TINY
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
 # Stiffness of soft springs relative to that of the softest body. With a direct solver, springs are as stiff as that body,
 # since soft springs reduce the accuracy (with 1e-6, a wedge has an error of 3e-9; with 1e-3, displacements of plates
@@ -140,11 +140,14 @@ class Freed:
         """
         rates, slip = self.relative[1:, sliding] @ motions, solution.slip[sliding].T
         limit, length = np.linalg.norm(solution.tangential[sliding], axis=1), np.hypot.reduce(slip)
+        least = SINGLE_PRECISION * largest(length)
+        if not least or not rates.size:
+            return np.zeros_like(elongation)
         load = self.stiffness * (motions.T @ elongation)
-        load += np.einsum("dmz,m,dm", rates, limit / np.maximum(length, TINY), slip)
-        left, amplitudes = slip, np.zeros(motions.shape[1])
+        load += np.einsum("dmz,m,dm", rates, limit / np.maximum(length, least), slip)
+        left = slip
         for _ in range(MAX_NEWTON_ITERATIONS):
-            weights = limit / np.maximum(np.hypot.reduce(left), SINGLE_PRECISION * largest(length) + TINY)
+            weights = limit / np.maximum(np.hypot.reduce(left), least)
             matrix = np.einsum("dmz,m,dmy", rates, weights, rates)
             amplitudes = np.linalg.pinv(matrix, hermitian=True) @ (load - np.einsum("dmz,m,dm", rates, weights, slip))
             left = slip + rates @ amplitudes
@@ -159,7 +162,7 @@ class Freed:
     def _inverse(self) -> Array:
         """Pseudoinverse (k, k) of `stretched`, whose singular values are about 1, or 0 in motions without restraint."""
         U, s, V = np.linalg.svd(self.stretched)
-        return np.asarray((V.T * np.divide(1.0, s, out=np.zeros_like(s), where=s > SINGLE_PRECISION)) @ U.T)
+        return np.asarray((V.T * np.divide(1.0, s, out=np.zeros_like(s), where=s > LENGTH_ROUND_OFF)) @ U.T)
 
 
 class FloatingBodies:

@@ -253,10 +253,8 @@ class WeightedMortar(Formulation):
         """Return whether facets that carry forces are partly covered."""
         partly = False
         for block, weights, whole in zip(self.secondary.blocks, means.coverage.weights, self._whole, strict=True):
-            covered = weights.sum(axis=1) / whole.sum(axis=1)
-            partly |= bool(
-                (multiplier[block.local].any(axis=1) & (covered > NO_AREA) & (covered < 1.0 - NO_AREA)).any()
-            )
+            covered, full, loaded = weights.sum(axis=1), whole.sum(axis=1), multiplier[block.local].any(axis=1)
+            partly |= bool((loaded & (covered > NO_AREA * full) & (covered < (1.0 - NO_AREA) * full)).any())
         return partly
 
     def _at_points(self, at: Configuration, means: Means, multiplier: Array) -> Linearised:

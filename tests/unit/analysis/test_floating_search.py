@@ -1,6 +1,7 @@
 """Floating bodies: springs whose anchors follow the bodies, and the cost of a step."""
 
 import dataclasses
+import warnings
 
 import numpy as np
 import pytest
@@ -219,3 +220,15 @@ def test_a_box_rides_on_a_driven_one(dim, options):
     np.testing.assert_allclose(moved, 0.5, atol=1e-4)
     force = step.contact["AB"].force
     assert np.abs(force[:-1]).max() < 1e-8 * force[-1]
+
+
+@pytest.mark.parametrize("penalty", [100.0, 0.01])
+def test_a_soft_penalty_holds_a_stiff_block(penalty):
+    model = elastic_model(fc.generate.block((2.0, 1.0), (6, 3), "quad4"), "plane_strain", E=2e5, LEFT="x")
+    model.add_pressure("TOP", 1e-3)
+    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, penalty=penalty)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fc.FastcontactWarning)  # of the penetration
+        step = fc.solve(model, 1)[-1]
+    np.testing.assert_allclose(-step.displacement[:, 1], 1e-3 / penalty, rtol=1e-6, atol=1e-8)
