@@ -140,10 +140,11 @@ class Freed:
         """
         rates, slip = self.relative[1:, sliding] @ motions, solution.slip[sliding].T
         limit, length = np.linalg.norm(solution.tangential[sliding], axis=1), np.hypot.reduce(slip)
-        least = SINGLE_PRECISION * largest(length)
-        if not least or not rates.size:
+        least, spring_force = SINGLE_PRECISION * largest(length), self.stiffness * elongation
+        moving = largest(rates) > LENGTH_ROUND_OFF
+        if not (moving and least and largest(limit) > ROUND_OFF * largest(spring_force)):
             return np.zeros_like(elongation)
-        load = self.stiffness * (motions.T @ elongation)
+        load = motions.T @ spring_force
         load += np.einsum("dmz,m,dm", rates, limit / np.maximum(length, least), slip)
         left = slip
         for _ in range(MAX_NEWTON_ITERATIONS):

@@ -86,9 +86,9 @@ def test_forces_that_cannot_be_more_accurate_settle_without_a_compliance(accepta
     assert found["amg"].active.sum() > found["amg"].sticking.sum()
 
 
-@pytest.mark.parametrize(("factor", "told"), [(1.0, True), (0.0, False)], ids=["pressed", "lifted"])
-def test_only_a_contact_that_carries_a_force_is_said_to_be_too_coarse(factor, told, recwarn):
-    """A ball without force still touches one node of the dent that it has left."""
+@pytest.mark.parametrize(("factor", "told"), [(1.0, "contact"), (0.0, "in load step 1,")], ids=["pressed", "lifted"])
+def test_a_contact_is_said_to_be_too_coarse_where_it_carries_a_force(factor, told, recwarn):
+    """A ball without force still touches one node of the dent that it has left, which says nothing about the mesh."""
     model = fc.Model(fc.generate.block((2.0, 1.0), (8, 4), "quad8"), kinematics="axisymmetric")
     model.add_material(fc.ElasticPlastic(E=200e3, nu=0.3, yield_stress=400.0, hardening=[(0.0, 400.0), (1.0, 2000.0)]))
     model.fix("BOTTOM", "y")
@@ -97,4 +97,5 @@ def test_only_a_contact_that_carries_a_force_is_said_to_be_too_coarse(factor, to
     model.add_obstacle("ball", secondary="TOP", obstacle=ball, force={"y": -300.0}, ramp=ramp)
     last = fc.solve(model, [1.0, 2.0])[-1]
     assert last.contact["ball"].active.any()
-    assert any("element across" in w or "elements across" in w for w in last.warnings) == told
+    (text,) = [text for text in last.warnings if "element across" in text or "elements across" in text]
+    assert text.startswith(told)
