@@ -26,6 +26,7 @@ class Sizes:
 
     length: float
     force: float
+    round_off: float  # of gaps, which are differences of coordinates [length]
 
 
 def out_of_balance(model: fc.Model, step: fc.StepResult, factor: float, tolerance: float = 0.0) -> tuple[float, Sizes]:
@@ -41,7 +42,10 @@ def out_of_balance(model: fc.Model, step: fc.StepResult, factor: float, toleranc
     largest = max(np.abs(part).max(initial=0.0) for part in (external, contact, step.reaction))
     noise = max(ROUND_OFF, 10 * tolerance) * (abs(K) @ np.abs(step.displacement).ravel()).max(initial=0.0)
     residual = float(np.abs(internal - contact - external - step.reaction).max())
-    sizes = Sizes(np.abs(step.displacement).max(initial=0.0) or 1.0, float(largest) if largest > noise else np.inf)
+    gaps = 16.0 * float(np.finfo(float).eps) * float(np.abs(model.mesh.points).max())
+    sizes = Sizes(
+        np.abs(step.displacement).max(initial=0.0) or 1.0, float(largest) if largest > noise else np.inf, gaps
+    )
     return max(residual - noise, 0.0) / (noise or 1.0) if largest <= noise else residual / largest, sizes
 
 
@@ -99,7 +103,9 @@ def complementarity(settled, sizes: Sizes) -> tuple[float, float, float]:
     state, constraints = settled.solution, settled.constraints
     usable = np.diff(constraints.B.indptr) > 0
     usable &= ~constraints.equality
-    gap, force = np.minimum(state.gap[usable] / sizes.length, 1e6), state.multiplier[usable] / sizes.force
+    gap = state.gap[usable]
+    gap = np.minimum(np.where(gap < 0.0, np.minimum(gap + sizes.round_off, 0.0), gap) / sizes.length, 1e6)
+    force = state.multiplier[usable] / sizes.force
     product = float(np.abs(gap * force).max(initial=0.0))
     return float(-gap.min(initial=0.0)), float(-force.min(initial=0.0)), product
 
