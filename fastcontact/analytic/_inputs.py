@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from fastcontact.arrays import REFUSAL, Array, is_masked
 from fastcontact.errors import ModelError, check_known
 
-# Largest magnitude of an input, whose cube is finite in double precision.
+# Largest magnitude of an input. Its cube is finite in double precision.
 LARGEST = 1e60
 PLANE = ("plane_strain", "plane_stress")
 
@@ -119,7 +119,7 @@ class Bodies:
 
     @property
     def G_star(self) -> float:
-        """Tangential modulus [pressure], 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2 (Mindlin 1949)."""
+        """Tangential modulus [pressure], 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2 with shear moduli G (Mindlin 1949)."""
         return 1.0 / sum(2.0 * (2.0 - nu) * (1.0 + nu) / E for E, nu in self._elastic)
 
     @property
@@ -145,11 +145,12 @@ class Bodies:
 
 
 def effective_radius(R1: float, R2: float, names: tuple[str, str] = ("R1", "R2")) -> float:
-    """Return the relative radius R [length], with 1/R = 1/R1 + 1/R2; one radius may be infinite, for a plane."""
+    """Return the relative radius R [length], with 1/R = 1/R1 + 1/R2; ModelError if both radii are infinite."""
     R1 = positive(names[0], R1, infinite=True)
     R2 = positive(names[1], R2, infinite=True)
     if math.isinf(R1) and math.isinf(R2):
-        raise ModelError(f"{names[0]} and {names[1]} are both infinite: two planes have no Hertz contact")
+        reason = "two planes have no Hertz contact" if names == ("R1", "R2") else "use hertz_line for line contact"
+        raise ModelError(f"{names[0]} and {names[1]} are both infinite: {reason}")
     return 1.0 / (1.0 / R1 + 1.0 / R2)
 
 

@@ -121,7 +121,7 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     If `command` is given, mesh generators, whose import takes most of the time, are declared only for the subcommand
     `mesh`.
     """
-    top = Parser(prog="fastcontact", description="Fast finite elements for elastic contact problems.")
+    top = Parser(prog="fastcontact", description="Finite-element analysis of elastic contact problems.")
     top.add_argument("--version", action=PrintVersion, nargs=0, help="show program's version number and exit")
     top.add_argument(
         "--print-completion", metavar="SHELL", choices=SHELLS, action=PrintCompletion,

@@ -15,7 +15,7 @@ HELP = "list the ready-made cases, or print or copy one of them"
 ARGUMENTS = {
     "name": ({"nargs": "?"}, "print this case file instead of the list"),
     "--copy NAME": "copy this case file and its mesh file",
-    "-o --output FILE": "copy to this file (default: NAME.toml, here)",
+    "-o --output FILE": "copy to this file (default: NAME.toml in the current directory)",
 }
 
 

@@ -236,7 +236,7 @@ def append_run(file: OpenObjects, n_steps: int, run: Any, flush: Callable[[], No
 
 
 def set_restart(file: OpenObjects, number: int, state: NDArray[np.uint8]) -> None:
-    """Write the packed restart data of step `number`. The table never shrinks, since HDF5 would reuse the space."""
+    """Write the packed restart data of step `number`. The table never shrinks: HDF5 could overwrite freed space."""
     table = file[f"fastcontact/{layout.restart_table(number)}"]
     if len(table) < len(state):
         table.resize(len(state), axis=0)

@@ -12,7 +12,7 @@ from fastcontact.cases.decks.blocks import Block, Item, Located, Location, folde
 
 @dataclass(frozen=True, slots=True)
 class Cell(Located):
-    """An element: its type, the numbers of its nodes, the location of its *ELEMENT, its line, and the set of the block."""
+    """An element: its type, its node numbers, the location of its *ELEMENT, its own line, and the ELSET of *ELEMENT."""
 
     type: str
     nodes: Sequence[int]

@@ -18,7 +18,7 @@ from fastcontact.model.model import Model
 def pretension_section(content: Content, block: Block) -> None:
     """Read *PRE-TENSION SECTION: a surface across a bolt, and the node of the shortening and the force of the bolt."""
     if len(block.rows) > 1:
-        raise block.refuse(f"{len(block.rows)} data lines, but one is needed, the normal")
+        raise block.refuse(f"{len(block.rows)} data lines, but at most one is allowed, the normal")
     row = block.rows[0] if block.rows else None
     normal = None if row is None else (row.number(0), row.number(1, 0.0), row.number(2, 0.0))
     if normal is not None and not any(normal):

@@ -93,7 +93,7 @@ def factorise(
     begin: Offsets, below: Numbers, sizes: tuple[int, int], begins: Offsets,
     source: Offsets, previous: tuple[Array, Array, Array], target: Offsets, updates: Array, L: Array, d: Array,
 ) -> int:  # fmt: skip
-    """Fill L and `d` (n,); return -1, or the first column whose pivot, which `d` contains, is not positive.
+    """Fill L and `d` (n,); return -1, or the first column with a pivot that is not positive, which is then in `d`.
 
     Parameters
     ----------

@@ -84,7 +84,7 @@ BAD_INPUT = [
     ("flat_punch_2d", {"half_width": 0.0}, "half_width is 0"),
     ("hertz_box", {"radius": 1.5}, "narrower than the box"),
     ("hertz_box", {"kinematics": "axisymetric"}, "axisymmetric"),
-    ("hertz_elliptical", {"R1y": math.inf}, "R1y and R2y are both infinite"),
+    ("hertz_elliptical", {"R1y": math.inf}, "R1y and R2y are both infinite: use hertz_line for line contact"),
     ("hertz_elliptical", {"R1y": 1e14}, "use hertz_line"),
     ("hertz_elliptical", {"R1x": -1.0}, "R1x is -1"),
     ("hertz_elliptical", {"force": None}, "exactly one of force, approach, pressure_max"),

@@ -284,7 +284,7 @@ def test_a_locked_section_may_be_named_again_in_a_new_list(tmp_path):
 
 
 def test_a_section_has_one_normal(tmp_path):
-    with pytest.raises(fc.CaseError, match="2 data lines, but one is needed, the normal"):
+    with pytest.raises(fc.CaseError, match="2 data lines, but at most one is allowed, the normal"):
         deck_of(tmp_path, BAR.replace("0., 0., 1.\n*Boundary", "0., 0., 1.\n0., 0., 1.\n*Boundary") + TIGHT)
 
 
