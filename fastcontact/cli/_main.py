@@ -1,9 +1,10 @@
 """Dispatch to the subcommands, and conversion of errors to exit codes.
 
-The exit codes are 0 for success, 1 for invalid input, 2 for failed convergence, failed runs of a study or an adaptive
-study that misses its tolerance, 3 for a failed check of the case (``run --strict``), 130 for an interruption from the
-keyboard, 143 for SIGTERM and 129 for SIGHUP. Invalid input is reported in one line. After failed convergence or an
-interruption, the result file contains all converged steps.
+The exit codes are 0 for success, 1 for invalid input, for files that cannot be read or written and for a study that is
+interrupted from the keyboard, 2 for failed convergence, failed runs of a study or an adaptive study that misses its
+tolerance, 3 for a failed check of the case (``run --strict``), 130 for an interruption of other commands from the keyboard,
+143 for SIGTERM and 129 for SIGHUP. Invalid input is reported in one line. After failed convergence or an interruption, the
+result file contains all converged steps.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from fastcontact.cli._terminal import encodable, say, stderr_is_terminal, warnin
 from fastcontact.errors import ConvergenceError, FastcontactError, printable, unknown
 
 SHELLS = ("bash", "zsh", "tcsh")
-# Options that need no arguments of subcommands.
+# Options of the main command, for which the mesh generators need not be declared.
 BRIEF = ("-h", "--help", "--version")
 # Names and metavars of arguments whose values are file names.
 FILES = ("case", "file", "output", "mesh", "FILE", "PNG", "FOLDER", "DIR")
@@ -37,7 +38,7 @@ class PrintCompletion(argparse.Action):
     """Action of ``--print-completion SHELL``: print the completion script of a shell and exit."""
 
     def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option_string: Any = None) -> None:
-        """Print the script; FastcontactError if shtab is not installed."""
+        """Print the completion script. Raises FastcontactError if shtab is not installed."""
         try:
             import shtab
         except ImportError as error:

@@ -39,8 +39,8 @@ class CohesiveLaw:
         Whether damage heals when the sides approach each other, as for adhesion.
     initiation : str
         Criterion of damage initiation in mixed mode. With ``"bk"``, the squares of the limits are interpolated like the
-        energies; with ``"quadratic"``, the squares of the tractions over their limits sum to one; with ``"maximum"``, one
-        traction reaches its limit.
+        energies; with ``"quadratic"``, the squares of the ratios of traction to strength sum to one; with ``"maximum"``, the
+        largest of these ratios is one.
     mixed_mode : str
         Fracture energy in mixed mode: ``"bk"`` for the interpolation of Benzeggagh and Kenane, or ``"power"`` for the power
         law, in which powers of the energies over their limits sum to one.

@@ -46,7 +46,7 @@ class Sectors:
 
     @classmethod
     def of(cls, model: Model) -> Sectors | None:
-        """Return the sectors of a model; None without cyclic symmetry. ModelError if it has several axes."""
+        """Return the sectors of a model; None without cyclic symmetry. ModelError if axes or numbers of sectors differ."""
         periodic_interfaces = [interface for interface in model.periodic_interfaces if interface.turn is not None]
         if not periodic_interfaces:
             return None

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
+from fastcontact.elasticity.incompatible_modes import BENDING
+
 # Corners of the faces 1, 2, ... of Abaqus and CalculiX.
 TETRAHEDRON = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
 HEXAHEDRON = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
@@ -22,7 +24,8 @@ UNSUPPORTED = {
     "S": "shell", "STRI": "shell", "B": "beam", "T": "truss", "M": "membrane", "CPEG": "generalised plane strain",
     "DC": "convective heat transfer", "R": "rigid", "SC": "continuum shell", "C3D8P": "pore pressure", "CONN": "connector",
     "DASHPOT": "dashpot", "MASS": "mass", "F3D": "network", "D": "network", "U": "user", "COH": "cohesive",
-    "GK": "gasket", "ITS": "slide line",
+    "GK": "gasket", "ITS": "tube support", "ISL": "slide line", "SPRING": "spring", "SFM": "surface", "DC1D": "heat link",
+    "ROTARYI": "rotary inertia", "DCOUP": "distributing coupling",
 }  # fmt: skip
 
 
@@ -61,7 +64,7 @@ class ElementType:
 
 @cache
 def element_type(name: str) -> ElementType | None:
-    """Return the translation of an element type of a deck, given in upper case; None unless it is a supported solid."""
+    """Return the translation of an element type in upper case; None unless it is a supported solid or heat conductor."""
     conducts = name[:4] in CONDUCTING
     base = CONDUCTING[name[:4]] + name[4:] if conducts else name.removesuffix("T")
     note, modes = "", False
@@ -79,6 +82,8 @@ def element_type(name: str) -> ElementType | None:
     element = table.get(base[3:])
     if modes and kinematics == "axisymmetric":
         modes, note = False, "without incompatible modes, which makes thin parts stiffer in bending"
+    elif modes and element not in BENDING:  # C3D10I, whose stresses at the surface are improved
+        modes, note = False, "an ordinary quadratic one here"
     return ElementType(name, element, kinematics, note, modes, conducts) if element and kinematics else None
 
 

@@ -166,10 +166,10 @@ class _Writer:
 
 
 class _Row(_Writer):
-    """Generator of the loop over the blocks of a row, with a sum for each row of the blocks and each lane of a vector.
+    """Generator of the body of the loop over the blocks of a row, with a sum for each row of the blocks and each vector lane.
 
-    With three columns, a vector has one number too many. It is the number before the row in the last row of a block, and the
-    number after the row in the other rows, so that nothing outside the block is read.
+    With three columns, a vector of four also reads a neighbour of the row: the number after it or, in the last row of a
+    block, the number before it, so that nothing outside the block is read.
     """
 
     def __init__(self, context: Any, builder: Any, signature: Any, args: Any, m: int, n: int) -> None:
@@ -215,7 +215,7 @@ class _Row(_Writer):
         return [self._sum(totals, int(self.shifted and r == self.m - 1)) for r, totals in enumerate(self.totals)]
 
     def _sum(self, totals: list[Any], first: int) -> Any:
-        """Return the sum of the used lanes, starting at the first one."""
+        """Return the sum of the used lanes, which begin at lane `first`."""
         lanes = []
         for piece, total in zip(self.pieces, totals, strict=True):
             vector = self.builder.load(total)
@@ -235,7 +235,7 @@ class _Row(_Writer):
 
 
 class _RowBothWays(_Row):
-    """Generator like `_Row` that also adds the product of the transposed blocks and the entries of x in the row to y."""
+    """Generator like `_Row` that also adds `factor` times the product of the transposed blocks and x in the row to y."""
 
     def __init__(self, context: Any, builder: Any, signature: Any, args: Any, m: int, n: int) -> None:
         super().__init__(context, builder, signature, args, m, n)
@@ -245,7 +245,7 @@ class _RowBothWays(_Row):
         self.added: list[Any] = []
 
     def process(self, r: int, p: int, numbers: Any, last: bool) -> None:
-        """Add a row of the block times a number of x."""
+        """Add row r of the block times `factor` and the entry of x in block row and row r."""
         if last:
             numbers = self.shuffled(numbers, [1, 2, 3, 3])
         width = self.pieces[p].width

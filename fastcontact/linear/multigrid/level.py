@@ -56,8 +56,8 @@ class Level:
     eliminated : Elimination or None
         Eliminated equations, only on the finest level. The weights are stored in the precision of the cycle.
     change : tuple of ndarray, or None
-        Contribution of eliminated equations and springs to the matrix, only on coarser levels: the numbers (k,) of the block
-        rows that change, and the change in these rows as `indptr`, `indices` and `data` of a `BlockMatrix`.
+        What eliminated equations and springs add to the matrix, only on coarser levels: the numbers (k,) of the block rows
+        that change, and the change in these rows as `indptr`, `indices` and `data` of a `BlockMatrix`.
     springs : Springs or None
         Springs that are added to the matrix after the elimination of equations, only on the finest level.
     followers : Elimination or None
@@ -101,7 +101,7 @@ class Level:
         return Level(self.A, self.diagonal, inverse, self.bound, self.P, self.R)
 
     def relax(self, r: AnyArray, first: float, second: float, begin: bool = False) -> None:
-        """Make one Chebyshev step for the residual r (n,), see `cycle_kernels.relax`; `x` then satisfies the equations."""
+        """Change `x` by a Chebyshev step for the residual r (n,), see `cycle_kernels.relax`, then its eliminated unknowns."""
         real = r.dtype.type
         self.scale(r, real(first), real(second), self.d, self.x, begin)
         if self.free_motions is not None:

@@ -14,7 +14,8 @@ QUADRANGLES = ("quad4", "quad8", "quad9")
 FACES = TRIANGLES + QUADRANGLES
 # Largest admissible number, whose cube can still be represented.
 LARGEST = 1e100
-# Largest numbers of segments of a line and of cells. Larger numbers are probably due to wrong units or decimal points.
+# Largest numbers of segments of a line and of cells of a mesh. Larger numbers are probably due to wrong units or
+# decimal points.
 MOST_SEGMENTS = 1_000_000
 MOST_CELLS = 5_000_000
 
@@ -72,7 +73,7 @@ def count(name: str, value: Any) -> int:
 
 
 def segments(quotient: float) -> int:
-    """Return a number of segments, which is at least 1 and `quotient` rounded up. Raises MeshError if it is too large."""
+    """Return `quotient` rounded up to a number of segments, at least 1. Raises MeshError if it is too large."""
     if not quotient <= MOST_SEGMENTS:
         raise MeshError(
             f"a line of the mesh would be divided into {quotient:.3g} segments, more than {MOST_SEGMENTS}: check the units "

@@ -218,9 +218,10 @@ class ModelContact(ModelConnections):
         """Apply a fluid pressure to both sides of a contact pair, wherever the fluid can penetrate from a source.
 
         Starting at the source, the fluid advances from facet to facet where the sides are open, or where the contact
-        pressure does not exceed the fluid pressure. There it acts on each side along the normals of that side, in finite
-        strain the normals of the deformed surface. The pressure at each secondary node is the attribute
-        ``fluid_pressure`` of the contact result. To apply the pressure of the fluid to other surfaces, use `add_pressure`.
+        pressure does not exceed the fluid pressure. There it acts on the secondary side along its normals, and on the
+        primary side along the normal of the gap, in finite strain those of the deformed surfaces. The pressure at each
+        secondary node is the attribute ``fluid_pressure`` of the contact result. To apply the pressure of the fluid to
+        other surfaces, use `add_pressure`.
 
         Parameters
         ----------
