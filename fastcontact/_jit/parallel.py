@@ -36,7 +36,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def shared(work: Callable[[Part], Result], parts: Sequence[Part]) -> list[Result]:
-    """Return the results of `work` on all parts, of which the first runs in this thread and each other in another thread."""
+    """Return the results of `work` on all parts: on the first in this thread, on each other part in another thread."""
     if len(parts) == 1:
         return [work(parts[0])]
     others = [_pool().submit(work, part) for part in parts[1:]]
@@ -82,7 +82,7 @@ def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Res
 
 
 def read_only(numbers: AnyArray) -> AnyArray:
-    """Return a read-only view, such as the arrays of a mesh, since kernels are compiled separately for writable arrays."""
+    """Return a read-only view: arrays of a mesh are read-only, and a kernel would be compiled again for writable arrays."""
     view = numbers.view()
     view.flags.writeable = False
     return view

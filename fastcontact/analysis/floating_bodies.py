@@ -1,11 +1,12 @@
-"""Floating bodies, which contact alone restrains: soft springs regularise their singular stiffness matrix.
+"""Floating bodies, which contact alone restrains: springs regularise their singular stiffness matrix.
 
 Each rigid-body mode that supports leave free gets one spring at one node. The springs are anchored at a position of the
 bodies, so that the contact problem is regular. Its solution stretches the springs, which are then anchored at a new
 position. This is repeated until they carry no force. Each pairing begins at the last position.
 
 If the matrix is factorised, the linear response of the contact problem to the position is known, and Newton's method finds
-the position at which the springs are slack. For the final contact state it takes one step, for any stiffness of the springs.
+the position at which the springs are slack. Once the contact state no longer changes, one Newton step suffices, whatever
+the stiffness of the springs.
 
 Otherwise the springs are soft compared with the body, and the new position is that at which they would be slack without
 contact. This is the proximal point method for the minimum of the energy under the inequalities of contact (Rockafellar,
@@ -42,11 +43,12 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 # scatter by 2e-11, and with 1 by 1e-12). With multigrid they are soft, since stiff ones would cost more solutions: with
 # 1e-3, 1e-2 and 1, a stack with friction takes 4.1, 4.2 and 65 linear solutions, and a bolt 2.8, 5.3 and 27. Stiff
 # springs also compensate the negative stiffness that rotated bodies may have under load. The reference is the softest
-# body, because a contact is not stiffer than the softer one of its bodies (for a layer that is softer by 2e5, 100
-# positions did not suffice with the stiffness of the other body).
+# body, because a contact is not stiffer than the softer one of its bodies (for a layer that is softer by a
+# factor of 2e5, 100 positions did not suffice with the stiffness of the other body).
 SOFT = 1e-3
-# Singular value of `stretched`, about 1 for motions that contact restrains, up to which only the turning of friction with the
-# direction of slip restrains a motion (without this, a box that rides on a driven one is not found in 3D).
+# Singular value of `stretched`, about 1 for motions that contact restrains, up to which a motion is restrained only because
+# the friction force turns with the slip direction (without this, the iteration fails for a box that rides on a driven one in
+# 3D).
 WEAK = 1e-2
 
 
@@ -106,9 +108,9 @@ class Freed:
     def slackened(self, elongation: Array, solution: Solution) -> tuple[Array, float]:
         """Return the change (k,) of the positions that makes springs with an `elongation` (k,) slack [length].
 
-        In motions that contact does not restrain, elongations do not relax: bodies slide until friction balances the
-        springs, or move by the elongations and until the first gap of the `solution` closes. The largest remaining
-        elongation is returned as well.
+        In motions that contact does not restrain, no change of the positions reduces the elongations. Bodies then slide
+        until friction balances the springs; otherwise they move by the elongations, and further until the first gap of
+        the `solution` closes. The largest elongation that the linear response leaves is returned as well.
         """
         relaxed, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
         remaining = largest(elongation - self.stretched @ relaxed)
@@ -175,7 +177,7 @@ class FloatingBodies:
         The free rigid-body modes.
     system : System
     soft : bool
-        Whether the springs are softer than the softest body by the factor SOFT; otherwise they are as stiff.
+        Whether the springs have SOFT times the stiffness of the softest body; otherwise they are as stiff as it.
 
     Attributes
     ----------
@@ -256,9 +258,9 @@ class FloatingBodies:
         """Return the motions that neither contact forces nor bilateral contact restrain at the end of a step, by body.
 
         Any position without contact forces is then a solution. Contact forces of sides that just touch are round-off and are
-        ignored: they are negligible compared with the loads, or with the force of a spring that is elongated by the largest
-        displacement, whichever is smaller. Without loads, only the latter applies. So are contact forces that the
-        out-of-balance forces exceed, as those of an iterative solver may.
+        ignored: they are negligible compared with the smaller of the loads and the force of a spring that is elongated by
+        the largest displacement; without loads, compared with the latter. Contact forces smaller than the out-of-balance
+        forces, which may be large with an iterative solver, are ignored, too.
 
         Parameters
         ----------
@@ -305,13 +307,15 @@ class FloatingBodies:
         solve_at : callable
             Function that returns the `Solution` of the contact problem with the springs anchored at a position (k,) [length].
         freed : callable, optional
-            Function that returns the linear response to positions, given that of a solution; see the method `freed`.
+            Function that returns the response `Freed` to positions, given the response of a solution with springs at a
+            fixed position; see the method `freed`. By default Newton's method is not used.
         springs : ndarray of int (k,)
-            Numbers of the unknowns at `dofs`, among the unknowns of the solution.
+            Indices of the displacement components `dofs` among the unknowns of the solution.
         start : ndarray (k,)
             First position [length].
         load : float
-            Scale of the loads, to which the forces of the springs are compared, as well as to contact forces [force].
+            Scale of the loads. Springs are slack if their forces are negligible compared with it or with the largest
+            contact force [force].
         noise : float
             Relative accuracy of displacements, due to the tolerance of the linear solver [-].
         round_off : float

@@ -34,7 +34,7 @@ COMMAND_LINE = "fastcontact.cli._main"
 
 @contextlib.contextmanager
 def interruptible(raised: list[int] | None = None) -> Iterator[None]:
-    """Let Ctrl-C, SIGTERM and SIGHUP interrupt a ``with`` block with a KeyboardInterrupt that Python does not discard.
+    """Let Ctrl-C, SIGTERM and SIGHUP interrupt a ``with`` block by KeyboardInterrupt, raised again if Python discards it.
 
     The numbers of the signals received are appended to the list `raised`. Signals with a handler other than the default one
     keep it.
@@ -66,7 +66,7 @@ def interruptible(raised: list[int] | None = None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def restoring_interrupt(raised: list[int]) -> Iterator[None]:
-    """Raise KeyboardInterrupt in place of an error by which a C function has replaced the interruption by a signal.
+    """Raise KeyboardInterrupt if a C function has replaced the KeyboardInterrupt of a signal by another error.
 
     `raised` contains the signals received. An error that is raised while KeyboardInterrupt is handled is genuine.
     """

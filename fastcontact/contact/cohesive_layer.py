@@ -57,7 +57,7 @@ class Layer:
     def after(self, constraints: Constraints, u: Array) -> Bond:
         """Return the state of the layer at the end of a step with displacements u (n_dofs,) [length]."""
         end = (constraints.gap0 + constraints.B @ u).reshape(self.rest.shape) + self.rest
-        # Broken constraints have no tangential rows.
+        # Rows of broken constraints along tangents are zero, so that `end` does not contain their slips.
         opening, *slips = np.where(self.damage < 1.0, end, self.separation)
         sliding = sum((s[:, None] * t for s, t in zip(slips, self.directions)), np.zeros_like(self.before.sliding))
         slip, law = np.linalg.norm(sliding, axis=1), self.law
@@ -72,7 +72,7 @@ class Layer:
 def bonded(law: CohesiveLaw, constraints: Constraints, at: Configuration, initial_gap: Array) -> Constraints:
     """Return `constraints`, which have tangents, as a cohesive layer: equations whose compliance follows its law.
 
-    Cohesive layers have no traction at the initial gaps `initial_gap` (m,), while adhesion acts across them [length]. Broken
+    The initial gaps `initial_gap` (m,) [length] do not load a cohesive layer, whereas adhesion acts across them. Broken
     constraints may close again, with the stiffness of the intact layer.
     """
     assert constraints.areas is not None
@@ -90,7 +90,7 @@ def bonded(law: CohesiveLaw, constraints: Constraints, at: Configuration, initia
     slips = [s0 + T @ u for T, s0 in zip(constraints.tangents, slip0, strict=True)]
     opening = constraints.gaps(at.displacement) - initial_gap
     damage = law.damage(opening, np.sqrt(sum((s**2 for s in slips), zero)), damage)
-    # At the beginning of a step an obstacle may have moved, which the body follows in this pairing only.
+    # In the first pairing of a step an obstacle may have moved already, but the body not yet: this opening is no damage.
     if at.bond is not None and np.array_equal(u, start):
         damage = np.minimum(damage, before.damage)
     intact, jump = damage < 1.0, np.stack([opening, *slips])

@@ -132,7 +132,7 @@ def find_contacts(
 ) -> FoundContacts:
     """Find the surfaces of different bodies that face each other, and choose the secondary side of each pair.
 
-    Sample points of all outer facets are projected on the closest facet of all other bodies. Two facets face each other
+    Sample points of all outer facets are projected on the closest facet of any other body. Two facets face each other
     if the distance along their normals is small enough and the normals are opposed. A surface with edges at which the
     normals differ by 48 degrees or more is split into one pair for each smooth face, since a side of a pair has one
     normal at each node. The secondary side is the one with the finer mesh; between equally fine sides it is that of the
@@ -142,8 +142,8 @@ def find_contacts(
     ----------
     mesh : Mesh
     distance : float, optional
-        Largest gap or overlap [length]. By default smooth faces of two bodies form a pair if somewhere their distance is
-        at most the size of the larger of the two facets. The pair extends as far as their normals are opposed.
+        Largest gap or overlap [length]. By default smooth faces of two bodies form a pair if their distance is at most
+        the size of the larger of two opposite facets somewhere. The pair then extends as far as the normals are opposed.
     angle : float
         Largest deviation of the normals from opposite directions, more than 0 and less than 90 [degrees].
     groups : sequence of str, optional

@@ -9,14 +9,20 @@ from fastcontact.mesh.jacobian_kernels import jacobian_2d, jacobian_3d, transpos
 
 @kernel
 def _determinant_2d(x, slopes, q):
-    """Return det J of a cell with nodes x (2, n_nodes) at point q of the shape derivatives `slopes` (n_q, 2, n_nodes)."""
+    """Return det J of a cell with nodes x (2, n_nodes) at point q.
+
+    `slopes` (n_q, 2, n_nodes) are the derivatives of the shape functions.
+    """
     j00, j01, j10, j11 = jacobian_2d(x, slopes, q)
     return j00 * j11 - j01 * j10
 
 
 @kernel
 def _determinant_3d(x, slopes, q):
-    """Return det J of a cell with nodes x (3, n_nodes) at point q of the shape derivatives `slopes` (n_q, 3, n_nodes)."""
+    """Return det J of a cell with nodes x (3, n_nodes) at point q.
+
+    `slopes` (n_q, 3, n_nodes) are the derivatives of the shape functions.
+    """
     j00, j01, j02, j10, j11, j12, j20, j21, j22 = jacobian_3d(x, slopes, q)
     return j00 * (j11 * j22 - j12 * j21) + j01 * (j12 * j20 - j10 * j22) + j02 * (j10 * j21 - j11 * j20)
 
@@ -32,7 +38,7 @@ def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
     cells : (n_cells, n_nodes)
         Connectivity of the cells.
     dN : (n_q, n_nodes, dim)
-        Shape derivatives at the quadrature points.
+        Derivatives of the shape functions at the quadrature points.
     weights : (n_q,)
         Weights of the quadrature points.
     edges : (n_edges, 2)

@@ -151,7 +151,7 @@ COMMANDS = [
      r"unknown generator 'half-sphere': did you mean 'half-spheres'"),
     ("result file missing", ["profile", "nothing.vtkhdf"],
      r"there is no file 'nothing\.vtkhdf': check its name and the folder you are in"),
-    ("profile of a mesh", ["profile", "forma04a.med"],
+    ("`fastcontact profile` on a mesh file", ["profile", "forma04a.med"],
      r"'forma04a\.med' has no fastcontact results: name a file that fastcontact wrote \(\.vtkhdf\)"),
     ("information on a missing file", ["info", "nothing.med"],
      r"there is no file 'nothing\.med': check its name and the folder you are in"),

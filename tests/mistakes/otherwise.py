@@ -7,7 +7,7 @@ Not every program behaves like this; each does in some cases. Where a current pr
 OTHERWISE = {
     "an error, often a traceback or pages of messages from the file library": (
         "mesh file missing", "mesh is a text file", "mesh file is empty", "mesh file is truncated",
-        "suffix of no known format", "case file missing", "case is a folder", "result file missing", "profile of a mesh",
+        "suffix of no known format", "case file missing", "case is a folder", "result file missing", "`fastcontact profile` on a mesh file",
         "information on a missing file", "export of a case file", "mesh written with an unknown suffix", "broken TOML",
     ),
     "an error that names the wrong group, without the intended one": (
@@ -41,7 +41,7 @@ OTHERWISE = {
     "a solution of NaN values, or the value is read as zero": (
         "E is not a number", "support value is not finite", "a pressure that is NaN", "a table with NaN",
     ),
-    "an error of the programming language, far from the mistake": (
+    "an exception (traceback) raised far from the mistake": (
         "E is a string", "support value is a string", "load steps as a string", "fractional number of load steps", "ramp is not a table",
         "threads as a word", "a function that returns the wrong shape", "coordinates in one dimension",
         "cells with a node too few", "theory lacks a radius", "an expression as a value",

@@ -19,8 +19,9 @@ same text. A doubtful but solvable model is solved, with a warning that states t
 shown on screen and stored in the log, in `--json` and in the result file (`open_results(path).warnings`); in Python it
 is a `FastcontactWarning`.
 
-The tables are generated from tests, which make each mistake and compare the message. The last column describes a common
-response of finite-element programs to the same mistake; programs differ.
+The tables show messages or parts of them; `...` stands for text that varies. They are generated from tests, which make
+each mistake and compare the message. The last column describes a common response of finite-element programs to the same
+mistake; programs differ.
 """
 SECTIONS = (
     ("In a case file", "`fastcontact run` with the ready-made case FORMA04 A and one change:", CASES),

@@ -25,7 +25,7 @@ class Cholmod(FactorSolver):
     def _factorised(self, K: bsr_array, last: Indices) -> SymmetricFactors:
         from kvxopt import cholmod, matrix
 
-        factor = factorised(lower_triangle(K.tocsr()), matrix(fill_reducing(K, last)))  # K's rows are its columns
+        factor = factorised(lower_triangle(K.tocsr()), matrix(fill_reducing(K, last)))  # rows of K are its columns
         # CHOLMOD may reorder independent branches of the elimination tree, which changes no dependencies.
         position = np.empty(self.n, np.intp)
         position[_elimination_order(factor, self.n)] = np.arange(self.n)
@@ -38,9 +38,9 @@ class Cholmod(FactorSolver):
 def by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Array) -> LowerTriangle:
     """Return a Cholesky factor, given by columns with ascending rows, with the rows once per supernode.
 
-    A column belongs to the supernode of the previous one if it is the first row below the diagonal of the latter and has one
-    entry fewer. It then has the same rows below, since the rows of a column without its diagonal are contained in those of
-    its parent.
+    Column j + 1 belongs to the supernode of column j if j + 1 is the first row of column j below the diagonal, and if column
+    j + 1 has one entry fewer. Below their diagonals both then have the same rows from j + 2 on, since the rows of a column
+    without its diagonal are contained in those of its parent, the column of its first row below the diagonal.
     """
     entries = np.diff(start)
     continues = np.zeros(len(entries), bool)
