@@ -314,6 +314,7 @@ def test_text_is_shown_as_it_stands() -> None:
     assert escaped("two\nlines\tand\x00 more") == "two lines and? more"
     assert escaped("r² é µ") == "r² é µ"
     assert escaped("π") == r"\f{Symbol}p\f{}"
+    assert escaped("\u0391") == r"\f{Symbol}A\f{}", "a capital that looks like a Latin one"
     assert escaped("a \u2212 b") == "a - b"
     assert escaped("\uff02\uff3c") == r"\"\\", "also where a letter turns into markup only here"
     assert escaped("x₁ 日") == "x1 ?"
