@@ -43,7 +43,7 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
     declining = len(changes) <= WINDOW or min(changes[-WINDOW:]) <= DECLINE * min(changes[:-WINDOW])
     size = changes[-1] if declining else max(changes[-WINDOW:])
     more = ["more updates (Criteria.max_geometry_updates)"] if declining else []
-    advice = [*more, *_bilateral_advice(problem), *_smoothing_advice(problem, last["nodes"])]
+    advice = [*more, *(_bilateral_advice(problem) or _smoothing_advice(problem, last["nodes"]))]
     advice.append("a fixed number of updates (Criteria.geometry_updates)")
     if float(f"{size:.0e}") < NOTABLE:  # otherwise `Criteria` refuses it
         criterion = f"Criteria.geometry, which is {problem.criteria.geometry:g}, above {size:.0e}"

@@ -201,7 +201,7 @@ def _unsettled(state: State) -> Iterator[str]:
 def _turning_flow(state: State) -> Iterator[str]:
     """Yield a warning where the plastic flow changes its direction notably within a load step.
 
-    Under a ball that is pressed in in 4, 8 and 16 steps, the stresses change by 2.1, 1.7 and 1.3 % if the last step is
+    Under a ball that is pressed in with 4, 8 and 16 steps, the stresses change by 2.1, 1.7 and 1.3 % if the last step is
     halved, and the force is 6, 3 and 1.1 % too small. With kinematic hardening, both are below 1 %.
     """
     size, change = state.flow
@@ -545,11 +545,12 @@ def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
 
     It is zero for bodies that deform more than they rotate.
     """
-    mesh, dim, capacity = problem.model.mesh, problem.model.mesh.dim, np.zeros(bodies(problem.model.mesh)[0])
+    mesh, dim = problem.model.mesh, problem.model.mesh.dim
+    n_bodies, body = bodies(mesh)
+    capacity = np.zeros(n_bodies)
     motion, rotation = np.zeros((2, *mesh.points.shape))
     rotating = np.zeros(mesh.n_points, bool)
-    body = bodies(mesh)[1]
-    for number in range(len(capacity)):
+    for number in range(n_bodies):
         nodes = np.flatnonzero(body == number)
         modes, u = rigid_modes(mesh.points[nodes], problem.model.kinematics), last.displacement[nodes].ravel()
         amplitude = np.linalg.lstsq(modes, u)[0]

@@ -237,7 +237,12 @@ class WeightedMortar(Formulation):
             linearised = self._at_points(at, means, multiplier)
         else:
             sides = np.concatenate([self.secondary.points, self.primary.points])
-            points = MeanMotions(lambda moved: self._means(moved, at, means.coverage.kept)[-3:], deformed, sides)
+
+            def means_at(moved: Array) -> tuple[csr_array, Array, Array]:
+                varied = self._means(moved, at, means.coverage.kept)
+                return varied.motion, varied.closer, varied.normal
+
+            points = MeanMotions(means_at, deformed, sides)
             linearised = Linearised(self.secondary, points, None, means.normal, multiplier)
         if slipping is None:
             return linearised
