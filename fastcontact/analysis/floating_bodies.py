@@ -110,7 +110,8 @@ class Freed:
 
         In motions that contact does not restrain, no change of the positions reduces the elongations. Bodies then slide
         until friction balances the springs; otherwise they move by the elongations, and further until the first gap of
-        the `solution` closes. The largest elongation that the linear response leaves is returned as well.
+        the `solution` closes. The largest elongation that the linear response leaves is returned as well; it is infinite if
+        bodies slide, which the linear response does not describe.
         """
         relaxed, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
         remaining = largest(elongation - self.stretched @ relaxed)
@@ -122,7 +123,7 @@ class Freed:
             firm = s > WEAK
             slide = self._slide(V[~firm].T, elongation, solution, sliding)
             if slide.any():
-                return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), remaining
+                return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), np.inf
         change = -relaxed
         if unrestrained:
             motion = elongation - self._inverse @ (self.stretched @ elongation)
@@ -361,5 +362,7 @@ class FloatingBodies:
             # peeling layer, approach equilibrium slowly.
             position = mixing.mixed(position, position + elongation) if step is None else position + step[0]
             last_stretch, relaxed = stretch, 0.0 if step is None else stretch
+            if step is not None and step[1] == np.inf:  # elongations need not decrease when bodies slide
+                last_stretch = np.inf
         state = dataclasses.replace(state, iterations=iterations)
         return RigidPosition(state, position, self.stiffness * elongation, positions, slack)

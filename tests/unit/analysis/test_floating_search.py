@@ -179,8 +179,8 @@ def test_slack_is_in_units_of_the_contact_forces(force):
     assert found.position[0] > 0.5
 
 
-def carried(dim, options):
-    """A box on a wider one, which is driven sideways by much more than it deforms."""
+def carried(dim, options, angle):
+    """A box on a wider one, which is driven sideways by much more than it deforms, and the matrix that turns both."""
     box = fc.generate.block if dim == 2 else fc.generate.box
     sizes, divisions = ((60.0, 20.0), (40.0, 20.0)), ((6, 2), (5, 3))
     if dim == 3:
@@ -192,15 +192,18 @@ def carried(dim, options):
         fc.generate.renamed(mesh, {name: f"{body}_{name}" for name in mesh.group_names})
         for body, mesh in (("A", lower), ("B", upper))
     ]
-    mesh = fc.generate.union(*boxes)
+    mesh, turn = fc.generate.union(*boxes), np.eye(dim)
+    turn[:: dim - 1, :: dim - 1] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    mesh = mesh.replace(points=mesh.points @ turn.T)
     low, high = ("BOTTOM", "TOP") if dim == 2 else ("ZMIN", "ZMAX")
     model = elastic_model(mesh, "plane_strain" if dim == 2 else "3d", E=210e3)
     model.add_pressure(f"B_{high}", 0.1, ramp=[(0, 0), (1, 1), (2, 1)])
-    model.prescribe(f"A_{low}", x=0.5, **dict.fromkeys("yz"[: dim - 1], 0.0), ramp=[(0, 0), (1, 0), (2, 1)])
+    model.prescribe(f"A_{low}", **dict(zip("xyz"[:dim], 0.5 * turn[:, 0], strict=True)), ramp=[(0, 0), (1, 0), (2, 1)])
     model.add_contact("AB", secondary=f"B_{low}", primary=f"A_{high}", **{"friction": 0.3, **options})
-    return model
+    return model, turn
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.5])
 @pytest.mark.parametrize(
     ("dim", "options"),
     [
@@ -212,13 +215,13 @@ def carried(dim, options):
         (3, {}),
     ],
 )
-def test_a_box_rides_on_a_driven_one(dim, options):
+def test_a_box_rides_on_a_driven_one(dim, options, angle):
     """Friction carries a box that nothing else holds: it moves as far as the box below, and no shear remains."""
-    model = carried(dim, options)
+    model, turn = carried(dim, options, angle)
     step = fc.solve(model, [1.0, 2.0])[-1]
-    moved = step.displacement[model.mesh.points_of(f"B_{'TOP' if dim == 2 else 'ZMAX'}"), 0]
+    moved = step.displacement[model.mesh.points_of(f"B_{'TOP' if dim == 2 else 'ZMAX'}")] @ turn[:, 0]
     np.testing.assert_allclose(moved, 0.5, atol=1e-4)
-    force = step.contact["AB"].force
+    force = step.contact["AB"].force @ turn
     assert np.abs(force[:-1]).max() < 1e-8 * force[-1]
 
 
