@@ -109,9 +109,9 @@ class Freed:
         """Return the change (k,) of the positions that makes springs with an `elongation` (k,) slack [length].
 
         In motions that contact does not restrain, no change of the positions reduces the elongations. Bodies then slide
-        until friction balances the springs; otherwise they move by the elongations, and further until the first gap of
-        the `solution` closes. The largest elongation that the linear response leaves is returned as well; it is infinite if
-        bodies slide, which the linear response does not describe.
+        until friction balances the springs, if that is farther than the elongations; otherwise they move by the elongations,
+        and further until the first gap of the `solution` closes. The largest elongation that the linear response leaves is
+        returned as well; it is infinite if bodies slide, which the linear response does not describe.
         """
         relaxed, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
         remaining = largest(elongation - self.stretched @ relaxed)
@@ -122,7 +122,7 @@ class Freed:
             U, s, V = np.linalg.svd(self.stretched)
             firm = s > WEAK
             slide = self._slide(V[~firm].T, elongation, solution, sliding)
-            if slide.any():
+            if largest(slide) > largest(elongation):
                 return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), np.inf
         change = -relaxed
         if unrestrained:

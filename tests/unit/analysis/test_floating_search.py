@@ -235,3 +235,22 @@ def test_a_soft_penalty_holds_a_stiff_block(penalty):
         warnings.simplefilter("ignore", fc.FastcontactWarning)  # of the penetration
         step = fc.solve(model, 1)[-1]
     np.testing.assert_allclose(-step.displacement[:, 1], 1e-3 / penalty, rtol=1e-6, atol=1e-8)
+
+
+def test_a_nearly_incompressible_ring_that_friction_holds_by_few_sliding_points_settles():
+    """Three walls of a groove: points that slide by round-off must not replace Newton's method."""
+    mesh = fc.generate.block((4.0, 4.0), (8, 8), "quad8", (20.0, 0.0))
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=10.0, nu=0.4995))
+    lid, ramp = {"motion": {"y": -0.1}}, [(0, 0), (1, 1), (2, 1)]
+    for side, point, normal, motion in (
+        ("TOP", (0.0, 4.0), (0.0, -1.0), lid), ("BOTTOM", (0.0, 0.0), (0.0, 1.0), {}), ("LEFT", (20.0, 0.0), (1.0, 0.0), {}),
+    ):  # fmt: skip
+        wall = fc.obstacles.HalfSpace(point=point, normal=normal)
+        model.add_obstacle(side.lower(), secondary=side, obstacle=wall, friction=0.3, ramp=ramp, **motion)
+    model.add_pressure("RIGHT", 0.2, ramp=[(0, 0), (1, 0), (2, 1)])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fc.FastcontactWarning)
+        contact = fc.solve(model, [0.25 * k for k in range(1, 9)])[-1].contact
+    total = sum(pair.force[1] for pair in contact.values())
+    assert abs(total) < 1e-6 * contact["top"].normal_force
