@@ -86,8 +86,8 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
     )
 
 
-def friction_exceeded(bodies: FloatingBodies, factor: float, coefficients: Array) -> str:
-    """Return the message for loads beyond the friction cone, which `factor` times the `coefficients` would hold."""
+def friction_exceeded(factor: float, bodies: list[str], coefficients: Array) -> str:
+    """Return the message for loads that move `bodies`, which `factor` times the friction `coefficients` would hold."""
     distinct = np.unique(coefficients[coefficients > 0.0])
     values = factor * distinct[0], distinct[0]
     digits = next((n for n in range(3, 12) if f"{values[0]:.{n}g}" != f"{values[1]:.{n}g}"), 12)
@@ -97,7 +97,7 @@ def friction_exceeded(bodies: FloatingBodies, factor: float, coefficients: Array
         else f"about {factor:.3g} times the coefficients given, which are from {distinct[0]:.3g} to {distinct[-1]:.3g}"
     )
     return (
-        f"friction cannot hold {', '.join(bodies.motions.by_body())} against the loads: this would require {needed}. Lower "
+        f"friction cannot hold {', '.join(bodies)} against the loads: this would require {needed}. Lower "
         "the loads along the contact, press harder, or support the bodies along the contact"
     )
 

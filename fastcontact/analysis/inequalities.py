@@ -264,8 +264,8 @@ def _with_floating_bodies(
         return solution
 
     def failure(text: str, **options: bool) -> ConvergenceError:
-        coefficient = needed_friction(constraints, modes, iterate.u, *loads)
-        text = text if coefficient is None else friction_exceeded(bodies, coefficient, constraints.friction)
+        needed = needed_friction(constraints, bodies.motions, iterate.u, *loads)
+        text = text if needed is None else friction_exceeded(*needed, constraints.friction)
         text += loose_bolts(problem.model.pretensions, modes, step.load.force.reshape(problem.shape))
         return ConvergenceError(text, iterate.history, **options)
 

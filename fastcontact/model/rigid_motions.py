@@ -346,36 +346,43 @@ def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | Non
     size : float
         Size of the model [length].
     """
+    stop = _farthest(gaps, gap, work, size)
+    return None if np.abs(stop).max() > 0.99 * FAR else stop * size
+
+
+def _farthest(gaps: Array, gap: Array, work: Array, size: float) -> Array:
+    """Return the amplitudes of `stopped_at` relative to `size`, which are at most FAR [-]."""
     if not work.any():
         return np.zeros(len(work))
     rows = np.abs(gaps).max(axis=1, initial=0.0) > ZERO
     open_by = np.maximum(gap[rows], 0.0) / size
-    stop = _extreme(work / np.abs(work).max(), gaps[rows], open_by, np.empty((0, len(work))), FAR)
-    return None if np.abs(stop).max() > 0.99 * FAR else stop * size
+    return _extreme(work / np.abs(work).max(), gaps[rows], open_by, np.empty((0, len(work))), FAR)
 
 
-def needed_friction(constraints: Constraints, motions: Array, u: Array, work: Array, size: float) -> float | None:
-    """Return the smallest factor on the coefficients of friction with which rigid bodies are stopped [-].
+def needed_friction(
+    constraints: Constraints, motions: FreeMotions, u: Array, work: Array, size: float
+) -> tuple[float, list[str]] | None:
+    """Return the smallest factor on the coefficients of friction with which rigid bodies are stopped [-], and which slide.
 
     Returns None if the given coefficients suffice even with the pyramid inscribed in Coulomb's cone, or if no factor up to
-    MOST_FRICTION suffices. `motions` (n_dofs, k) are the rigid-body motions, and `u` (n_dofs,) the displacements [length];
-    `work` and `size` are as in `stopped_at`.
+    MOST_FRICTION suffices. `u` (n_dofs,) are the displacements [length]; `work` and `size` are as in `stopped_at`.
     """
     if not constraints.friction.any():
         return None
     inscribed = 1.0 if len(constraints.tangents) == 1 else np.cos(np.pi / EDGES)
     low, high = inscribed, MOST_FRICTION
 
-    def stops(factor: float) -> bool:
+    def slide(factor: float) -> Array:
         rows, gap0 = resisting(constraints, factor)
-        return stopped_at(rows @ motions, gap0 + rows @ u, work, size) is not None
+        stop = _farthest(rows @ motions.displacement, gap0 + rows @ u, work, size)
+        return np.where(np.abs(stop) > 0.99 * FAR, stop, 0.0)
 
-    if stops(low) or not stops(high):
+    if not slide(low).any() or slide(high).any():
         return None
     while high > 1.001 * low:
         middle = float(np.sqrt(low * high))
-        low, high = (low, middle) if stops(middle) else (middle, high)
-    return high / inscribed
+        low, high = (middle, high) if slide(middle).any() else (low, middle)
+    return high / inscribed, list(motions.combined(slide(low)[:, None]).by_body())
 
 
 def _extreme(along: Array, gaps: Array, gap: Array, held: Array, bound: float) -> Array:
