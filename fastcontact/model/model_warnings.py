@@ -62,7 +62,7 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     texts = [*_moduli(model), *_named_units(model), *_proportions(model, float(motion.max())), poorest_cell(model.mesh)]
     texts += [hanging_nodes_warning(model), _coincident(model), *_friction(model), *_penetrating(model, pairs, motion)]
     texts += [*_unramped(model, ramp), *prescribed_overlap_warnings(pairs, supports), *_lost_loads(model)]
-    texts += [*_split_sides(model, pairs), *_wetted_twice(model), _stiffness(model.mesh)]
+    texts += [*_split_sides(model, pairs), *_different_ends(model), *_wetted_twice(model), _stiffness(model.mesh)]
     texts += [text for load in model.loads for text in _load_integral(model, load)]
     return [text for text in texts if text]
 
@@ -79,6 +79,17 @@ def _split_sides(model: Model, pairs: Pairs) -> Iterator[str]:
     return split_side_warnings(
         [(pair, bound) for pair, bound in pairs if pair.primary and np.isin(nodes[pair.name], common).any()]
     )
+
+
+def _different_ends(model: Model) -> Iterator[str]:
+    """Yield a warning for each contact with nodes at one end of a sector that coincide with no node of the other end."""
+    for (name, nodes), pair in itertools.product(model.interpolated.items(), model.contact):
+        count = len(np.intersect1d(nodes, model.mesh.points_of(pair.secondary)))
+        if count:
+            yield (
+                f"{count} nodes of contact '{pair.name}' at the ends of {name} coincide with no node of the other end: "
+                "pressures near them may be wrong by as much as their mean. Use equal meshes where contact meets the ends"
+            )
 
 
 def _lost_loads(model: Model) -> Iterator[str]:

@@ -32,7 +32,8 @@ class PeriodicInterface(NamedTuple):
     """Coincident nodes of the two ends of a periodic part, `first` (m,) and `second` (m,).
 
     In a ring of several `sectors`, vectors at a second node are those at the first node times `turn` (dim, dim), the matrix
-    of `rotation`; the constraint `relation` enforces this for displacements. These three are None without a rotation.
+    of `rotation`; the constraint `relation` enforces this for displacements. These three are None without a rotation, and
+    `relation` is None, too, if other nodes of the ends do not coincide and are tied to facets.
     """
 
     first: Indices
@@ -99,8 +100,8 @@ def periodic(
 
 def cyclic(
     mesh: Mesh, ends: tuple[str, str], sectors: int, origin: Sequence[float], direction: Sequence[float]
-) -> tuple[list[MultiPointConstraint], PeriodicInterface | None]:
-    """Return the constraints of the two ends of a sector, and the nodes that they tie, or None if nodes are tied to facets.
+) -> tuple[list[MultiPointConstraint], PeriodicInterface]:
+    """Return the constraints of the two ends of a sector, and their coincident nodes.
 
     Parameters
     ----------
@@ -128,15 +129,16 @@ def cyclic(
     )
     match, distance, tolerance = coincident(mesh, (ends[0], first), (ends[1], second), turn, shift)
     far = int(np.argmax(distance))
-    if len(first) == len(second) == len(np.unique(match)) and distance[far] <= tolerance:
-        interface = PeriodicInterface(first, second[match], turn, rotation, sectors)
+    same = distance <= tolerance
+    interface = PeriodicInterface(first[same], second[match[same]], turn, rotation, sectors)
+    if len(first) == len(second) == len(np.unique(match)) and same.all():
         relation = MultiPointConstraint(name, turned_rows(interface, 1.0, mesh))
         return [relation], interface._replace(relation=relation)
     dependent, facets = (ends[0], ends[1]) if len(first) >= len(second) else (ends[1], ends[0])
     if all(mesh.cells_of(end, dim=mesh.dim - 1) for end in ends):
         for sign in (1.0, -1.0):
             if (rows := _rows_to_facets(mesh, dependent, facets, rotation, sign)) is not None:
-                return [MultiPointConstraint(name, _without_zeros(rows))], None
+                return [MultiPointConstraint(name, _without_zeros(rows))], interface
     raise ModelError(
         f"{name}: point {first[far]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[far]:.3g} from the "
         f"nearest node of '{ends[1]}', and the groups do not consist of facets that coincide: check axis and sectors"

@@ -47,7 +47,7 @@ class Sectors:
     @classmethod
     def of(cls, model: Model) -> Sectors | None:
         """Return the sectors of a model; None without cyclic symmetry. ModelError if axes or numbers of sectors differ."""
-        periodic_interfaces = [interface for interface in model.periodic_interfaces if interface.turn is not None]
+        periodic_interfaces = [interface for interface in model.periodic_interfaces if interface.relation is not None]
         if not periodic_interfaces:
             return None
         first = periodic_interfaces[0]

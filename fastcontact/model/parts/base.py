@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 from fastcontact._jit import ahead
 from fastcontact._tools.argument_types import finite_vector, typed
 from fastcontact._tools.units import named_units
-from fastcontact.arrays import AnyArray, Array, Mask, Numbers
+from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.elasticity.incompatible_modes import BENDING
 from fastcontact.elasticity.initial_states import InitialState
@@ -145,7 +145,7 @@ class ModelBase(Suggesting):
         self.related_supports: list[tuple[str, MultiPointConstraint]] = []  # supports by group, as constraints
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
-        self.interpolated: list[str] = []  # cyclic symmetries whose nodes are tied to facets
+        self.interpolated: dict[str, Indices] = {}  # nodes of cyclic symmetries without a counterpart, tied to facets
         self.periodic_interfaces: list[PeriodicInterface] = []  # coincident nodes of periodic parts
         self.contact: list[ContactPair] = []
 

@@ -297,10 +297,11 @@ class ModelConnections(ModelInitialStates):
             )
         relations, interface = cyclic(self.mesh, (first, second), sectors, point, axis)
         self.relations.extend(relations)
-        if interface is None:
-            self.interpolated.append(name)
-        else:
+        if len(interface.first):
             self.periodic_interfaces.append(interface)
+        if interface.relation is None:
+            nodes = np.union1d(*(self.mesh.points_of(end) for end in (first, second)))
+            self.interpolated[name] = np.setdiff1d(nodes, interface[:2])
 
     def relate(
         self, terms: Iterable[tuple[str | int, str, float]], value: float = 0.0, *, ramp: History = None

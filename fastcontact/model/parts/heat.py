@@ -214,7 +214,9 @@ class ModelHeat(ModelBase):
         if self.temperatures:
             raise ModelError("temperatures are both given by add_temperature and conducted: use fix_temperature")
         if self.interpolated:
-            raise ModelError(f"{self.interpolated[0]} connects different meshes and conducts no heat: use equal ones")
+            raise ModelError(
+                f"{next(iter(self.interpolated))} connects different meshes and conducts no heat: use equal ones"
+            )
         self.conduction().check()
         without_expansion = [material for material, _ in self.materials if material.expansion is None]
         if self.expands and without_expansion:
