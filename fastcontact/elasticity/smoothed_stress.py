@@ -50,6 +50,7 @@ def smoothed_stress(
     for number in np.unique(np.concatenate([*material.values()])):
         average = recovery.NodalAverage(mesh.n_points, components)
         rows_of_material = {name: np.flatnonzero(material[name] == number) for name in at_nodes}
+        rows_of_material = {name: rows for name, rows in rows_of_material.items() if len(rows)}
         for name, rows in rows_of_material.items():
             xi, extrapolation = sampling(name)
             cells = mesh.cells[name][rows]

@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from models import united
 
 import fastcontact as fc
 from fastcontact.analysis.load_step import load_step
@@ -129,3 +130,16 @@ def test_the_comparison_leaves_nothing_behind_in_the_solver(linear_solver):
     before = repr(problem.solver.snapshot())
     assert locking_warning(problem, state.u)
     assert repr(problem.solver.snapshot()) == before
+
+
+def test_a_material_without_cells_of_the_element_with_incompatible_modes():
+    """The recovery of stresses raised a ValueError."""
+    lower, upper = fc.generate.block((4.0, 0.5), (8, 2)), fc.generate.block((1.0, 1.0), (2, 2), "quad8", (1.5, 0.5))
+    model = fc.Model(united(L_=lower, U_=upper), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.2, incompatible_modes=True), "L_BLOCK")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.25), "U_BLOCK")
+    model.fix("L_BOTTOM", "xy")
+    model.fix("U_LEFT", "x")
+    model.add_pressure("U_TOP", 1.0)
+    model.add_contact("c", secondary="U_BOTTOM", primary="L_TOP")
+    assert fc.solve(model, 1)[-1].contact["c"].force == pytest.approx([0.0, 1.0], abs=1e-3)
