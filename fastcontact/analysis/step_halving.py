@@ -13,10 +13,14 @@ from dataclasses import replace
 import numpy as np
 
 from fastcontact.analysis.convergence_messages import friction_used, limit_load
-from fastcontact.analysis.load_step import load_step
+from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.load_step import load_step, prepare_start
+from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
+from fastcontact.arrays import largest
 from fastcontact.errors import ConvergenceError
+from fastcontact.model.checks import facet_lengths
 from fastcontact.results.step import StepResult
 
 log = logging.getLogger("fastcontact")
@@ -56,7 +60,10 @@ def _substeps(
     if halved >= state.halved or not begin < middle < end:
         try:
             after, result = load_step(problem, state, index, end)
-            if last or not _slides_while_touching(problem, state, after):
+            unique = last or not (
+                _slides_while_touching(problem, state, after) or _has_two_equilibria(problem, state, after, index)
+            )
+            if unique:
                 if problem.bodies is not None:  # how many times the next step is halved before its first attempt
                     few = len(result.iterations["history"]) <= FEW
                     after = replace(after, halved=max(halved - few, 0))
@@ -92,6 +99,32 @@ def _slides_while_touching(problem: Problem, state: State, after: State) -> bool
     if allowed is None or problem.bodies is None or state.work is None or after.work is None:
         return False
     return after.work.touching - state.work.touching > allowed * after.work.friction
+
+
+def _has_two_equilibria(problem: Problem, state: State, after: State, index: int) -> bool:
+    """Return whether the step has another equilibrium, in which bodies pass each other or slide instead of sticking.
+
+    It is sought from the equilibrium without friction. Smaller steps find which of them the load path leads to. Steps that
+    begin with contact, and those in which contact surfaces move by less than the smallest facet, are regarded as unique.
+    """
+    pairs = {name: pair for name, pair in problem.pairs.items() if pair.friction and not pair.options.tied}
+    closed = [any(mask.any() for mask in ends.active.values()) for ends in (state, after)]
+    if not pairs or closed != [False, True]:
+        return False
+    zero = np.zeros(problem.model.mesh.dim)
+    poses = [np.stack([ends.obstacles.get(name, zero) for name in pairs]) for ends in (state, after)]
+    motion = max(largest((after.u - state.u)[problem.contact_dofs]), largest(poses[1] - poses[0]))
+    if motion < min(float(facet_lengths(pair).min()) for pair in pairs.values()):
+        return False
+    load = problem.load_at(after.instant)
+    problem.solver.put_back(state.solver)
+    begin, frictionless = prepare_start(problem, state, index, load), dict.fromkeys(pairs, 0.0)
+    smooth = replace(load, friction_factors={**load.friction_factors, **frictionless})
+    try:
+        u = newton(begin, load, newton(replace(begin, load=smooth), smooth)).u
+    except ConvergenceError:
+        return False
+    return largest(u - after.u) > NOTABLE * largest(after.u - state.u)
 
 
 def _summed(substeps: list[StepResult]) -> StepResult:

@@ -129,8 +129,8 @@ class ContactMiddle:
         Whether arc lengths are counted in the opposite direction of the line.
     direction : ndarray (dim,), optional
         Direction of the line from which distances are measured [-].
-    ignored : tuple of int
-        Coordinates along which the model represents an infinite surface.
+    ignored : tuple of ndarray (dim,)
+        Unit vectors along which the model represents an infinite surface [-].
     tangent : ndarray (dim,), optional
         Direction along which half-widths are measured [-]. If None, as for a middle on the axis, in 3D, and on a ring that
         is in contact along its whole circumference, half-widths are measured by `places`.
@@ -141,7 +141,7 @@ class ContactMiddle:
     start: float = 0.0
     reversed: bool = False
     direction: Array | None = None
-    ignored: tuple[int, ...] = ()
+    ignored: tuple[Array, ...] = ()
     tangent: Array | None = None
 
     def places(self, positions: Array) -> Array:
@@ -152,9 +152,8 @@ class ContactMiddle:
                 along -= self.line.length * np.round(along / self.line.length)
             return -along if self.reversed else along
         arm = positions - self.position
-        arm[:, list(self.ignored)] = 0.0
-        if self.direction is not None:
-            arm -= (arm @ self.direction)[:, None] * self.direction
+        for direction in (*self.ignored, *(() if self.direction is None else (self.direction,))):
+            arm -= (arm @ direction)[:, None] * direction
         return np.asarray(np.linalg.norm(arm, axis=1))
 
 
@@ -193,20 +192,21 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     return _in_space(points, weight, planes, mean)
 
 
-def _in_space(points: Array, weight: Array, planes: list[tuple[int, Indices]], mean: Array) -> ContactMiddle:
+def _in_space(points: Array, weight: Array, planes: list[tuple[Array, Indices]], mean: Array) -> ContactMiddle:
     """Return the middle on a surface in 3D; parallel planes of symmetry at both ends represent an infinite surface."""
-    centre = weight @ points
-    ends: dict[int, list[float]] = {}
+    centre, single, ignored = weight @ points, list[tuple[Array, float]](), list[Array]()
     for axis, nodes in planes:
-        ends.setdefault(axis, []).append(float(points[nodes, axis].mean()))
-    ignored = tuple(axis for axis, values in ends.items() if len(values) > 1)
-    if len(ignored) >= 2:
-        ignored = ()
-    for axis, values in ends.items():
-        if len(values) == 1:
-            centre[axis], mean[axis] = values[0], 0.0
+        if sum(axis is other for other, _ in planes) == 1:
+            single.append((axis, float(points[nodes].mean(axis=0) @ axis)))
+        elif not any(axis is other for other in ignored):
+            ignored.append(axis)
+    if single:
+        axes, values = np.stack([axis for axis, _ in single]), np.array([value for _, value in single])
+        onto_planes = np.linalg.pinv(axes)
+        centre, mean = centre + onto_planes @ (values - axes @ centre), mean - onto_planes @ (axes @ mean)
     length = float(np.linalg.norm(mean))
-    return ContactMiddle(centre, direction=mean / length if length > FACING else None, ignored=ignored)
+    direction = mean / length if length > FACING else None
+    return ContactMiddle(centre, direction=direction, ignored=tuple(ignored) if len(ignored) < 2 else ())
 
 
 def _radius_is_monotone(surface: Surface, coordinates: Array) -> bool:
@@ -218,8 +218,8 @@ def _radius_is_monotone(surface: Surface, coordinates: Array) -> bool:
     return bool(steps.min() >= -noise or steps.max() <= noise)
 
 
-def symmetry_planes(pair: Formulation) -> list[tuple[int, Indices]]:
-    """Return, for each plane of symmetry at an end of a surface, the axis normal to it and the nodes of the surface on it.
+def symmetry_planes(pair: Formulation) -> list[tuple[Array, Indices]]:
+    """Return, for each plane of symmetry at an end of a surface, its unit normal (dim,) and the nodes of the surface on it.
 
     Supports prescribe zero displacement along its normal, and the opposite body does not extend beyond the plane.
     """
@@ -227,22 +227,42 @@ def symmetry_planes(pair: Formulation) -> list[tuple[int, Indices]]:
     if motions is None:
         return []
     points, opposite = coordinates[surface.points], coordinates[pair.primary.points]
-    held = np.diagonal(motions.at(surface.points), axis1=1, axis2=2) >= TOGETHER**2
-    held &= ~motions.driven[surface.points]
+    held, driven = motions.at(surface.points), motions.driven[surface.points]
+    partly_held = np.trace(held, axis1=1, axis2=2) < points.shape[1] - 0.5
     tolerance, planes = SINGLE_PRECISION * float(np.ptp(points, axis=0).max()), []
-    across = np.abs(nodal_normals(surface, coordinates)) < LEANING  # otherwise the plane does not cut the surface
-    for axis in range(points.shape[1]):
-        x = points[:, axis]
+    normals = nodal_normals(surface, coordinates)
+    for axis in _held_directions(held[partly_held]):
+        x = points @ axis
         if np.ptp(x) <= 10 * tolerance:
             continue
+        on_plane = partly_held & (np.einsum("d,nde,e->n", axis, held, axis) >= TOGETHER**2)
+        on_plane &= ~driven[:, np.abs(axis) > SINGLE_PRECISION].any(axis=1)
+        on_plane &= np.abs(normals @ axis) < LEANING  # otherwise the plane does not cut the surface
         for end, outward in ((x.min(), -1.0), (x.max(), 1.0)):
-            if (outward * (opposite[:, axis] - end) > 10 * tolerance).any():
+            if (outward * (opposite @ axis - end) > 10 * tolerance).any():
                 continue
-            on_end = np.abs(x - end) <= tolerance
-            nodes = np.flatnonzero(on_end & held[:, axis] & ~held.all(axis=1) & across[:, axis])
-            if len(nodes) and len(nodes) == np.count_nonzero(on_end & ~held.all(axis=1)):
-                planes.append((axis, nodes))
+            on_end = partly_held & (np.abs(x - end) <= tolerance)
+            if on_end.any() and on_plane[on_end].all():
+                planes.append((axis, np.flatnonzero(on_end)))
     return planes
+
+
+def _held_directions(projectors: Array) -> list[Array]:
+    """Return the distinct unit vectors (dim,) along which nodes are held, given their `projectors` (n, dim, dim).
+
+    If a node is held in several directions, those of other nodes are chosen first, then coordinate axes.
+    """
+    dim, directions = projectors.shape[1], list[Array]()
+    distinct = np.unique(np.round(projectors, 9).reshape(-1, dim * dim), axis=0).reshape(-1, dim, dim)
+    for P in distinct[np.argsort(np.trace(distinct, axis1=1, axis2=2), kind="stable")]:
+        inside = [n for n in [*directions, *np.eye(dim)] if np.linalg.norm(P @ n) > 1.0 - SINGLE_PRECISION]
+        for n in [*inside, *np.linalg.eigh(P)[1].T[::-1]]:
+            if (length := np.linalg.norm(P @ n)) > 0.5:
+                along = P @ n / length * (1.0 if n[np.argmax(np.abs(n))] > 0.0 else -1.0)
+                P = P - np.outer(along, along)
+                if not any(np.abs(along - known).max() <= SINGLE_PRECISION for known in directions):
+                    directions.append(along)
+    return directions
 
 
 def _weights(force: Array, gap: Array) -> Array:
@@ -259,7 +279,7 @@ def _weights(force: Array, gap: Array) -> Array:
 
 
 def _along_line(
-    surface: Surface, coordinates: Array, weight: Array, planes: list[tuple[int, Indices]], mean: Array
+    surface: Surface, coordinates: Array, weight: Array, planes: list[tuple[Array, Indices]], mean: Array
 ) -> ContactMiddle:
     """Return the middle on a surface in a plane model; a surface in several pieces is projected along its mean normal."""
     points, length = coordinates[surface.points], float(np.linalg.norm(mean))
@@ -273,6 +293,6 @@ def _along_line(
         ends = lengths[on_plane]  # both ends of a half ring lie on the plane
         start = float(ends[np.argmin(np.abs(ends - weight @ lengths))])
         backward = start > 0.5 * (lengths.min() + lengths.max())
-        return ContactMiddle(line.at(start), line, start, backward, tangent=np.eye(2)[axis])
+        return ContactMiddle(line.at(start), line, start, backward, tangent=axis)
     start = float(weight @ lengths)
     return ContactMiddle(line.at(start), line, start, tangent=tangent if length > FACING else None)

@@ -134,7 +134,8 @@ def _nodal_means(side: Surface, values: Sequence[Array], angles: Sequence[Array]
     weighted = [(angle[:, :, None] * normals).reshape(-1, dim) for normals, angle in zip(values, angles, strict=True)]
     total: Array = np.column_stack([np.bincount(at, component, n) for component in np.concatenate(weighted).T])
     side.add_across_ends(total)
-    return total / np.linalg.norm(total, axis=1, keepdims=True)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.divide(total, length, out=np.zeros_like(total), where=length > 0.0)  # facets may degenerate to points
 
 
 def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:

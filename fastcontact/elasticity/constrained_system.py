@@ -97,7 +97,9 @@ class ConstrainedMotion:
         values = np.concatenate(right_sides)
         conditions, known = self._elimination.conditions, np.concatenate([held, values])
         violation = np.abs(conditions @ known)
-        violated = np.flatnonzero(violation > CONFLICT * (np.abs(conditions) @ np.abs(known)))
+        # Coefficients may be round-off, such as the cosine of a right angle.
+        allowed = np.maximum(CONFLICT * (np.abs(conditions) @ np.abs(known)), ROUND_OFF * largest(known))
+        violated = np.flatnonzero(violation > allowed)
         if len(violated):
             row = self._elimination.origin[violated[0]]
             ends = np.cumsum([relation.rows.shape[0] for relation in self.relations])

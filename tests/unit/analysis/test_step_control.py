@@ -267,3 +267,21 @@ def test_a_cell_that_turns_inside_out_is_told_with_its_measure() -> None:
     u[prepared.model.mesh.points_of("TOP"), 1] = -1.5
     with pytest.raises(fc.ConvergenceError, match=r"cell 0 of quad4 near \[0.5 0.5\] is inverted \(J = -0.5\)"):
         prepared.deformed(u.ravel(), prepared.initial_state(), None)
+
+
+@pytest.mark.parametrize(
+    ("strain", "friction", "end"), [("finite", 0.25, 0.3), ("finite", 0.25, 0.9), ("small", 0.5, 0.9)]
+)
+def test_a_beam_that_passes_a_disc_in_one_step_does_not_stick_to_it(strain, friction, end):
+    """The equilibrium of a jammed beam exists, too, with a force of up to 1200."""
+    element, n = ("quad8", (3, 34)) if strain == "small" else ("quad4", (2, 12))
+    beam = block((1.5, 17.0), n, element, (0.0, -17.0)).merged_groups("SIDE", ["LEFT", "BOTTOM"])
+    model = fc.Model(beam, "plane_stress", strain=strain)
+    model.add_material(fc.LinearElastic(E=2600.0, nu=0.38))
+    model.prescribe("TOP", x=0.0, y=-9.0)
+    disc = fc.obstacles.Sphere((-0.7, -20.0), 0.5)
+    model.add_obstacle("c", secondary="SIDE", obstacle=disc, friction=friction)
+    with pytest.warns(fc.FastcontactWarning, match="never closed"):
+        (step,) = fc.solve(model, [end])
+    assert not step.contact["c"].force.any()
+    assert len(step.iterations["substeps"]) > 1

@@ -139,15 +139,34 @@ def test_a_closed_line_is_cut_open_opposite_to_the_contact():
     np.testing.assert_allclose(line.at(0.5 * line.length), [2.0, 0.0], atol=1e-9)
 
 
-@pytest.mark.parametrize("quarter", [True, False], ids=["quarter", "whole"])
+@pytest.mark.parametrize("degrees", [0.001, 30.0, 90.0])
+def test_planes_of_symmetry_may_be_inclined(degrees):
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    straight, turned = [], []
+    for angle, (x, y), results in ((0.0, (1.0, 0.0), straight), (degrees, (c, s), turned)):
+        mesh = fc.generate.transformed(fc.generate.cylinder_on_block("quad4", contact_size=1.0), rotate=angle)
+        model = elastic_model(mesh, BLOCK_BOTTOM="xy", CYLINDER_TOP={"x": 0.1 * y, "y": -0.1 * x})
+        model.fix("AXIS", "x", axes=(x, y))
+        model.add_contact("c", secondary="CONT_CYLINDER", primary="CONT_BLOCK")
+        contact = fc.solve(model, 1)[-1].contact["c"]
+        results += [*contact.radius, *contact.middle, contact.tangent @ (x, y)]
+    assert turned == pytest.approx(straight, abs=1e-6)
+    assert straight[2:] == pytest.approx([0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("quarter", [True, False, "turned"], ids=["quarter", "whole", "turned"])
 def test_in_space_distances_are_from_the_centre_of_pressure_or_the_planes_of_symmetry(quarter):
     low, size = (0.0, 1.0) if quarter else (-1.0, 2.0)
     n = 8 if quarter else 16
     at = np.array([20.0, -5.0, 3.0])
     mesh = fc.generate.box((size, size, 1.0), (n, n, 4), "hex8", (at[0] + low, at[1] + low, at[2] - 1.0))
+    if quarter == "turned":
+        x, y = mesh.points[:, 0] - at[0], mesh.points[:, 1] - at[1]
+        points = np.column_stack([at[0] + 0.8 * x - 0.6 * y, at[1] + 0.6 * x + 0.8 * y, mesh.points[:, 2]])
+        mesh = mesh.replace(points=points)
     model = elastic_model(mesh, "3d", E=E)
     if quarter:
-        supported(model, XMIN="x", YMIN="y", ZMIN="z")
+        supported(model, XMIN="normal", YMIN="normal", ZMIN="z")
     else:
         model.fix("ZMIN", "xyz")
     ball = fc.obstacles.Sphere(centre=(at[0], at[1], at[2] + 3.0), R=3.0)

@@ -198,6 +198,14 @@ def test_a_support_that_contradicts_a_normal_one_is_told():
 
 
 # ----------------------------------------------------------------------------- supports along axes
+def test_a_cosine_that_is_round_off_contradicts_no_support():
+    model = model_of(block(2))
+    c, s = np.cos(np.pi / 2), np.sin(np.pi / 2)
+    model.fix("LEFT", "x", axes=(c, s))
+    supported(model, BOTTOM="y", TOP={"x": 0.1 * s, "y": -0.1 * c})
+    assert last(model).displacement[:, 1] == pytest.approx(0.0, abs=1e-12)
+
+
 @pytest.mark.parametrize("element", ["tri3", "quad8", "tet10", "hex8"])
 def test_supports_along_axes_turn_with_the_body(element):
     dim, Q, held, moved, straight, turned = pair_of(element)
