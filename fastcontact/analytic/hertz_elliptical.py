@@ -90,10 +90,8 @@ def _ratio_of_axes(ratio_of_radii: float) -> float:
         raise ModelError(
             f"the relative radii differ by a factor of {ratio_of_radii:g}: use hertz_line for line contact"
         )
-    logarithm = math.log(ratio_of_radii)
-    return math.exp(
-        brentq(lambda x: math.log(_ratio_of_radii(math.exp(x))) - logarithm, math.log(_FLATTEST), 0.0, xtol=1e-15)
-    )
+    logarithm, interval = math.log(ratio_of_radii), (math.log(_FLATTEST), 0.0)
+    return math.exp(brentq(lambda x: math.log(_ratio_of_radii(math.exp(x))) - logarithm, *interval, xtol=1e-15))
 
 
 def _solve(bodies: Bodies, R_x: float, R_y: float, name: str, value: float) -> HertzElliptical:

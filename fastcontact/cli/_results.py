@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact._tools import toml_text
-from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
+from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cli._terminal import say
 from fastcontact.errors import CaseError, check_known
 
@@ -97,13 +97,6 @@ def pressure_curves(
     if approach is None and not hasattr(theory, "at_force"):
         return {curve.name: theory}
     return compared(curve.name, theory, contact, theories["share"], approach=approach, load=load)
-
-
-def curve_of(theory: Any) -> PressureCurve:
-    """Return the pressure curve of a theory that `pressure_curves` has returned."""
-    curve = pressure_curve(theory)
-    assert curve is not None
-    return curve
 
 
 def compared(

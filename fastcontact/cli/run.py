@@ -140,10 +140,9 @@ def _solved(
 
     if options.estimate_error:
         from fastcontact.studies.error_norms import estimate_error
-    fields, large = (ERROR_FIELD,) if options.estimate_error else (), case.model.mesh.n_points >= LARGE
-    with ResultWriter(
-        output, case.model, case_text=case.text, cell_fields=fields, resume=options.resume, background=large
-    ) as writer:
+    fields = (ERROR_FIELD,) if options.estimate_error else ()
+    settings = {"cell_fields": fields, "resume": options.resume, "background": case.model.mesh.n_points >= LARGE}
+    with ResultWriter(output, case.model, case_text=case.text, **settings) as writer:
         _check_same(case, writer.done, output)
         last = writer.done[-1] if writer.done else None
         done = [(of_step(step), step.warnings) for step in writer.done]  # each step, which may be large, is read once

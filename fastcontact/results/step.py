@@ -483,11 +483,10 @@ class StepResult(Suggesting):
     def shown(self) -> dict[str, str]:
         """Names and values of the load factor, the largest displacement and stress, and the iterations, for reprs."""
         displacement, stress = (float(np.abs(field).max(initial=0.0)) for field in (self.displacement, self.von_mises))
+        units = {} if "parameter" in self.iterations else self.units
         shown = {
             self.iterations.get("parameter", "load factor"): f"{self.load_factor:.6g}",
-            "largest displacement": with_unit(
-                f"{displacement:.6g}", {} if "parameter" in self.iterations else self.units, "length"
-            ),
+            "largest displacement": with_unit(f"{displacement:.6g}", units, "length"),
             "largest von Mises stress": with_unit(f"{stress:.6g}", self.units, "pressure"),
         }
         labels = {"geometry_updates": "geometry updates", "active_set_iterations": "active-set iterations"}
