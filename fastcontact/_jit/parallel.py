@@ -35,8 +35,8 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_pool.cache_clear)  # threads do not survive a fork
 
 
-def shared(work: Callable[[Part], Result], parts: Sequence[Part]) -> list[Result]:
-    """Return the results of `work` on all parts: on the first in this thread, on each other part in another thread."""
+def parallel_map(work: Callable[[Part], Result], parts: Sequence[Part]) -> list[Result]:
+    """Return the results of `work` for all parts: the first in this thread, each other one in another thread."""
     if len(parts) == 1:
         return [work(parts[0])]
     others = [_pool().submit(work, part) for part in parts[1:]]
@@ -47,7 +47,7 @@ def shared(work: Callable[[Part], Result], parts: Sequence[Part]) -> list[Result
     return [first, *(other.result() for other in others)]
 
 
-def spread(kernel: Any, count: int, work: float, *arguments: Any) -> None:
+def parallel_for(kernel: Any, count: int, work: float, *arguments: Any) -> None:
     """Call ``kernel(low, high, *arguments)`` for ranges that together cover 0 to `count`, each in a thread.
 
     `work` is the work per row or cell, see `portions`; 0 for rows that must be computed in order.
@@ -55,7 +55,7 @@ def spread(kernel: Any, count: int, work: float, *arguments: Any) -> None:
     if count * work <= WORTHWHILE:
         kernel(0, count, *arguments)
     else:
-        shared(lambda portion: kernel(*portion, *arguments), portions(count, work))
+        parallel_map(lambda portion: kernel(*portion, *arguments), portions(count, work))
 
 
 @cache

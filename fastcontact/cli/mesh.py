@@ -8,7 +8,7 @@ import typing
 from collections.abc import Callable
 from typing import Any
 
-from fastcontact.cli._arguments import add_loudness, declare
+from fastcontact.cli._arguments import add_verbosity, declare
 from fastcontact.cli._outputs import check_outputs, say_written
 from fastcontact.cli._terminal import say
 
@@ -28,7 +28,7 @@ def add_generators(parser: argparse.ArgumentParser) -> None:
         subparser = kinds.add_parser(name, help=doc.splitlines()[0], description=doc, formatter_class=LINE_BREAKS)
         options = (_option(generator, parameter) for parameter in inspect.signature(generator).parameters.values())
         declare(subparser, {**OUTPUT, **dict(options)})
-        add_loudness(subparser, default=argparse.SUPPRESS)  # keeps -q and -v given before the name
+        add_verbosity(subparser, default=argparse.SUPPRESS)  # keeps -q and -v given before the name
 
 
 def _option(generator: Callable[..., Any], parameter: inspect.Parameter) -> tuple[str, Any]:

@@ -212,7 +212,7 @@ def append_tables(
     _set_row(file["fastcontact/steps"], number, np.array(row, layout.STEP_ROW))
 
 
-def append_rows(file: OpenObjects, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
+def append_offsets(file: OpenObjects, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
     """Write the rows of step `number` in which viewers find the positions of fields."""
     rows = {"Values": step.load_factor, "NumberOfParts": 1, "PartOffsets": 0, "CellOffsets": 0}
     for name, value in {**rows, "PointDataOffsets/displacement": number * mesh.n_points}.items():

@@ -419,7 +419,7 @@ def test_a_step_interrupted_half_way_can_be_written_again(path: Path, monkeypatc
     with ResultWriter(path, MESH) as out:
         out.write(step_result(0))
         with monkeypatch.context() as patch:
-            patch.setattr(write_arrays, "append_rows", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+            patch.setattr(write_arrays, "append_offsets", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
             with pytest.raises(KeyboardInterrupt):
                 out.write(step_result(4))
         assert len(open_results(path)) == 1

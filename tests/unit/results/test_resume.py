@@ -183,7 +183,7 @@ def test_what_a_dead_writer_left_of_a_step_is_written_over(path: Path, monkeypat
         steps = [_with_error(step_result(number)) for number in range(3)]
         out.write(steps[0])
         with monkeypatch.context() as patch:
-            patch.setattr(write_arrays, "append_rows", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+            patch.setattr(write_arrays, "append_offsets", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
             with pytest.raises(KeyboardInterrupt):
                 out.write(steps[2])
     with ResultWriter(path, MESH, cell_fields=("error",), resume=True) as out:
