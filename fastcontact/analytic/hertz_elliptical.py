@@ -101,10 +101,11 @@ def _solve(bodies: Bodies, R_x: float, R_y: float, name: str, value: float) -> H
     E_star, R_mean = bodies.E_star, math.sqrt(R_x * R_y)
     k = _ratio_of_axes(max(R_x, R_y) / min(R_x, R_y))
     integrals = math.sqrt(elliprd(0.0, 1.0, k**2) * elliprd(0.0, k**2, 1.0)) / 3.0
-    stiffness = 1.0 / (0.75 * R_mean / E_star * 4.0 / math.pi * k**1.5 * integrals)
-    pressure = 1.5 * stiffness / math.pi
+    # Quantities at a mean radius of 1, which grow with the powers in `laws`.
+    force = 1.0 / (0.75 * R_mean / E_star * 4.0 / math.pi * k**1.5 * integrals)
+    pressure = 1.5 * force / math.pi
     approach = pressure * math.sqrt(k) * float(ellipkm1(k**2)) / E_star
-    laws = {"mean": (1.0, 1.0), "approach": (approach, 2.0), "force": (stiffness, 3.0), "pressure_max": (pressure, 1.0)}
+    laws = {"mean": (1.0, 1.0), "approach": (approach, 2.0), "force": (force, 3.0), "pressure_max": (pressure, 1.0)}
     values = by_power_laws(laws, name, value)
     mean = values.pop("mean")
     axes = (mean / math.sqrt(k), mean * math.sqrt(k))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -32,7 +32,7 @@ def chosen_step(results: Any, number: int) -> Any:
     return results[number - 1]
 
 
-def chosen_contact(options: argparse.Namespace, step: Any) -> str:
+def chosen_contact(options: Namespace, step: Any) -> str:
     """Return the name of the contact pair that the options select, by default the first pair.
 
     If the first of several pairs is selected by default, the names of the others are printed. Raises CaseError if there is no

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ ARGUMENTS = {
 }
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Namespace) -> int:
     """Write the files of the options, or print the table if none is requested."""
     from fastcontact.results.reader import open_results
     from fastcontact.results.tables import contact_table, with_column, write_csv
