@@ -61,7 +61,7 @@ class CommittedFile(DriverFile):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         self.synchronised = False
-        interrupted = journal.found(self._file)  # changes of a writer that was killed or stopped by a power loss
+        interrupted = journal.pending(self._file)  # changes of a writer that was killed or stopped by a power loss
         for offset, data in interrupted:
             self._put(offset, data)
         self._pending: dict[int, bytes] = {}

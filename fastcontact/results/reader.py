@@ -163,7 +163,7 @@ class Results(StepSequence):
         self._raw: Any = open(path, "rb")  # noqa: SIM115
         self._file: Any = None
         try:
-            writes = journal.found(self._raw) if not is_being_written(self.path) or repeat else []
+            writes = journal.pending(self._raw) if not is_being_written(self.path) or repeat else []
             if writes:
                 self._raw = journal.Repeated(self._raw, writes)
             with self._explained():

@@ -359,9 +359,9 @@ class ContactResult(Suggesting):
     def force_parts(self) -> tuple[float, float, float]:
         """Magnitudes of `force` and of its normal and tangential parts [force]; without friction the last is zero."""
         normal = np.where(np.isfinite(self.normal), self.normal, 0.0)
-        part = np.einsum("nd,nd->n", self.force_vectors, normal) @ normal if self.shear.any() else self.force
-        part = np.where(self.force == 0.0, 0.0, part)  # radial forces of axisymmetric models balance each other
-        total, normal_part, tangential = np.linalg.norm([self.force, part, self.force - part], axis=1)
+        along = np.einsum("nd,nd->n", self.force_vectors, normal) @ normal if self.shear.any() else self.force
+        along = np.where(self.force == 0.0, 0.0, along)  # radial forces of axisymmetric models balance each other
+        total, normal_part, tangential = np.linalg.norm([self.force, along, self.force - along], axis=1)
         return float(total), float(normal_part), float(tangential)
 
     @property

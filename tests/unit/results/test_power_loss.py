@@ -133,7 +133,7 @@ def test_a_loss_of_power_costs_no_step(recorded, largest, shares, tmp_path: Path
                 crashed.write_bytes(disk.state(kept, int(random.choice([len(disk.safe), *disk.sizes]))))
                 tried += 1
                 with open(crashed, "rb") as file:
-                    repeated += bool(journal.found(file))
+                    repeated += bool(journal.pending(file))
                 with open_results(crashed) as results:
                     assert steps <= len(results) <= steps + 1
                     for number in {0, len(results) // 2, len(results) - 1} if len(results) else ():
@@ -164,7 +164,7 @@ def test_a_run_goes_on_after_a_loss_of_power(recorded, tmp_path: Path) -> None:
         for number in range(5, 7):
             out.write(nth_step(number))
     with open(crashed, "rb") as file:
-        assert not journal.found(file)
+        assert not journal.pending(file)
     assert_holds(crashed, 7, nth_step)
 
 
@@ -176,7 +176,7 @@ def test_a_journal_counts_whole_or_not_at_all(tmp_path: Path, damage: str) -> No
     data = b"CONTENTS" if damage == "data" else b"contents"
     path.write_bytes(data + {"cut": log[:-1], "changed": log[:3] + b"x" + log[4:]}.get(damage, log))
     with open(path, "rb") as file:
-        assert journal.found(file) == (writes if damage == "none" else [])
+        assert journal.pending(file) == (writes if damage == "none" else [])
 
 
 def test_changes_beyond_a_journal_are_made_in_turns(monkeypatch: pytest.MonkeyPatch) -> None:
