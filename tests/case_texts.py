@@ -38,51 +38,46 @@ COMING = (
 )
 
 
-def of_block(tables, kinematics="plane_stress", material="E = 1000.0\nnu = 0.3", steps=1, **held):
-    """Return a case file of the mesh ``block.med``, of one material, with groups held along axes, and further tables."""
-    supports = "".join(
-        f'[[support]]\ngroup = "{group}"\n' + "".join(f"{axis} = 0.0\n" for axis in axes)
-        for group, axes in held.items()
-    )
+def supports(**held):
+    """Return tables of supports, by group: the axes along which it is held, such as "xy", or its displacements by axis."""
+    tables = ""
+    for group, axes in held.items():
+        values = dict.fromkeys(axes, 0.0) if isinstance(axes, str) else axes
+        tables += f'[[support]]\ngroup = "{group}"\n' + "".join(f"{axis} = {u}\n" for axis, u in values.items())
+    return tables
+
+
+def contact_pair(secondary="CONT_UPPER", primary="CONT_LOWER", options="", name="pair"):
+    """Return the table of a contact pair, by default of the mesh "block-on-block"."""
+    return f'[contact.{name}]\nsecondary = "{secondary}"\nprimary = "{primary}"\n{options}\n'
+
+
+def case_of(mesh, tables="", kinematics="plane_strain", material="E = 1000.0\nnu = 0.3", ramp="steps = 1", **held):
+    """Return a case file of one material, with the keys of its mesh, further tables and `supports`."""
     return f"""
 kinematics = "{kinematics}"
 [mesh]
-file = "block.med"
+{mesh}
 [[material]]
 {material}
-{supports}{tables}
+{supports(**held)}{tables}
 [ramp]
-steps = {steps}
+{ramp}
 """
+
+
+def of_block(tables, kinematics="plane_stress", material="E = 1000.0\nnu = 0.3", steps=1, **held):
+    """Return a case file of the mesh ``block.med``, of one material, with groups held along axes, and further tables."""
+    return case_of('file = "block.med"', tables, kinematics, material, f"steps = {steps}", **held)
 
 
 def spheres(size, steps, head=""):
     """Return a case file: two half-spheres of linear triangles, pressed together by 4 mm."""
-    return f"""
-title = "small spheres"
-kinematics = "axisymmetric"
-{head}[mesh]
-generator = "half-spheres"
-element = "tri3"
-size = {size}
-[[material]]
-E = 20000.0
-nu = 0.3
-[[support]]
-group = "A1A2"
-x = 0.0
-[[support]]
-group = "A2B2"
-y = -2.0
-[[support]]
-group = "A1B1"
-y = 2.0
-[contact.hertz]
-secondary = "CONT1"
-primary = "CONT2"
-[ramp]
-steps = {steps}
-"""
+    mesh, held = 'generator = "half-spheres"\nelement = "tri3"', {"A1A2": "x", "A2B2": {"y": -2.0}, "A1B1": {"y": 2.0}}
+    return f'title = "small spheres"\n{head}' + case_of(
+        f"{mesh}\nsize = {size}", contact_pair("CONT1", "CONT2", name="hertz"), "axisymmetric", "E = 20000.0\nnu = 0.3",
+        f"steps = {steps}", **held,
+    )  # fmt: skip
 
 
 UNITS = 'units = { length = "mm", force = "N", pressure = "MPa" }\n'

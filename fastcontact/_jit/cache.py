@@ -58,9 +58,8 @@ def _environment(module: str, constants: list[Any], name: str) -> Any:
     """Return the constants of a compiled function as Numba keeps them, by the name of the function."""
     known = lookup_environment(name)
     if known is None:
-        known = Environment(
-            {"__name__": module} if module.startswith("numba.") else vars(importlib.import_module(module))
-        )
+        names = {"__name__": module} if module.startswith("numba.") else vars(importlib.import_module(module))
+        known = Environment(names)
         known.consts[:] = constants
         known.env_name = name
         Environment._memo[name] = known

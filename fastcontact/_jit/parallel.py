@@ -17,8 +17,8 @@ from fastcontact._jit import decorators
 from fastcontact.arrays import AnyArray
 
 Result = TypeVar("Result")
-Part = TypeVar("Part")
-Given = ParamSpec("Given")
+Item = TypeVar("Item")
+Parameters = ParamSpec("Parameters")
 # Work, counted in nodes, up to which waking other threads (0.03 ms) costs more than they save; default number of nodes of a
 # cell; and largest number of threads.
 WORTHWHILE, NODES = 80_000, 4
@@ -35,19 +35,19 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_pool.cache_clear)  # threads do not survive a fork
 
 
-def shared(work: Callable[[Part], Result], parts: Sequence[Part]) -> list[Result]:
-    """Return the results of `work` on all parts: on the first in this thread, on each other part in another thread."""
-    if len(parts) == 1:
-        return [work(parts[0])]
-    others = [_pool().submit(work, part) for part in parts[1:]]
+def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """Return the results of a function for all items: the first in this thread, each other one in another thread."""
+    if len(items) == 1:
+        return [function(items[0])]
+    others = [_pool().submit(function, item) for item in items[1:]]
     try:
-        first = work(parts[0])
+        first = function(items[0])
     finally:
-        wait(others)  # they use the arguments of this call, also if the first part fails
+        wait(others)  # they use the arguments of this call, also if the first item fails
     return [first, *(other.result() for other in others)]
 
 
-def spread(kernel: Any, count: int, work: float, *arguments: Any) -> None:
+def parallel_for(kernel: Any, count: int, work: float, *arguments: Any) -> None:
     """Call ``kernel(low, high, *arguments)`` for ranges that together cover 0 to `count`, each in a thread.
 
     `work` is the work per row or cell, see `portions`; 0 for rows that must be computed in order.
@@ -55,7 +55,7 @@ def spread(kernel: Any, count: int, work: float, *arguments: Any) -> None:
     if count * work <= WORTHWHILE:
         kernel(0, count, *arguments)
     else:
-        shared(lambda portion: kernel(*portion, *arguments), portions(count, work))
+        parallel_map(lambda portion: kernel(*portion, *arguments), portions(count, work))
 
 
 @cache
@@ -66,7 +66,7 @@ def _libraries() -> Any:
     return ThreadpoolController()
 
 
-def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Result]:
+def on_one_blas_thread(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     """Limit BLAS to one thread while a function runs.
 
     Further threads would spin between the small calls of a contact iteration. Besides, the number of threads determines the
@@ -74,7 +74,7 @@ def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Res
     """
 
     @wraps(function)
-    def limited(*args: Given.args, **kwargs: Given.kwargs) -> Result:
+    def limited(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
         with _libraries().limit(limits=1, user_api="blas"):
             return function(*args, **kwargs)
 

@@ -18,9 +18,9 @@ def versions() -> dict[str, str]:
     by_name = {"fastcontact": __version__, "python": platform.python_version()}
     for name in LIBRARIES:
         with contextlib.suppress(metadata.PackageNotFoundError):
-            found = metadata.distribution(name)
+            library = metadata.distribution(name)
             # `metadata.version` would import `email`.
-            text = found.read_text("METADATA") or found.read_text("PKG-INFO") or ""
+            text = library.read_text("METADATA") or library.read_text("PKG-INFO") or ""
             if version := text.partition("\nVersion: ")[2].partition("\n")[0]:
                 by_name[name] = version
     return by_name

@@ -90,10 +90,8 @@ def _ratio_of_axes(ratio_of_radii: float) -> float:
         raise ModelError(
             f"the relative radii differ by a factor of {ratio_of_radii:g}: use hertz_line for line contact"
         )
-    logarithm = math.log(ratio_of_radii)
-    return math.exp(
-        brentq(lambda x: math.log(_ratio_of_radii(math.exp(x))) - logarithm, math.log(_FLATTEST), 0.0, xtol=1e-15)
-    )
+    logarithm, interval = math.log(ratio_of_radii), (math.log(_FLATTEST), 0.0)
+    return math.exp(brentq(lambda x: math.log(_ratio_of_radii(math.exp(x))) - logarithm, *interval, xtol=1e-15))
 
 
 def _solve(bodies: Bodies, R_x: float, R_y: float, name: str, value: float) -> HertzElliptical:
@@ -103,10 +101,11 @@ def _solve(bodies: Bodies, R_x: float, R_y: float, name: str, value: float) -> H
     E_star, R_mean = bodies.E_star, math.sqrt(R_x * R_y)
     k = _ratio_of_axes(max(R_x, R_y) / min(R_x, R_y))
     integrals = math.sqrt(elliprd(0.0, 1.0, k**2) * elliprd(0.0, k**2, 1.0)) / 3.0
-    stiffness = 1.0 / (0.75 * R_mean / E_star * 4.0 / math.pi * k**1.5 * integrals)
-    pressure = 1.5 * stiffness / math.pi
+    # Quantities at a mean radius of 1, which grow with the powers in `laws`.
+    force = 1.0 / (0.75 * R_mean / E_star * 4.0 / math.pi * k**1.5 * integrals)
+    pressure = 1.5 * force / math.pi
     approach = pressure * math.sqrt(k) * float(ellipkm1(k**2)) / E_star
-    laws = {"mean": (1.0, 1.0), "approach": (approach, 2.0), "force": (stiffness, 3.0), "pressure_max": (pressure, 1.0)}
+    laws = {"mean": (1.0, 1.0), "approach": (approach, 2.0), "force": (force, 3.0), "pressure_max": (pressure, 1.0)}
     values = by_power_laws(laws, name, value)
     mean = values.pop("mean")
     axes = (mean / math.sqrt(k), mean * math.sqrt(k))

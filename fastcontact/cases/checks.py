@@ -15,6 +15,8 @@ from fastcontact.cases.keys import NUMBER, check_keys, keys_of
 from fastcontact.errors import CaseError, check_known, unknown
 from fastcontact.results.step import ContactResult, StepResult
 
+Table = Mapping[str, Any]  # of a case file
+
 STRESS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "yz": 4, "xz": 5}
 _AXES = {"x": 0, "y": 1, "z": 2}
 # Quantities that exist in three dimensions only.
@@ -145,12 +147,7 @@ CHECK = keys_of(Check)
 
 
 def read_check(
-    where: str,
-    entry: Mapping[str, Any],
-    probes: Mapping[str, int],
-    pairs: Mapping[str, Any],
-    theories: Mapping[str, Any],
-    kinematics: str = "3d",
+    where: str, entry: Table, probes: Mapping[str, int], pairs: Table, theories: Table, kinematics: str = "3d"
 ) -> Check:
     """Return the check that an entry of a case file describes; CaseError if a key or a value is invalid."""
     check_keys(where, entry, CHECK, ("quantity", "tolerance"))

@@ -362,9 +362,9 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
 
 def ramp_points(table: list[Any], where: str = "ramp.table") -> Table:
     """Return the pairs of instant and load multiplier [-] of a ramp; CaseError if `table` is not a list of such pairs."""
-    pairs = isinstance(table, list) and all(
-        isinstance(row, list) and len(row) == 2 and all(isinstance(v, NUMBER) for v in row) for row in table
-    )
-    if not table or not pairs:
+    rows = table if isinstance(table, list) else [None]
+    if not rows or not all(
+        isinstance(row, list) and [isinstance(v, NUMBER) for v in row] == [True] * 2 for row in rows
+    ):
         raise CaseError(f"'{where}' must be a list of pairs [instant, multiplier of the loads]")
     return tuple((float(t), float(v)) for t, v in table)

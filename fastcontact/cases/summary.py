@@ -76,9 +76,8 @@ def _sensitivity(case: Case, last: StepResult, quantity: Label, by: Sequence[Lab
     from fastcontact.analysis.sensitivities import sensitivities
 
     try:
-        result = sensitivities(
-            case.model, last, quantity, by, ramp=case.ramp, criteria=case.criteria, linear_solver=case.linear_solver
-        )
+        options: dict[str, Any] = {"ramp": case.ramp, "criteria": case.criteria, "linear_solver": case.linear_solver}
+        result = sensitivities(case.model, last, quantity, by, **options)
     except ModelError as error:
         return {"quantity": list(quantity), "refused": str(error)}
     derivatives = [{"by": list(parameter), "value": value} for parameter, value in result.derivatives.items()]
@@ -207,9 +206,8 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         f"{sum(s['geometry_updates'] for s in steps)} geometry updates",
     ]
     if substeps := [len(s["substeps"]) for s in steps if "substeps" in s]:
-        rows.append(
-            f"  {count(len(substeps), 'load step')} did not converge as a whole, {sum(substeps)} substeps instead"
-        )
+        divided = count(len(substeps), "load step")
+        rows.append(f"  {divided} did not converge as a whole, {sum(substeps)} substeps instead")
     peak = summary["von_mises_max"]
     loaded = peak["value"] > 0.0 or "heat" not in summary  # heat conduction alone has no forces
     for name, contact in summary["contact"].items() if loaded else ():
@@ -231,10 +229,8 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         powers = ", ".join(f"{name} {heat[name]:.4g}" for name in ("loads", "films", "friction"))
         supports = f"prescribed temperatures {heat['entering']:.6g} in, {heat['entering'] - heat['supports']:.6g} out"
         contacts = "".join(f"; across '{name}' {power:.6g}" for name, power in heat["contacts"].items())
-        low, high = heat["temperature"]
-        rows.append(
-            f"  temperatures from {low:.6g} to {high:.6g}; heat into the bodies by {supports}, {powers}{contacts}"
-        )
+        temperatures = "temperatures from {:.6g} to {:.6g}".format(*heat["temperature"])
+        rows.append(f"  {temperatures}; heat into the bodies by {supports}, {powers}{contacts}")
     if report := summary["regularised"]:
         rows.append(
             f"  held by contact alone: {grouped(report['motions'])}. Regularised by springs of "
@@ -243,8 +239,7 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         )
     for name, theory in summary["theory"].items():
         rows += _theory_lines(name, theory, summary["contact"][name]["extent"])
-    for entry in summary["sensitivities"]:
-        rows.append(_sensitivity_line(entry))
+    rows += map(_sensitivity_line, summary["sensitivities"])
     if "modes" in summary:
         rows += _mode_lines(summary["modes"])
     for check in summary["checks"]:

@@ -24,7 +24,7 @@ def declare(parser: Any, table: Mapping[str, Any], **common: Any) -> None:
         parser.add_argument(*(flags or names), **{"help": text, **form, **kind, **common})
 
 
-def add_loudness(parser: Any, default: Any) -> None:
+def add_verbosity(parser: Any, default: Any) -> None:
     """Add the verbosity options, which all commands share, with the default value `default`."""
     table = {
         "-v --verbose": "report what is being done and why",

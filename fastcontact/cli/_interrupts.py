@@ -27,7 +27,7 @@ HANDLERS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SI
 if hasattr(signal, "SIGHUP"):
     HANDLERS[signal.SIGHUP] = signal.SIG_DFL
 # Exit codes by signal, as in shells.
-CODES: dict[int, int] = {number: 128 + number for number in HANDLERS}
+EXIT_CODES: dict[int, int] = {number: 128 + number for number in HANDLERS}
 IMPORTING = ("importlib._bootstrap", "_frozen_importlib")
 COMMAND_LINE = "fastcontact.cli._main"
 

@@ -22,8 +22,8 @@ from typing import Any
 
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
-from fastcontact.cli._arguments import add_loudness, declare
-from fastcontact.cli._interrupts import CODES, forget, interruptible, restoring_interrupt
+from fastcontact.cli._arguments import add_verbosity, declare
+from fastcontact.cli._interrupts import EXIT_CODES, forget, interruptible, restoring_interrupt
 from fastcontact.cli._terminal import encodable, say, stderr_is_terminal, warnings_shown
 from fastcontact.errors import ConvergenceError, FastcontactError, printable, unknown
 
@@ -138,7 +138,7 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
         elif command in (None, name):
             module.add_generators(subparser)
         subparser.set_defaults(run=module.run)
-        add_loudness(subparser, default=False)
+        add_verbosity(subparser, default=False)
     return top
 
 
@@ -160,14 +160,14 @@ def _run_with_exit_code(words: list[str], raised: list[int]) -> int:
     except FastcontactError as error:
         say(f"error: {error}", error=True)
         forget(error)  # an interrupted study raises this error
-        return CODES[raised[0]] if raised and raised[0] != signal.SIGINT else 1
+        return EXIT_CODES[raised[0]] if raised and raised[0] != signal.SIGINT else 1
     except BrokenPipeError:
         return 1
     except KeyboardInterrupt as error:
         number = raised[0] if raised else signal.SIGINT
         say("\n".join(["interrupted" if number == signal.SIGINT else "terminated", *_notes(error)]), error=True)
         forget(error)
-        return CODES[number]
+        return EXIT_CODES[number]
 
 
 def _run(words: list[str]) -> int:

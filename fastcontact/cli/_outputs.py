@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fastcontact._tools.paths import PathLike
 from fastcontact.cli._results import load_multiplier, pressure_curves
 from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
@@ -18,9 +19,7 @@ if TYPE_CHECKING:
 
 
 def check_outputs(
-    read: Iterable[str | os.PathLike[str] | None],
-    files: Iterable[str | os.PathLike[str] | None],
-    pictures: Iterable[str | os.PathLike[str] | None] = (),
+    read: Iterable[PathLike | None], files: Iterable[PathLike | None], pictures: Iterable[PathLike | None] = ()
 ) -> None:
     """Check that output files can be written, and that they replace neither an input file nor another output.
 

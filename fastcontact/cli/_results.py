@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from fastcontact._tools import toml_text
-from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
+from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cli._terminal import say
 from fastcontact.errors import CaseError, check_known
 
@@ -32,7 +32,7 @@ def chosen_step(results: Any, number: int) -> Any:
     return results[number - 1]
 
 
-def chosen_contact(options: argparse.Namespace, step: Any) -> str:
+def chosen_contact(options: Namespace, step: Any) -> str:
     """Return the name of the contact pair that the options select, by default the first pair.
 
     If the first of several pairs is selected by default, the names of the others are printed. Raises CaseError if there is no
@@ -97,13 +97,6 @@ def pressure_curves(
     if approach is None and not hasattr(theory, "at_force"):
         return {curve.name: theory}
     return compared(curve.name, theory, contact, theories["share"], approach=approach, load=load)
-
-
-def curve_of(theory: Any) -> PressureCurve:
-    """Return the pressure curve of a theory that `pressure_curves` has returned."""
-    curve = pressure_curve(theory)
-    assert curve is not None
-    return curve
 
 
 def compared(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import os
 import signal
 import threading
+from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -105,7 +105,7 @@ ARGUMENTS = {
 }
 
 
-def check_targets(options: argparse.Namespace, *also: str | None) -> None:
+def check_targets(options: Namespace, *also: str | None) -> None:
     """Check before a study that its output files and those in `also` can be written; errors as for `check_outputs`."""
     from fastcontact.cases.case import files_of_case
 
@@ -117,7 +117,7 @@ def names(text: str | None) -> list[str] | None:
     return [name.strip() for name in text.split(",") if name.strip()] if text else None
 
 
-def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
+def finished(options: Namespace, study: Callable[..., Any]) -> Any:
     """Return the result of a study, which runs on the executor of the options.
 
     An interruption raises FastcontactError with a message on how to resume.
@@ -137,9 +137,7 @@ def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
         progress.close()
 
 
-def report(
-    options: argparse.Namespace, result: Any, hint: str, failures: Sequence[str] = (), also: Sequence[str] = ()
-) -> int:
+def report(options: Namespace, result: Any, hint: str, failures: Sequence[str] = (), also: Sequence[str] = ()) -> int:
     """Write the files of the options, print the result and return the exit code.
 
     The messages of failed runs (`failures`), the lines of the result and the names of the files are printed. `also` are the

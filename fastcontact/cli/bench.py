@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import sys
+from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,6 @@ def suite(name: str) -> Any:
     return importlib.import_module(f"suite.{name}")
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Namespace) -> int:
     """Run the benchmarks, print the table, and write the files of the options."""
     return int(suite("command").run(options))

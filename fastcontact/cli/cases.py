@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 import tomllib
+from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ ARGUMENTS = {
 }
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Namespace) -> int:
     """List the ready-made cases, or print or copy one of them."""
     from fastcontact.cases.case import shipped_case, shipped_cases
 

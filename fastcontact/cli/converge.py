@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
+from argparse import Namespace
 from functools import partial
 
 from fastcontact.cli import _study
@@ -31,7 +31,7 @@ ARGUMENTS = {
 }
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Namespace) -> int:
     """Run the study, write the files of the options and print the results; return 2 if a run failed."""
     from fastcontact.studies.runs import convergence_study
 
@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
     return _study.report(options, study, HINT, failures)
 
 
-def _adaptive(options: argparse.Namespace) -> int:
+def _adaptive(options: Namespace) -> int:
     """Run an adaptive study, write the files of the options and print the table; return 2 if the tolerance is not met."""
     from fastcontact.studies.adaptive import adaptive_study
 

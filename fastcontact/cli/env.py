@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import signal
 import tempfile
 import time
+from argparse import Namespace
 
 from fastcontact.cli._terminal import say, stderr_is_terminal
 from fastcontact.errors import FastcontactError
@@ -15,7 +15,7 @@ HELP = "show versions, threads and the cache folder of compiled kernels"
 ARGUMENTS = {"--warmup": "compile all kernels, so that later runs start fast"}
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Namespace) -> int:
     """Print the environment and, if requested, compile the kernels."""
     from fastcontact._jit import cache, decorators
     from fastcontact._tools.versions import versions

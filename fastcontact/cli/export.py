@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 
 from fastcontact.cli._outputs import check_outputs, say_written
 from fastcontact.errors import CaseError
@@ -15,7 +15,7 @@ ARGUMENTS = {
 }
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Namespace) -> int:
     """Write the files of the options."""
     if not (options.med or options.xdmf):
         raise CaseError("nothing to export: give --med FILE or --xdmf FILE")

@@ -8,11 +8,14 @@ import typing
 from collections.abc import Callable
 from typing import Any
 
-from fastcontact.cli._arguments import add_loudness, declare
+from fastcontact.cli._arguments import add_verbosity, declare
 from fastcontact.cli._outputs import check_outputs, say_written
 from fastcontact.cli._terminal import say
 
 HELP = "generate a mesh with named groups and report its quality"
+# Help formatter that keeps the line breaks of docstrings.
+LINE_BREAKS = argparse.RawDescriptionHelpFormatter
+OUTPUT = {"-o --output OUTPUT": ({"required": True}, "mesh file, format by suffix: .med, .msh, .inp, .vtu, ...")}
 
 
 def add_generators(parser: argparse.ArgumentParser) -> None:
@@ -22,17 +25,10 @@ def add_generators(parser: argparse.ArgumentParser) -> None:
     kinds = parser.add_subparsers(dest="generator", metavar="GENERATOR", required=True)
     for name, generator in GENERATORS.items():
         doc = inspect.getdoc(generator) or ""
-        subparser = kinds.add_parser(name, help=doc.splitlines()[0], description=doc, formatter_class=_Raw)
-        output = {
-            "-o --output OUTPUT": ({"required": True}, "mesh file, format by suffix: .med, .msh, .inp, .vtu, ...")
-        }
+        subparser = kinds.add_parser(name, help=doc.splitlines()[0], description=doc, formatter_class=LINE_BREAKS)
         options = (_option(generator, parameter) for parameter in inspect.signature(generator).parameters.values())
-        declare(subparser, {**output, **dict(options)})
-        add_loudness(subparser, default=argparse.SUPPRESS)  # keeps -q and -v given before the name
-
-
-class _Raw(argparse.RawDescriptionHelpFormatter):
-    """Help formatter that keeps the line breaks of docstrings."""
+        declare(subparser, {**OUTPUT, **dict(options)})
+        add_verbosity(subparser, default=argparse.SUPPRESS)  # keeps -q and -v given before the name
 
 
 def _option(generator: Callable[..., Any], parameter: inspect.Parameter) -> tuple[str, Any]:

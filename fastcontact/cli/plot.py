@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 from typing import Any
 
 from fastcontact.cli import _results
@@ -38,7 +38,7 @@ ARGUMENTS = {
 }
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Namespace) -> int:
     """Write the picture or the animation, or show the interactive window."""
     from fastcontact.results import plot
     from fastcontact.results.reader import open_results
@@ -76,7 +76,7 @@ def _plane(text: str) -> tuple[int, float]:
         raise CaseError(f"'{text}' is not a plane: write for example y=0") from None
 
 
-def _animate(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> None:
+def _animate(options: Namespace, results: Any, step: Any, case: dict[str, Any]) -> None:
     """Write the animation over the load steps or, with ``--phases``, over a period of vibration."""
     from fastcontact.results import plot
     from fastcontact.results.step import phases
@@ -89,7 +89,7 @@ def _animate(options: argparse.Namespace, results: Any, step: Any, case: dict[st
 
 
 def _body_plot(
-    options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any], plane: tuple[int, float] | None
+    options: Namespace, results: Any, step: Any, case: dict[str, Any], plane: tuple[int, float] | None
 ) -> Any:
     """Return a plot of the deformed mesh, or of a section through it."""
     from fastcontact.results import plot
@@ -106,7 +106,7 @@ def _body_plot(
     return plot.section(results.mesh, step, point, normal, **labels)
 
 
-def _contact_plot(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
+def _contact_plot(options: Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
     """Return a plot of the map, the zones or the history of a contact pair, or of the stresses on the axis below it."""
     from fastcontact.results import plot
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import Namespace
 from typing import Any
 
 import numpy as np
 
+from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.cli import _results
 from fastcontact.cli._outputs import check_outputs, draw_profile, say_written
-from fastcontact.cli._results import curve_of, load_multiplier, pressure_curves
+from fastcontact.cli._results import load_multiplier, pressure_curves
 from fastcontact.cli._terminal import say
 
 HELP = "pressure along the contact line against theory: CSV, XMGRACE .agr, PNG"
@@ -21,7 +22,7 @@ ARGUMENTS = {
 }
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Namespace) -> int:
     """Write the files of the options, or print the table if none is requested."""
     from fastcontact.results.reader import open_results
     from fastcontact.results.tables import contact_table, with_column, write_csv
@@ -35,13 +36,14 @@ def run(options: argparse.Namespace) -> int:
     table = contact_table(contact, step)
     load = load_multiplier(case["ramp"], step)
     theories = pressure_curves(case["theories"].get(name, {}), contact, approach=case["approach"].get(name), load=load)
-    for label, theory in theories.items():
+    curves = {label: curve for label, theory in theories.items() if (curve := pressure_curve(theory))}
+    for label, curve in curves.items():
         column = f"pressure_{label.replace(', ', '_').replace(' ', '_').replace('é', 'e')}"
-        table = with_column(table, column, curve_of(theory).pressure(table["radius"]))
+        table = with_column(table, column, curve.pressure(table["radius"]))
     if options.csv:
         write_csv(options.csv, table)
     if options.agr:
-        _write_agr(options.agr, case, contact, step, theories)
+        _write_agr(options.agr, case, contact, step, curves)
     if options.png:
         draw_profile(contact, step, theories, options.png, case["title"] or name)
     if options.csv or options.agr or options.png:
@@ -60,7 +62,7 @@ def _print(table: Any) -> None:
         say("  ".join(f"{row[name]:>14.6g}" for name in names))
 
 
-def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, Any]) -> None:
+def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, PressureCurve]) -> None:
     """Write an XMGRACE project with the computed pressure and that of theories by label."""
     from fastcontact.results.units import labelled
     from fastcontact.results.xmgrace import Curve, write_agr
@@ -69,8 +71,7 @@ def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theorie
     position = contact.place[order]
     style = "line+symbols" if contact.coordinates.shape[1] == 2 else "symbols"
     curves = [Curve(position, contact.pressure[order], "computed", style=style)]
-    for label, theory in theories.items():
-        curve = curve_of(theory)
+    for label, curve in theories.items():
         end = min(curve.radius, float(np.abs(position).max()))
         x = np.unique(np.concatenate([position[[0, -1]], np.linspace(max(-end, min(position[0], 0.0)), end, 200)]))
         curves.append(Curve(x, curve.pressure(np.abs(x)), label))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import math
 import os
 import time
+from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,7 +41,7 @@ ARGUMENTS = {
 }
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Namespace) -> int:
     """Solve the case, write the files of the options and print the summary."""
     from fastcontact._jit import decorators
     from fastcontact.cases import summary
@@ -91,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
+def _modes(options: Namespace, case: Case, last: StepResult) -> Any:
     """Return the natural modes that the case or the command requests, after writing them to the file of the options."""
     arguments = {**(case.modes or {}), **_diameters(options.nodal_diameters)}
     if case.modes is None and not options.modes and not arguments:
@@ -118,7 +118,7 @@ def _diameters(text: str | None) -> dict[str, Any]:
         raise CaseError(f"--nodal-diameters {text}: write integers separated by commas, or all") from None
 
 
-def _new_steps(options: argparse.Namespace, case: Case, done: Sequence[StepResult] = ()) -> Iterator[StepResult]:
+def _new_steps(options: Namespace, case: Case, done: Sequence[StepResult] = ()) -> Iterator[StepResult]:
     """Check the model, and return the steps after the steps `done`, which are computed when they are requested."""
     from fastcontact.analysis.run import solve_steps
 
@@ -127,7 +127,7 @@ def _new_steps(options: argparse.Namespace, case: Case, done: Sequence[StepResul
 
 
 def _solved(
-    options: argparse.Namespace, case: Case, output: Path, new: Iterator[StepResult] | None
+    options: Namespace, case: Case, output: Path, new: Iterator[StepResult] | None
 ) -> tuple[int, list[str], Any, list[dict[str, Any]]]:
     """Write all steps: `new`, or those that remain of a resumed run.
 
@@ -140,10 +140,9 @@ def _solved(
 
     if options.estimate_error:
         from fastcontact.studies.error_norms import estimate_error
-    fields, large = (ERROR_FIELD,) if options.estimate_error else (), case.model.mesh.n_points >= LARGE
-    with ResultWriter(
-        output, case.model, case_text=case.text, cell_fields=fields, resume=options.resume, background=large
-    ) as writer:
+    fields = (ERROR_FIELD,) if options.estimate_error else ()
+    settings = {"cell_fields": fields, "resume": options.resume, "background": case.model.mesh.n_points >= LARGE}
+    with ResultWriter(output, case.model, case_text=case.text, **settings) as writer:
         _check_same(case, writer.done, output)
         last = writer.done[-1] if writer.done else None
         done = [(of_step(step), step.warnings) for step in writer.done]  # each step, which may be large, is read once

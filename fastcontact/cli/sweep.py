@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 import math
+from argparse import Namespace
 from functools import partial
 from typing import Any
 
@@ -27,7 +27,7 @@ ARGUMENTS = {
 }
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Namespace) -> int:
     """Run the sweep, write the files of the options and print the table; return 2 if a run failed."""
     from fastcontact.studies.runs import parameter_sweep
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from fastcontact._jit.parallel import portions, shared
+from fastcontact._jit.parallel import parallel_map, portions
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.search import search_2d_kernels
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
@@ -191,7 +191,7 @@ def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
         from fastcontact.contact import projection_kernels
 
         out = np.empty(nodes.shape)
-        shared(lambda portion: projection_kernels.normals(nodes, slopes, *portion, out), portions(*block.facets.shape))
+        parallel_map(lambda span: projection_kernels.normals(nodes, slopes, *span, out), portions(*block.facets.shape))
         return out
     normal = area_vectors(nodes, slopes)
     return normal / np.linalg.norm(normal, axis=2, keepdims=True)
@@ -206,7 +206,7 @@ def facet_angles(element: elements.Element, nodes: Array) -> Array:
     angle, n = np.empty(nodes.shape[:2]), element.n_corners
     around = np.arange(n)
     others = np.column_stack([(around + 1) % n, (around - 1) % n])
-    shared(lambda span: projection_kernels.angles(nodes, others, *span, angle), portions(len(nodes), nodes.shape[1]))
+    parallel_map(lambda span: projection_kernels.angles(nodes, others, *span, angle), portions(*nodes.shape[:2]))
     return angle
 
 
@@ -271,7 +271,7 @@ def _on_lines(points: Array, corners: Array, closest: Closest) -> None:
         hull = corners.copy()
         hull[:, 2] = 2.0 * corners[:, 2] - 0.5 * (corners[:, 0] + corners[:, 1])
     tree = build(hull.min(axis=1), hull.max(axis=1))
-    shared(
+    parallel_map(
         lambda portion: search_2d_kernels.closest_facets(points, order, *portion, corners, numbers, tree, closest),
         portions(len(points)),
     )
@@ -286,12 +286,12 @@ def _on_faces(points: Array, corners: Array, closest: Closest) -> None:
     centre = 0.5 * (corners.min(axis=0).min(axis=0) + corners.max(axis=0).max(axis=0))
     facets = Facets(corners[numbers], centre, np.empty(corners.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))
-    shared(
+    parallel_map(
         lambda portion: facets_3d_kernels.prepare(facets, *portion, table.to_terms, table.weights, low, high),
         portions(n),
     )
     tree, domain = build(low, high), Domain(table.nodes, flat_triangles(len(table.nodes)), table.sides)
-    shared(
+    parallel_map(
         lambda portion: search_3d_kernels.closest_facets(
             points, order, *portion, facets, domain, numbers, tree, closest
         ),
@@ -351,7 +351,7 @@ def along_normals(
         for kind, low, high in zip(nodes_of_blocks, sizes[:-1], sizes[1:], strict=True)
     ]
     terms, directions = _polynomials(nodes_of_blocks), _polynomials(at_nodes)
-    shared(
+    parallel_map(
         lambda portion: projection_kernels.along_normals(
             *portion, relative_points, heights, terms, directions, side.triangular, side.neighbours, projection
         ),

@@ -210,7 +210,7 @@ class NonlinearBodies:
                 )  # fmt: skip
                 return status, int(cell) + rows.start
 
-            for status, cell in parallel.shared(linearise_part, range(len(row_ranges))):
+            for status, cell in parallel.parallel_map(linearise_part, range(len(row_ranges))):
                 if status:
                     raise ConvergenceError(self._failure(status, name, cell, displacement))
             history[name], stress[name] = new if self._has_history else before[name], cauchy
@@ -315,7 +315,7 @@ class NonlinearBodies:
                 logarithm[rows],
             )  # fmt: skip
 
-        parallel.shared(fill_rows, parallel.portions(len(cells), len(N)))
+        parallel.parallel_map(fill_rows, parallel.portions(len(cells), len(N)))
         return J, ratio, logarithm
 
     def _yielding(self, name: str, bodies: DeformedBodies, J: Array) -> list[Array]:

@@ -110,7 +110,7 @@ class CellStress:
             if self._averaged is not None:
                 self._add_modes((name, xi, dN), nodes, numbers, stress, rows[portion])
 
-        parallel.shared(fill_rows, parallel.portions(len(out), cells.shape[1]))
+        parallel.parallel_map(fill_rows, parallel.portions(len(out), cells.shape[1]))
         if self._offset is not None:
             self._add_offset(self._offset, (name, xi, rows), cells, material, out)
 
@@ -289,7 +289,7 @@ class NodalAverage:
         arguments = parallel.read_only(cells), extrapolation, values
         sums = self._total, self._count
         # The kernel is in the module for 2D, but is independent of the dimension and the number of components.
-        parallel.shared(lambda nodes: LOOPS[2].add_nodal(*arguments, *nodes, *sums), self._node_ranges(cells))
+        parallel.parallel_map(lambda nodes: LOOPS[2].add_nodal(*arguments, *nodes, *sums), self._node_ranges(cells))
 
     def _node_ranges(self, cells: Numbers) -> list[tuple[int, int]]:
         """Return a range of nodes for each thread, such that all ranges have about the same number of cells."""

@@ -95,7 +95,7 @@ def _slots(cells: Numbers, indptr: Numbers, indices: Numbers) -> Numbers:
         rows = slice(*portion)
         pattern_kernels.find_slots(cells[rows], indptr, indices, slots[rows])
 
-    parallel.shared(find, parallel.portions(*cells.shape))
+    parallel.parallel_map(find, parallel.portions(*cells.shape))
     return slots
 
 
@@ -141,7 +141,7 @@ def stiffness(
             _add_part, mesh=mesh, name=name, material=material[name], moduli=of_element,
             axisymmetric=kinematics == "axisymmetric", pattern=pattern, data=data,
         )  # fmt: skip
-        bad_cells = parallel.shared(add_part, range(len(pattern.owners(mesh, name).cells)))
+        bad_cells = parallel.parallel_map(add_part, range(len(pattern.owners(mesh, name).cells)))
         bad = min((number for number in bad_cells if number >= 0), default=-1)
         if bad >= 0:
             where = mesh.points[block[bad]].mean(axis=0)

@@ -61,7 +61,7 @@ class CommittedFile(DriverFile):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         self.synchronised = False
-        interrupted = journal.found(self._file)  # changes of a writer that was killed or stopped by a power loss
+        interrupted = journal.pending(self._file)  # changes of a writer that was killed or stopped by a power loss
         for offset, data in interrupted:
             self._put(offset, data)
         self._pending: dict[int, bytes] = {}
@@ -76,9 +76,7 @@ class CommittedFile(DriverFile):
     def _contents(self) -> int:
         """Return the end of the contents of the file, which the superblock states [bytes]."""
         head, size = self._head, self._file.seek(0, os.SEEK_END)
-        supported = (
-            head.startswith(SUPERBLOCK) and head[8] == 0 and head[13] == 8
-        )  # version 0, addresses of eight bytes
+        supported = head.startswith(SUPERBLOCK) and (head[8], head[13]) == (0, 8)  # version 0, addresses of eight bytes
         return min(int.from_bytes(head[40:48], "little"), size) if supported else size
 
     def _read_head(self) -> bytes:

@@ -57,7 +57,7 @@ def batches(changes: Iterable[Write]) -> Iterator[list[Write]]:
     yield batch
 
 
-def found(file: IO[bytes]) -> list[Write]:
+def pending(file: IO[bytes]) -> list[Write]:
     """Return the changes in the journal of a file.
 
     The list is empty if there is no journal, or if the journal or the new data are incomplete. Raises FileError for a journal

@@ -141,11 +141,9 @@ def optional_columns(contact: ContactResult) -> tuple[str, ...]:
 
 def contact_row(dim: int, optional: Iterable[str] = ()) -> np.dtype[Any]:
     """Return the data type of the row of a secondary node of a pair at a step; `optional` are its `optional_columns`."""
-    names = ("abscissa", "place", "gap", "pressure", "multiplier", *optional)
-    scalars = [(name, "<f8") for name in names]
-    vectors = [
-        (name, "<f8", (dim,)) for name in ("coordinates", "force_vectors", "normal", "shear", "slip", "slip_total")
-    ]
+    scalars = [(name, "<f8") for name in ("abscissa", "place", "gap", "pressure", "multiplier", *optional)]
+    names = ("coordinates", "force_vectors", "normal", "shear", "slip", "slip_total")
+    vectors = [(name, "<f8", (dim,)) for name in names]
     return np.dtype([("points", "<i4"), ("active", "i1"), ("sticking", "i1"), *scalars, *vectors])
 
 
@@ -253,9 +251,8 @@ def point_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
     values = {name: getattr(step, name) for name in step_shapes(mesh) if getattr(step, name) is not None}
     values["contact_pressure"] = contact_pressure(mesh, step)
     values |= {f"contact_{name}": contact_slip(mesh, step, name) for name in ("slip", "slip_total")}
-    return {
-        name: padded(values[name], width) for name, width in {**POINT_FIELDS, **HEAT_FIELDS}.items() if name in values
-    }
+    widths = {**POINT_FIELDS, **HEAT_FIELDS}.items()
+    return {name: padded(values[name], width) for name, width in widths if name in values}
 
 
 def point_flags(mesh: Mesh) -> dict[str, Flags]:

@@ -163,7 +163,7 @@ class Results(StepSequence):
         self._raw: Any = open(path, "rb")  # noqa: SIM115
         self._file: Any = None
         try:
-            writes = journal.found(self._raw) if not is_being_written(self.path) or repeat else []
+            writes = journal.pending(self._raw) if not is_being_written(self.path) or repeat else []
             if writes:
                 self._raw = journal.Repeated(self._raw, writes)
             with self._explained():
@@ -254,14 +254,12 @@ class Results(StepSequence):
     def _repr_html_(self) -> str:
         """Return tables of the contents and of the last step for notebooks."""
         steps = f"{self._n_steps}, to load factor {self.load_factors[-1]:.6g}" if self._n_steps else "none yet"
+        cells = [f"{len(block)} {name}" for name, block in self.mesh.cells.items()]
         rows = [
             ("steps", steps),
             ("run", "complete" if self.complete else self.error or "incomplete"),
             ("kinematics", self.kinematics),
-            (
-                "mesh",
-                ", ".join([f"{self.mesh.n_points} points", *(f"{len(b)} {n}" for n, b in self.mesh.cells.items())]),
-            ),
+            ("mesh", ", ".join([f"{self.mesh.n_points} points", *cells])),
             ("groups", ", ".join(self.mesh.group_names)),
             *(("warning", text) for text in self.warnings),
         ]
@@ -495,9 +493,7 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     primary_forces: dict[str, Any] = {}
     if "primary_first" in step.dtype.names:
         table = _rows(pair["primary"], step, "primary_", f"the table of primary forces of '{name}'")
-        primary_forces = {
-            f"primary_{column}": np.ascontiguousarray(table[column]) for column in ("points", "force_vectors")
-        }
+        primary_forces = {f"primary_{name}": np.ascontiguousarray(table[name]) for name in ("points", "force_vectors")}
     return ContactResult(name=name, formulation=formulation, **resultants, **primary_forces, **columns)
 
 

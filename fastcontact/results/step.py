@@ -359,9 +359,9 @@ class ContactResult(Suggesting):
     def force_parts(self) -> tuple[float, float, float]:
         """Magnitudes of `force` and of its normal and tangential parts [force]; without friction the last is zero."""
         normal = np.where(np.isfinite(self.normal), self.normal, 0.0)
-        part = np.einsum("nd,nd->n", self.force_vectors, normal) @ normal if self.shear.any() else self.force
-        part = np.where(self.force == 0.0, 0.0, part)  # radial forces of axisymmetric models balance each other
-        total, normal_part, tangential = np.linalg.norm([self.force, part, self.force - part], axis=1)
+        along = np.einsum("nd,nd->n", self.force_vectors, normal) @ normal if self.shear.any() else self.force
+        along = np.where(self.force == 0.0, 0.0, along)  # radial forces of axisymmetric models balance each other
+        total, normal_part, tangential = np.linalg.norm([self.force, along, self.force - along], axis=1)
         return float(total), float(normal_part), float(tangential)
 
     @property
@@ -483,11 +483,10 @@ class StepResult(Suggesting):
     def shown(self) -> dict[str, str]:
         """Names and values of the load factor, the largest displacement and stress, and the iterations, for reprs."""
         displacement, stress = (float(np.abs(field).max(initial=0.0)) for field in (self.displacement, self.von_mises))
+        units = {} if "parameter" in self.iterations else self.units
         shown = {
             self.iterations.get("parameter", "load factor"): f"{self.load_factor:.6g}",
-            "largest displacement": with_unit(
-                f"{displacement:.6g}", {} if "parameter" in self.iterations else self.units, "length"
-            ),
+            "largest displacement": with_unit(f"{displacement:.6g}", units, "length"),
             "largest von Mises stress": with_unit(f"{stress:.6g}", self.units, "pressure"),
         }
         labels = {"geometry_updates": "geometry updates", "active_set_iterations": "active-set iterations"}

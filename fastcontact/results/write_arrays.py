@@ -116,9 +116,7 @@ def write_case(file: Any, mesh: Mesh, kinematics: str, case_text: str, units: Ma
     growing_table(group, "notes", np.uint8, rows=BYTES)
     growing_table(group, "runs", layout.RUN_ROW)
     for number in (0, 1):
-        growing_table(
-            group, layout.restart_table(number), np.uint8, rows=int(np.clip(8 * mesh.n_points, BYTES, 1 << 20))
-        )
+        growing_table(group, layout.restart_table(number), np.uint8, rows=min(max(8 * mesh.n_points, BYTES), 1 << 20))
 
 
 def _write_groups(parent: Any, name: str, groups: Any) -> None:
@@ -200,9 +198,8 @@ def append_tables(
     """Write contact tables, iterations, warnings and other `notes` of step `number`; new pairs are added to `pairs`."""
     for name in step.contact:
         if name not in pairs:
-            pairs[name] = _new_pair(
-                file["fastcontact/contact"], name, mesh.dim, layout.optional_columns(step.contact[name])
-            )
+            columns = layout.optional_columns(step.contact[name])
+            pairs[name] = _new_pair(file["fastcontact/contact"], name, mesh.dim, columns)
     for name, pair in pairs.items():
         _append_contact(pair, number, step.contact.get(name))
     if step.material_stress is not None:
@@ -215,7 +212,7 @@ def append_tables(
     _set_row(file["fastcontact/steps"], number, np.array(row, layout.STEP_ROW))
 
 
-def append_rows(file: OpenObjects, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
+def append_offsets(file: OpenObjects, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
     """Write the rows of step `number` in which viewers find the positions of fields."""
     rows = {"Values": step.load_factor, "NumberOfParts": 1, "PartOffsets": 0, "CellOffsets": 0}
     for name, value in {**rows, "PointDataOffsets/displacement": number * mesh.n_points}.items():

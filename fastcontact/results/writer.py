@@ -242,7 +242,7 @@ class ResultWriter:
             write_arrays.set_restart(self._objects, self.n_steps, restart)
             if in_parts:
                 self._flush()
-            write_arrays.append_rows(self._objects, self._mesh, self.n_steps, step, self._cell_fields)
+            write_arrays.append_offsets(self._objects, self._mesh, self.n_steps, step, self._cell_fields)
             if in_parts:
                 self._flush()
             self._objects["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))

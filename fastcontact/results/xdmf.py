@@ -103,7 +103,6 @@ def _field(address: str, n_points: int, number: int, n_steps: int) -> Iterator[s
         start, size = (number * n_points, column)[:dims], (n_points, count)[:dims]
         selection = f'<DataItem Format="XML" Dimensions="3 {dims}">{_words((*start, *[1] * dims, *size))}</DataItem>'
         whole = _data(address, (n_points * n_steps, width)[:dims])
-        item = (
-            f'<DataItem ItemType="HyperSlab" Dimensions="{_words(size)}" Type="HyperSlab">{selection}{whole}</DataItem>'
-        )
+        slab = f'ItemType="HyperSlab" Dimensions="{_words(size)}" Type="HyperSlab"'
+        item = f"<DataItem {slab}>{selection}{whole}</DataItem>"
         yield _attribute(label, "Vector" if count == 3 else "Scalar", "Node", item)

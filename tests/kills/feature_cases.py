@@ -4,50 +4,24 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from case_texts import COMING, CUBE, pressed
+from case_texts import COMING, CUBE, case_of, contact_pair, pressed, supports
 
-# Two blocks, of which the upper one is pressed down and then pushed to and fro.
-BLOCKS = """
-kinematics = "{kinematics}"
-{top}
-[mesh]
-generator = "block-on-block"
+LINEAR = "E = 1000.0\nnu = 0.3"
+MESH = """generator = "block-on-block"
 divisions_lower = [6, 3]
 divisions_upper = [4, 2]
 size_upper = [6.0, 3.0]
-shift = 2.0
-[[material]]
-{material}
-[[support]]
-group = "LOWER_BOTTOM"
-x = 0.0
-y = 0.0
-[[support]]
-group = "UPPER_TOP"
-y = {down}
-ramp = [[0.0, 0.0], [0.5, 1.0], [1.0, 0.8]]
-[[support]]
-group = "UPPER_TOP"
-x = {along}
-ramp = [[0.0, 0.0], [0.25, 0.0], [0.75, 1.0], [1.0, 0.5]]
-[contact.pair]
-secondary = "CONT_UPPER"
-primary = "CONT_LOWER"
-{options}
-[ramp]
-steps = 6
-{tail}
-"""
-LINEAR = "E = 1000.0\nnu = 0.3"
+shift = 2.0"""
 
 
 def _blocks(
-    material: str = LINEAR, options: str = "", tail: str = "", top: str = "", down: float = -0.02, along: float = 0.02,
-    kinematics: str = "plane_strain",
-) -> str:  # fmt: skip
-    return BLOCKS.format(
-        material=material, options=options, tail=tail, top=top, down=down, along=along, kinematics=kinematics
-    )
+    material: str = LINEAR, options: str = "", tail: str = "", top: str = "", down: float = -0.02, along: float = 0.02
+) -> str:
+    """Return a case of two blocks, of which the upper one is pressed down and then pushed to and fro."""
+    lowered = {"y": down, "ramp": [[0.0, 0.0], [0.5, 1.0], [1.0, 0.8]]}
+    pushed = {"x": along, "ramp": [[0.0, 0.0], [0.25, 0.0], [0.75, 1.0], [1.0, 0.5]]}
+    tables = supports(UPPER_TOP=pushed) + contact_pair(options=options) + tail
+    return f"{top}\n" + case_of(MESH, tables, material=material, ramp="steps = 6", LOWER_BOTTOM="xy", UPPER_TOP=lowered)
 
 
 HOT = """[[fixed_temperature]]

@@ -6,46 +6,24 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import feature_cases
-from case_texts import spheres
+from case_texts import case_of, contact_pair, spheres, supports
 
 ROOT = Path(__file__).resolve().parents[2]
 
 # A quarter of a half-sphere is pressed on a block and then pushed along it, so that it sticks here and slides there.
-RUBBING = """
-title = "a part of a sphere rubs a block"
-kinematics = "3d"
-[mesh]
-generator = "sphere-on-block"
+MESH = """generator = "sphere-on-block"
 R = 20.0
 size = 8.0
 contact_size = 1.2
 contact_radius = 6.0
-growth = 1.0
-[[material]]
-E = 20000.0
-nu = 0.3
-[[support]]
-group = "BLOCK_BOTTOM"
-x = 0.0
-y = 0.0
-z = 0.0
-[[support]]
-group = "SPHERE_TOP"
-y = -0.6
-z = 0.0
-ramp = [[0.0, 0.0], [0.5, 1.0], [1.0, 1.0]]
-[[support]]
-group = "SPHERE_TOP"
-x = 0.5
-ramp = [[0.0, 0.0], [0.5, 0.0], [1.0, 1.0]]
-[contact.pair]
-secondary = "CONT_SPHERE"
-primary = "CONT_BLOCK"
-formulation = "node_to_segment"
-friction = 0.3
-[ramp]
-steps = 12
-"""
+growth = 1.0"""
+PRESSED = {"y": -0.6, "z": 0.0, "ramp": [[0.0, 0.0], [0.5, 1.0], [1.0, 1.0]]}
+PUSHED = {"x": 0.5, "ramp": [[0.0, 0.0], [0.5, 0.0], [1.0, 1.0]]}
+PAIR = contact_pair("CONT_SPHERE", "CONT_BLOCK", 'formulation = "node_to_segment"\nfriction = 0.3')
+RUBBING = case_of(
+    MESH, supports(SPHERE_TOP=PUSHED) + PAIR, "3d", "E = 20000.0\nnu = 0.3", "steps = 12",
+    BLOCK_BOTTOM="xyz", SPHERE_TOP=PRESSED,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

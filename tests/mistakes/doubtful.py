@@ -4,6 +4,7 @@
 from typing import NamedTuple
 
 import library
+from case_texts import contact_pair, supports
 
 import fastcontact as fc
 from fastcontact import generate
@@ -26,49 +27,16 @@ units = {{ length = "mm", force = "N", pressure = "MPa" }}
 mesh.file = "doubtful.med"
 ramp.steps = {steps}
 """
-STEEL = """
-[[material]]
-E = 1000.0
-nu = 0.3
-"""
-BLOCKS = """
-[[support]]
-group = "LOWER_BOTTOM"
-x = 0.0
-y = 0.0
-[[support]]
-group = "UPPER_TOP"
-x = 0.0
-y = -0.01
-"""
-SPHERES = """
-[[support]]
-group = "A1A2"
-x = 0.0
-[[support]]
-group = "A2B2"
-y = -2.0
-[[support]]
-group = "A1B1"
-y = 2.0
-[contact.pair]
-secondary = "CONT1"
-primary = "CONT2"
-formulation = "node_to_segment"
-"""
-PAIR = """
-[contact.pair]
-secondary = "CONT_UPPER"
-primary = "CONT_LOWER"
-"""
+STEEL = "[[material]]\nE = 1000.0\nnu = 0.3\n"
+BLOCKS = supports(LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.0, "y": -0.01})
+SPHERES = supports(A1A2="x", A2B2={"y": -2.0}, A1B1={"y": 2.0}) + contact_pair(
+    "CONT1", "CONT2", 'formulation = "node_to_segment"'
+)
+PAIR = contact_pair()
 
 
 def of(*parts, kinematics="plane_strain", steps=1):
     return HEAD.format(kinematics=kinematics, steps=steps) + "".join(parts)
-
-
-def held(group, **components):
-    return f'\n[[support]]\ngroup = "{group}"\n' + "".join(f"{axis} = {value}\n" for axis, value in components.items())
 
 
 def raised(height):
@@ -96,7 +64,7 @@ def bent():
 def turned(angle):
     """Supports that turn a square without deforming it, as linear kinematics see it."""
     corners = {"BOTTOM_LEFT": (0, 0), "BOTTOM_RIGHT": (1, 0), "TOP_LEFT": (0, 1), "TOP_RIGHT": (1, 1)}
-    return "".join(held(name, x=float(-angle * y), y=float(angle * x)) for name, (x, y) in corners.items())
+    return supports(**{name: {"x": float(-angle * y), "y": float(angle * x)} for name, (x, y) in corners.items()})
 
 
 # fmt: off
@@ -127,10 +95,10 @@ DOUBTS = [
             r"bodies '\w+' and '\w+' interpenetrate by 0\.009 near \[.*\], and no contact is defined between them: add_contact for the groups that meet",
         ),
     ),
-    Doubt("strains are large", lambda: block((1.0, 1.0), (2, 2)), of(STEEL, held("BOTTOM", x=0.0, y=0.0), held("TOP", y=0.3)),
+    Doubt("strains are large", lambda: block((1.0, 1.0), (2, 2)), of(STEEL, supports(BOTTOM="xy", TOP={"y": 0.3})),
           (r"the largest equivalent strain is 0\.\d+, beyond the 0\.1 up to which linear kinematics are accurate",)),
     Doubt("plastic strains are large", lambda: block((1.0, 1.0), (2, 2)),
-          of(STEEL + 'law = "elastic_plastic"\nyield_stress = 3.0\n', held("LEFT", x=0.0), held("BOTTOM", y=0.0), held("TOP", y=-0.7)),
+          of(STEEL + 'law = "elastic_plastic"\nyield_stress = 3.0\n', supports(LEFT="x", BOTTOM="y", TOP={"y": -0.7})),
           (r"the largest plastic strain is 0\.\d+, beyond the 0\.2 up to which linear kinematics are valid: contact pressures there are too low, under a ball by 10 % at 0\.2; strain='finite' has no such limit",)),
     Doubt(
         "rotations are large",
@@ -145,8 +113,7 @@ DOUBTS = [
         lambda: raised(30.0),
         of(
             STEEL,
-            held("LOWER_BOTTOM", x=0.0, y=0.0),
-            held("UPPER_TOP", x=0.0),
+            supports(LOWER_BOTTOM="xy", UPPER_TOP="x"),
             '[[couple]]\ngroup = "UPPER_TOP"\ncomponent = "y"\n',
             '[[force]]\ngroup = "UPPER_TOP_LEFT"\ny = -1e-9\n',
             PAIR,
@@ -156,7 +123,7 @@ DOUBTS = [
             r"the loads strain the model by about .*: are loads, lengths and E in",
         ),
     ),
-    Doubt("a cell is poor", library.uneven, of(STEEL, held("BOTTOM", x=0.0, y=0.0)),
+    Doubt("a cell is poor", library.uneven, of(STEEL, supports(BOTTOM="xy")),
           (r"cell \d+ \(tri6 .*\) is poor: its smallest Jacobian is 0\.0\d+ of its largest; move its nodes or remesh",)),
     Doubt("the mesh does not resolve the contact", lambda: generate.half_spheres("tri3", size=5.0),
           of(STEEL, SPHERES, kinematics="axisymmetric"),
@@ -164,7 +131,7 @@ DOUBTS = [
     Doubt(
         "the quadrature of the stiffness is not exact",
         bent,
-        of(STEEL, held("ALL", x=0.0, y=0.0)),
+        of(STEEL, supports(ALL="xy")),
         (
             r"the quadrature of the stiffness is not exact on curved or distorted cells: its error is \d+\.\d+% of the total; use smaller or better-shaped cells",
         ),
@@ -174,7 +141,7 @@ DOUBTS = [
         lambda: block((1.0, 1.0), (6, 6)),
         of(
             STEEL.replace("0.3", '0.499\nvolumetric = "plain"'),
-            held("BOTTOM", x=0.0, y=0.0),
+            supports(BOTTOM="xy"),
             '[[traction]]\ngroup = "TOP"\nx = 0.1\n',
         ),
         (
@@ -186,9 +153,8 @@ DOUBTS = [
         lambda: generate.rings("quad4", divisions_inner=(2, 12), divisions_outer=(2, 8)),
         of(
             STEEL,
-            held("SYMMETRY_X", x=0.0),
-            held("SYMMETRY_Y", y=0.0),
-            '[contact.pair]\nsecondary = "CONT_INNER"\nprimary = "CONT_OUTER"\nformulation = "continuous"\nclearance = -0.2\n',
+            supports(SYMMETRY_X="x", SYMMETRY_Y="y"),
+            contact_pair("CONT_INNER", "CONT_OUTER", 'formulation = "continuous"\nclearance = -0.2'),
         ),
         (
             r"contact 'pair': facets of 'CONT_INNER' and of the other side deviate from their arcs by up to 0\.297, which may change pressures by about 5\.24, compared with a mean of 3\.85: surface_smoothing=True measures the gap between the arcs; quadratic elements, or facets of length 0\.96 instead of 6\.5 reduce the error",
@@ -199,7 +165,7 @@ DOUBTS = [
         lambda: generate.union(
             block((0.5, 1.0), (2, 2), name="A"), block((0.5, 1.0), (2, 2), origin=(0.5, 0.0), name="B")
         ),
-        of(STEEL, held("BOTTOM", x=0.0, y=0.0)),
+        of(STEEL, supports(BOTTOM="xy")),
         (
             r"3 nodes lie where another one is, and no contact joins them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact",
         ),
@@ -207,7 +173,7 @@ DOUBTS = [
     Doubt(
         "E is in Pa where the case names MPa",
         lambda: block((1.0, 1.0), (2, 2)),
-        of(STEEL.replace("1000.0", "2.1e11"), held("BOTTOM", x=0.0, y=0.0)),
+        of(STEEL.replace("1000.0", "2.1e11"), supports(BOTTOM="xy")),
         (
             r"Young's modulus E = 2\.1e\+11 MPa of all cells is 1\.05e\+05 times that of diamond: is it in another unit\?",
         ),
@@ -215,7 +181,7 @@ DOUBTS = [
     Doubt(
         "the loads are in another unit than E",
         lambda: block((1.0, 1.0), (2, 2)),
-        of(STEEL, held("BOTTOM", x=0.0, y=0.0), '[[pressure]]\ngroup = "TOP"\nvalue = 1e-10\n'),
+        of(STEEL, supports(BOTTOM="xy"), '[[pressure]]\ngroup = "TOP"\nvalue = 1e-10\n'),
         (
             r"the loads strain the model by about 1e-13 \(total force over E times the cross-section of the model\): are loads, lengths and E in one set of units\?",
         ),
@@ -262,7 +228,7 @@ DOUBTS = [
         lambda: block((1.0, 1.0), (8, 8)).with_facet_group("HALF", lambda x: (x[:, 1] > 0.999) & (x[:, 0] < 0.51)),
         of(
             STEEL,
-            held("BOTTOM", x=0.0, y=0.0),
+            supports(BOTTOM="xy"),
             '[obstacle.pair]\nsecondary = "HALF"\nmotion = { y = -0.02 }\n',
             'shape = { kind = "half_space", point = [0.0, 1.0], normal = [0.0, -1.0] }\n',
         ),
@@ -275,7 +241,7 @@ DOUBTS = [
         lambda: generate.union(
             block((0.5, 1.0), (2, 2), name="A"), block((0.5, 1.0), (2, 2), origin=(0.5 + 1e-7, 0.0), name="B")
         ),
-        of(STEEL, held("BOTTOM", x=0.0, y=0.0)),
+        of(STEEL, supports(BOTTOM="xy")),
         (
             r"3 nodes lie within 1e-07 of another one, and no contact joins them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact",
         ),
@@ -301,7 +267,7 @@ DOUBTS = [
         lambda: block((1.0, 1.0), (2, 2)),
         of(
             STEEL,
-            held("BOTTOM", x=0.0, y=0.0),
+            supports(BOTTOM="xy"),
             '[[pressure]]\ngroup = "TOP"\nvalue = 1.0\n[[traction]]\ngroup = "RIGHT"\nx = 1.0\n',
             "ramp = [[0.0, 0.0], [1.0, 0.0], [2.0, 1.0]]\n",
         ).replace("ramp.steps = 1", "ramp = { instants = [1.0, 2.0], table = [[0.0, 0.0], [2.0, 2.0]] }"),

@@ -1,7 +1,10 @@
 """Generate the documentation page on mistakes from the catalogue: ``python tests/mistakes/page.py``."""
 
 import re
+import sys
 from pathlib import Path
+
+sys.path.append(str(Path(__file__).parents[1]))  # case texts that all tests share
 
 import library
 from accidents import ACCIDENTS

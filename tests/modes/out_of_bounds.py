@@ -3,7 +3,7 @@
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
-from fastcontact._jit.parallel import WORTHWHILE, spread
+from fastcontact._jit.parallel import WORTHWHILE, parallel_for
 
 
 @kernel
@@ -15,7 +15,7 @@ def beyond(low, high, values, out):
 if __name__ == "__main__":
     for work in (1, WORTHWHILE):
         try:
-            spread(beyond, 3, work, np.zeros(2), np.zeros(3))
+            parallel_for(beyond, 3, work, np.zeros(2), np.zeros(3))
             print("nothing")
         except IndexError:
             print("IndexError")

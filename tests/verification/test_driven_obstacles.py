@@ -5,6 +5,7 @@ import json
 import h5py
 import numpy as np
 import pytest
+from case_texts import case_of
 from models import elastic_model
 
 import fastcontact as fc
@@ -160,26 +161,13 @@ def test_forces_that_cannot_be_are_told(options, error, message):
         fc.solve(block_under_a_ball("plane_strain", **options), fc.linear_ramp(4))
 
 
-CASE = """
-kinematics = "axisymmetric"
-[mesh]
-generator = "quarter-disc"
-[[material]]
-E = 20000.0
-nu = 0.3
-[[support]]
-group = "A1A2"
-x = 0.0
-[[support]]
-group = "A1B1"
-y = 0.0
-[obstacle.plane]
+PLANE = """[obstacle.plane]
 secondary = "CONT1"
 shape = { kind = "half_space", point = [0.0, 0.0], normal = [0.0, -1.0] }
 force = { y = -2.0e5 }
-[ramp]
-steps = 2
 """
+STEEL = "E = 20000.0\nnu = 0.3"
+CASE = case_of('generator = "quarter-disc"', PLANE, "axisymmetric", STEEL, "steps = 2", A1A2="x", A1B1="y")
 
 
 def test_from_case_file_to_result_file(tmp_path):

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from case_texts import case_of, contact_pair
 from models import supported
 from pairwise import first_of
 from scipy.optimize import brentq
@@ -441,67 +442,38 @@ def test_functions_that_are_no_conductance_and_bodies_that_no_heat_reaches():
         fc.solve(model, 1)
 
 
-CASE = """
-title = "heat through two bars"
-kinematics = "plane_strain"
-reference_temperature = 20.0
-
-[mesh]
-generator = "block-on-block"
-size_lower = [0.05, 0.1]
-size_upper = [0.05, 0.1]
-
-[[material]]
-groups = ["UPPER"]
-E = 1e9
-nu = 0.3
-conductivity = 50
-
-[[material]]
+LOWER = """[[material]]
 groups = ["LOWER"]
 E = 1e9
 nu = 0.3
 conductivity = {along = "y", table = [[-1.0, 20.0], [1.0, 20.0]]}
-
-[[support]]
-group = "LOWER_BOTTOM"
-x = 0.0
-y = 0.0
-
-[[support]]
-group = "UPPER_TOP"
-x = 0.0
-y = -1e-5
-
-[[fixed_temperature]]
+"""
+JOINT = contact_pair(options="conductance = {pressure = [[0.0, 1000.0], [1e9, 1000.0]]}", name="joint")
+HEATED = """[[fixed_temperature]]
 group = "LOWER_BOTTOM"
 value = 0.0
-
 [[film]]
 group = "UPPER_TOP"
 coefficient = 1e9
 ambient = 100.0
-
-[contact.joint]
-secondary = "CONT_UPPER"
-primary = "CONT_LOWER"
-conductance = {pressure = [[0.0, 1000.0], [1e9, 1000.0]]}
-
 [probes]
 corner = "UPPER_TOP_LEFT"
-
 [[check]]
 quantity = "joint.heat"
 value = 625.0
 source = "R = 0.1 / 50 + 1 / 1000 + 0.1 / 20"
 tolerance = 1e-6
-
 [[check]]
 quantity = "corner.temperature"
 value = 100.0
 source = "the ambient"
 tolerance = 1e-4
 """
+CASE = "reference_temperature = 20.0\n" + case_of(
+    'generator = "block-on-block"\nsize_lower = [0.05, 0.1]\nsize_upper = [0.05, 0.1]', LOWER + JOINT + HEATED,
+    material='groups = ["UPPER"]\nE = 1e9\nnu = 0.3\nconductivity = 50',
+    LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.0, "y": -1e-5},
+)  # fmt: skip
 
 
 def test_case_files_have_heat(tmp_path):

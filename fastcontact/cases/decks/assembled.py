@@ -12,8 +12,9 @@ import numpy as np
 
 from fastcontact.arrays import Array, Mask
 from fastcontact.cases.decks.blocks import Location, Row, defined, folded
-from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, SurfaceDefinition
+from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, Surface, SurfaceEntry
 from fastcontact.cases.decks.element_types import ElementType, element_type
+from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.mesh import elements
 
 # Number of set names that a message lists, and length to which it cuts a name.
@@ -102,10 +103,6 @@ class Assembly:
         """Return the part of an instance, or the nodes and elements outside all parts if `scope` is empty."""
         return self.content.instances[scope].part if scope else self.content.root
 
-    def is_rotated(self, scope: str) -> bool:
-        """Return whether an instance is rotated."""
-        return bool(scope and self.content.instances[scope].rotation)
-
     @cached_property
     def scopes(self) -> list[str]:
         """Names of all instances in the form used for lookup, preceded by the empty name."""
@@ -169,9 +166,8 @@ class Assembly:
             return self.members(kind, entry.name, entry.location)
         part, name = self.part(scope), folded(entry.name)
         if kind == "node" and name not in part.node_sets and name in part.element_sets:
-            return (
-                point for element in self.members_of("element", scope, name, entry.location) for point in element.points
-            )
+            elements = self.members_of("element", scope, name, entry.location)
+            return (point for element in elements for point in element.points)
         return self.members_of(kind, scope, name, entry.location, entry.name)
 
     def _items_of(self, kind: str, scope: str) -> Mapping[int, Any]:
@@ -217,17 +213,11 @@ class Assembly:
             faces: dict[Face, None] = {}
             for face in definition.faces:
                 members = self.elements_of(face.of if not scope else f"{scope}.{face.of}", face.location)
-                if face.label:
-                    entries = [
-                        (element, self.facet(element, int(face.label[1:]), face.location)) for element in members
-                    ]
-                else:
-                    entries = [entry for element in members for entry in self._free_faces(element, face.location)]
-                faces.update(dict.fromkeys(entries))
+                faces.update(dict.fromkeys(entry for element in members for entry in self._faces_of(element, face)))
             self.surfaces[label] = list(faces)
         return self.surfaces[label]
 
-    def surface(self, name: str, location: Location) -> tuple[SurfaceDefinition, str]:
+    def surface(self, name: str, location: Location) -> tuple[Surface, str]:
         """Return the definition of a surface and the instance that contains it; CaseError if it is not defined."""
         scope, label = self.split_name(name)
         surfaces = self.part(scope).surfaces
@@ -253,9 +243,12 @@ class Assembly:
             )
         return facets_of_faces(solid.element)[label - 1]
 
-    def _free_faces(self, element: Element, location: Location) -> Iterator[Face]:
-        """Yield the faces of an element that no other solid shares."""
-        name = self._type_of_solid(element, location).element
+    def _faces_of(self, element: Element, entry: SurfaceEntry) -> Iterator[Face]:
+        """Yield the face of an element that an entry of a surface selects, or its faces that no other solid shares."""
+        if entry.label:
+            yield element, self.facet(element, int(entry.label[1:]), entry.location)
+            return
+        name = self._type_of_solid(element, entry.location).element
         for face in np.flatnonzero(self.free_faces[name][element.row]).tolist():
             yield element, facets_of_faces(name)[face]
 
@@ -304,7 +297,7 @@ class Assembly:
         """Return the outer faces whose corners are all in `points`."""
         return [face for face, corners in self._faces_at(points) if corners <= points]
 
-    def surface_nodes(self, definition: SurfaceDefinition, scope: str) -> list[int]:
+    def surface_nodes(self, definition: Surface, scope: str) -> list[int]:
         """Return the points of a node-based surface without repetition."""
         entries = [(face.of if not scope else f"{scope}.{face.of}", face.location) for face in definition.faces]
         return list(dict.fromkeys(point for name, location in entries for point in self.nodes(name, location)))
@@ -317,7 +310,7 @@ class Assembly:
                     return f"{self.content.instances[scope].name}.{number}" if scope else str(number)
         return "of a rotation"
 
-    def faces_of_nodes(self, definition: SurfaceDefinition, scope: str) -> tuple[list[Face], list[Face], list[int]]:
+    def faces_of_nodes(self, definition: Surface, scope: str) -> tuple[list[Face], list[Face], list[int]]:
         """Return the complete faces of a node-based surface, incomplete faces around its remaining nodes, and these nodes.
 
         All corners of a complete face are on the surface. Around each node that belongs to no complete face, the faces with
@@ -380,12 +373,8 @@ def _coordinates_in_assembly(part: Part, instance: Instance | None) -> Array:
         return points
     points = points + np.array(instance.translation)
     if instance.rotation:
-        a, b = np.array(instance.rotation[:3]), np.array(instance.rotation[3:6])
-        axis = (b - a) / np.linalg.norm(b - a)
-        angle = math.radians(instance.rotation[6])
-        relative = points - a
-        along = np.outer(relative @ axis, axis)
-        points = a + along + math.cos(angle) * (relative - along) + math.sin(angle) * np.cross(axis, relative)
+        (a, b), angle = np.reshape(instance.rotation[:6], (2, 3)), math.radians(instance.rotation[6])
+        points = a + (points - a) @ Rotation(tuple(a), tuple(b - a), angle).matrix(angle).T
         size = np.abs(points).max(initial=0.0)
         points[np.abs(points) < 1e-14 * size] = 0.0
     return points

@@ -13,18 +13,18 @@ from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 from fastcontact.cases.decks import interactions
 from fastcontact.cases.decks.assembled import Element, Target
+from fastcontact.cases.decks.axes import axes_by_cell, local_axes, orientation_of
 from fastcontact.cases.decks.blocks import defined, folded, refusing
 from fastcontact.cases.decks.conditions import Component, Conditions, Period
+from fastcontact.cases.decks.constraints import make_rotations, relations_of
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
 from fastcontact.cases.decks.fields import add_initial_stresses, add_temperatures
 from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
 from fastcontact.cases.decks.histories import ByShape, Histories
-from fastcontact.cases.decks.local_axes import axes_by_cell, local_axes, orientation_of
 from fastcontact.cases.decks.materials import law_of, strain_of
 from fastcontact.cases.decks.meshing import deck_mesh_of, group_of_surface, secondary_group
-from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections
-from fastcontact.cases.decks.stepping import MOST_INCREMENTS
+from fastcontact.cases.decks.steps import MOST_INCREMENTS
 from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
@@ -54,7 +54,7 @@ class Building:
         Load steps.
     thickness : float
         Thickness of a plane model [length]. The forces in the model are per unit thickness.
-    links : list of MultiPointConstraint
+    constraints : list of MultiPointConstraint
         Multi-point constraints that are not supports.
     local_supports : list of MultiPointConstraint
         Supports that are expressed as constraints, because they act along local axes or not in all steps.
@@ -87,7 +87,7 @@ class Building:
             self.model.add_material(material, group)
         self.local_supports: list[MultiPointConstraint] = []
         self.driven: dict[tuple[int, int], Table] = {}
-        self.links: list[MultiPointConstraint] = []
+        self.constraints: list[MultiPointConstraint] = []
         if only_heat:
             self.model.fix(self._point_group("held", range(mesh.n_points)), "xyz"[: mesh.dim])
             add_sectors(self.model, self.assembly)
@@ -104,10 +104,10 @@ class Building:
     def _mechanics(self, conditions: Conditions, pressures: list[Callable[[Model], None]]) -> None:
         """Add supports, constraints, loads, temperatures and springs to the model."""
         self._supports(conditions)
-        self.links += relations_of(self.assembly, self.model.mesh)
-        self.model.relations += [*self.local_supports, *self.links]
-        self.links += add_sections(self.model, self.assembly, conditions.locks)
-        self.links += add_sectors(self.model, self.assembly)
+        self.constraints += relations_of(self.assembly, self.model.mesh)
+        self.model.relations += [*self.local_supports, *self.constraints]
+        self.constraints += add_sections(self.model, self.assembly, conditions.locks)
+        self.constraints += add_sectors(self.model, self.assembly)
         self._forces(conditions)
         for add in pressures:
             add(self.model)
@@ -144,7 +144,7 @@ class Building:
         by_material: dict[tuple[str, str, bool], list[Any]] = {}
         for element in self.assembly.solids:
             section = element.assigned_section
-            key = (folded(section.material), folded(section.orientation), element.solid.modes)
+            key = (folded(section.material), folded(section.orientation), element.solid.incompatible_modes)
             by_material.setdefault(key, []).append(element)
         materials = []
         for (name, orientation, modes), members in by_material.items():
@@ -161,15 +161,13 @@ class Building:
         if not section.orientation:
             return None
         axes = orientation_of(self.content, section.orientation, section.location)
-        for element in members:
-            if axes.part is not self.content.root and self.assembly.is_rotated(element.scope):
-                raise axes.refuse(
-                    "axes of a part whose instance is rotated are not supported: give them in the assembly"
-                )
+        rotated = {scope for scope, instance in self.content.instances.items() if instance.rotation}
+        if axes.part is not self.content.root and any(element.scope in rotated for element in members):
+            raise axes.refuse("axes of a part whose instance is rotated are not supported: give them in the assembly")
         if axes.distribution:
             return axes_by_cell(self.assembly, axes, members)
         if axes.cylindrical:
-            a, b = np.array(axes.points[:3]), np.array(axes.points[3:])
+            a, b = np.reshape(axes.points, (2, 3))
             return CylindricalAxes(tuple(a.tolist()), tuple((b - a).tolist()))
         return tuple(tuple(row) for row in local_axes(axes, np.zeros(3)).tolist())
 
@@ -351,7 +349,7 @@ class Building:
                 **self._clearance_option(pair, glued=True),
             }
         if law.kind != "unilateral":
-            if law.friction or law.changes:
+            if law.friction or law.friction_changes:
                 raise law.refuse(f"friction with {law.kind} contact is not supported")
             options["kind"] = law.kind
         if law.penalty is not None and law.kind != "tied":

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fastcontact.cases.decks.assembled import Target, targets
+from fastcontact.cases.decks.axes import local_directions
 from fastcontact.cases.decks.blocks import Block, Location, Row
 from fastcontact.cases.decks.content import Condition
 from fastcontact.cases.decks.fields import OF_HEAT, HeatConditions, initial_temperatures, temperatures_of_block
 from fastcontact.cases.decks.histories import Histories
-from fastcontact.cases.decks.local_axes import local_directions
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.sections import Locks
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -101,7 +101,7 @@ class Conditions:
             self.forces.take(condition, self._forces(block))
         else:
             entries = ((t, row.number(2), row.location) for row in block.each() for t in targets(self.assembly, row))
-            self.loads.take(condition, entries, lambda name: name.keyword == keyword)
+            self.loads.take(condition, entries)
 
     def _change(self, number: int) -> None:
         """Record the supports that begin or end at the start of step `number`."""

@@ -39,7 +39,7 @@ class Members(Item):
 
 
 @dataclass(frozen=True, slots=True)
-class Face:
+class SurfaceEntry:
     """An entry of a surface: `of` is an element set or number, with the label of a face, or a node set or number."""
 
     location: Location
@@ -48,13 +48,13 @@ class Face:
 
 
 @dataclass
-class SurfaceDefinition(Located):
+class Surface(Located):
     """A surface of element faces or, if `of_nodes` is true, of nodes."""
 
     name: str
     location: Location
     of_nodes: bool
-    faces: list[Face] = field(default_factory=list)
+    faces: list[SurfaceEntry] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Part:
     node_sets: dict[str, list[Members]] = field(default_factory=dict)
     element_sets: dict[str, list[Members]] = field(default_factory=dict)
     set_names: dict[str, str] = field(default_factory=dict)
-    surfaces: dict[str, SurfaceDefinition] = field(default_factory=dict)
+    surfaces: dict[str, Surface] = field(default_factory=dict)
     sections: list[Section] = field(default_factory=list)
 
     def add(self, kind: str, name: str, members: list[Members]) -> None:
@@ -129,12 +129,13 @@ class Interaction(Located):
     location: Location
     penalty: float | list[tuple[float, float]] | dict[str, float] | None = None
     friction: float = 0.0
-    stick: float | None = None
+    stick_slope: float | None = None
     kind: str = "unilateral"
     cohesion: dict[str, Block] = field(default_factory=dict)
     conductance: list[Block] = field(default_factory=list)
     friction_heat: tuple[Location, float] | None = None
-    changes: list[tuple[int, Interaction]] = field(default_factory=list)  # number of preceding steps, and new friction
+    # Number of preceding steps, and new friction.
+    friction_changes: list[tuple[int, Interaction]] = field(default_factory=list)
 
 
 @dataclass
@@ -188,8 +189,8 @@ class MultiPoint(Item):
 
 
 @dataclass(frozen=True)
-class Link(Item):
-    """A reference node and the nodes that follow it (rigid, kinematic) or whose mean motion it has (distributing)."""
+class Coupling(Item):
+    """A rigid body or coupling: a reference node, and the nodes that follow it or (distributing) whose mean motion it has."""
 
     reference: str
     group: str
@@ -252,10 +253,10 @@ class Step(Located):
     nonlinear: bool = False
     period: float = 1.0
     increment: float = 1.0
-    static: bool = False
+    has_procedure: bool = False
     perturbation: bool = False
     heat: str = ""  # "alone"; "coupled" with displacements; empty if temperatures are not computed
-    modes: int = 0
+    n_modes: int = 0
     conditions: list[Condition] = field(default_factory=list)
 
 
@@ -274,8 +275,8 @@ class Content:
     sectors: list[Sectors] = field(default_factory=list)
     equations: list[Equation] = field(default_factory=list)
     multi_points: list[MultiPoint] = field(default_factory=list)
-    links: list[Link] = field(default_factory=list)
-    axes: list[Axes] = field(default_factory=list)
+    couplings: list[Coupling] = field(default_factory=list)
+    transforms: list[Axes] = field(default_factory=list)
     pretension_sections: list[PretensionSection] = field(default_factory=list)
     orientations: dict[str, Axes] = field(default_factory=dict)
     distributions: dict[str, Block] = field(default_factory=dict)

@@ -171,23 +171,22 @@ class Deck:
         }  # fmt: skip
         sums = {name: _scaled(t, step.iterations[name]) for name in ("work", "heat") if step.iterations.get(name)}
         heat = None if step.heat_reaction is None else t * step.heat_reaction
-        return replace(
-            step, reaction=t * reaction, contact=contacts, iterations=step.iterations | sums, heat_reaction=heat
-        )
+        iterations = step.iterations | sums
+        return replace(step, reaction=t * reaction, contact=contacts, iterations=iterations, heat_reaction=heat)
 
     def _support_reactions(self, reaction: Array, instant: float) -> Array:
         """Return the reactions (n_points, dim) [force] at supports, without the forces of multi-point constraints.
 
         The Lagrange multipliers of the constraints follow from the reactions at components without a support.
         """
-        links = self.building.links
-        if not links:
+        constraints = self.building.constraints
+        if not constraints:
             return reaction.copy()
         supported = self.model.prescribed()[0].ravel()
         for support in self.building.local_supports:
             if not isinstance(support, TemporaryConstraint) or support.acts_from(instant):
                 supported[support.rows.indices] = True
-        rows = [link.rows for link in links]
+        rows = [constraint.rows for constraint in constraints]
         forces = multipliers(reaction.ravel(), rows, supported)
         of_constraints = sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(supported.size))
         return reaction - of_constraints.reshape(reaction.shape)

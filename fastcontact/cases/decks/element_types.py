@@ -43,7 +43,7 @@ class ElementType:
         Kinematics of the model.
     note : str
         Difference between the element of the deck and that of the package, or an empty string.
-    modes : bool
+    incompatible_modes : bool
         True if the element has incompatible modes.
     conducts : bool
         True if the element conducts heat and has no displacements.
@@ -53,7 +53,7 @@ class ElementType:
     element: str
     kinematics: str
     note: str = ""
-    modes: bool = False
+    incompatible_modes: bool = False
     conducts: bool = False
 
     @property

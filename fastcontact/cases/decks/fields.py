@@ -47,10 +47,7 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
     Histories that differ only by a factor share a field. If the histories have corners at fewer times than there are such
     fields, one field for each of these times is added instead.
     """
-    changes = (
-        (tuple((time, value - table[0][1]) for time, value in table), points) for table, points in histories.alike()
-    )
-    fields = list(ByShape.of(changes))
+    fields = list(ByShape.of((relative_table(table, table[0][1]), points) for table, points in histories.alike()))
     times = sorted({time for *_, table in fields for time, _ in table})
     if len(fields) <= len(times):
         for _, points, values, table in fields:
@@ -210,23 +207,24 @@ class HeatConditions:
         """Record a block of heat loads of the current step."""
         keyword = condition.block.keyword
         histories: dict[str, Histories[Any]] = {"CFLUX": self.powers, "FILM": self.films, "SFILM": self.films}
-        history = histories.get(keyword, self.fluxes)
-        if condition.new:
-            history.forget(lambda name: getattr(name, "keyword", keyword) == keyword)
-        for row in condition.block.each():
-            if keyword == "CFLUX":
-                if row.whole(1, TEMPERATURE) not in (0, TEMPERATURE):
-                    raise row.refuse(f"degree of freedom {row.text(1)} is not 11, the temperature")
-                for point in self._points_of_solids(row):
-                    self.powers.give(point, row.number(2), condition.amplitude, row.location)
-                continue
-            film = history is self.films
-            if film and row.number(3) < 0.0:
-                raise row.refuse(f"the film coefficient {row.number(3):g} must not be negative")
-            for target in targets(self.assembly, row, (row.number(3),) if film else ()):
-                if film:
-                    self._replace_film(target, row)
-                history.give(target, row.number(2), condition.amplitude, row.location)
+        entries = ((name, row.number(2), row.location) for row in condition.block.each() for name in self._names(row))
+        histories.get(keyword, self.fluxes).take(condition, entries)
+
+    def _names(self, row: Row) -> Iterator[int | Target]:
+        """Yield the points or the targets of a line of a heat load, and remove the films that it replaces."""
+        keyword = row.location.keyword
+        if keyword == "CFLUX":
+            if row.whole(1, TEMPERATURE) not in (0, TEMPERATURE):
+                raise row.refuse(f"degree of freedom {row.text(1)} is not 11, the temperature")
+            yield from self._points_of_solids(row)
+            return
+        film = keyword in ("FILM", "SFILM")
+        if film and row.number(3) < 0.0:
+            raise row.refuse(f"the film coefficient {row.number(3):g} must not be negative")
+        for target in targets(self.assembly, row, (row.number(3),) if film else ()):
+            if film:
+                self._replace_film(target, row)
+            yield target
 
     def _replace_film(self, film: Target, row: Row) -> None:
         """Remove an earlier film of the same face with another coefficient; CaseError if the current step defines both."""
@@ -260,7 +258,7 @@ class HeatConditions:
         for table, names in self.temperatures.alike():
             for span, points in self.temperature_spans.of(names).items():
                 spans += [span] * (span not in spans)
-                rises.add(spans.index(span), self._relative_table(table), points)
+                rises.add(spans.index(span), relative_table(table, self.reference), points)
         for number, nodes, value, table in rises:
             group = assembly.add_points(f"temperature {len(adders)}", nodes)
             fixed = {"value": _absolute(value, self.reference), "ramp": table, **_limits(spans[number])}
@@ -291,16 +289,17 @@ class HeatConditions:
                     faces_by_film.setdefault((table, film.numbers[0], span), []).append(film.face)
         for (table, coefficient, span), faces in faces_by_film.items():
             group = assembly.add_facets(f"film {len(adders)}", faces)
-            rise = self._relative_table(table)
+            rise = relative_table(table, self.reference)
             size = max((value for _, value in rise), key=abs)
             ramp = tuple((time, value / size) for time, value in rise) if size else None
             film_options: dict[str, Any] = {"ambient": self.reference + size, "ramp": ramp, **_limits(span)}
             adders.append(partial(Model.add_film, group=group, coefficient=coefficient, **film_options))
         return adders
 
-    def _relative_table(self, table: Table) -> Table:
-        """Return a temperature history relative to the reference temperature."""
-        return tuple((time, value - self.reference) for time, value in table)
+
+def relative_table(table: Table, reference: float) -> Table:
+    """Return a history minus a reference value."""
+    return tuple((time, value - reference) for time, value in table)
 
 
 def _limits(span: tuple[float, float]) -> dict[str, float]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import groupby
 
 from fastcontact.cases.decks.blocks import Block, Row, defined, folded, registered, unquoted
-from fastcontact.cases.decks.content import Cell, Content, Face, Instance, Members, Part, Section, SurfaceDefinition
+from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, Surface, SurfaceEntry
 from fastcontact.cases.decks.element_types import described, element_type
 from fastcontact.mesh import elements
 
@@ -99,13 +99,13 @@ def group(content: Content, part: Part, block: Block) -> None:
 def surface(content: Content, part: Part, block: Block) -> None:
     """Read *SURFACE: the faces of elements or the nodes of a surface."""
     name, kind = block.required("NAME"), block.choice("TYPE", ("ELEMENT", "NODE"))
-    definition = SurfaceDefinition(name, block.location, kind == "NODE")
+    definition = Surface(name, block.location, kind == "NODE")
     registered("surface", name, part.surfaces, definition, block)
     for row in block.each():
         label = row.text(1).upper()
         if not definition.of_nodes and label and not (label[0] == "S" and label[1:].isdigit()):
             raise row.refuse(f"face '{row.text(1)[:40]}' is not supported: faces of solids are S1, S2, ...")
-        definition.faces.append(Face(row.location, row.text(0), "" if definition.of_nodes else label))
+        definition.faces.append(SurfaceEntry(row.location, row.text(0), "" if definition.of_nodes else label))
 
 
 def instance(content: Content, block: Block) -> Instance:

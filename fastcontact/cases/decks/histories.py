@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Generic, TypeVar
@@ -156,15 +156,10 @@ class Histories(Generic[Name]):
         self.changing.put(name, value, amplitude, location)
         self.dying.pop(name, None)
 
-    def take(
-        self,
-        condition: Condition,
-        entries: Iterable[tuple[Name, float, Location]],
-        removed: Callable[[Name], bool] | None = None,
-    ) -> None:
-        """Set the values of the lines of a block; OP=NEW first removes earlier values as `forget` does."""
+    def take(self, condition: Condition, entries: Iterable[tuple[Name, float, Location]]) -> None:
+        """Set the values of the lines of a block; OP=NEW first removes the earlier values of its keyword."""
         if condition.new:
-            self.forget(removed)
+            self.forget(condition.block.keyword)
         for name, value, location in entries:
             self.give(name, value, condition.amplitude, location)
 
@@ -184,11 +179,11 @@ class Histories(Generic[Name]):
             self.tracks.update((name, track) for name in names)
         self.initial, self.changing = self.changing, Values()
 
-    def forget(self, removed: Callable[[Name], bool] | None = None) -> None:
-        """Remove the values of earlier steps for whose names `removed` returns true, by default all."""
+    def forget(self, keyword: str = "") -> None:
+        """Remove the values of earlier steps, except those whose names have another keyword."""
         self.initial = Values()
         for name, track in self.tracks.items():
-            if track.alive and name not in self.changing and (removed is None or removed(name)):
+            if track.alive and name not in self.changing and getattr(name, "keyword", keyword) == keyword:
                 self.dying[name] = None
 
     def advance(self, number: int, step: Step) -> None:

@@ -40,7 +40,7 @@ def changed_interaction(content: Content, step: Step, block: Block) -> Interacti
     name = block.required("INTERACTION")
     original = defined("surface interaction", name, content.interactions, block)
     changed = Interaction(name, block.location, friction=-1.0)  # the negative value reveals a missing *FRICTION
-    original.changes.append((len(content.steps) - 1, changed))
+    original.friction_changes.append((len(content.steps) - 1, changed))
     return changed
 
 
@@ -79,8 +79,8 @@ def friction(content: Content, current: Interaction, block: Block) -> None:
     if current.friction < 0:
         raise row.refuse(f"the coefficient of friction {current.friction:g} is negative")
     if row.text(1) and row.number(1):
-        current.stick = row.positive(1, "stick slope")
-        content.note(row, f"{current.stick:g} is the stick slope, shear traction divided by slip, as in CalculiX")
+        current.stick_slope = row.positive(1, "stick slope")
+        content.note(row, f"{current.stick_slope:g} is the stick slope, shear traction divided by slip, as in CalculiX")
     if len(row.entries) > 2 and any(row.entries[2:]):
         raise row.refuse("friction that depends on pressure or temperature is not supported: give one coefficient")
 
@@ -112,19 +112,19 @@ def keep(content: Content, current: Interaction, block: Block) -> None:
 
 def friction_of(law: Interaction, n_steps: int) -> dict[str, Any]:
     """Return the friction options of a pair, whose coefficient *CHANGE FRICTION changes at the start of steps."""
-    table, stick_slopes = [(0.0, law.friction)], {law.stick} if law.friction else set()
-    for n_before, changed in law.changes:
+    table, stick_slopes = [(0.0, law.friction)], {law.stick_slope} if law.friction else set()
+    for n_before, changed in law.friction_changes:
         if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
             raise changed.refuse("must be followed by *FRICTION and by no other change of the interaction")
         table += [(float(n_before), table[-1][1]), (n_before + JUMP, changed.friction)]
-        stick_slopes |= {changed.stick} if changed.friction else set()
+        stick_slopes |= {changed.stick_slope} if changed.friction else set()
+        if len(stick_slopes) > 1:
+            raise changed.refuse("a change of the stick slope is not supported: repeat the earlier slope")
     largest = max(value for _, value in table)
     if not largest:
         return {}
-    if len(stick_slopes) > 1:
-        raise law.changes[0][1].refuse("a change of the stick slope is not supported: repeat the earlier slope")
     options: dict[str, Any] = {"friction": largest, "tangential_penalty": stick_slopes.pop()}
-    if law.changes:
+    if law.friction_changes:
         points = {**dict(table), float(n_steps): table[-1][1]}
         options["friction_ramp"] = [(time, value / largest) for time, value in sorted(points.items())]
     return options
@@ -136,13 +136,12 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
     Raises CaseError if the law of the deck is not supported.
     """
     blocks = law.cohesion
-    behaviour, initiation, evolution = (
-        blocks.get(name) for name in ("COHESIVE BEHAVIOR", "DAMAGE INITIATION", "DAMAGE EVOLUTION")
-    )
+    names = ("COHESIVE BEHAVIOR", "DAMAGE INITIATION", "DAMAGE EVOLUTION")
+    behaviour, initiation, evolution = map(blocks.get, names)
     if behaviour is None:
         first = next(iter(blocks.values()))
         raise first.refuse(f"surface interaction '{law.name}' has no *COHESIVE BEHAVIOR")
-    if law.friction or law.changes or law.penalty is not None or law.kind != "unilateral":
+    if law.friction or law.friction_changes or law.penalty is not None or law.kind != "unilateral":
         raise behaviour.refuse("a cohesive layer excludes *FRICTION, NO SEPARATION, and tied or soft contact")
     stiffness = _stiffness(behaviour)
     if initiation is None and evolution is None and stiffness is None:
@@ -259,7 +258,6 @@ def perfect_conductance(content: Content, model: Model, location: Location) -> A
     """Return the conductance of a tie [power / (area temperature)], so large that the sides have nearly one temperature."""
     largest = max(np.max(material.conductivity) for material, _ in model.materials)
     h = PERFECT * float(largest) / float(np.ptp(model.mesh.points, axis=0).max())
-    content.note(
-        location, f"the conductance is {h:.3g}; the temperatures of the sides differ by about 1e-8 of their variation"
-    )
+    difference = "the temperatures of the sides differ by about 1e-8 of their variation"
+    content.note(location, f"the conductance is {h:.3g}; {difference}")
     return (lambda pressure, gap: np.full(gap.shape, h)) if content.heat == "alone" else h

@@ -7,17 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-from fastcontact.cases.decks import (
-    fields,
-    gaps,
-    geometry,
-    interactions,
-    local_axes,
-    materials,
-    relating,
-    sections,
-    stepping,
-)
+from fastcontact.cases.decks import axes, constraints, fields, gaps, geometry, interactions, materials, sections, steps
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Instance, Interaction, Material, Part, Step
 
@@ -87,18 +77,18 @@ TRANSLATED = {
     "COUPLING": Keyword(
         "property", lambda content, block: block, "REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME", "coupling"
     ),
-    **dict.fromkeys(("DISTRIBUTING", "KINEMATIC"), Keyword("coupling", relating.coupling, opens="coupling")),
-    "STEP": Keyword("step", stepping.new_step, "NLGEOM; AMPLITUDE; PERTURBATION", IGNORED_BY_STEPS, "step"),
-    "END STEP": Keyword("step", stepping.end_step, opens="step"),
+    **dict.fromkeys(("DISTRIBUTING", "KINEMATIC"), Keyword("coupling", constraints.coupling, opens="coupling")),
+    "STEP": Keyword("step", steps.new_step, "NLGEOM; AMPLITUDE; PERTURBATION", IGNORED_BY_STEPS, "step"),
+    "END STEP": Keyword("step", steps.end_step, opens="step"),
     "HEADING": Keyword("deck", heading, ANYTHING),
     # In parts, or in decks without parts.
-    "DISTRIBUTION": Keyword("part", local_axes.distribution, "NAME; LOCATION", "TABLE"),
-    "DISTRIBUTION TABLE": Keyword("part", local_axes.distribution_table, ANYTHING),
+    "DISTRIBUTION": Keyword("part", axes.distribution, "NAME; LOCATION", "TABLE"),
+    "DISTRIBUTION TABLE": Keyword("part", axes.distribution_table, ANYTHING),
     "ELEMENT": Keyword("part", geometry.cells, "TYPE; ELSET"),
     "ELSET": Keyword("part", geometry.group, "ELSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED"),
     "NODE": Keyword("part", geometry.nodes, "NSET; SYSTEM"),
     "NSET": Keyword("part", geometry.group, "NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED; FREQUENCY"),
-    "ORIENTATION": Keyword("part", local_axes.orientation, "NAME; SYSTEM; DEFINITION"),
+    "ORIENTATION": Keyword("part", axes.orientation, "NAME; SYSTEM; DEFINITION"),
     "SOLID SECTION": Keyword("part", geometry.section, "ELSET; MATERIAL; ORIENTATION", "CONTROLS"),
     "SURFACE": Keyword("part", geometry.surface, "NAME; TYPE", "INTERNAL"),
     # Below *MATERIAL.
@@ -125,33 +115,33 @@ TRANSLATED = {
     "GAP HEAT GENERATION": Keyword("interaction", interactions.gap_heat_generation),
     "SURFACE BEHAVIOR": Keyword("interaction", interactions.behaviour, "PRESSURE-OVERCLOSURE; NO SEPARATION"),
     # In the whole model.
-    "AMPLITUDE": Keyword("model", stepping.amplitude, "NAME; TIME; DEFINITION; VALUE"),
-    "CLEARANCE": Keyword("model", relating.clearance, "SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
-    "CONTACT PAIR": Keyword("model", relating.contact_pair, "INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
+    "AMPLITUDE": Keyword("model", steps.amplitude, "NAME; TIME; DEFINITION; VALUE"),
+    "CLEARANCE": Keyword("model", constraints.clearance, "SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
+    "CONTACT PAIR": Keyword("model", constraints.contact_pair, "INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
     "CYCLIC SYMMETRY MODEL": Keyword("model", sections.cyclic_symmetry_model, "N; TIE", "NGRAPH; CHECK; ELSET"),
-    "EQUATION": Keyword("model", relating.equation),
+    "EQUATION": Keyword("model", constraints.equation),
     "GAP": Keyword("model", gaps.gap, "ELSET"),
     "INITIAL CONDITIONS": Keyword("model", fields.initial_conditions, "TYPE"),
-    "MPC": Keyword("model", relating.multi_point),
+    "MPC": Keyword("model", constraints.multi_point),
     "PHYSICAL CONSTANTS": Keyword("model", without_effect("no effect: there is no radiation"), ANYTHING),
     "PRE-TENSION SECTION": Keyword("model", sections.pretension_section, "SURFACE; NODE"),
-    "RIGID BODY": Keyword("model", relating.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
+    "RIGID BODY": Keyword("model", constraints.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
     "SPRING": Keyword("model", gaps.spring, "ELSET"),
-    "TIE": Keyword("model", relating.tie, "POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
-    "TRANSFORM": Keyword("model", local_axes.transform, "NSET; TYPE"),
+    "TIE": Keyword("model", constraints.tie, "POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
+    "TRANSFORM": Keyword("model", axes.transform, "NSET; TYPE"),
     # Supports and loads in steps.
-    "BOUNDARY": Keyword("step", stepping.condition, "OP; AMPLITUDE; FIXED; TYPE"),
+    "BOUNDARY": Keyword("step", steps.condition, "OP; AMPLITUDE; FIXED; TYPE"),
     **dict.fromkeys(
         ("CFLUX", "CLOAD", "DFLUX", "DLOAD", "DSFLUX", "DSLOAD", "FILM", "SFILM", "TEMPERATURE"),
-        Keyword("step", stepping.condition, "OP; AMPLITUDE"),
+        Keyword("step", steps.condition, "OP; AMPLITUDE"),
     ),
     # Procedures of steps.
     **dict.fromkeys(
         ("COUPLED TEMPERATURE-DISPLACEMENT", "HEAT TRANSFER", "UNCOUPLED TEMPERATURE-DISPLACEMENT"),
-        Keyword("procedure", stepping.heated, "STEADY STATE", SOLUTION_CONTROLS),
+        Keyword("procedure", steps.heated, "STEADY STATE", SOLUTION_CONTROLS),
     ),
-    "FREQUENCY": Keyword("procedure", stepping.frequency, "", "EIGENSOLVER; NORMALIZATION; SOLVER; STORAGE; GLOBAL"),
-    "STATIC": Keyword("procedure", stepping.static, "", SOLUTION_CONTROLS),
+    "FREQUENCY": Keyword("procedure", steps.frequency, "", "EIGENSOLVER; NORMALIZATION; SOLVER; STORAGE; GLOBAL"),
+    "STATIC": Keyword("procedure", steps.static, "", SOLUTION_CONTROLS),
 }
 # Ignored keywords: output requests, because results contain all output, and convergence controls.
 _OUTPUT = (

@@ -10,17 +10,9 @@ import numpy as np
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.blocks import Block, as_number, refusing, registered
 from fastcontact.cases.decks.content import Content, Material
+from fastcontact.elasticity import nonlinear_materials as nonlinear
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.materials import LinearElastic
-from fastcontact.elasticity.nonlinear_materials import (
-    STRAINS,
-    ElasticPlastic,
-    MooneyRivlin,
-    NeoHookean,
-    NonlinearElastic,
-    Ogden,
-    Yeoh,
-)
 
 # Number of constants of *ELASTIC by type.
 CONSTANTS = {"ISOTROPIC": 2, "ENGINEERING CONSTANTS": 9, "ORTHOTROPIC": 9, "ANISOTROPIC": 21}
@@ -119,7 +111,8 @@ def plastic(content: Content, current: Material, block: Block) -> None:
         modulus = (table[1][1] - table[0][1]) / table[1][0] if len(table) == 2 else 0.0
         table = table[:1]
     with refusing(block, current.about):
-        law = ElasticPlastic(E=elastic.E, nu=elastic.nu, yield_stress=table[0][1], hardening=table, kinematic=modulus)
+        E, nu, limit = elastic.E, elastic.nu, table[0][1]
+        law = nonlinear.ElasticPlastic(E=E, nu=nu, yield_stress=limit, hardening=table, kinematic=modulus)
     current.law = lambda axes: law
 
 
@@ -151,10 +144,11 @@ def hyperelastic(content: Content, current: Material, block: Block) -> None:
 def _hyperelastic(kind: str, constants: list[float], mu: float, bulk: float) -> Any:
     """Return a hyperelastic material from its constants, its shear modulus and its bulk modulus [pressure]."""
     if kind == "NEO HOOKE":
-        return NeoHookean(E=9.0 * bulk * mu / (3.0 * bulk + mu), nu=(3.0 * bulk - 2.0 * mu) / (2.0 * (3.0 * bulk + mu)))
+        E, nu = 9.0 * bulk * mu / (3.0 * bulk + mu), (3.0 * bulk - 2.0 * mu) / (2.0 * (3.0 * bulk + mu))
+        return nonlinear.NeoHookean(E, nu)
     if kind == "OGDEN":
-        return Ogden(constants[::2], constants[1::2], bulk=bulk)
-    law: Any = MooneyRivlin if kind == "MOONEY-RIVLIN" else Yeoh
+        return nonlinear.Ogden(constants[::2], constants[1::2], bulk=bulk)
+    law: Any = nonlinear.MooneyRivlin if kind == "MOONEY-RIVLIN" else nonlinear.Yeoh
     return law(*constants, bulk)
 
 
@@ -187,15 +181,14 @@ def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     assert material.law is not None
     law, expansion = material.law(axes), material.expansion
     law = replace(law, density=material.density)
-    if isinstance(law, NonlinearElastic) and modes:
+    if isinstance(law, nonlinear.NonlinearElastic) and modes:
         content.note(material, f"{material.about}incompatible modes are left out, since it is nonlinear")
     elif modes:
         law = replace(law, incompatible_modes=True)
     if content.heat or material.conductivity is not None:
         law = _with_constants(material, law, axes, conductivity=_conductivity(content, material))
-    heated = content.heat or any(
-        condition.block.keyword == "TEMPERATURE" for step in content.steps for condition in step.conditions
-    )
+    conditions = [condition for step in content.steps for condition in step.conditions]
+    heated = content.heat or any(condition.block.keyword == "TEMPERATURE" for condition in conditions)
     if expansion is None:
         if heated:
             content.note(material, f"material '{material.name}' has no *EXPANSION: temperatures cause no strain")
@@ -224,7 +217,7 @@ def _conductivity(content: Content, material: Material) -> float | tuple[float, 
 def _with_constants(material: Material, law: Any, axes: Any, **constants: Any) -> Any:
     """Return a material with additional constants; an elastic one becomes orthotropic for constants along the axes."""
     if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
-        if isinstance(law, NonlinearElastic):
+        if isinstance(law, nonlinear.NonlinearElastic):
             raise material.refuse(
                 f"{material.about}expansion and conductivity along axes are supported in elastic materials only"
             )
@@ -236,17 +229,16 @@ def _with_constants(material: Material, law: Any, axes: Any, **constants: Any) -
 
 def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
     """Return the strain measure of the model, and the reason why NLGEOM is ignored, or an empty string."""
-    if any("small" not in getattr(law, "strains", STRAINS) for law in laws):
+    if any("small" not in getattr(law, "strains", nonlinear.STRAINS) for law in laws):
         return "finite", ""
     if content.heat == "alone" or not any(step.nonlinear for step in content.steps):
         return "small", ""
+    plastic_laws = [law for law in laws if isinstance(law, nonlinear.ElasticPlastic)]
     reasons = {
-        "kinematic hardening": any(isinstance(law, ElasticPlastic) and law.kinematic for law in laws),
-        "a nearly incompressible elastic material": any(
-            law.averaged and not isinstance(law, ElasticPlastic) for law in laws
-        ),
+        "kinematic hardening": any(law.kinematic for law in plastic_laws),
+        "a nearly incompressible elastic material": any(law.averaged and law not in plastic_laws for law in laws),
         "initial stresses": bool(content.initial_stresses),
-        "couplings, rigid bodies and multi-point constraints": bool(content.links or content.multi_points),
+        "couplings, rigid bodies and multi-point constraints": bool(content.couplings or content.multi_points),
         "pretension sections": bool(content.pretension_sections),
         "incompatible modes": any(law.incompatible_modes for law in laws),
     }

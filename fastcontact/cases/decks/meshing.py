@@ -11,7 +11,7 @@ import numpy as np
 from fastcontact.arrays import Indices
 from fastcontact.cases.decks.assembled import Assembly, Element, Face, assemble, facet_points
 from fastcontact.cases.decks.blocks import Location, folded
-from fastcontact.cases.decks.content import Content, SurfaceDefinition
+from fastcontact.cases.decks.content import Content, Surface
 from fastcontact.mesh import topology
 from fastcontact.mesh.mesh import Mesh, starts_of
 
@@ -173,12 +173,11 @@ def _add_groups(deck_mesh: DeckMesh) -> None:
                 deck_mesh.add_facets(prefix + definition.name, faces)
         for name, members in part.element_sets.items():
             if name not in part.surfaces and members:
-                deck_mesh.add_solids(
-                    prefix + part.set_names[name], deck_mesh.members_of("element", scope, name, members[0].location)
-                )
+                solids = deck_mesh.members_of("element", scope, name, members[0].location)
+                deck_mesh.add_solids(prefix + part.set_names[name], solids)
 
 
-def _add_node_based_surface(deck_mesh: DeckMesh, group: str, definition: SurfaceDefinition, scope: str) -> None:
+def _add_node_based_surface(deck_mesh: DeckMesh, group: str, definition: Surface, scope: str) -> None:
     """Add a group of the facets around the nodes of a node-based surface; other points of these facets are `loose`."""
     complete, further, remaining = deck_mesh.faces_of_nodes(definition, scope)
     if not (complete or further):  # the nodes belong to no solid

@@ -23,9 +23,8 @@ def pretension_section(content: Content, block: Block) -> None:
     normal = None if row is None else (row.number(0), row.number(1, 0.0), row.number(2, 0.0))
     if normal is not None and not any(normal):
         raise block.refuse("the normal is zero")
-    content.pretension_sections.append(
-        PretensionSection(block.location, block.required("SURFACE"), block.required("NODE"), normal)
-    )
+    names = block.required("SURFACE"), block.required("NODE")
+    content.pretension_sections.append(PretensionSection(block.location, *names, normal))
 
 
 class Locks:
@@ -61,12 +60,8 @@ class Locks:
         self.number = number
         if not any(condition.new for condition in supports):
             return
-        named = {
-            p
-            for condition in supports
-            for row in condition.block.each()
-            for p in assembly.nodes(row.text(0), row.location)
-        }
+        rows = [row for condition in supports for row in condition.block.each()]
+        named = {point for row in rows for point in assembly.nodes(row.text(0), row.location)}
         for point in self.begins:
             if point not in named:
                 location = next(condition.block.location for condition in supports if condition.new)
@@ -149,7 +144,7 @@ def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]
     for sectors in content.sectors:
         ends = _ends(content, sectors)
         used.add(id(ends))
-        first, second = np.array(sectors.points[:3]), np.array(sectors.points[3:])
+        first, second = np.reshape(sectors.points, (2, 3))
         direction = (second - first) / np.linalg.norm(second - first)
         if model.mesh.dim == 2 and np.abs(direction[:2]).max() > 1e-9:
             raise sectors.refuse("the axis of a plane model is along z: give two points that differ in z only")

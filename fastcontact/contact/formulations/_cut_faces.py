@@ -211,7 +211,7 @@ def _integrated(
         primary.nodes, primary.count, primary_to_terms @ primary.nodes, primary_to_terms, _middle(opposite),
         pairs, *quadrature.triangle(min(degree + degree % 2, 8)), *heights, mass, integrals, closer,
     )  # fmt: skip
-    failed = parallel.shared(
+    failed = parallel.parallel_map(
         lambda portion: _cut_faces_kernels.integrate(*portion, *arguments), parallel.portions(n, EFFORT)
     )
     if max(failed) >= 0:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fastcontact._jit.parallel import spread
+from fastcontact._jit.parallel import parallel_for
 from fastcontact.arrays import AnyArray, Array, largest
 from fastcontact.linear.krylov import krylov_kernels
 from fastcontact.linear.krylov.krylov_kernels import CHUNK, WORK_OF_NUMBER
@@ -29,7 +29,7 @@ LOST = 0.98
 
 def scaled(factor: float, a: AnyArray, b: AnyArray) -> None:
     """Fill `b` (n,) with ``factor * a``, in the precision of b."""
-    spread(krylov_kernels.scaled, len(a), WORK_OF_NUMBER, factor, a, b)
+    parallel_for(krylov_kernels.scaled, len(a), WORK_OF_NUMBER, factor, a, b)
 
 
 class Iteration:
@@ -57,7 +57,7 @@ class Iteration:
 
     def dot(self, a: Array, b: Array) -> float:
         """Return the dot product of two vectors (n,)."""
-        spread(krylov_kernels.dot, len(self._sums), WORK_OF_NUMBER * CHUNK, a, b, self._sums)
+        parallel_for(krylov_kernels.dot, len(self._sums), WORK_OF_NUMBER * CHUNK, a, b, self._sums)
         return float(krylov_kernels.total(self._sums))
 
     def start(self) -> None:
@@ -82,7 +82,7 @@ class Iteration:
 
     def _stepped(self, alpha: float, p: Array, q: Array, x: Array, r: Array) -> float:
         """Make the step ``x += alpha p``, ``r -= alpha q`` of any vectors; return the square of the norm of r."""
-        spread(krylov_kernels.advance, len(self._sums), WORK_OF_NUMBER * CHUNK, alpha, p, q, x, r, self._sums)
+        parallel_for(krylov_kernels.advance, len(self._sums), WORK_OF_NUMBER * CHUNK, alpha, p, q, x, r, self._sums)
         return float(krylov_kernels.total(self._sums))
 
 
@@ -116,7 +116,7 @@ class ConjugateGradients(Iteration):
         if self._rz > 0.0:
             beta = -self._alpha * self.dot(self.q, self.z) / self._rz
         self._rz = rz
-        spread(krylov_kernels.turn, len(self.p), WORK_OF_NUMBER, beta, self.z, self.p)
+        parallel_for(krylov_kernels.turn, len(self.p), WORK_OF_NUMBER, beta, self.z, self.p)
         multiply(self.p, self.q)
         curvature = self.dot(self.p, self.q)
         if not (rz > 0.0 and curvature > 0.0):

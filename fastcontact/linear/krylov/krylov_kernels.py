@@ -2,7 +2,7 @@
 """Vector operations of the conjugate gradient method, with sums that do not depend on the number of threads.
 
 Sums are taken over chunks of fixed length. Kernels process the chunks, or the entries, `low` to ``high - 1``; see
-`_jit.parallel.spread`.
+`_jit.parallel.parallel_for`.
 """
 
 import numpy as np

@@ -5,8 +5,8 @@ A block matrix is passed as ``indptr`` (n_rows + 1,), ``indices`` (n_blocks,) an
 `matrix.BlockMatrix`. The block size (m, n) is passed as two tuples of zeros, ``rows`` of length m and ``cols`` of length n,
 because the compiler knows the lengths of tuples. Array views of blocks within the loops would cost four times as much.
 
-Kernels with the arguments `low` and `high` compute the block rows from `low` to `high`, see `_jit.parallel.spread`. Each
-row is summed by one thread in a fixed order, so that results do not depend on the number of threads.
+Kernels with the arguments `low` and `high` compute the block rows from `low` to `high`, see `_jit.parallel.parallel_for`.
+Each row is summed by one thread in a fixed order, so that results do not depend on the number of threads.
 """
 
 import numpy as np

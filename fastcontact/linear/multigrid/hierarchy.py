@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 from scipy.sparse import csr_matrix
 
-from fastcontact._jit.parallel import spread
+from fastcontact._jit.parallel import parallel_for
 from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.level import COARSEST, DEGREE, SAFETY, Coarse, Level, chebyshev, largest_eigenvalue
@@ -116,7 +116,7 @@ class Hierarchy:
         # The prolongator is stored in the precision of the cycle before the coarse matrix is computed, so that the latter is
         # the Galerkin product with the prolongator that the cycle uses.
         columns, blocks = pattern.indices, np.empty(pattern.nnz * size * n_modes, self.dtype)
-        spread(
+        parallel_for(
             galerkin_kernels.smooth_prolongator, n, WORK_OF_ROW, A.indptr, A.indices, A.storage, A.exact, level.inverse,
             aggregate, tentative.ravel(), omega, pattern.indptr, columns, blocks, A.rows, cols,
         )  # fmt: skip
@@ -227,11 +227,11 @@ def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Numbers, Numbers, Numbe
     count, near_count = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
     work = WORK_OF_ROW * len(A.indptr) // max(1, n_coarse)
     patterns = A.indptr, A.indices, P.indptr, P.indices, *index[:2]
-    spread(galerkin_kernels.count_galerkin, n_coarse, work, *patterns, count, near_count)
+    parallel_for(galerkin_kernels.count_galerkin, n_coarse, work, *patterns, count, near_count)
     indptr = pointers(count)
     columns = np.empty(indptr[-1], np.int32)
     out = np.zeros(int(indptr[-1]) * len(P.cols) ** 2)
-    spread(
+    parallel_for(
         galerkin_kernels.galerkin, n_coarse, work, A.indptr, A.indices, A.storage, A.exact, P.indptr, P.indices, P.data,
         *index, indptr, int(near_count.max(initial=0)), columns, out, P.rows, P.cols,
     )  # fmt: skip

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
-from fastcontact._jit.parallel import spread
+from fastcontact._jit.parallel import parallel_for
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, split_matrix_kernels, symmetric_storage_kernels
 
@@ -78,12 +78,12 @@ class BlockMatrix:
         numbers = (self.data,) if x.dtype == self.data.dtype else self.exact
         if self.storage is not ALL:
             length, n = self.storage[3], len(self.indptr) - 1
-            spread(
+            parallel_for(
                 symmetric_storage_kernels.multiply, -(-n // length), WORK_OF_ROW * length, self.storage, numbers, x,
                 real(factor), real(share), z, y, self.rows,
             )  # fmt: skip
             return
-        spread(
+        parallel_for(
             cycle_kernels.multiply, len(self.indptr) - 1, WORK_OF_ROW, self.indptr, self.indices, numbers, x, real(factor),
             real(share), z, y, self.rows, self.cols,
         )  # fmt: skip
@@ -104,7 +104,7 @@ class BlockMatrix:
     def row_sums(self, u: Array) -> Array:
         """Return ``abs(A) @ abs(u)`` (n,) for a square matrix, computed with its high part."""
         out = np.empty(len(u))
-        spread(
+        parallel_for(
             symmetric_storage_kernels.row_sums, len(self.indptr) - 1, WORK_OF_ROW, self.indptr, self.indices, self.storage,
             (self.data,), u, len(self.rows), out,
         )  # fmt: skip
@@ -127,7 +127,7 @@ class BlockMatrix:
         size, n = len(self.rows), len(self.indptr) - 1
         data = np.empty(len(self.indices) * size * size)
         arrays = self.indptr, self.indices, self.storage, self.exact
-        spread(symmetric_storage_kernels.expand, n, WORK_OF_ROW, *arrays, size, data)
+        parallel_for(symmetric_storage_kernels.expand, n, WORK_OF_ROW, *arrays, size, data)
         return bsr_array((data.reshape(-1, size, size), self.indices, self.indptr), shape=2 * (n * size,))
 
 
@@ -263,7 +263,7 @@ def _store(
         safe_end = int(np.searchsorted(start, 2 * int(indptr[first]), side="right")) - 1
         end = max(min(n, safe_end), min(n, first + SHORTEST))
         work = WORK_OF_ROW if end == safe_end else 0
-        spread(
+        parallel_for(
             symmetric_storage_kernels.store_rows, end - first, work, first, widest, indptr, indices, storage, unit, numbers,
             square, high, low,
         )  # fmt: skip

@@ -11,8 +11,8 @@ from fastcontact.errors import names_of
 from fastcontact.results.plot._axes import UNITS
 from fastcontact.results.plot._shape import animate, deformed_shape, section, view
 from fastcontact.results.plot.contact_map import contact_map
+from fastcontact.results.plot.contact_pairs import contacts
 from fastcontact.results.plot.curves import axis_stress, contact_zones, history, pressure_profile
-from fastcontact.results.plot.found import contacts
 
 __all__ = [
     "UNITS", "animate", "axis_stress", "contact_map", "contact_zones", "contacts", "deformed_shape", "history",

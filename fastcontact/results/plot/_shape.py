@@ -269,10 +269,8 @@ def section(
         axes.add_collection(LineCollection(list(strokes), colors="black", linewidths=0.2, alpha=0.6))
     undeformed = triangles[best][:3] - ((triangles[best][:3] - origin) @ direction) * direction
     size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
-    label = (
-        f"{shown.described(values[best], units, ' on the section')}\nundeformed at {position_text(undeformed, size)}"
-    )
-    _axes.mark(axes, flat[best], label)
+    extreme = shown.described(values[best], units, " on the section")
+    _axes.mark(axes, flat[best], f"{extreme}\nundeformed at {position_text(undeformed, size)}")
     if zoom is not None:
         axes.set(xlim=points[:, 0], ylim=points[:, 1])
     through = position_text(origin, float(np.ptp(mesh.points, axis=0).max()))
@@ -353,12 +351,10 @@ def _cut_tetrahedra(data: Array, height: Array) -> tuple[Array, Array]:
         if not rows.any():
             continue
         edges = [(i, j) for i in range(4) for j in range(4) if number >> i & 1 and not number >> j & 1]
-        if len(edges) == 4:  # the intersection is a quadrangle
-            edges = [edges[0], edges[1], edges[3], edges[2]]
         points = np.stack([_zero_crossing(data[rows], height[rows], i, j) for i, j in edges], axis=1)
         pieces.append(points[:, :3])
-        if len(edges) == 4:
-            pieces.append(points[:, [0, 2, 3]])
+        if len(edges) == 4:  # the diagonal of a quadrangle joins the second and the third edge
+            pieces.append(points[:, 1:])
         on_face = [k for k, (i, j) in enumerate(edges) if i < 3 and j < 3]
         if len(on_face) == 2:
             strokes.append(points[:, on_face])
@@ -549,9 +545,8 @@ def writer_of(path: Path, pictures_per_second: int) -> Any:
     if not FFMpegWriter.isAvailable():
         raise FastcontactError(f"'{path}' needs the program ffmpeg, which is not installed: write a .gif instead")
     # Most codecs require an even number of pixels in both directions.
-    return FFMpegWriter(
-        fps=pictures_per_second, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
-    )
+    even = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
+    return FFMpegWriter(fps=pictures_per_second, extra_args=even)
 
 
 @contextlib.contextmanager

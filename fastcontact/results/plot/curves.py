@@ -164,9 +164,11 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mappin
     label = f"edges: {centre - inside:.4g} and {valued(centre + inside, units, 'length')}"
     if one_sided and before.size:  # the contact is a ring around an open middle
         ax.axvspan(before.max(), closed.min(), color=colour, alpha=0.15, lw=0)
-        label = (
-            f"edges: {before.max():.4g} to {closed.min():.4g}, and {inside:.4g} to {valued(outside, units, 'length')}"
+        inner, outer = (
+            f"{before.max():.4g} to {closed.min():.4g}",
+            f"{inside:.4g} to {valued(outside, units, 'length')}",
         )
+        label = f"edges: {inner}, and {outer}"
     elif abs(centre) <= 0.01 * outside:
         # The difference of the bounds may be smaller than the distance of two nodes, because constraints may lie between
         # nodes. Nodes beyond the contact are excluded, because on a curved surface their distance from the middle along the
@@ -246,9 +248,8 @@ def axis_stress(
     axes, units = new_axes(ax, (6.4, 4.8)), units_of(units, step)
     reach = PLOTTED_DEPTH * np.nan_to_num(contacts_of([step], pair)[0].radius[0]) or float(depth.max())
     shown = depth <= reach
-    values = {caption: stress[:, component] for caption, component in COMPONENTS.items()} | {
-        "von Mises": von_mises(stress)
-    }
+    values = {caption: stress[:, component] for caption, component in COMPONENTS.items()}
+    values["von Mises"] = von_mises(stress)
     for number, name in enumerate(bodies):
         here = shown & (side == 1 - 2 * number)
         for (caption, value), colour, marker in zip(values.items(), COLOURS, "osD", strict=True):

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numba
 import numpy as np
 import pytest
+from new_process import printed
 
 from fastcontact._jit import ahead, compiling, decorators
 from fastcontact.contact.search.box_tree_kernels import Tree
@@ -49,15 +50,13 @@ def test_types_are_those_of_arguments():
 
 @jitted
 def test_a_helper_leaves_kernels_on_disk_and_tells_each(tmp_path):
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     number = next(number for number, (_, name, _) in enumerate(ahead.table()["kernels"]) if name == "work_sizes")
     code = (
         "import sys; from fastcontact._jit import ahead\n"
         f"ahead.kernels_of = lambda runs: [{number}]\n"
         "ahead.main(['1', '0'])"
     )
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-    assert done.stdout == f"{number}\n"
+    assert printed(code, NUMBA_CACHE_DIR=tmp_path) == f"{number}\n"
     assert [path.name.split(".")[1] for path in tmp_path.rglob("*.nbc")] == ["work_sizes"]
 
 
@@ -198,23 +197,19 @@ def test_a_helper_leaves_out_what_the_run_compiles(tmp_path):
         "import time; done = []\n"
         "ahead.main(['1', '0']); print(done)"
     )
-    done = subprocess.run([sys.executable, "-c", code], input="1\n", capture_output=True, text=True, check=True)
-    assert done.stdout == "0\n1\n[0]\n"
+    assert printed(code, given="1\n") == "0\n1\n[0]\n"
 
 
 @jitted
 @pytest.mark.slow
 def test_a_run_finds_all_its_kernels(tmp_path):
     """Both kinds of elements of the training cases: nothing is left to compile, so no type in the table is another one."""
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_NUM_THREADS": "1"}
+    variables = {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_NUM_THREADS": "1"}
     helper = [sys.executable, "-m", "fastcontact._jit.ahead", "1", "0", "2d"]
-    subprocess.run(helper, env=environment, capture_output=True, check=True)
+    subprocess.run(helper, env=os.environ | variables, capture_output=True, check=True)
     code = (
         "import json; from fastcontact._jit import compiling; from fastcontact.cli import main\n"
         "codes = [main(['run', name, '-q', '-o', 'a.vtkhdf']) for name in ('forma04a', 'press-fit')]\n"
         "print(json.dumps([*codes, compiling.count]))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True, cwd=tmp_path
-    )
-    assert json.loads(done.stdout) == [0, 0, 0]
+    assert json.loads(printed(code, folder=tmp_path, **variables)) == [0, 0, 0]

@@ -4,15 +4,14 @@ import copy
 import dis
 import importlib
 import json
-import os
 import pkgutil
 import shutil
-import subprocess
 import sys
 
 import numpy as np
 import pytest
 from models import supported
+from new_process import printed
 
 import fastcontact as fc
 from fastcontact._jit import cache, decorators, interpreting
@@ -143,11 +142,7 @@ print(*answers)
 
 
 def test_python_runs_a_kernel_until_it_has_taken_its_time_and_never_one_that_is_kept(tmp_path):
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_DISABLE_JIT": "0"}
-    answers = [
-        subprocess.run([sys.executable, "-c", ASK], env=environment, capture_output=True, text=True, check=True).stdout
-        for _ in range(2)
-    ]
+    answers = [printed(ASK, NUMBA_CACHE_DIR=tmp_path, NUMBA_DISABLE_JIT=0) for _ in range(2)]
     assert answers == ["9 0 0 1 9 0 1 int\n", "9 0 1 0 9 0 1 int\n"]
 
 
@@ -155,11 +150,9 @@ def test_the_time_of_earlier_runs_counts(tmp_path):
     """In the first run Python has spent nothing yet; in the second one more than it may."""
     short = ASK.partition("interpreting.SECONDS = ")[0] + "print(answers[2])"
     short = short.replace("answers = [", "interpreting.SECONDS_OF_RUNS = 1e-9\nanswers = [", 1)
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_DISABLE_JIT": "0"}
 
     def ask():
-        run = subprocess.run([sys.executable, "-c", short], env=environment, capture_output=True, text=True, check=True)
-        return run.stdout
+        return printed(short, NUMBA_CACHE_DIR=tmp_path, NUMBA_DISABLE_JIT=0)
 
     assert ask() == "0\n"
     (path,) = tmp_path.rglob(interpreting.SPENT)

@@ -6,12 +6,12 @@ import logging
 import os
 import pkgutil
 import shutil
-import subprocess
 import sys
 from importlib import import_module
 
 import numba
 import pytest
+from new_process import printed
 from pairwise import first_of
 
 import fastcontact
@@ -71,18 +71,13 @@ print(np.allclose(twice(A), np.linalg.cholesky(np.linalg.cholesky(A))), sum(twic
 
 def test_a_kernel_is_loaded_without_the_modules_of_numba_that_it_was_compiled_with(tmp_path):
     (tmp_path / "own.py").write_text(OWN)
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
-    program = [
+    variables = {"NUMBA_CACHE_DIR": tmp_path / "cache", "NUMBA_DISABLE_JIT": 0}
+    programs = (
         LOAD.rpartition("print(np.allclose")[0],
         LOAD,
         LOAD,
-    ]  # the kernel that calls it is compiled once it is loaded
-    said = [
-        subprocess.run(
-            [sys.executable, "-c", text], capture_output=True, text=True, check=True, env=environment, cwd=tmp_path
-        ).stdout.splitlines()
-        for text in program
-    ]
+    )  # a kernel that calls it is compiled once it is loaded
+    said = [printed(program, folder=tmp_path, **variables).splitlines() for program in programs]
     values = said[0][0].rpartition("]]")[0]
     assert said[0] == [f"{values}]] 0 True", "not square"]
     assert said[1] == [f"{values}]] 1 False", "not square", "True 0"]
@@ -114,13 +109,10 @@ def asked(folder, kernel=CALLS):
 
 @jitted
 def test_a_new_process_finds_kernels_and_notices_changes_in_other_files(tmp_path):
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
     write(tmp_path)
     assert asked(tmp_path) == (20.0, 0)
-    done = subprocess.run(
-        [sys.executable, "-c", ASK], capture_output=True, text=True, check=True, env=environment, cwd=tmp_path
-    )
-    assert done.stdout == "20.0 1\n"
+    variables = {"NUMBA_CACHE_DIR": tmp_path / "cache", "NUMBA_DISABLE_JIT": 0}
+    assert printed(ASK, folder=tmp_path, **variables) == "20.0 1\n"
     write(tmp_path, number=22)
     assert asked(tmp_path) == (230.0, 0)
 
@@ -295,13 +287,8 @@ print(hashlib.sha256(axes.tobytes()).hexdigest(), sum(planes.compiled.stats.cach
 
 
 def test_the_process_that_compiles_has_the_bits_of_another_of_fewer_threads(tmp_path):
-    answers = []
-    for threads in "21":
-        environment = {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_NUM_THREADS": threads, "NUMBA_DISABLE_JIT": "0"}
-        done = subprocess.run(
-            [sys.executable, "-c", QUESTION], capture_output=True, text=True, check=True, env=os.environ | environment
-        )
-        answers.append(done.stdout.split())
+    variables = {"NUMBA_CACHE_DIR": tmp_path, "NUMBA_DISABLE_JIT": 0}
+    answers = [printed(QUESTION, NUMBA_NUM_THREADS=threads, **variables).split() for threads in (2, 1)]
     assert [hits for _, hits in answers] == ["0", "1"]
     assert answers[0][0] == answers[1][0]
 
@@ -358,11 +345,5 @@ print(digest.hexdigest())
 
 @pytest.mark.slow
 def test_a_run_that_compiles_has_the_bits_of_later_ones(tmp_path):
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_DISABLE_JIT": "0"}
-    answers = [
-        subprocess.run(
-            [sys.executable, "-c", WHOLE], capture_output=True, text=True, check=True, env=environment, timeout=1500
-        ).stdout
-        for _ in range(2)
-    ]
+    answers = [printed(WHOLE, NUMBA_CACHE_DIR=tmp_path, NUMBA_DISABLE_JIT=0) for _ in range(2)]
     assert answers[0] == answers[1]

@@ -103,16 +103,16 @@ def test_rows_are_spread_over_threads_and_an_error_in_one_of_them_is_raised(thre
         barrier.wait(10.0)
 
     barrier = threading.Barrier(3)
-    parallel.spread(rows, 10, 1, -1)
+    parallel.parallel_for(rows, 10, 1, -1)
     assert sorted(ranges) == [(0, 3), (3, 6), (6, 10)]
     assert len(idents) == 3
     barrier = threading.Barrier(2)
     for wrong in (0, 9):
         with pytest.raises(ValueError, match=str(wrong)):
-            parallel.spread(rows, 10, 1, wrong)
+            parallel.parallel_for(rows, 10, 1, wrong)
     ranges.clear()
     barrier = threading.Barrier(1)
-    parallel.spread(rows, 10, 0, -1)
+    parallel.parallel_for(rows, 10, 0, -1)
     assert ranges == [(0, 10)]
 
 

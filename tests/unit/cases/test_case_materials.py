@@ -4,7 +4,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from case_texts import of_block
+from case_texts import case_of, of_block
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
@@ -75,20 +75,6 @@ def test_mistakes_in_materials_name_the_key(tmp_path, text, message):
         material(tmp_path, text)
 
 
-NONLINEAR_CASE = """
-kinematics = "axisymmetric"
-{strain}
-[mesh]
-generator = "block"
-[[material]]
-{material}
-[[support]]
-group = "BOTTOM"
-y = 0.0
-[[support]]
-group = "TOP"
-y = 0.01
-"""
 LAWS = {
     'law = "elastic_plastic"\nE = 200\nnu = 0.3\nyield_stress = 1\nhardening = [[0, 1], [0.1, 2]]\nkinematic = 3': (
         fc.ElasticPlastic(E=200.0, nu=0.3, yield_stress=1.0, hardening=[(0.0, 1.0), (0.1, 2.0)], kinematic=3.0)
@@ -104,7 +90,8 @@ LAWS = {
 
 
 def built(material: str, strain: str = ""):
-    return build_case(tomllib.loads(NONLINEAR_CASE.format(material=material, strain=strain)), name="case")
+    text = case_of('generator = "block"', "", "axisymmetric", material, BOTTOM="y", TOP={"y": 0.01})
+    return build_case(tomllib.loads(strain + text), name="case")
 
 
 @pytest.mark.parametrize("text", LAWS)

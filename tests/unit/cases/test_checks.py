@@ -4,6 +4,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from case_texts import case_of
 from matplotlib_pictures import contact_of
 
 import fastcontact as fc
@@ -158,36 +159,17 @@ def test_the_share_of_a_contact_lies_between_nothing_and_all_of_it():
 
 
 # A drum that is pressed on a block and turns, with friction and wear: a mesh maker with lists, in a case file.
-DRUM = """
-kinematics = "plane_strain"
-[mesh]
-generator = "block"
-size = [8.0, 2.0]
-divisions = [24, 6]
-origin = [-4.0, -2.0]
-[[material]]
-E = 1000.0
-nu = 0.3
-[[support]]
-group = "BOTTOM"
-x = 0.0
-y = 0.0
-[obstacle.drum]
+DRIVEN = """[obstacle.drum]
 secondary = "TOP"
 shape = { kind = "sphere", centre = [0.0, 5.0], R = 5.0 }
 motion = { y = -0.1 }
 rotation = { angle = 0.1, centre = [0.0, 5.0], ramp = [[0.0, 0.0], [1.0, 1.0]] }
 friction = 0.2
 wear = 1e-5
-[ramp]
-instants = [0.5, 1.0]
 """
-UNITS = """
-[units]
-length = "mm"
-force = "N"
-pressure = "MPa"
-"""
+BLOCK = 'generator = "block"\nsize = [8.0, 2.0]\ndivisions = [24, 6]\norigin = [-4.0, -2.0]'
+DRUM = case_of(BLOCK, DRIVEN, ramp="instants = [0.5, 1.0]", BOTTOM="xy")
+UNITS = '[units]\nlength = "mm"\nforce = "N"\npressure = "MPa"\n'
 QUANTITIES = ("torque", "force.x", "force.y", "moment.z", "wear_max", "force", "pressure_max", "radius")
 
 
@@ -250,11 +232,11 @@ def test_what_a_pair_does_not_have_is_told(old, new, quantity, message):
 
 
 def test_moments_of_circles_are_refused():
-    text = (
-        'kinematics = "axisymmetric"\n[mesh]\ngenerator = "quarter-disc"\nsize = 10.0\n[[material]]\nE = 1.0\nnu = 0.3\n'
+    tables = (
         '[obstacle.plane]\nsecondary = "CONT1"\nshape = { kind = "half_space", point = [0, 0], normal = [0, -1] }\n'
         '[[check]]\nquantity = "plane.moment.z"\nvalue = 1.0\ntolerance = 0.1\n'
     )
+    text = case_of('generator = "quarter-disc"\nsize = 10.0', tables, "axisymmetric")
     with pytest.raises(fc.CaseError, match=r"unknown quantity in check.0. 'moment.z'"):
         build_case(tomllib.loads(text), name="plane")
 

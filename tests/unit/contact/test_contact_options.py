@@ -3,40 +3,16 @@
 import tomllib
 
 import pytest
+from case_texts import case_of, contact_pair
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
 from fastcontact.cases.summary import lines, of_step, summarise
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
 
-CASE = """
-kinematics = "plane_strain"
-[mesh]
-generator = "block-on-block"
-element = "quad4"
-divisions_lower = [3, 2]
-divisions_upper = [3, 2]
-[[material]]
-E = 1000.0
-nu = 0.3
-[[support]]
-group = "LOWER_LEFT"
-x = 0.0
-[[support]]
-group = "UPPER_LEFT"
-x = 0.0
-[[support]]
-group = "LOWER_BOTTOM"
-y = 0.0
-[[support]]
-group = "UPPER_TOP"
-y = -0.02
-[ramp]
-steps = 2
-[contact.pair]
-secondary = "CONT_UPPER"
-primary = "CONT_LOWER"
-"""
+MESH = 'generator = "block-on-block"\nelement = "quad4"\ndivisions_lower = [3, 2]\ndivisions_upper = [3, 2]'
+HELD = {"LOWER_LEFT": "x", "UPPER_LEFT": "x", "LOWER_BOTTOM": "y", "UPPER_TOP": {"y": -0.02}}
+CASE = case_of(MESH, ramp="steps = 2", **HELD) + contact_pair()
 
 
 def case_with(options):

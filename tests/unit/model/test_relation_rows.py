@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from case_texts import case_of
 from models import elastic_model, supported
 
 import fastcontact as fc
@@ -334,30 +335,14 @@ def test_a_run_goes_on_before_at_and_after_the_lock():
         assert resumed[-1].displacement == pytest.approx(whole[-1].displacement, rel=1e-13, abs=1e-18)
 
 
-CASE = """title = "bolt"
-kinematics = "plane_stress"
-[mesh]
-file = "bar.med"
-[[material]]
-E = 1000.0
-nu = 0.3
-[[support]]
-group = "TOP"
-x = 0.0
-y = 0.0
-[[support]]
-group = "BOTTOM"
-x = 0.0
-y = 0.0
-[[pretension]]
+BOLT = """[[pretension]]
 name = "bolt"
 section = "CUT"
 force = 3.0
 locked_from = 1.0
-[ramp]
-instants = [1.0, 2.0]
-table = [[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]
 """
+RAMP = "instants = [1.0, 2.0]\ntable = [[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]"
+CASE = case_of('file = "bar.med"', BOLT, "plane_stress", ramp=RAMP, TOP="xy", BOTTOM="xy")
 
 
 def test_a_case_file_cuts_its_mesh_and_the_summary_tells(tmp_path, capsys):

@@ -19,7 +19,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from test_result_files import MESH, assert_same, step_result
+from test_result_files import MESH, assert_holds, step_result
 from test_resume import spheres
 
 import fastcontact as fc
@@ -31,13 +31,6 @@ from fastcontact.results.committed_file import uninterrupted
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     return tmp_path / "run.vtkhdf"
-
-
-def assert_holds(path: Path, n_steps: int) -> None:
-    with open_results(path) as results:
-        assert len(results) == n_steps
-        for number, step in enumerate(results):
-            assert_same(step, step_result(number), f"step {number}")
 
 
 def failing_after(count: int, error: BaseException, monkeypatch: pytest.MonkeyPatch, name: str) -> list[int]:

@@ -20,9 +20,9 @@ def test_unsupported_types_are_described(name, kind):
 
 @pytest.mark.parametrize("name", ["C3D8I", "C3D8IH", "CPE4I", "CPS4I"])
 def test_linear_types_have_incompatible_modes(name):
-    assert element_type(name).modes
+    assert element_type(name).incompatible_modes
 
 
 def test_the_quadratic_tetrahedron_with_improved_surface_stress_has_no_incompatible_modes():
     kind = element_type("C3D10I")
-    assert (kind.element, kind.modes, kind.note) == ("tet10", False, "an ordinary quadratic one here")
+    assert (kind.element, kind.incompatible_modes, kind.note) == ("tet10", False, "an ordinary quadratic one here")

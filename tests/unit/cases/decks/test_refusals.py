@@ -61,6 +61,14 @@ def with_material(lines):
     return before("*Solid Section, elset=low", lines)
 
 
+def with_orientation(lines):
+    return before("*Material", "*Orientation, name=o\n" + lines)
+
+
+def with_relation(lines, text=WHOLE):
+    return before("*Boundary", lines, text)
+
+
 def with_law(lines):
     return before("*Contact Pair", lines)
 
@@ -80,8 +88,8 @@ MODEL = {
     "nodes in a step": (with_load("*Nset, nset=new\n1\n"), r"\*NSET: cannot be inside a step"),
     "material in a step": (with_load("*Material, name=new\n"), r"\*MATERIAL: cannot be inside a step"),
     "friction nowhere": (before("*Surface Int", "*Friction\n0.1\n"), r"\*FRICTION: belongs below \*SURFACE INTER"),
-    "kinematic nowhere": (before("*Boundary", "*Kinematic\n1, 3\n"), r"\*KINEMATIC: belongs below \*COUPLING"),
-    "coupling alone": (before("*Boundary", "*Coupling, ref node=1, surface=ss\n"), r"\*KINEMATIC or \*DISTRIBUTING must"),
+    "kinematic nowhere": (with_relation("*Kinematic\n1, 3\n"), r"\*KINEMATIC: belongs below \*COUPLING"),
+    "coupling alone": (with_relation("*Coupling, ref node=1, surface=ss\n"), r"\*KINEMATIC or \*DISTRIBUTING must"),
     "coupling at the end": (
         instead(STEP, "*Coupling, ref node=1, surface=ss\n"),
         r"\*COUPLING: \*KINEMATIC or \*DISTRIBUTING must follow",
@@ -93,9 +101,9 @@ MODEL = {
     "not flat": (FLAT.replace("6, 2., 1.", "6, 2., 1., 0.5"), "CPE4 lie in the plane z = const, but z differs"),
     "two kinematics": (FLAT.replace("CPE4, elset=two", "CAX4, elset=two"), "of type CAX4 and CPE4 .* cannot be in one"),
     "include with a parameter": ("*Include, input=a.inp, more=1\n", r"\*INCLUDE: the parameter MORE is not supported"),
-    "transform": (before("*Boundary", "*Transform, nset=top\n"), r"\*TRANSFORM: 0 data lines, but one is needed"),
+    "transform": (with_relation("*Transform, nset=top\n"), r"\*TRANSFORM: 0 data lines, but one is needed"),
     "transform without axes": (
-        before("*Boundary", "*Transform, nset=top\n1., 0., 0., 2., 0., 0.\n*Boundary\ntop, 1\n"),
+        with_relation("*Transform, nset=top\n1., 0., 0., 2., 0., 0.\n*Boundary\ntop, 1\n"),
         r"the local axes are not defined at the point \[0.0, 0.0, 2.0\]",
     ),
 }  # fmt: skip
@@ -129,22 +137,17 @@ MATERIALS = {
         instead("*Elastic\n200000., 0.", "*Elastic, type=engineering constants\n1., 1., 1., 2., 0., 0., 1., 1.,\n1."),
         r"\*ELASTIC: material 'steel': ",
     ),
-    "orientation of nothing": (
-        before("*Material", "*Orientation, name=o\n"),
-        "a data line with six coordinates is nee",
-    ),
+    "orientation of nothing": (with_orientation(""), "a data line with six coordinates is nee"),
     "orientation twice": (
-        before(
-            "*Material", "*Orientation, name=o\n1., 0., 0., 0., 1., 0.\n*Orientation, name=O\n0., 1., 0., 0., 0., 1.\n"
-        ),
+        with_orientation("1., 0., 0., 0., 1., 0.\n*Orientation, name=O\n0., 1., 0., 0., 0., 1.\n"),
         "orientation 'O' is defined twice",
     ),
     "orientation with an origin": (
-        before("*Material", "*Orientation, name=o\n1., 0., 0., 0., 1., 0., 0., 0., 1.\n"),
+        with_orientation("1., 0., 0., 0., 1., 0., 0., 0., 1.\n"),
         "an origin of the axes is not supported",
     ),
     "orientation turned further": (
-        before("*Material", "*Orientation, name=o\n1., 0., 0., 0., 1., 0.\n3, 30.\n"),
+        with_orientation("1., 0., 0., 0., 1., 0.\n3, 30.\n"),
         "a further rotation of the axes is not supported",
     ),
     "density": (with_material("*Density\n0.\n"), "material 'steel': the density 0 must be positive"),
@@ -158,19 +161,17 @@ CONTACTS = {
         r"\*SURFACE INTERACTION: friction with tied contact is not supported",
     ),
     "clearance of nothing": (
-        before("*Boundary", "*Clearance, slave=ss, master=roof, value=0.1\n"),
+        with_relation("*Clearance, slave=ss, master=roof, value=0.1\n"),
         "there is no contact pair of 'ss' and 'roof' above this line",
     ),
     "clearance of a wedge": (
-        before(
-            "*Boundary", "*Clearance, slave=ss, master=sm, value=0.1\n", instead("11, 0., 0., 1.", "11, 0., 0., 1.1")
-        ),
+        with_relation("*Clearance, slave=ss, master=sm, value=0.1\n", instead("11, 0., 0., 1.", "11, 0., 0., 1.1")),
         r"\*CLEARANCE is supported between sides at a uniform distance only",
     ),
     "adjust by a word": (instead("type=SURFACE TO", "adjust=some, type=SURFACE TO"), "ADJUST=some: only a distance"),
     "a surface without faces": (instead("up, S1\n", ""), "surface 'ss' has no faces"),
     "an orientation that is not there": (
-        before("*Boundary", "*Coupling, ref node=15, surface=roof, orientation=o\n*Kinematic\n3\n"),
+        with_relation("*Coupling, ref node=15, surface=roof, orientation=o\n*Kinematic\n3\n"),
         "orientation 'o' is not defined",
     ),
     "pair of one": (
@@ -192,32 +193,32 @@ CONTACTS = {
     ),
 }
 RELATIONS = {
-    "equation of none": (before("*Boundary", "*Equation\n0\n"), "an equation cannot have 0 terms"),
-    "equation too short": (before("*Boundary", "*Equation\n2\n15, 1, 1.\n"), "the equation has 1 terms, 2 are announced"),
+    "equation of none": (with_relation("*Equation\n0\n"), "an equation cannot have 0 terms"),
+    "equation too short": (with_relation("*Equation\n2\n15, 1, 1.\n"), "the equation has 1 terms, 2 are announced"),
     "equation too long": (
-        before("*Boundary", "*Equation\n1\n15, 1, 1., 16, 1, 1.\n"),
+        with_relation("*Equation\n1\n15, 1, 1., 16, 1, 1.\n"),
         "the equation has 2 terms, 1 are announced",
     ),
-    "equation of a rotation": (before("*Boundary", "*Equation\n1\n15, 4, 1.\n"), "component 4 of '15' is not within 1 to 3"),
-    "equation of zeros": (before("*Boundary", "*Equation\n1\n15, 1, 0.\n"), "all coefficients of the equation are zero"),
-    "equation of a set": (before("*Boundary", "*Equation\n1\ntop, 1, 1.\n"), "'top' has 4 nodes, but one is needed"),
+    "equation of a rotation": (with_relation("*Equation\n1\n15, 4, 1.\n"), "component 4 of '15' is not within 1 to 3"),
+    "equation of zeros": (with_relation("*Equation\n1\n15, 1, 0.\n"), "all coefficients of the equation are zero"),
+    "equation of a set": (with_relation("*Equation\n1\ntop, 1, 1.\n"), "'top' has 4 nodes, but one is needed"),
     "coupling of component 7": (
-        before("*Boundary", "*Coupling, ref node=15, surface=roof\n*Kinematic\n7\n"),
+        with_relation("*Coupling, ref node=15, surface=roof\n*Kinematic\n7\n"),
         "the components 7 to 7 are not within 1 to 6",
     ),
     "rigid body of its own node": (
-        before("*Boundary", "*Rigid Body, nset=alone, ref node=15\n", before("*Nset, nset=top", "*Nset, nset=alone\n15\n")),
+        with_relation("*Rigid Body, nset=alone, ref node=15\n", before("*Nset, nset=top", "*Nset, nset=alone\n15\n")),
         "'alone' contains no nodes that could follow the reference node",
     ),
-    "springs of two": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n1.\n2.\n"), "need an empty line, followed by"),
-    "spring with a law": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n1., 2.\n"), "only linear springs are supp"),
-    "spring of no stiffness": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n0.\n"), "the stiffness 0 must be"),
-    "spring of a solid": (before("*Boundary", "*Spring, elset=up\n\n1.\n"), "element 2 is not a spring of type SPRINGA"),
-    "spring without stiffness": (before("*Boundary", SPRING), r"element 7 of type SPRINGA has no \*SPRING"),
-    "gap without a direction": (before("*Boundary", GAP + "*Gap, elset=gaps\n1.\n"), "the direction of the gap elements is"),
-    "gap of a solid": (before("*Boundary", "*Gap, elset=up\n1., 0., 0., 1.\n"), "acts on elements of type GAPUNI only"),
+    "springs of two": (with_relation(SPRING + "*Spring, elset=springs\n\n1.\n2.\n"), "need an empty line, followed by"),
+    "spring with a law": (with_relation(SPRING + "*Spring, elset=springs\n\n1., 2.\n"), "only linear springs are supp"),
+    "spring of no stiffness": (with_relation(SPRING + "*Spring, elset=springs\n\n0.\n"), "the stiffness 0 must be"),
+    "spring of a solid": (with_relation("*Spring, elset=up\n\n1.\n"), "element 2 is not a spring of type SPRINGA"),
+    "spring without stiffness": (with_relation(SPRING), r"element 7 of type SPRINGA has no \*SPRING"),
+    "gap without a direction": (with_relation(GAP + "*Gap, elset=gaps\n1.\n"), "the direction of the gap elements is"),
+    "gap of a solid": (with_relation("*Gap, elset=up\n1., 0., 0., 1.\n"), "acts on elements of type GAPUNI only"),
     "gap on one node": (
-        before("*Boundary", GAP + "*Gap, elset=gaps\n1., 0., 0., 1.\n"),
+        with_relation(GAP + "*Gap, elset=gaps\n1., 0., 0., 1.\n"),
         "gap elements are supported on all nodes of whole faces only",
     ),
 }  # fmt: skip

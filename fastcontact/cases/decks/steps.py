@@ -25,13 +25,13 @@ def new_step(content: Content, step: Step | None, block: Block) -> Step:
 
 def static(content: Content, step: Step, block: Block) -> None:
     """Read *STATIC: the initial increment and the duration of the step, whose ratio is the number of increments."""
-    if step.static:
+    if step.has_procedure:
         raise block.refuse("the step has this keyword twice")
-    if step.modes:
+    if step.n_modes:
         raise block.refuse("a step has either *STATIC or one *FREQUENCY")
     if step.perturbation:
         raise step.refuse("PERTURBATION is not supported with *STATIC, only with *FREQUENCY")
-    step.static = True
+    step.has_procedure = True
     if "STABILIZE" in block.parameters:
         content.note(block, "STABILIZE has no effect: bodies that are held by contact alone need no damping")
     for row in block.rows[:1]:
@@ -55,20 +55,20 @@ def heated(content: Content, step: Step, block: Block) -> None:
 
 def frequency(content: Content, step: Step, block: Block) -> None:
     """Read *FREQUENCY: the number of modes, which is 10 by default."""
-    if step.static or step.modes:
+    if step.has_procedure or step.n_modes:
         raise block.refuse("a step has either *STATIC or one *FREQUENCY")
     number = block.rows[0].whole(0, 10) if block.rows else 10
     if number < 1:
         raise block.rows[0].refuse("the number of modes must be at least 1")
-    step.modes = number
+    step.n_modes = number
 
 
 def end_step(content: Content, step: Step | None, block: Block) -> None:
     """Read *END STEP; a step with *FREQUENCY is removed from the load steps and stored as a request for modes."""
     if step is None:
         raise block.refuse("there is no step to end")
-    if not step.modes:
-        if not step.static:
+    if not step.n_modes:
+        if not step.has_procedure:
             raise step.refuse("the step has no *STATIC or other procedure")
         return
     if step.conditions:
@@ -79,10 +79,10 @@ def end_step(content: Content, step: Step | None, block: Block) -> None:
     if content.steps[-1].heat == "alone":
         raise step.refuse("*FREQUENCY after *HEAT TRANSFER is not supported: displacements are fixed there")
     stiffening = step.perturbation or any(earlier.nonlinear for earlier in content.steps)
-    content.modes = {"n": step.modes, "stress_stiffening": stiffening}
+    content.modes = {"n": step.n_modes, "stress_stiffening": stiffening}
     content.note(
         step,
-        f"{step.modes} modes at the last step, {'with' if stiffening else 'without'} the initial-stress stiffness "
+        f"{step.n_modes} modes at the last step, {'with' if stiffening else 'without'} the initial-stress stiffness "
         "(PERTURBATION, or NLGEOM before)",
     )
 

@@ -80,9 +80,8 @@ def _draw_2d(axes: Any, found_contacts: FoundContacts) -> None:
 
     mesh = found_contacts.mesh
     for name, cells in mesh.solids.items():
-        axes.add_collection(
-            PolyCollection(list(outlines(name, mesh.points[cells])), facecolors="0.95", edgecolors="0.8", lw=0.3)
-        )
+        polygons = list(outlines(name, mesh.points[cells]))
+        axes.add_collection(PolyCollection(polygons, facecolors="0.95", edgecolors="0.8", lw=0.3))
     for group, label, colour, opacity in _sides(found_contacts):
         # Each line is drawn from end to end, through its mid-side node if it is quadratic.
         lines = [mesh.points[b[:, [0, 2, 1] if b.shape[1] == 3 else [0, 1]]] for b in mesh.cells_of(group, 1).values()]
@@ -98,7 +97,5 @@ def _draw_3d(axes: Any, found_contacts: FoundContacts) -> None:
     for facets in outer_facets(mesh).values():
         axes.add_collection3d(Poly3DCollection(triangles_of(mesh.points, facets), facecolors="0.6", alpha=0.12))
     for group, label, colour, opacity in _sides(found_contacts):
-        triangles = [triangles_of(mesh.points, block) for block in mesh.cells_of(group, 2).values()]
-        axes.add_collection3d(
-            Poly3DCollection(np.concatenate(triangles), facecolors=[colour], alpha=opacity, label=label)
-        )
+        triangles = np.concatenate([triangles_of(mesh.points, block) for block in mesh.cells_of(group, 2).values()])
+        axes.add_collection3d(Poly3DCollection(triangles, facecolors=[colour], alpha=opacity, label=label))

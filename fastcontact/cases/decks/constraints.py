@@ -12,9 +12,9 @@ from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import facet_points
+from fastcontact.cases.decks.axes import local_axes, local_directions, orientation_of
 from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, refusing, unquoted
-from fastcontact.cases.decks.content import Content, Equation, Link, MultiPoint, Pair, SectorEnds
-from fastcontact.cases.decks.local_axes import local_axes, local_directions, orientation_of
+from fastcontact.cases.decks.content import Content, Coupling, Equation, MultiPoint, Pair, SectorEnds
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.loads import Traction
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
@@ -29,12 +29,12 @@ FLAT = 1e-9
 
 def make_rotations(deck_mesh: DeckMesh) -> None:
     """Add a point for the rotation of each reference node, before the mesh is made; CaseError in axisymmetric models."""
-    for link in deck_mesh.content.links:
-        point = deck_mesh.node(link.reference, link.location)
-        if link.rotation:
-            deck_mesh.rotations[point] = deck_mesh.node(link.rotation, link.location)
+    for coupling in deck_mesh.content.couplings:
+        point = deck_mesh.node(coupling.reference, coupling.location)
+        if coupling.rotation:
+            deck_mesh.rotations[point] = deck_mesh.node(coupling.rotation, coupling.location)
         elif deck_mesh.kinematics == "axisymmetric":
-            raise link.refuse("is not supported in axisymmetric models: relate the nodes by *EQUATION")
+            raise coupling.refuse("is not supported in axisymmetric models: relate the nodes by *EQUATION")
         else:
             deck_mesh.rotation(point)
 
@@ -46,9 +46,9 @@ def relations_of(deck_mesh: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
     rows = [_equation(deck_mesh, equation, axes) for equation in content.equations]
     rows += [row for constraint in content.multi_points for row in multi_point_rows(deck_mesh, constraint)]
     constraints = [relation("the equations of the deck", rows, mesh.points.shape)] if rows else []
-    for link in content.links:
-        name = f"*{link.location.keyword} of line {link.location.line}"
-        constraints.append(MultiPointConstraint(name, _link_rows(deck_mesh, mesh, link)))
+    for coupling in content.couplings:
+        name = f"*{coupling.location.keyword} of line {coupling.location.line}"
+        constraints.append(MultiPointConstraint(name, _coupling_rows(deck_mesh, mesh, coupling)))
     return constraints
 
 
@@ -77,61 +77,61 @@ def _pin_rows(deck_mesh: DeckMesh, pin: MultiPoint) -> list[list[Term]]:
             f"'{pin.nodes[0]}' and '{pin.nodes[1]}' have {numbers} nodes: the numbers must be equal, or the second number 1, "
             "and no node may be tied to itself"
         )
-    return [
-        [(p, axis, 1.0), (q, axis, -1.0)] for p, q in zip(first, second, strict=True) for axis in range(deck_mesh.dim)
-    ]
+    pairs = list(zip(first, second, strict=True))
+    return [[(p, axis, 1.0), (q, axis, -1.0)] for p, q in pairs for axis in range(deck_mesh.dim)]
 
 
-def _points(deck_mesh: DeckMesh, link: Link) -> list[int]:
-    """Return the points that a link relates to its reference point, in ascending order; CaseError if there are none."""
-    if link.kind == "nodes":
-        points = deck_mesh.nodes(link.group, link.location)
-    elif link.kind == "elements":
-        elements = deck_mesh.elements_of(link.group, link.location)
+def _points(deck_mesh: DeckMesh, coupling: Coupling) -> list[int]:
+    """Return the points that a coupling relates to its reference point, in ascending order; CaseError if there are none."""
+    if coupling.kind == "nodes":
+        points = deck_mesh.nodes(coupling.group, coupling.location)
+    elif coupling.kind == "elements":
+        elements = deck_mesh.elements_of(coupling.group, coupling.location)
         points = [p for element in elements if element.type is not None for p in element.points]
     else:
-        definition, scope = deck_mesh.surface(link.group, link.location)
+        definition, scope = deck_mesh.surface(coupling.group, coupling.location)
         if definition.of_nodes:
             points = deck_mesh.surface_nodes(definition, scope)
         else:
-            points = [p for face in deck_mesh.faces(link.group, link.location) for p in facet_points(*face)]
-    reference = deck_mesh.node(link.reference, link.location)
+            points = [p for face in deck_mesh.faces(coupling.group, coupling.location) for p in facet_points(*face)]
+    reference = deck_mesh.node(coupling.reference, coupling.location)
     followers = sorted(set(points) - {reference, deck_mesh.rotations[reference]})
     if not followers:
-        raise link.refuse(f"'{link.group}' contains no nodes that could follow the reference node")
+        raise coupling.refuse(f"'{coupling.group}' contains no nodes that could follow the reference node")
     return followers
 
 
-def _link_rows(deck_mesh: DeckMesh, mesh: Mesh, link: Link) -> csr_array:
-    """Return the constraint rows of a link.
+def _coupling_rows(deck_mesh: DeckMesh, mesh: Mesh, coupling: Coupling) -> csr_array:
+    """Return the constraint rows of a coupling.
 
-    The nodes follow the reference point or, if the link is distributing, the reference point has the area-weighted mean
+    The nodes follow the reference point or, if the coupling is distributing, the reference point has the area-weighted mean
     motion of a surface.
     """
     n_dofs = mesh.points.size
-    point = deck_mesh.node(link.reference, link.location)
-    reference = ReferencePoint(
-        point, deck_mesh.rotations[point], tuple(deck_mesh.points[point][: deck_mesh.dim].tolist())
-    )
-    points = np.array(_points(deck_mesh, link), np.intp)
+    point = deck_mesh.node(coupling.reference, coupling.location)
+    position = tuple(deck_mesh.points[point][: deck_mesh.dim].tolist())
+    reference = ReferencePoint(point, deck_mesh.rotations[point], position)
+    points = np.array(_points(deck_mesh, coupling), np.intp)
     coordinates = deck_mesh.points[points, : deck_mesh.dim]
-    if not link.distributing:
-        directions = np.array([_directions(deck_mesh, link, follower) for follower in points.tolist()])
+    if not coupling.distributing:
+        directions = np.array([_directions(deck_mesh, coupling, follower) for follower in points.tolist()])
         return rigid_rows(reference, points, coordinates, directions, n_dofs)
-    deck_mesh.faces(link.group, link.location)
-    surface = Traction(group_of_surface(deck_mesh, link.group), {0: 1.0}, None)
+    deck_mesh.faces(coupling.group, coupling.location)
+    surface = Traction(group_of_surface(deck_mesh, coupling.group), {0: 1.0}, None)
     areas = surface.vector(mesh, deck_mesh.kinematics)[:, 0]
     weight = areas[points] / areas[points].sum()
-    with refusing(link):
-        return distributing_rows(reference, points, coordinates, weight, _directions(deck_mesh, link, point), n_dofs)
+    directions = _directions(deck_mesh, coupling, point)
+    with refusing(coupling):
+        return distributing_rows(reference, points, coordinates, weight, directions, n_dofs)
 
 
-def _directions(deck_mesh: DeckMesh, link: Link, point: int) -> Array:
+def _directions(deck_mesh: DeckMesh, coupling: Coupling, point: int) -> Array:
     """Return the unit vectors (n, dim) [-] along which a coupling constrains a point."""
     axes = np.eye(3)
-    if link.orientation:
-        axes = local_axes(orientation_of(deck_mesh.content, link.orientation, link.location), deck_mesh.points[point])
-    return axes[[component - 1 for component in link.components if component <= deck_mesh.dim], : deck_mesh.dim]
+    if coupling.orientation:
+        orientation = orientation_of(deck_mesh.content, coupling.orientation, coupling.location)
+        axes = local_axes(orientation, deck_mesh.points[point])
+    return axes[[component - 1 for component in coupling.components if component <= deck_mesh.dim], : deck_mesh.dim]
 
 
 def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[Term]]:
@@ -214,9 +214,8 @@ def contact_pair(content: Content, block: Block) -> None:
     if "SMALL SLIDING" in block.parameters:
         content.note(block, "SMALL SLIDING: no effect, contact is detected in the deformed configuration")
     adjust = block.get("ADJUST") if "ADJUST" in block.parameters else ""
-    content.pairs += [
-        Pair(*sides, block.required("INTERACTION"), adjust=adjust) for sides in _sides(block, "a contact pair")
-    ]
+    interaction = block.required("INTERACTION")
+    content.pairs += [Pair(*sides, interaction, adjust=adjust) for sides in _sides(block, "a contact pair")]
 
 
 def _sides(block: Block, kind: str) -> Iterator[tuple[Location, str, str]]:
@@ -251,11 +250,8 @@ def tie(content: Content, block: Block) -> None:
         value = as_number(block.location, tolerance)
         if value < 0.0:
             raise block.refuse(f"POSITION TOLERANCE={value:g} is negative")
-        content.note(
-            block,
-            f"POSITION TOLERANCE={value:g}: no effect, the surfaces are tied where they face each other, at any distance, "
-            "not node by node",
-        )
+        text = "no effect, the surfaces are tied where they face each other, at any distance, not node by node"
+        content.note(block, f"POSITION TOLERANCE={value:g}: {text}")
     if adjust == "YES" and "ADJUST" in block.parameters:
         content.note(block, "ADJUST=YES: nodes are not moved, distances of the sides are kept")
     content.pairs += [Pair(*sides, tied=True) for sides in _sides(block, "a tie")]
@@ -299,7 +295,7 @@ def multi_point(content: Content, block: Block) -> None:
         elif len(nodes) != 2:
             raise row.refuse(f"{kind} needs two nodes, the dependent and the independent one")
         elif kind == "BEAM":
-            content.links.append(Link(row.location, nodes[1], nodes[0], "nodes"))
+            content.couplings.append(Coupling(row.location, nodes[1], nodes[0], "nodes"))
         else:
             content.multi_points.append(MultiPoint(row.location, kind, tuple(nodes)))
     content.multi_points += [MultiPoint(row.location, kind, tuple(nodes)) for row, kind, nodes in continuing]
@@ -307,9 +303,9 @@ def multi_point(content: Content, block: Block) -> None:
 
 def rigid_body(content: Content, block: Block) -> None:
     """Read *RIGID BODY: nodes or elements that move as a rigid body with a reference node."""
-    kind = "elements" if block.get("ELSET") else "nodes"
-    group = block.get("ELSET") or block.required("NSET")
-    content.links.append(Link(block.location, block.required("REF NODE"), group, kind, rotation=block.get("ROT NODE")))
+    kind, group = ("elements", block.get("ELSET")) if block.get("ELSET") else ("nodes", block.required("NSET"))
+    reference, rotation = block.required("REF NODE"), block.get("ROT NODE")
+    content.couplings.append(Coupling(block.location, reference, group, kind, rotation=rotation))
 
 
 def coupling(content: Content, block: Block, inner: Block) -> None:
@@ -320,11 +316,7 @@ def coupling(content: Content, block: Block, inner: Block) -> None:
         if not 1 <= first <= last <= 6:
             raise row.refuse(f"the components {first} to {last} are not within 1 to 6")
         components.update(range(first, last + 1))
-    content.links.append(
-        Link(
-            block.location, block.required("REF NODE"), block.required("SURFACE"), "surface",
-            components=tuple(sorted(components)) or (1, 2, 3, 4, 5, 6),
-            distributing=inner.keyword == "DISTRIBUTING",
-            orientation=block.get("ORIENTATION"),
-        )
-    )  # fmt: skip
+    names = block.required("REF NODE"), block.required("SURFACE"), "surface"
+    directions = tuple(sorted(components)) or (1, 2, 3, 4, 5, 6)
+    distributing, orientation = inner.keyword == "DISTRIBUTING", block.get("ORIENTATION")
+    content.couplings.append(Coupling(block.location, *names, directions, distributing, orientation=orientation))

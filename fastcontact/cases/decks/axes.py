@@ -54,14 +54,14 @@ def transform(content: Content, block: Block) -> None:
     cylindrical = block.choice("TYPE", ("R", "C")) == "C"
     row = block.only()
     points = tuple(row.number(i) for i in range(6))
-    content.axes.append(Axes(block.location, block.required("NSET"), cylindrical, points))
+    content.transforms.append(Axes(block.location, block.required("NSET"), cylindrical, points))
 
 
 def local_directions(assembly: Assembly) -> dict[int, Array]:
     """Return the local axes (3, 3) [-], in rows, of each point with *TRANSFORM."""
     return {
         point: local_axes(axes, assembly.points[point])
-        for axes in assembly.content.axes
+        for axes in assembly.content.transforms
         for point in assembly.nodes(axes.name, axes.location)
     }
 
@@ -107,7 +107,7 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
 
 def local_axes(axes: Axes, point: Array) -> Array:
     """Return the local axes (3, 3) [-], in rows, at a point; CaseError if they are not defined there."""
-    a, b = np.array(axes.points[:3]), np.array(axes.points[3:])
+    a, b = np.reshape(axes.points, (2, 3))
     if axes.cylindrical:
         third, first = b - a, point - a
         third = third / max(np.linalg.norm(third), 1e-300)
