@@ -44,7 +44,6 @@ class Term(Protocol):
 
     def residual(self, u: Array) -> tuple[Array, Energies]:
         """Return the nodal forces (n_dofs,) of the term at u [force], and its energies."""
-        ...
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array | csr_array | None:
         """Return the derivative (n, n) of the nodal forces with respect to the n displacements of points [force / length].
@@ -53,7 +52,6 @@ class Term(Protocol):
         `problem.prepare` passed to the linear solver. `geometric` selects how much of the geometric stiffness is included,
         see `NonlinearBodies.at`.
         """
-        ...
 
     def commit(self, u: Array, state: State) -> State:
         """Return `state` with the history variables of the term at u, the end of the load step.

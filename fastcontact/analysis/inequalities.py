@@ -294,8 +294,7 @@ def _with_floating_bodies(
         gaps = gaps_at_rest(problem.model, bodies.motions)
         raise failure(not_balanced(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))
     iterate.rigid = rigid
-    solution = rigid.state
-    respond = solution.response
+    solution, respond = rigid.state, rigid.state.response
     if freed is not None and respond is not None:
         solution = replace(solution, response=lambda: freed(respond()).respond)
     return solution, dofs.displacement(solution.u, lift + bodies.rigid(rigid.position))

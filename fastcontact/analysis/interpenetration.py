@@ -55,9 +55,8 @@ def _without_contact(
     problem: Problem, between: Mapping[frozenset[int], Sequence[str]], overlaps: Sequence[Inside]
 ) -> list[str]:
     """Return a warning for each two overlapping bodies without a contact pair between them, the deepest overlap first."""
-    mesh = problem.model.mesh
+    mesh, texts = problem.model.mesh, dict[frozenset[int], str]()
     _, body = bodies(mesh)
-    texts: dict[frozenset[int], str] = {}
     for first, second, points, depth in sorted(overlaps, key=lambda entry: -float(entry[3].max())):
         body_pair, row = frozenset((first, second)), int(np.argmax(depth))
         notable = depth[row] > LENGTH_ROUND_OFF * np.ptp(mesh.points, axis=0).max()

@@ -30,6 +30,7 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.elasticity import incompatible_modes, recovery
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.elasticity.incompatible_modes import BENDING as BENDING_ELEMENTS
+from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.recovery import BATCH, CellStress
 from fastcontact.elasticity.smoothed_stress import smoothed_stress
@@ -77,9 +78,7 @@ class StressScatter:
             if elements.get(name).order == 1 and not (has_modes and name in BENDING_ELEMENTS)
         ]  # fmt: skip
         self.energy = self.pressure = 0.0
-        laws = [material for material, _ in problem.model.materials]
-        nu = np.array([law.largest_nu if isinstance(law, LinearElastic) else -1.0 for law in laws])[field.owner]
-        self._nearly_incompressible = (nu >= SUSPICIOUS) & (problem.model.kinematics != "plane_stress")
+        nu, self._nearly_incompressible = _poisson_ratios(problem.model, field)
         self.nu = float(nu.max(initial=-1.0))
         thermal, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
         offset = problem.model.stress_offset(thermal, initial, field, step.temperature)
@@ -119,6 +118,16 @@ class StressScatter:
                 (computed[..., :3].mean(axis=2) ** 2 * mean_weights).sum(),
             ]  # fmt: skip
         return sums
+
+
+def _poisson_ratios(model: Model, field: MaterialField) -> tuple[Array, Mask]:
+    """Return the largest Poisson's ratios (n,) of a material field, and where they are suspicious.
+
+    They are -1 for materials without a mean dilatation.
+    """
+    laws = [material for material, _ in model.materials]
+    nu = np.array([law.largest_nu if isinstance(law, LinearElastic) else -1.0 for law in laws])[field.owner]
+    return nu, (nu >= SUSPICIOUS) & (model.kinematics != "plane_stress")
 
 
 def nonlinear_scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[str]:
@@ -190,11 +199,7 @@ class Comparison:
         field = model.material_field()
         self._moduli, self._material = field.moduli, field.rows
         self._treatment, self._owner = field.treatment, field.owner
-        nu = np.full(len(self._moduli), -1.0)  # below all admissible values, for materials without a mean dilatation
-        for number, (material, _) in enumerate(model.materials):
-            if isinstance(material, LinearElastic):
-                nu[field.owner == number] = material.largest_nu
-        self._suspicious = (nu >= SUSPICIOUS) & (model.kinematics != "plane_stress")
+        nu, self._suspicious = _poisson_ratios(model, field)
         self._cells = {name: rows for name in model.mesh.solids if (rows := self._may_lock(name)).any()}
         self.elements = list(self._cells)
         self.nu = max((float(nu[self._material[name][rows]].max()) for name, rows in self._cells.items()), default=0.0)

@@ -28,15 +28,12 @@ class Compliance(Protocol):
 
     def block(self, rows: Indices) -> Array:
         """Return the submatrix (q, q) of C for the constraints `rows` (q,); if C is diagonal, only the diagonal (q,)."""
-        ...
 
     def among(self, rows: Indices) -> Array | FieldCompliance:
         """Return the value of `block`, or an equivalent object that linear solvers can use without forming the submatrix."""
-        ...
 
     def apply(self, multiplier: Array) -> Array:
         """Return ``C @ multiplier`` (m,) [length] for multipliers (m,) [force]."""
-        ...
 
 
 class NodalField(Protocol):
@@ -63,7 +60,6 @@ class NodalField(Protocol):
 
         In partly covered facets the pressure refers to the covered part of the area.
         """
-        ...
 
     def traction(self, force: Array) -> Array:
         """Return nodal tractions (n_nodes, dim) per unit reference area [pressure] for forces (m, dim) [force]."""
@@ -134,23 +130,19 @@ class Wetted(Protocol):
     @property
     def rows(self) -> Mask:
         """Constraints (m,) in the part that fluid fills."""
-        ...
 
     @property
     def pressure(self) -> Array:
         """Fluid pressure at the secondary nodes (n_nodes,) [pressure]."""
-        ...
 
     def force(self, displacement: Array) -> Array:
         """Return the nodal forces (n_points, dim) of the fluid on the secondary side [force].
 
         `displacement` (n_points, dim) are the displacements of all points [length].
         """
-        ...
 
     def stiffness(self, displacement: Array) -> csr_array:
         """Return the symmetric part (n_dofs, n_dofs) of the negative derivative of `force` [force / length]."""
-        ...
 
 
 class Tied(Protocol):
@@ -159,14 +151,12 @@ class Tied(Protocol):
     @property
     def directions(self) -> tuple[Array, ...]:
         """Tangents (m, dim) at the constraints of the formulation."""
-        ...
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
         """Return the normal (m,) and tangential (m, k) forces at the constraints of the formulation [force].
 
         `multiplier` are the multipliers of the equations [force].
         """
-        ...
 
 
 @dataclass(frozen=True, eq=False)
