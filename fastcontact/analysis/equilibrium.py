@@ -436,6 +436,6 @@ def solve_displacements(
         return system.displacement(v, lift), np.zeros(len(lift))
     contact_force, rigid = settled.force, settled.iterate.rigid
     if problem.floating_bodies is not None and rigid is not None:
-        lift = lift + problem.floating_bodies.rigid(rigid.position)
+        lift = lift + problem.floating_bodies.rigid(rigid.anchor)
     v = loaded.full_solution(system.reduced(contact_force), settled.solution.u)
     return system.displacement(v, lift), contact_force

@@ -24,7 +24,7 @@ from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.formulations._formulation import LEANING
-from fastcontact.contact.held_motions import TOGETHER
+from fastcontact.contact.held_motions import SAME_DIRECTION
 from fastcontact.contact.pairing import FACING
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
@@ -227,7 +227,7 @@ def symmetry_planes(pair: Formulation) -> list[tuple[int, Indices]]:
     if motions is None:
         return []
     points, opposite = coordinates[surface.points], coordinates[pair.primary.points]
-    held = np.diagonal(motions.at(surface.points), axis1=1, axis2=2) >= TOGETHER**2
+    held = np.diagonal(motions.at(surface.points), axis1=1, axis2=2) >= SAME_DIRECTION**2
     held &= ~motions.driven[surface.points]
     tolerance, planes = SINGLE_PRECISION * float(np.ptp(points, axis=0).max()), []
     across = np.abs(nodal_normals(surface, coordinates)) < LEANING  # otherwise the plane does not cut the surface

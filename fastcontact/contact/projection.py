@@ -30,7 +30,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 # value lies between the exterior angles of octagons and heptagons, so that regular polygons do not depend on round-off.
 CORNER = 48.0
 # Number of consecutive points that need not be sorted for the search.
-TOGETHER = 16
+POINTS_PER_LEAF = 16
 # Overhang up to which a point faces the end of a side. Nodes on an axis or in a plane of symmetry lie slightly beyond
 # inclined facets, and nodes at the end of one side beyond that of the other if both sides strain differently.
 BESIDE = 0.05
@@ -263,7 +263,7 @@ def closest_of_kinds(points: Array, kinds: Sequence[Array]) -> Closest:
 
 
 def _on_lines(points: Array, corners: Array, closest: Closest) -> None:
-    numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, TOGETHER)
+    numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, POINTS_PER_LEAF)
     corners = corners[numbers]
     hull = corners
     if corners.shape[1] == 3:  # a parabola lies in the polygon of its ends and this point (Bezier)
@@ -281,7 +281,7 @@ def _on_faces(points: Array, corners: Array, closest: Closest) -> None:
     from fastcontact.contact.search.projection_3d_kernels import Domain, Facets
 
     n, table = len(corners), tables(corners.shape[1])
-    numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, TOGETHER)
+    numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, POINTS_PER_LEAF)
     centre = 0.5 * (corners.min(axis=0).min(axis=0) + corners.max(axis=0).max(axis=0))
     facets = Facets(corners[numbers], centre, np.empty(corners.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))

@@ -36,7 +36,7 @@ CHANGED = 1e-3
 SMOOTH = 1e-3
 # Error of the derivatives from simultaneous moves, relative to the largest derivative, above which points are moved one by
 # one.
-TOGETHER = 1e-5
+SEPARABLE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,7 +246,7 @@ class MovingContact:
         n, k = len(self.u), len(self.active)
         error = np.abs(difference - derivative @ shift)
         blocks = (slice(0, n), slice(n, n + k), slice(n + k, None))
-        return all(largest(error[block]) <= TOGETHER * largest(difference[block]) for block in blocks)
+        return all(largest(error[block]) <= SEPARABLE * largest(difference[block]) for block in blocks)
 
 
 def _independent_groups(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
