@@ -88,8 +88,8 @@ def _beside_contact(
         row = int(np.argmax(depth))
         if depth[row] > limit and depth[row] - _at_rest(problem, entries, int(points[row])) > limit:
             label = " and ".join(body_name(mesh, body, number) for number in sorted(body_pair))
-            what = f"bodies {label} pass through each other"
-            texts.append(_lacking_facets(problem, names[0], what, depth[row], points[row]))
+            subject = f"bodies {label} pass through each other"
+            texts.append(_lacking_facets(problem, names[0], subject, depth[row], points[row]))
     return texts
 
 

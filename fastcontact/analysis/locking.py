@@ -195,28 +195,25 @@ class Comparison:
     """
 
     def __init__(self, model: Model) -> None:
-        self._model = model
-        field = model.material_field()
-        self._moduli, self._material = field.moduli, field.rows
-        self._treatment, self._owner = field.treatment, field.owner
-        nu, self._suspicious = _poisson_ratios(model, field)
+        self._model, self._field = model, model.material_field()
+        nu, self._suspicious = _poisson_ratios(model, self._field)
         self._cells = {name: rows for name in model.mesh.solids if (rows := self._may_lock(name)).any()}
-        self.elements = list(self._cells)
-        self.nu = max((float(nu[self._material[name][rows]].max()) for name, rows in self._cells.items()), default=0.0)
+        self.elements, numbers = list(self._cells), self._field.rows
+        self.nu = max((float(nu[numbers[name][rows]].max()) for name, rows in self._cells.items()), default=0.0)
 
     def _may_lock(self, name: str) -> Mask:
         """Return which cells (n_cells,) of an element may lock."""
-        numbers = self._material[name]
-        bends = incompatible_modes.with_modes(name, self._treatment)
-        treated = self._treatment[numbers] & 1 > 0 if bends is None else self._treatment[numbers] > 0
+        numbers, treatment = self._field.rows[name], self._field.treatment
+        bends = incompatible_modes.with_modes(name, treatment)
+        treated = treatment[numbers] & 1 > 0 if bends is None else treatment[numbers] > 0
         return self._suspicious[numbers] & ((name in AT_NODES) | ~treated)
 
     def force(self, displacement: Array) -> Array:
         """Return the forces S u (n_points, dim) [force] for displacements u (n_points, dim) [length]."""
-        mesh, kinematics = self._model.mesh, self._model.kinematics
-        arguments = mesh, kinematics, self._moduli, self._material, displacement
-        stress = recovery.stress_at_points(*arguments, self._treatment)
-        reference = recovery.stress_at_points(*arguments, self._treatment | self._suspicious)
+        mesh, kinematics, field = self._model.mesh, self._model.kinematics, self._field
+        arguments = mesh, kinematics, field.moduli, field.rows, displacement
+        stress = recovery.stress_at_points(*arguments, field.treatment)
+        reference = recovery.stress_at_points(*arguments, field.treatment | self._suspicious)
         excess = {name: np.zeros_like(stress[name]) for name in self._cells}
         for name in self._cells:
             excess[name][..., :3] = (stress[name] - reference[name])[..., :3].mean(axis=2, keepdims=True)
@@ -234,14 +231,14 @@ class Comparison:
             volume[name] = volumes.sum(axis=1)
             mean_stress = reference[name][..., :3].mean(axis=2)
             pressure[name] = (mean_stress * volumes).sum(axis=1) / volume[name]
-        for number in np.unique(self._owner[self._suspicious]):
+        owner = self._field.owner
+        for number in np.unique(owner[self._suspicious]):
             nodal_volume, volume_pressure = np.zeros((2, mesh.n_points))
-            rows = {name: np.flatnonzero(self._owner[self._material[name]] == number) for name in names}
+            rows = {name: np.flatnonzero(owner[self._field.rows[name]] == number) for name in names}
             for name in names:
                 cells = mesh.cells[name][rows[name]]
-                for node in cells.T:
-                    np.add.at(nodal_volume, node, volume[name][rows[name]])
-                    np.add.at(volume_pressure, node, (volume[name] * pressure[name])[rows[name]])
+                np.add.at(nodal_volume, cells, volume[name][rows[name], None])
+                np.add.at(volume_pressure, cells, (volume[name] * pressure[name])[rows[name], None])
             mean = volume_pressure / np.where(nodal_volume > 0.0, nodal_volume, 1.0)
             for name in names:
                 deviation = pressure[name][rows[name]] - mean[mesh.cells[name][rows[name]]].mean(axis=1)

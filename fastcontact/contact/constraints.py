@@ -19,6 +19,7 @@ from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.linearised_geometry import Geometry
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import normals
+from fastcontact.contact.surface import by_block
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
@@ -448,30 +449,25 @@ class _BlockDiagonal:
 
     def __init__(self, pairs: list[Constraints]) -> None:
         self._compliances = [pair.compliance for pair in pairs]
-        self._start = np.cumsum([0] + [len(pair) for pair in pairs])
+        self._sizes = [len(pair) for pair in pairs]
 
     def block(self, rows: Indices) -> Array:
         values = np.zeros((len(rows), len(rows)))
-        for compliance, first, end in zip(self._compliances, self._start[:-1], self._start[1:], strict=True):
-            in_block = np.flatnonzero((rows >= first) & (rows < end))
+        for compliance, (in_block, numbers) in zip(self._compliances, by_block(rows, self._sizes), strict=True):
             if compliance is not None and len(in_block):
-                values[np.ix_(in_block, in_block)] = compliance.block(rows[in_block] - first)
+                values[np.ix_(in_block, in_block)] = compliance.block(numbers)
         return values
 
     def among(self, rows: Indices) -> Array | FieldCompliance:
         blocks = []
-        for inner, first, end in zip(self._compliances, self._start[:-1], self._start[1:], strict=True):
-            in_block = rows[(rows >= first) & (rows < end)] - first
-            n = len(in_block)
-            compliance = FieldCompliance.none(n) if inner is None or not n else inner.among(in_block)
+        for inner, (_, numbers) in zip(self._compliances, by_block(rows, self._sizes), strict=True):
+            n = len(numbers)
+            compliance = FieldCompliance.none(n) if inner is None or not n else inner.among(numbers)
             if not isinstance(compliance, FieldCompliance):
                 return self.block(rows)
             blocks.append(compliance)
         return FieldCompliance.stacked(blocks, lambda: self.block(rows))
 
     def apply(self, multiplier: Array) -> Array:
-        values = np.zeros(len(multiplier))
-        for inner, first, end in zip(self._compliances, self._start[:-1], self._start[1:], strict=True):
-            if inner is not None:
-                values[first:end] = inner.apply(multiplier[first:end])
-        return values
+        of_pairs = zip(self._compliances, np.split(multiplier, np.cumsum(self._sizes)[:-1]), strict=True)
+        return np.concatenate([np.zeros(len(own)) if inner is None else inner.apply(own) for inner, own in of_pairs])

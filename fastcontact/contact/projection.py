@@ -20,7 +20,7 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.search import search_2d_kernels
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import flat_triangles, tables
-from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
+from fastcontact.contact.surface import FacetBlock, Surface, by_block, line_neighbours
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
@@ -59,16 +59,14 @@ class Places:
 
 def places(side: Surface, facet: Indices, xi: Array) -> Places:
     """Return the points of `side` at the reference coordinates `xi` (n, dim - 1) in the facets numbered `facet` (n,)."""
-    width, n, first = max(block.facets.shape[1] for block in side.blocks), len(facet), 0
+    width, n = max(block.facets.shape[1] for block in side.blocks), len(facet)
     nodes, local = np.empty((n, width), np.int32), np.empty((n, width), np.intp)
     shape, gradient = np.zeros((n, width)), np.zeros((n, width, xi.shape[1]))
-    for block in side.blocks:
-        rows = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
-        element, number, k = elements.get(block.element), facet[rows] - first, block.facets.shape[1]
+    for block, (rows, number) in zip(side.blocks, by_block(facet, side.sizes), strict=True):
+        element, k = elements.get(block.element), block.facets.shape[1]
         columns = np.minimum(np.arange(width), k - 1)
         nodes[rows], local[rows] = block.facets[number][:, columns], block.local[number][:, columns]
         shape[rows, :k], gradient[rows, :k] = element.shape(xi[rows]), element.gradient(xi[rows])
-        first += len(block.facets)
     return Places(nodes, local, shape, gradient)
 
 
@@ -95,19 +93,13 @@ def at_common_edges(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, 
     at = places(side, facet, xi)
     row, k = np.nonzero(np.abs(at.shape) > LENGTH_ROUND_OFF)
     around = csr_array((np.ones(len(row)), (row, at.local[row, k])), shape=(len(facet), len(side.points)))
-    local = [block.local for block in side.blocks]
-    ends = np.concatenate([[0], np.cumsum(np.concatenate([np.full(len(nodes), nodes.shape[1]) for nodes in local]))])
-    nodes = np.concatenate([nodes.ravel() for nodes in local])
-    of_facets = csr_array((np.ones(len(nodes)), nodes, ends), shape=(len(ends) - 1, len(side.points)))
-    common = coo_array(around @ of_facets.T)
+    common = coo_array(around @ side.incidence.T)
     contains_all = common.data == np.diff(around.indptr)[common.row]
     point, common_facet = common.row[contains_all].astype(np.intp), common.col[contains_all].astype(np.intp)
-    coordinates, first = np.empty((len(point), xi.shape[1])), 0
-    for block in side.blocks:
-        rows = np.flatnonzero((common_facet >= first) & (common_facet < first + len(block.local)))
-        same = block.local[common_facet[rows] - first][:, :, None] == at.local[point[rows]][:, None]
+    coordinates = np.empty((len(point), xi.shape[1]))
+    for block, (rows, number) in zip(side.blocks, by_block(common_facet, side.sizes), strict=True):
+        same = block.local[number][:, :, None] == at.local[point[rows]][:, None]
         coordinates[rows] = np.einsum("pkj,pj->pk", same, at.shape[point[rows]]) @ elements.get(block.element).nodes
-        first += len(block.local)
     return point, common_facet, coordinates
 
 

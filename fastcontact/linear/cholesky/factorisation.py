@@ -94,17 +94,17 @@ class SymbolicFactors:
         A matrix with this pattern.
     last : ndarray of int (m,)
         Unknowns that are eliminated last.
-    many : bool, optional
+    repeated : bool, optional
         Whether many matrices will be factorised, so that it pays off to compute two orders and choose the better one.
     """
 
-    def __init__(self, K: bsr_array, last: Indices, many: bool = False) -> None:
+    def __init__(self, K: bsr_array, last: Indices, repeated: bool = False) -> None:
         n, is_last = K.shape[0], np.zeros(K.shape[0], bool)
         self._pattern, self._last = (K.indptr, K.indices), last
         self._previous = Previous(np.empty(0), np.empty(0, np.int64), NO_FACTORS)
         self._numbers: csc_array | None = None
         self._first: csc_array | None
-        orders = [fill_reducing(K, last, connected) for connected in (False, True)[: 1 + many]]
+        orders = [fill_reducing(K, last, connected) for connected in (False, True)[: 1 + repeated]]
         analysed = [(order, A := reordered(K, order), elimination_tree(A)) for order in orders]
         order, self._first, self._tree = min(analysed, key=lambda entry: np.square(entry[2].entries, dtype=float).sum())
         self._unknowns, self._position = order[self._tree.order], np.empty(n, np.intp)

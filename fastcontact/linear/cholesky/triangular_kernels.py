@@ -165,16 +165,16 @@ def _reached(first: Offsets, row_start: Offsets, rows: Numbers, marked: Mask) ->
 
 @kernel
 def _copied(
-    start: Offsets, values: Array, low: int, high: int, end: int, rest: Numbers, panel: Array, below: Offsets
+    start: Offsets, values: Array, low: int, high: int, end: int, rows_below: Numbers, panel: Array, below: Offsets
 ) -> int:
     """Copy columns `low` to ``high - 1`` of L, from row `high` on, to `panel` one by one; return their length.
 
-    The numbers of these rows are written to `below`: `high` to ``end - 1`` in the same supernode, then `rest`.
+    The numbers of these rows are written to `below`: `high` to ``end - 1`` in the same supernode, then `rows_below`.
     """
-    size = end - high + len(rest)
+    size = end - high + len(rows_below)
     for j in range(low, high):
         for k in range(size):
             panel[(j - low) * size + k] = values[start[j] + high - j + k]
     for k in range(size):
-        below[k] = high + k if high + k < end else rest[high + k - end]
+        below[k] = high + k if high + k < end else rows_below[high + k - end]
     return size

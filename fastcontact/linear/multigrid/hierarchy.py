@@ -22,15 +22,7 @@ from scipy.sparse import csr_matrix
 from fastcontact._jit.parallel import spread
 from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
-from fastcontact.linear.multigrid.level import (
-    COARSEST,
-    DEGREE,
-    SAFETY,
-    CoarseLevel,
-    Level,
-    chebyshev,
-    largest_eigenvalue,
-)
+from fastcontact.linear.multigrid.level import COARSEST, SAFETY, CoarseLevel, Level, chebyshev, largest_eigenvalue
 from fastcontact.linear.multigrid.matrix import ALL, WORK_OF_ROW, BlockMatrix, pointers
 
 
@@ -157,7 +149,7 @@ class Hierarchy:
     def bounds(self, values: Sequence[float]) -> None:
         for level, bound in zip(self.levels, values, strict=True):
             level.bound = bound
-        self._factors = [chebyshev(bound, DEGREE) for bound in values]
+        self._factors = [chebyshev(bound) for bound in values]
 
     def raise_bounds(self, factor: float) -> None:
         """Multiply the bounds of the smoothers by `factor`, until the next call of `set_bounds`."""

@@ -157,7 +157,7 @@ class Level:
         return total + sum(A.nbytes for A in (self.P, self.R) if A is not None)
 
 
-def chebyshev(bound: float, degree: int) -> list[tuple[float, float]]:
+def chebyshev(bound: float, degree: int = DEGREE) -> list[tuple[float, float]]:
     """Return the coefficients of `degree` Chebyshev steps for eigenvalues between ``SMOOTHED * bound`` and `bound`.
 
     The coefficients of a step multiply the last step and the preconditioned residual, see `cycle_kernels.relax`.

@@ -102,7 +102,7 @@ def factors(K, last):
     return symbolic.factors(K)
 
 
-@pytest.mark.parametrize("A", [*MATRICES, *(positive(n, 1.0, n) for n in (2, 47, 48, 49, 130)), positive(300, 0.3, 7)])
+@pytest.mark.parametrize("A", [*MATRICES, *(positive(n, 1.0, n) for n in (2, 47, 48, 49)), positive(300, 0.3, 7)])
 @pytest.mark.parametrize("m", [0, 1, 7])
 def test_factors_are_those_of_the_matrix(A, m):
     n = A.shape[0]

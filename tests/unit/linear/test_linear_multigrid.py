@@ -324,6 +324,16 @@ def test_springs_side_by_side_may_push_along_other_rows():
     assert Springs(R, one).joined(None).rows is R
 
 
+def test_rows_subtracted_from_others():
+    rows = 200
+    A, rng = random_blocks(3, 3, rows, 40)
+    numbers, x, y = rng.permutation(rows).astype(np.int32), rng.normal(size=120), rng.normal(size=3 * rows)
+    expected = y.reshape(-1, 3).copy()
+    expected[numbers] -= (A @ x).reshape(-1, 3)
+    cycle_kernels.subtract_rows(0, rows, numbers, A.indptr, A.indices, (A.data.ravel(),), x, y, (0, 0, 0))
+    assert y == pytest.approx(expected.ravel())
+
+
 def test_many_coupled_equations_are_assigned_unknowns():
     rng = np.random.default_rng(8)
     B = csr_array((rng.random((450, 900)) < 0.01) * rng.normal(size=(450, 900)) + np.eye(450, 900, 3))
