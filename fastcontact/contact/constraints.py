@@ -380,32 +380,25 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
     count, nodes = max(len(pair.tangents) for pair in pairs), [pair.nodes for pair in pairs if pair.nodes is not None]
     tangents = [pair.tangents or (csr_array(pair.B.shape),) * count for pair in pairs]
 
-    def joined(name: str) -> Any:
-        return np.concatenate([getattr(pair, name) for pair in pairs])
-
-    def of_tangents(name: str) -> Array:  # zero for pairs without tangents
-        return np.hstack([np.resize(getattr(pair, name), (count, len(pair))) for pair in pairs])
-
+    joined: dict[str, Any] = {
+        name: np.concatenate([getattr(pair, name) for pair in pairs])
+        for name in ("gap0", "positions", "friction", "equality", "softness", "tangential_softness")
+    }
+    for name in ("slip0", "elastic_slip"):  # zero for pairs without tangents
+        joined[name] = np.hstack([np.resize(getattr(pair, name), (count, len(pair))) for pair in pairs])
     factors = [np.zeros((1 + count, *pair.low_rank_compliance.shape[1:])) for pair in pairs]
     for factor, pair in zip(factors, pairs, strict=True):
         factor[: 1 + len(pair.tangents)] = pair.low_rank_compliance
     return StackedConstraints(
-        csr_array(vstack([pair.B for pair in pairs], format="csr")),
-        joined("gap0"),
-        joined("positions"),
-        _BlockDiagonal(pairs) if any(pair.compliance is not None for pair in pairs) else None,
-        tuple(csr_array(vstack(along, format="csr")) for along in zip(*tangents, strict=True)),
-        _stacked_directions(pairs),
-        joined("friction"),
-        of_tangents("slip0"),
-        joined("equality"),
-        joined("softness"),
-        np.stack([block_diag(*component) for component in zip(*factors, strict=True)]),
-        joined("tangential_softness"),
-        of_tangents("elastic_slip"),
+        B=csr_array(vstack([pair.B for pair in pairs], format="csr")),
+        compliance=_BlockDiagonal(pairs) if any(pair.compliance is not None for pair in pairs) else None,
+        tangents=tuple(csr_array(vstack(along, format="csr")) for along in zip(*tangents, strict=True)),
+        directions=_stacked_directions(pairs),
+        low_rank_compliance=np.stack([block_diag(*component) for component in zip(*factors, strict=True)]),
         nodes=None if len(nodes) < len(pairs) else np.concatenate(nodes),
         coupled_directions=_stacked_directions(pairs, coupled=True),
         parts=by_pair,
+        **joined,
     )
 
 
@@ -415,12 +408,9 @@ def _stacked_directions(pairs: list[Constraints], coupled: bool = False) -> tupl
     With `coupled`, `coupled_directions` take precedence over `directions`.
     """
     directions = [(pair.coupled_directions if coupled else ()) or pair.directions for pair in pairs]
-    return tuple(
-        np.vstack(
-            [along[j] if along else np.zeros_like(p.positions) for along, p in zip(directions, pairs, strict=True)]
-        )
-        for j in range(max(map(len, directions)))
-    )
+    count = max(map(len, directions))
+    filled = [along or (np.zeros_like(pair.positions),) * count for along, pair in zip(directions, pairs, strict=True)]
+    return tuple(np.vstack(of_axis) for of_axis in zip(*filled, strict=True))
 
 
 class _Softened:

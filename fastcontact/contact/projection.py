@@ -109,22 +109,21 @@ def nodal_normals(side: Surface, coordinates: Array) -> Array:
     The normal of a node is the mean of the unit normals of its facets, weighted by their angles at the node. With these
     weights it does not depend on how the surface is divided into facets (Thuermer and Wuethrich, 1998).
     """
-    normals = [facet_normals(block, coordinates) for block in side.blocks]
-    return _nodal_means(
-        side, normals, [facet_angles(elements.get(block.element), coordinates[block.facets]) for block in side.blocks]
-    )
+    return _nodal_means(side, *_at_nodes(side, coordinates))
 
 
-def _nodal_means(side: Surface, values: Sequence[Array], angles: Sequence[Array]) -> Array:
-    """Return the means (m, dim) of `nodal_normals`.
+def _at_nodes(side: Surface, coordinates: Array) -> tuple[Indices, Array, Array]:
+    """Return the node (p,), the unit normal (p, dim) and the angle (p,) [radian] of each facet at each of its nodes."""
+    node = np.concatenate([block.local.ravel() for block in side.blocks])
+    normals = [facet_normals(block, coordinates).reshape(-1, coordinates.shape[1]) for block in side.blocks]
+    angles = [facet_angles(elements.get(block.element), coordinates[block.facets]).ravel() for block in side.blocks]
+    return node, np.concatenate(normals), np.concatenate(angles)
 
-    `values` and `angles` are the normals (n_facets, k, dim) and the angles (n_facets, k) of the facets at their nodes, by
-    block.
-    """
-    n, dim = len(side.points), values[0].shape[2]
-    at = np.concatenate([block.local.ravel() for block in side.blocks])
-    weighted = [(angle[:, :, None] * normals).reshape(-1, dim) for normals, angle in zip(values, angles, strict=True)]
-    total: Array = np.column_stack([np.bincount(at, component, n) for component in np.concatenate(weighted).T])
+
+def _nodal_means(side: Surface, node: Indices, normal: Array, angle: Array) -> Array:
+    """Return the means (m, dim) of `nodal_normals`; the other arguments are the results of `_at_nodes`."""
+    weighted = (angle[:, None] * normal).T
+    total: Array = np.column_stack([np.bincount(node, component, len(side.points)) for component in weighted])
     side.add_across_ends(total)
     return total / np.linalg.norm(total, axis=1, keepdims=True)
 
@@ -140,29 +139,18 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
     list of ndarray (n_facets, n_nodes, dim)
         Normals of each block.
     """
-    facet_normals_of_blocks = [facet_normals(block, coordinates) for block in side.blocks]
-    angles = [facet_angles(elements.get(block.element), coordinates[block.facets]) for block in side.blocks]
-    means = _nodal_means(side, facet_normals_of_blocks, angles)
-    smooth = [means[block.local] for block in side.blocks]
+    node, normal, angle = _at_nodes(side, coordinates)
+    smooth = _nodal_means(side, node, normal, angle)[node]
     # A node is a corner if the normal of one of its facets deviates from the mean by more than half of CORNER.
-    flat, corner = np.cos(np.radians(0.5 * CORNER)), np.zeros(len(side.points), bool)
-    for block, normals, mean in zip(side.blocks, facet_normals_of_blocks, smooth, strict=True):
-        corner[block.local[np.einsum("fad,fad->fa", normals, mean) < flat]] = True
-    if not corner.any():
-        return smooth
-    node = np.concatenate([block.local.ravel() for block in side.blocks])
-    weight = np.concatenate([angle.ravel() for angle in angles])
-    normal = np.concatenate([normals.reshape(-1, coordinates.shape[1]) for normals in facet_normals_of_blocks])
-    joined = np.concatenate([normals.reshape(-1, coordinates.shape[1]) for normals in smooth])
+    corners = np.unique(node[np.einsum("pd,pd->p", normal, smooth) < np.cos(np.radians(0.5 * CORNER))])
     by_node, start = np.argsort(node, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(node))])
-    for at in np.flatnonzero(corner):
+    for at in corners:
         entries = by_node[start[at] : start[at + 1]]
         similar = normal[entries] @ normal[entries].T > np.cos(np.radians(CORNER))
-        total = (similar * weight[entries]) @ normal[entries]
-        joined[entries] = total / np.linalg.norm(total, axis=1, keepdims=True)
-    blocks = facet_normals_of_blocks
-    ends = np.cumsum([normals.shape[0] * normals.shape[1] for normals in blocks])[:-1]
-    return [means.reshape(like.shape) for means, like in zip(np.split(joined, ends), blocks, strict=True)]
+        total = (similar * angle[entries]) @ normal[entries]
+        smooth[entries] = total / np.linalg.norm(total, axis=1, keepdims=True)
+    of_blocks = np.split(smooth, np.cumsum([block.local.size for block in side.blocks])[:-1])
+    return [values.reshape(*block.local.shape, -1) for values, block in zip(of_blocks, side.blocks, strict=True)]
 
 
 def at_nodes_of_facets(of_blocks: Sequence[Array]) -> Array:
@@ -336,11 +324,8 @@ def along_normals(
     centre = 0.5 * (x.min(axis=0) + x.max(axis=0))
     heights = np.einsum("nd,nd->n", points - start.position, start.normal)
     relative_points, nodes_of_blocks = points - centre, [coordinates[block.facets] - centre for block in side.blocks]
-    sizes = np.cumsum([0] + [len(kind) for kind in nodes_of_blocks])
-    at_nodes = [
-        np.ascontiguousarray(normals[low:high, : kind.shape[1]])
-        for kind, low, high in zip(nodes_of_blocks, sizes[:-1], sizes[1:], strict=True)
-    ]
+    of_blocks = zip(np.split(normals, np.cumsum(side.sizes)[:-1]), nodes_of_blocks, strict=True)
+    at_nodes = [np.ascontiguousarray(values[:, : nodes.shape[1]]) for values, nodes in of_blocks]
     terms, directions = _polynomials(nodes_of_blocks), _polynomials(at_nodes)
     shared(
         lambda portion: projection_kernels.along_normals(

@@ -136,12 +136,9 @@ def triangular(name):
 
 def grid(name, n):
     """Reference coordinates (m, 2) all over a facet, its sides included."""
-    if triangular(name):
-        s, t = (a.ravel() for a in np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n), indexing="ij"))
-        inside = s + t <= 1 + 1e-12
-        return np.column_stack([s[inside], t[inside]])
-    s, t = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij")
-    return np.column_stack([s.ravel(), t.ravel()])
+    a = np.linspace(0 if triangular(name) else -1, 1, n)
+    xi = np.stack(np.meshgrid(a, a, indexing="ij"), axis=-1).reshape(-1, 2)
+    return xi[xi.sum(axis=1) <= 1 + 1e-12] if triangular(name) else xi
 
 
 def scattered(name, seed, n, bend=0.02):

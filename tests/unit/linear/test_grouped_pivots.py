@@ -4,10 +4,10 @@ import numpy as np
 import pressed_blocks
 import pytest
 from pairwise import first_of
+from pressed_blocks import solved
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 import fastcontact as fc
-from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import prepare
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.errors import ConvergenceError
@@ -275,11 +275,6 @@ def pressed(n, element="hex8", friction=0.0, **options):
     return pressed_blocks.pressed(element, friction, n=n, along=0.002, **{"formulation": "mortar", **options})
 
 
-def solved(model, name):
-    problem = prepare(model, fc.linear_ramp(1), fc.Criteria(), linear_solver=name)
-    return problem.solver, load_step(problem, problem.initial_state(), 1, 1.0)[1].contact["c"]
-
-
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
 def test_an_elimination_takes_weights_of_pivots_themselves(kind):
     rng = np.random.default_rng(7)
@@ -299,12 +294,13 @@ def test_an_elimination_takes_weights_of_pivots_themselves(kind):
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_standard_multipliers_over_a_whole_interface_cost_multigrid_what_dual_ones_do(friction):
-    solver, found = solved(pressed(10, friction=friction, multipliers="standard"), "amg")
+    solver, step = solved(pressed(10, friction=friction, multipliers="standard"), "amg")
     assert not solver.gave_up
     assert not solver.columns.asked
     dual = solved(pressed(10, friction=friction, multipliers="dual"), "amg")[0]
     assert solver.counters.iterations <= 2 * dual.counters.iterations
-    factors = solved(pressed(10, friction=friction, multipliers="standard"), "direct")[1]
+    factors = solved(pressed(10, friction=friction, multipliers="standard"), "direct")[1].contact["c"]
+    found = step.contact["c"]
     assert found.pressure == pytest.approx(factors.pressure, abs=1e-5 * factors.pressure.max())
     assert found.force == pytest.approx(factors.force, abs=1e-6 * np.abs(factors.force).max())
 
@@ -322,10 +318,11 @@ def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_man
     monkeypatch.setattr("fastcontact.linear.elimination.pivot_order.LARGEST_BLOCK", 8)
     monkeypatch.setattr("fastcontact.linear.elimination.pivot_order.FULL_UP_TO", 8)
     model = pressed(5, element, **options)
-    solver, found = solved(model, "amg")
+    solver, step = solved(model, "amg")
     assert "columns of the inverse stiffness" in solver.gave_up
     assert "dual" in solver.gave_up
-    assert found.force == pytest.approx(solved(model, "direct")[1].force, abs=1e-9)
+    force = solved(model, "direct")[1].contact["c"].force
+    assert step.contact["c"].force == pytest.approx(force, abs=1e-9)
     monkeypatch.setattr(amg, "AFFORDABLE", {3: 100})
     with pytest.raises(TooManyColumnsError, match="direct solver"):
         solved(model, "amg")

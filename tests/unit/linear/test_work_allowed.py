@@ -2,26 +2,14 @@
 
 import numpy as np
 import pytest
-from pressed_blocks import pressed
+from pressed_blocks import pressed, solved
 from scipy.sparse import csr_array
 from test_grouped_pivots import mass_equations
 
-import fastcontact as fc
-from fastcontact.analysis.load_step import load_step
-from fastcontact.analysis.problem import prepare
 from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, RepeatedError, condition
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.solvers import amg
-
-
-def solved(model, name, steps=1):
-    """Return the solver and the last result."""
-    problem = prepare(model, fc.linear_ramp(steps), fc.Criteria(), linear_solver=name)
-    state = problem.initial_state()
-    for index in range(steps):
-        state, result = load_step(problem, state, index + 1, (index + 1) / steps)
-    return problem.solver, result
 
 
 def columns_with_friction():
