@@ -10,7 +10,7 @@ diagonal compliance of these equations.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.sparse import csr_array, vstack
@@ -223,7 +223,7 @@ class Eliminated:
         spring = np.minimum(turning / np.maximum(1.0 - turning, TINY), STIFFEST) * self._unit[at] ** 2
         spring = spring / (1.0 + spring * self._compliance[1, at])  # in series with the compliance of the constraint
         free = (across * self._free[1:, at]).sum(axis=0)
-        return _Sliding(at, pull, _Across(across, Springs(csr_array(rows), spring), free))
+        return _Sliding(at, pull, Springs(csr_array(rows), spring), across, free)
 
     def _friction_terms(self, B: csr_array, closed_rows: Indices, sliding: _Sliding) -> FrictionTerms:
         """Return the friction terms of the linear system, whose equations `B` begin with the gaps of `closed_rows`."""
@@ -235,32 +235,13 @@ class Eliminated:
         force_rows = csr_array(vstack([force_rows, B[len(closed_rows) :]], format="csr"))
         if sliding.springs is None:
             return FrictionTerms(force_rows)
-        across = sliding.springs
-        preload = across.springs.rows.T @ (across.springs.stiffness * across.free)
-        return FrictionTerms(force_rows, across.springs, -preload)
+        springs = sliding.springs
+        return FrictionTerms(force_rows, springs, -springs.rows.T @ (springs.stiffness * sliding.free))
 
 
 def diagonal_compliance(constraints: Constraints) -> Array:
     """Return the diagonal compliance (1 + k, m) of constraints, along normals and then each tangent [length / force]."""
     return np.stack([constraints.softness, *[constraints.tangential_softness] * len(constraints.tangents)])
-
-
-@dataclass(frozen=True, eq=False)
-class _Across:
-    """Springs perpendicular to the slip directions of q sliding constraints in 3D.
-
-    Attributes
-    ----------
-    along : ndarray (k, q)
-        Unit vectors perpendicular to the slip directions, in components along the tangents.
-    springs : Springs
-    free : ndarray (q,)
-        Elongations at u = 0 [length].
-    """
-
-    along: Array
-    springs: Springs
-    free: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,18 +254,24 @@ class _Sliding:
         Numbers of the constraints.
     pull : ndarray (k, q)
         Ratios of the tangential forces to the normal force, ``mu d`` [-].
-    springs : _Across, optional
-        The springs perpendicular to the slip directions, in 3D.
+    springs : Springs, optional
+        Springs perpendicular to the slip directions, in 3D.
+    across : ndarray (k, q)
+        Unit vectors perpendicular to the slip directions, in components along the tangents.
+    free : ndarray (q,)
+        Elongations of the springs at u = 0 [length].
     """
 
     at: Indices
     pull: Array
-    springs: _Across | None = None
+    springs: Springs | None = None
+    across: Array = field(default_factory=lambda: np.empty(0))
+    free: Array = field(default_factory=lambda: np.empty(0))
 
     def force(self, normal: Array, u: Array) -> Array:
         """Return the tangential forces (k, q) for normal forces (q,) [force] and unknowns u (n,) [length]."""
         friction = self.pull * normal
         if self.springs is None:
             return friction
-        across, springs = self.springs, self.springs.springs
-        return np.asarray(friction - across.along * springs.stiffness * (springs.rows @ u + across.free))
+        elongation = self.springs.rows @ u + self.free
+        return np.asarray(friction - self.across * self.springs.stiffness * elongation)

@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, plates
+from models import elastic_model, plates, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -183,11 +183,7 @@ def carried(dim, options, angle):
     corner = (8.0, 20.0) if dim == 2 else (8.0, 6.0, 20.0)
     lower = box(sizes[0], divisions[0])
     upper = box(sizes[1], divisions[1], "quad4" if dim == 2 else "hex8", corner)
-    boxes = [
-        fc.generate.renamed(mesh, {name: f"{body}_{name}" for name in mesh.group_names})
-        for body, mesh in (("A", lower), ("B", upper))
-    ]
-    mesh, turn = fc.generate.union(*boxes), np.eye(dim)
+    mesh, turn = united(A_=lower, B_=upper), np.eye(dim)
     turn[:: dim - 1, :: dim - 1] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     mesh = mesh.replace(points=mesh.points @ turn.T)
     low, high = ("BOTTOM", "TOP") if dim == 2 else ("ZMIN", "ZMAX")

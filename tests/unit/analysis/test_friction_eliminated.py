@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 from scipy.sparse import csr_array, vstack
 from stepping import Stepping
 
@@ -32,13 +32,7 @@ def rubbing(formulation="node_to_segment", mu=0.3):
 def small_blocks(mu=0.3):
     """Pressed, then dragged along both axes: sliding turns."""
     lower, upper = fc.generate.box(divisions=(3, 3, 2)), fc.generate.box(divisions=(2, 2, 2), origin=(0.0, 0.0, 1.0))
-    named = [
-        body.replace(
-            cell_groups={f"{name}_{group}": cells for group, cells in body.cell_groups.items()}, point_groups={}
-        )
-        for name, body in (("L", lower), ("U", upper))
-    ]
-    model = elastic_model(fc.generate.union(*named), "3d", L_ZMIN="xyz")
+    model = elastic_model(united(L_=lower, U_=upper), "3d", L_ZMIN="xyz")
     model.prescribe("U_ZMAX", z=-1e-2, ramp=[(0, 0), (0.5, 1), (1, 1)])
     model.prescribe("U_ZMAX", x=2e-2, y=8e-3, ramp=[(0, 0), (0.5, 0.1), (1, 1)])
     model.add_contact("pair", secondary="U_ZMIN", primary="L_ZMAX", formulation="node_to_segment", friction=mu)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, supported, united
 
 import fastcontact as fc
 
@@ -120,10 +120,7 @@ def test_axisymmetric_spheres():
 @pytest.mark.parametrize("solver", [pytest.param("direct", marks=pytest.mark.slow), "amg"])
 def test_in_space_with_factors_and_with_a_hierarchy(solver):
     lower = fc.generate.box((4.0, 4.0, 2.0), (4, 4, 1))
-    upper = fc.generate.transformed(fc.generate.box((2.2, 2.4, 1.5), (2, 3, 1)), translate=(0.83, 0.72, 2.0))
-    mesh = fc.generate.union(
-        fc.generate.renamed(lower, lambda name: "L" + name), fc.generate.renamed(upper, lambda name: "U" + name)
-    )
+    mesh = united(L=lower, U=fc.generate.box((2.2, 2.4, 1.5), (2, 3, 1), "hex8", (0.83, 0.72, 2.0)))
 
     def make(E=1000.0, nu=0.3, moved=1.0, clearance=0.0):
         model = fc.Model(mesh, kinematics="3d")

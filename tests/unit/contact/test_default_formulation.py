@@ -21,10 +21,7 @@ def solved(model: fc.Model) -> fc.ContactResult:
 def bent(element, radii, cells, ends):
     """A block bent to a part of a ring between two angles: BOTTOM at the first radius, TOP at the second."""
     mesh = fc.generate.block((1.0, 1.0), cells, element)
-    angle, radius = (
-        ends[0] + (ends[1] - ends[0]) * mesh.points[:, 0],
-        radii[0] + (radii[1] - radii[0]) * mesh.points[:, 1],
-    )
+    angle, radius = (a + (b - a) * x for (a, b), x in zip((ends, radii), mesh.points.T, strict=True))
     return mesh.replace(points=radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
 
 
