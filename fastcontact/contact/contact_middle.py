@@ -16,9 +16,10 @@ the chord, not half the arc.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import depth_first_order
 
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices, Mask
@@ -96,23 +97,16 @@ def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> Unro
     return UnrolledLine(nodes, np.concatenate([[0.0], np.cumsum(lengths)]), closed=True)
 
 
-def _loop(surface: Surface) -> list[int] | None:
+def _loop(surface: Surface) -> Indices | None:
     """Return the nodes of a surface, as rows of its points, in order around one closed line; None if it is open."""
-    next_node: dict[int, int] = {}
-    for block in surface.blocks:
-        middles = block.local[:, 2:]
-        chains = np.concatenate([block.local[:, :1], middles, block.local[:, 1:2]], axis=1).tolist()
-        for chain in chains:
-            for begin, end in pairwise(chain):
-                if begin in next_node:
-                    return None
-                next_node[begin] = end
-    first = next(iter(next_node))
-    order, node = [first], next_node.get(first)
-    while node is not None and node != first and len(order) <= len(next_node):
-        order.append(node)
-        node = next_node.get(node)
-    return order if node == first and len(order) == len(surface.points) else None
+    chains = [np.concatenate([b.local[:, :1], b.local[:, 2:], b.local[:, 1:2]], axis=1) for b in surface.blocks]
+    begin, end = (np.concatenate([chain[:, i].ravel() for chain in chains]) for i in (slice(-1), slice(1, None)))
+    m = len(surface.points)
+    if not len(begin) == len(np.unique(begin)) == len(np.unique(end)) == m:
+        return None
+    successors = csr_array((np.ones(m), (begin, end)), shape=(m, m))
+    order = depth_first_order(successors, begin[0], return_predecessors=False)
+    return np.asarray(order, np.intp) if len(order) == m else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,11 +177,7 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
         return ContactMiddle(np.array([0.0, float(weight @ points[:, 1])]), direction=np.array([0.0, 1.0]))
     planes = symmetry_planes(pair)
     if closed.any():  # only the planes that the contact reaches
-        reached = [
-            any(closed[block.local[np.isin(block.local, nodes).any(axis=1)]].any() for block in surface.blocks)
-            for _, nodes in planes
-        ]
-        planes = [plane for plane, is_reached in zip(planes, reached, strict=True) if is_reached]
+        planes = [(axis, nodes) for axis, nodes in planes if (surface.beside[nodes] @ closed).any()]
     if dim == 2:
         return _along_line(surface, pair.points, weight, planes, mean)
     return _in_space(points, weight, planes, mean)

@@ -185,8 +185,8 @@ def _faced_by(
         candidates = candidates[((at >= begin) & (at <= end)).all(axis=1)]
     if not others.any() or not len(candidates):
         return np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0)
-    kinds = [block[others[first : first + len(block)]] for block, first in zip(outside.blocks.values(), outside.first)]
-    closest = closest_of_kinds(point[candidates], [outside.mesh.points[block] for block in kinds if len(block)])
+    kinds = outside.facets(np.flatnonzero(others)).values()
+    closest = closest_of_kinds(point[candidates], [outside.mesh.points[block] for block in kinds])
     facet, opposite = facet_of_point[candidates], np.flatnonzero(others)[closest.facet]
     difference = point[candidates] - closest.position
     gap = np.einsum("nd,nd->n", difference, closest.normal)
