@@ -312,13 +312,8 @@ def approach(constraints: Constraints, solution: Solution, rows: slice, contact:
     assert constraints.nodal is not None
     forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
     slips = np.einsum("mk,kmd->md", solution.approach[rows], np.stack(constraints.directions))
-    pressure = constraints.nodal.pressure(forces)[:, None]
-    mean = np.divide(
-        constraints.nodal.traction(forces[:, None] * slips),
-        pressure,
-        out=np.zeros_like(contact.coordinates),
-        where=pressure > 0.0,
-    )
+    pressure, mean = constraints.nodal.pressure(forces)[:, None], np.zeros_like(contact.coordinates)
+    np.divide(constraints.nodal.traction(forces[:, None] * slips), pressure, out=mean, where=pressure > 0.0)
     # The nodal values of a field may exceed the values from which it is computed.
     largest, length = np.linalg.norm(slips, axis=1).max(initial=0.0), np.linalg.norm(mean, axis=1)
     return mean * np.divide(largest, length, out=np.ones_like(length), where=length > largest)[:, None]
@@ -386,11 +381,8 @@ def _stretch(contact: ContactResult, displacement: Array, before: Array, after: 
         return stretch, stretch
     tangential = displacement[:, 0] if contact.tangent is None else displacement @ contact.tangent
     widths = (half_width(contact.place, contact.active, contact.across + k * tangential) for k in (0.0, 1.0))
-    ratios = [
-        deformed / undeformed if undeformed > 0.0 and np.isfinite(undeformed) else 1.0
-        for undeformed, deformed in zip(*widths, strict=True)
-    ]
-    return ratios[0], ratios[1]
+    low, high = (after / before if 0.0 < before < np.inf else 1.0 for before, after in zip(*widths, strict=True))
+    return low, high
 
 
 def _with_periodic_nodes(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:

@@ -93,13 +93,11 @@ class Criteria:
         updates = self.geometry_updates
         if updates is not None and (updates < 0 or int(updates) != updates):
             raise ModelError(f"geometry_updates = {self.geometry_updates} must be None or a whole number >= 0")
-        for name, least in (("max_geometry_updates", 0), ("max_active_set_iterations", 1)):
+        for name, least in (("max_geometry_updates", 0), ("max_active_set_iterations", 1), ("max_halvings", 0)):
             if getattr(self, name) < least or int(getattr(self, name)) != getattr(self, name):
                 raise ModelError(f"{name} = {getattr(self, name)} must be a whole number >= {least}")
         if self.absolute is not None and not 0 <= self.absolute < math.inf:
             raise ModelError(f"the convergence criterion absolute = {self.absolute} must be a force >= 0, or None")
-        if self.max_halvings < 0 or int(self.max_halvings) != self.max_halvings:
-            raise ModelError(f"max_halvings = {self.max_halvings} must be a whole number >= 0")
         if self.friction_while_touching is not None and not 0 < self.friction_while_touching <= 1:
             raise ModelError(f"friction_while_touching = {self.friction_while_touching} must be above 0 and at most 1")
         if self.keep_pairing and self.geometry_updates:

@@ -44,7 +44,6 @@ class Term(Protocol):
 
     def residual(self, u: Array) -> tuple[Array, Energies]:
         """Return the nodal forces (n_dofs,) of the term at u [force], and its energies."""
-        ...
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array | csr_array | None:
         """Return the derivative (n, n) of the nodal forces with respect to the n displacements of points [force / length].
@@ -53,7 +52,6 @@ class Term(Protocol):
         `problem.prepare` passed to the linear solver. `geometric` selects how much of the geometric stiffness is included,
         see `NonlinearBodies.at`.
         """
-        ...
 
     def commit(self, u: Array, state: State) -> State:
         """Return `state` with the history variables of the term at u, the end of the load step.
@@ -438,6 +436,6 @@ def solve_displacements(
         return system.displacement(v, lift), np.zeros(len(lift))
     contact_force, rigid = settled.force, settled.iterate.rigid
     if problem.floating_bodies is not None and rigid is not None:
-        lift = lift + problem.floating_bodies.rigid(rigid.position)
+        lift = lift + problem.floating_bodies.rigid(rigid.anchor)
     v = loaded.full_solution(system.reduced(contact_force), settled.solution.u)
     return system.displacement(v, lift), contact_force

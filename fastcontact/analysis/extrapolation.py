@@ -122,13 +122,7 @@ class Extrapolation:
     def to_dict(self) -> dict[str, Any]:
         """Return the data as numbers, lists and arrays, without the last displacements, which are saved elsewhere."""
         return {
-            "loads": [
-                [
-                    {"size": len(quantity), "places": np.flatnonzero(quantity), "values": quantity[quantity != 0.0]}
-                    for quantity in load
-                ]
-                for load in self.loads[-2:]
-            ],
+            "loads": [[_sparse(quantity) for quantity in load] for load in self.loads[-2:]],
             "before": [u for u, _ in self.states[:-1]],
             "ratios": list(self.ratios),
             "degree": self.degree,
@@ -165,8 +159,13 @@ def _ratio(first: Array, second: Array, third: Array) -> float | None:
     return float(np.sum(increment * last_increment)) / squared_norm if squared_norm else None
 
 
+def _sparse(values: Array) -> dict[str, Any]:
+    """Return the size (n) and the nonzero entries of an array (n,), with their indices."""
+    return {"size": len(values), "places": np.flatnonzero(values), "values": values[values != 0.0]}
+
+
 def _dense(data: Mapping[str, Any]) -> Array:
-    """Return the array (n,) whose nonzero entries `Extrapolation.to_dict` has saved."""
+    """Return the array (n,) from the result of `_sparse`."""
     values = np.zeros(data["size"])
     values[data["places"]] = data["values"]
     return values

@@ -60,7 +60,7 @@ class RigidPosition:
     ----------
     state : Solution
         The last solution, with the number of iterations for all positions.
-    position : ndarray (k,)
+    anchor : ndarray (k,)
         Displacement at which each spring is anchored [length].
     spring_force : ndarray (k,)
         Remaining force of each spring [force].
@@ -71,7 +71,7 @@ class RigidPosition:
     """
 
     state: Solution
-    position: Array
+    anchor: Array
     spring_force: Array
     positions: int
     slack: bool
@@ -221,9 +221,9 @@ class FloatingBodies:
             data[slot, component, component] += self.stiffness
         return bsr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
-    def rigid(self, position: Array) -> Array:
-        """Return the displacements (n_dofs,) of the rigid-body motion with the values `position` (k,) at `dofs` [length]."""
-        return np.asarray(self.motions.displacement @ position)
+    def rigid(self, anchor: Array) -> Array:
+        """Return the displacements (n_dofs,) of the rigid-body motion with the values `anchor` (k,) at `dofs` [length]."""
+        return np.asarray(self.motions.displacement @ anchor)
 
     def freed(self, constraints: Constraints, dofs: ActiveDofs, respond: Response) -> Freed:
         """Return the linear response to positions of the springs, given `respond` for springs at a fixed position."""
@@ -327,11 +327,11 @@ class FloatingBodies:
         RigidPosition
             The last position, also if the springs do not become slack or if a contact problem does not converge.
         """
-        position, last_stretch, iterations, relaxed = start, np.inf, 0, 0.0
+        anchor, last_stretch, iterations, relaxed = start, np.inf, 0, 0.0
         step, length = None, 1.0
         mixing = Anderson(len(start) + 1, np.arange(len(start)))
         for positions in range(1, MAX_NEWTON_ITERATIONS + 1):
-            state = solve_at(position)
+            state = solve_at(anchor)
             elongation, iterations = state.u[springs], iterations + state.iterations
             stretch = float(np.abs(elongation).max())
             load_stretch = max(load, float(np.abs(state.multiplier).max(initial=0.0))) / self.stiffness
@@ -350,7 +350,7 @@ class FloatingBodies:
                 and stretch > last_stretch - DECREASE * length * (last_stretch - step[1])
             ):
                 length *= 0.5
-                position = position - length * step[0]
+                anchor = anchor - length * step[0]
                 continue
             step, length = None, 1.0
             if stretch > last_stretch:
@@ -360,9 +360,9 @@ class FloatingBodies:
                     step = freed(state.response()).slackened(elongation, state)
             # Without Newton's method positions are accelerated, because parts much softer than the springs, such as a
             # peeling layer, approach equilibrium slowly.
-            position = mixing.mixed(position, position + elongation) if step is None else position + step[0]
+            anchor = mixing.mixed(anchor, anchor + elongation) if step is None else anchor + step[0]
             last_stretch, relaxed = stretch, 0.0 if step is None else stretch
             if step is not None and step[1] == np.inf:  # elongations need not decrease when bodies slide
                 last_stretch = np.inf
         state = dataclasses.replace(state, iterations=iterations)
-        return RigidPosition(state, position, self.stiffness * elongation, positions, slack)
+        return RigidPosition(state, anchor, self.stiffness * elongation, positions, slack)

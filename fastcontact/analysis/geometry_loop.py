@@ -228,15 +228,9 @@ def _move(
     significant = size and change > step.state.gap_round_off
     moved = _Moved(before, change, size, change / size if significant else 0.0)
     iterate.remember(constraints, solution)
-    iterate.history.append(
-        {
-            "displacement_change": moved.relative,
-            "active": int(solution.active.sum()),
-            "active_set_iterations": solution.iterations,
-            "settled": solution.settled,
-            **({"rounded": True} if iterate.rounded else {}),
-        }
-    )
+    entry = {"displacement_change": moved.relative, "active": int(solution.active.sum())}
+    entry |= {"active_set_iterations": solution.iterations, "settled": solution.settled}
+    iterate.history.append(entry | ({"rounded": True} if iterate.rounded else {}))
     return moved
 
 

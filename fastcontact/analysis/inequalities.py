@@ -256,9 +256,9 @@ def _with_floating_bodies(
     problem, state, lift, dofs = step.problem, step.state, step.load.lift, step.dofs
     last_active, guess = active, iterate.u
 
-    def solve_at(position: Array) -> Solution:
+    def solve_at(anchor: Array) -> Solution:
         nonlocal last_active, guess
-        shifted_lift = lift + bodies.rigid(position)
+        shifted_lift = lift + bodies.rigid(anchor)
         solution = _solve(step, constraints, iterate, last_active, accuracy, shifted_lift, guess)
         last_active, guess = solution.wanted, dofs.put(guess.copy(), dofs.displacement(solution.u, shifted_lift))
         return solution
@@ -294,8 +294,7 @@ def _with_floating_bodies(
         gaps = gaps_at_rest(problem.model, bodies.motions)
         raise failure(not_balanced(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))
     iterate.rigid = rigid
-    solution = rigid.state
-    respond = solution.response
+    solution, respond = rigid.state, rigid.state.response
     if freed is not None and respond is not None:
         solution = replace(solution, response=lambda: freed(respond()).respond)
-    return solution, dofs.displacement(solution.u, lift + bodies.rigid(rigid.position))
+    return solution, dofs.displacement(solution.u, lift + bodies.rigid(rigid.anchor))

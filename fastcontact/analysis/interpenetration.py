@@ -55,9 +55,8 @@ def _without_contact(
     problem: Problem, between: Mapping[frozenset[int], Sequence[str]], overlaps: Sequence[Inside]
 ) -> list[str]:
     """Return a warning for each two overlapping bodies without a contact pair between them, the deepest overlap first."""
-    mesh = problem.model.mesh
+    mesh, texts = problem.model.mesh, dict[frozenset[int], str]()
     _, body = bodies(mesh)
-    texts: dict[frozenset[int], str] = {}
     for first, second, points, depth in sorted(overlaps, key=lambda entry: -float(entry[3].max())):
         body_pair, row = frozenset((first, second)), int(np.argmax(depth))
         notable = depth[row] > LENGTH_ROUND_OFF * np.ptp(mesh.points, axis=0).max()
@@ -89,8 +88,8 @@ def _beside_contact(
         row = int(np.argmax(depth))
         if depth[row] > limit and depth[row] - _at_rest(problem, entries, int(points[row])) > limit:
             label = " and ".join(body_name(mesh, body, number) for number in sorted(body_pair))
-            what = f"bodies {label} pass through each other"
-            texts.append(_lacking_facets(problem, names[0], what, depth[row], points[row]))
+            subject = f"bodies {label} pass through each other"
+            texts.append(_lacking_facets(problem, names[0], subject, depth[row], points[row]))
     return texts
 
 

@@ -272,8 +272,8 @@ def recover(
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
     sections, reaction = problem.model.pretensions, reaction.reshape(-1, mesh.dim)
-    parts = problem.model.temperatures, problem.model.initial_states, sections
-    temperature, initial, pretension = (problem.factors(histories, instant[1]) for histories in parts)
+    histories = problem.model.temperatures, problem.model.initial_states, sections
+    temperature, initial, pretension = (problem.factors(each, instant[1]) for each in histories)
     pressures = [multiplier(table, problem.ramp, instant[1]) for _, table in problem.following]
     factors = {"temperature_factors": temperature, "initial_factors": initial, "pressure_factors": pressures}
     iterations = {**iterations, **{key: multipliers for key, multipliers in factors.items() if multipliers}}

@@ -30,6 +30,7 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.elasticity import incompatible_modes, recovery
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.elasticity.incompatible_modes import BENDING as BENDING_ELEMENTS
+from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.recovery import BATCH, CellStress
 from fastcontact.elasticity.smoothed_stress import smoothed_stress
@@ -77,9 +78,7 @@ class StressScatter:
             if elements.get(name).order == 1 and not (has_modes and name in BENDING_ELEMENTS)
         ]  # fmt: skip
         self.energy = self.pressure = 0.0
-        laws = [material for material, _ in problem.model.materials]
-        nu = np.array([law.largest_nu if isinstance(law, LinearElastic) else -1.0 for law in laws])[field.owner]
-        self._nearly_incompressible = (nu >= SUSPICIOUS) & (problem.model.kinematics != "plane_stress")
+        nu, self._nearly_incompressible = _poisson_ratios(problem.model, field)
         self.nu = float(nu.max(initial=-1.0))
         thermal, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
         offset = problem.model.stress_offset(thermal, initial, field, step.temperature)
@@ -119,6 +118,16 @@ class StressScatter:
                 (computed[..., :3].mean(axis=2) ** 2 * mean_weights).sum(),
             ]  # fmt: skip
         return sums
+
+
+def _poisson_ratios(model: Model, field: MaterialField) -> tuple[Array, Mask]:
+    """Return the largest Poisson's ratios (n,) of a material field, and where they are suspicious.
+
+    They are -1 for materials without a mean dilatation.
+    """
+    laws = [material for material, _ in model.materials]
+    nu = np.array([law.largest_nu if isinstance(law, LinearElastic) else -1.0 for law in laws])[field.owner]
+    return nu, (nu >= SUSPICIOUS) & (model.kinematics != "plane_stress")
 
 
 def nonlinear_scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[str]:
@@ -186,32 +195,25 @@ class Comparison:
     """
 
     def __init__(self, model: Model) -> None:
-        self._model = model
-        field = model.material_field()
-        self._moduli, self._material = field.moduli, field.rows
-        self._treatment, self._owner = field.treatment, field.owner
-        nu = np.full(len(self._moduli), -1.0)  # below all admissible values, for materials without a mean dilatation
-        for number, (material, _) in enumerate(model.materials):
-            if isinstance(material, LinearElastic):
-                nu[field.owner == number] = material.largest_nu
-        self._suspicious = (nu >= SUSPICIOUS) & (model.kinematics != "plane_stress")
+        self._model, self._field = model, model.material_field()
+        nu, self._suspicious = _poisson_ratios(model, self._field)
         self._cells = {name: rows for name in model.mesh.solids if (rows := self._may_lock(name)).any()}
-        self.elements = list(self._cells)
-        self.nu = max((float(nu[self._material[name][rows]].max()) for name, rows in self._cells.items()), default=0.0)
+        self.elements, numbers = list(self._cells), self._field.rows
+        self.nu = max((float(nu[numbers[name][rows]].max()) for name, rows in self._cells.items()), default=0.0)
 
     def _may_lock(self, name: str) -> Mask:
         """Return which cells (n_cells,) of an element may lock."""
-        numbers = self._material[name]
-        bends = incompatible_modes.with_modes(name, self._treatment)
-        treated = self._treatment[numbers] & 1 > 0 if bends is None else self._treatment[numbers] > 0
+        numbers, treatment = self._field.rows[name], self._field.treatment
+        bends = incompatible_modes.with_modes(name, treatment)
+        treated = treatment[numbers] & 1 > 0 if bends is None else treatment[numbers] > 0
         return self._suspicious[numbers] & ((name in AT_NODES) | ~treated)
 
     def force(self, displacement: Array) -> Array:
         """Return the forces S u (n_points, dim) [force] for displacements u (n_points, dim) [length]."""
-        mesh, kinematics = self._model.mesh, self._model.kinematics
-        arguments = mesh, kinematics, self._moduli, self._material, displacement
-        stress = recovery.stress_at_points(*arguments, self._treatment)
-        reference = recovery.stress_at_points(*arguments, self._treatment | self._suspicious)
+        mesh, kinematics, field = self._model.mesh, self._model.kinematics, self._field
+        arguments = mesh, kinematics, field.moduli, field.rows, displacement
+        stress = recovery.stress_at_points(*arguments, field.treatment)
+        reference = recovery.stress_at_points(*arguments, field.treatment | self._suspicious)
         excess = {name: np.zeros_like(stress[name]) for name in self._cells}
         for name in self._cells:
             excess[name][..., :3] = (stress[name] - reference[name])[..., :3].mean(axis=2, keepdims=True)
@@ -229,14 +231,14 @@ class Comparison:
             volume[name] = volumes.sum(axis=1)
             mean_stress = reference[name][..., :3].mean(axis=2)
             pressure[name] = (mean_stress * volumes).sum(axis=1) / volume[name]
-        for number in np.unique(self._owner[self._suspicious]):
+        owner = self._field.owner
+        for number in np.unique(owner[self._suspicious]):
             nodal_volume, volume_pressure = np.zeros((2, mesh.n_points))
-            rows = {name: np.flatnonzero(self._owner[self._material[name]] == number) for name in names}
+            rows = {name: np.flatnonzero(owner[self._field.rows[name]] == number) for name in names}
             for name in names:
                 cells = mesh.cells[name][rows[name]]
-                for node in cells.T:
-                    np.add.at(nodal_volume, node, volume[name][rows[name]])
-                    np.add.at(volume_pressure, node, (volume[name] * pressure[name])[rows[name]])
+                np.add.at(nodal_volume, cells, volume[name][rows[name], None])
+                np.add.at(volume_pressure, cells, (volume[name] * pressure[name])[rows[name], None])
             mean = volume_pressure / np.where(nodal_volume > 0.0, nodal_volume, 1.0)
             for name in names:
                 deviation = pressure[name][rows[name]] - mean[mesh.cells[name][rows[name]]].mean(axis=1)

@@ -174,7 +174,7 @@ class Problem:
         prescribed = combined(self.prescribed, self.ramp, instant, self.shape)
         factors = [multiplier(relation.ramp, self.ramp, instant) for relation in self.model.relations]
         lift = self.system.lift(prescribed.ravel(), factors)
-        obstacles, clearances, angles, frictions = {}, {}, {}, {}
+        obstacles, clearances, angles, frictions, fluids = {}, {}, {}, {}, {}
         for pair in self.model.contact:
             side = self.pairs[pair.name].primary
             if isinstance(side, RigidSide):
@@ -185,15 +185,12 @@ class Problem:
                 clearances[pair.name] = multiplier(pair.clearance_ramp, self.ramp, instant)
             if pair.friction_ramp is not None:
                 frictions[pair.name] = multiplier(pair.friction_ramp, self.ramp, instant)
+            if pair.fluid is not None:
+                fluids[pair.name] = pair.fluid.pressure * multiplier(pair.fluid.ramp, self.ramp, instant)
         force = combined(self.forces, self.ramp, instant, self.shape).ravel()
         following = tuple(multiplier(table, self.ramp, instant) for _, table in self.following)
-        fluids = {
-            pair.name: pair.fluid.pressure * multiplier(pair.fluid.ramp, self.ramp, instant)
-            for pair in self.model.contact if pair.fluid is not None
-        }  # fmt: skip
-        temperatures, rise = self.model.temperatures, None
-        if self.bodies is not None:
-            rise = self.model.temperature_rise(self.factors(temperatures, instant))
+        temperatures = self.factors(self.model.temperatures, instant)
+        rise = None if self.bodies is None else self.model.temperature_rise(temperatures)
         return StepLoad(lift, force, obstacles, clearances, angles, following, frictions, fluids, rise)
 
     def factors(self, histories: Iterable[Temperature | InitialState | Pretension], instant: float) -> list[float]:
@@ -298,10 +295,8 @@ def prepare(
         moved.flat[relation.rows[moving].indices] = True
     held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs), moved)
     pairs = {pair.name: model.bind(pair, held) for pair in model.contact}
-    for name, pair in pairs.items():
-        tabulated = isinstance(pair.options.penalty, OverclosureLaw)
-        options = pair.options
-        if criteria.keep_pairing and (tabulated or options.cohesion is not None or options.source is not None):
+    for name, options in ((name, pair.options) for name, pair in pairs.items() if criteria.keep_pairing):
+        if isinstance(options.penalty, OverclosureLaw) or options.cohesion is not None or options.source is not None:
             raise ContactError(
                 f"contact '{name}' has a table of penalties, a cohesive layer, adhesion, or a fluid, which require updates "
                 "of the geometry: omit keep_pairing"

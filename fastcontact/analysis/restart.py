@@ -46,12 +46,12 @@ def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
         )
     with _damage_reported(step):
         saved, end = state["case"], step.load_factor
-        parts = different(saved["parts"], case["parts"])
+        changed = different(saved["parts"], case["parts"])
         if _history(saved["table"], end, case["table"]) != _history(case["table"], end, saved["table"]):
-            parts.append(f"the load history up to {end:g}")
-    if parts:
+            changed.append(f"the load history up to {end:g}")
+    if changed:
         raise ModelError(
-            f"the steps so far belong to another case; changed since: {', '.join(parts)}. Continue with the model they "
+            f"the steps so far belong to another case; changed since: {', '.join(changed)}. Continue with the model they "
             f"were computed for, or start anew without resuming{_formulations(saved['parts'], case['parts'], model)}"
         )
 

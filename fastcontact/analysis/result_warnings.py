@@ -91,24 +91,15 @@ def result_warnings(
         configuration = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
         undetermined = _undetermined_tractions(pair, contact, pair.undetermined(configuration))
         warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
-        mesh = problem.model.mesh
-        pressures = [
-            *([sag[name]] if name in sag else _unresolved(pair, contact, state)),
-            *oscillating(pair, contact, mesh),
-        ]
+        unresolved, mesh = [sag[name]] if name in sag else _unresolved(pair, contact, state), problem.model.mesh
+        pressures = [*unresolved, *oscillating(pair, contact, mesh)]
         index, largest_contact = (peaks or {}).get(name, (last.index, contact))
         if not pressures and index != last.index:
             texts = [*_unresolved(pair, largest_contact, state), *oscillating(pair, largest_contact, mesh)]
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
         warnings += [*pressures, *_peak_at_edge(pair, last, contact), *_too_fast(name, pair, state)]
-    return [
-        *warnings,
-        *_unsettled(state),
-        *_loose(problem, last),
-        *_unbalanced(state),
-        *_slipping_before(problem.criteria, state),
-        *_turning_flow(state),
-    ]
+    warnings += [*_unsettled(state), *_loose(problem, last), *_unbalanced(state)]
+    return [*warnings, *_slipping_before(problem.criteria, state), *_turning_flow(state)]
 
 
 def _deep_penetration(pair: Formulation, contact: ContactResult, displacement: Array) -> Iterator[str]:
@@ -270,13 +261,10 @@ def _undetermined(last: StepResult, free: tuple[int, dict[str, list[str]]] | Non
 
 def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     laws, field = [material for material, _ in problem.model.materials], problem.field
-    isotropic = np.array([isinstance(law, LinearElastic) and not law.graded for law in laws])
-    # Strains of other materials are computed below.
-    shear = np.array(
-        [getattr(law if known else None, "shear_modulus", math.inf) for law, known in zip(laws, isotropic)]
-    )
-    strain, interface = 0.0, last.material_stress
-    interior = np.ones(len(last.stress), bool)
+    # Infinite for all but isotropic materials; the strains of the others are computed below.
+    moduli = (law.shear_modulus if isinstance(law, LinearElastic) and not law.graded else math.inf for law in laws)
+    shear = np.array([*moduli])
+    strain, interface, interior = 0.0, last.material_stress, np.ones(len(last.stress), bool)
     if interface is not None:
         interior[interface.points] = False
         strain = float((recovery.von_mises(interface.stress) / (3 * shear[interface.material])).max())
@@ -285,7 +273,7 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
             nodes = np.unique(block[field.number[name] == number])
             stress = last.von_mises[nodes[interior[nodes]]]
             strain = max(strain, float(stress.max(initial=0.0) / (3 * shear[number])))
-        others = np.flatnonzero(~isotropic[field.number[name]])
+        others = np.flatnonzero(np.isinf(shear[field.number[name]]))
         mean = last.stress[block[others]].mean(axis=1)
         strains = np.einsum("cij,cj->ci", field.compliance[field.rows[name][others]], mean)
         strain = max(strain, float(recovery.equivalent_strain(strains).max(initial=0.0)))
@@ -562,9 +550,8 @@ def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
         sides = (contact.points, contact.force_vectors), (contact.primary_points, contact.primary_force_vectors)
         for points, force in sides if friction else ():
             arm = np.maximum(np.linalg.norm(motion[points], axis=1), np.linalg.norm(rotation[points], axis=1))
-            work = np.maximum(
-                friction * np.linalg.norm(force, axis=1) * arm, np.abs((force * motion[points]).sum(axis=1))
-            )
+            of_friction = friction * np.linalg.norm(force, axis=1) * arm
+            work = np.maximum(of_friction, np.abs((force * motion[points]).sum(axis=1)))
             np.add.at(capacity, body[points], rotating[points] * work)
     return capacity
 

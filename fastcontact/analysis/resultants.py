@@ -213,6 +213,13 @@ def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: 
     )
 
 
+# Quantities of `contact_history`, in the order of its columns.
+QUANTITIES = (
+    "force", "moment", "area", "centre", "normal_force", "mean_gap", "pressure_mean", "pressure_max", "dissipation",
+    "friction_work",
+)  # fmt: skip
+
+
 @typed(ContactError)
 def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDArray[np.void]:
     """Return `contact_resultants` as a table, one row for each load step, for `write_csv` and pandas.
@@ -245,20 +252,14 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
     >>> fc.contact_history(model, steps, "joint")["normal_force"].round(9)
     array([10., 20.])
     """
-    resultants = contact_resultants(model, steps, name)
     axes = "xyz"[: model.mesh.dim]
-    moment_axes = "z" if model.mesh.dim == 2 else axes
+    vectors = {"force": axes, "moment": "z" if model.mesh.dim == 2 else axes, "centre": axes}
+    columns = [f"{name}_{axis}" if axis else name for name in QUANTITIES for axis in vectors.get(name, [""])]
     rows = [
-        (step.index, step.load_factor, *r.force, *r.moment, r.area, *r.centre, r.normal_force, r.mean_gap,
-         r.pressure_mean, r.pressure_max, r.dissipation, r.friction_work)
-        for step, r in zip(steps, resultants, strict=True)
-    ]  # fmt: skip
-    names = [
-        "load_factor", *(f"force_{axis}" for axis in axes), *(f"moment_{axis}" for axis in moment_axes), "area",
-        *(f"centre_{axis}" for axis in axes), "normal_force", "mean_gap", "pressure_mean", "pressure_max",
-        "dissipation", "friction_work",
-    ]  # fmt: skip
-    return np.array(rows, [("step", int), *((column, float) for column in names)])
+        (step.index, step.load_factor, *np.hstack([getattr(resultants, quantity) for quantity in QUANTITIES]))
+        for step, resultants in zip(steps, contact_resultants(model, steps, name), strict=True)
+    ]
+    return np.array(rows, [("step", int), *((column, float) for column in ("load_factor", *columns))])
 
 
 @typed(ContactError)

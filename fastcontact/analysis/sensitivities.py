@@ -150,7 +150,7 @@ def sensitivities(
     problem, contact = settled_step(model, step, ramp_of(ramp), criteria or Criteria(), linear_solver)
     nearest = checked_margin(contact, margin) if problem.pairs else 1.0
     contact, gradient = with_gradient(contact, step, tuple(quantity))
-    changes = [KINDS[str(parameter[0])][1](contact, parameter) for parameter in tuples]
+    changes = [KINDS[str(parameter[0])][2](contact, parameter) for parameter in tuples]
     values, solutions = _derivatives(contact, gradient, changes)
     return Sensitivities(gradient.value, dict(zip(tuples, values.tolist(), strict=True)), nearest, solutions)
 
@@ -212,12 +212,10 @@ def settled_step(
     state, load = restart.put_back(problem, step, touched), problem.load_at(step.load_factor)
     state = replace(state, obstacles=problem.obstacles_at(load, state.u))
     equilibrium = newton(prepare_start(problem, state, step.index, load), load)
-    settled, u = equilibrium.settled, equilibrium.u
-    if settled is None:
-        no_values, inactive = np.empty(0), np.empty(0, bool)
-        solution = Solution.frictionless(u, no_values, no_values, inactive, inactive)
-        return problem, MovingContact(problem, state, load, step.load_factor, u, solution)
-    return problem, MovingContact(problem, state, load, step.load_factor, u, settled.solution)
+    u, none, inactive = equilibrium.u, np.empty(0), np.empty(0, bool)
+    without_contact = Solution.frictionless(u, none, none, inactive, inactive)
+    solution = without_contact if equilibrium.settled is None else equilibrium.settled.solution
+    return problem, MovingContact(problem, state, load, step.load_factor, u, solution)
 
 
 def _check_path(model: Model, step: StepResult, criteria: Criteria) -> None:

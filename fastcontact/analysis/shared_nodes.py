@@ -234,10 +234,8 @@ def _areas(constraints: StackedConstraints) -> Array:
 
 def _nodes(constraints: StackedConstraints) -> Indices:
     """Return the node of each constraint (m,), -1 without one or where a compliance couples it with others."""
-    nodes = []
-    for part in constraints.parts.values():
-        coupled = part.coupled
-        nodes.append(np.full(len(part), -1) if part.nodes is None or coupled else part.nodes)
+    parts = constraints.parts.values()
+    nodes = [np.full(len(part), -1) if part.nodes is None or part.coupled else part.nodes for part in parts]
     return np.concatenate(nodes).astype(np.intp)
 
 

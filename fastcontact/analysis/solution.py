@@ -312,8 +312,8 @@ def in_increments(
         iterations += forces.iterations
         if (waiting & (forces.gaps[0] < 0.0)).any():
             # In 3D about as many constraints close together as lie along the edge of the closed region.
-            together = max(int(closed.sum() ** (1.0 - 1.0 / len(slip))), int(GROWTH * closed.sum()), 1)
-            instants, touching = _touching(last_gap, forces.gaps[0], waiting, together)
+            group_size = max(int(closed.sum() ** (1.0 - 1.0 / len(slip))), int(GROWTH * closed.sum()), 1)
+            instants, touching = _touching(last_gap, forces.gaps[0], waiting, group_size)
             fraction = min(float(instants[touching].max()), 1.0)
             end = begin + fraction * (1.0 - begin)
             since = np.where(touching, instants, 0.0) * forces.gaps[1:]

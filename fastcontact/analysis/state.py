@@ -165,7 +165,7 @@ class State:
             Contact pairs that were closed at the end of a step, in addition to those in `data`.
         """
         u = np.concatenate([displacement.ravel(), data["obstacles"]])
-        pairs, numbers = data["pairs"], data["numbers"]
+        pairs, numbers, extrapolation = data["pairs"], data["numbers"], data.get("extrapolation")
         of_pairs: dict[str, Any] = {
             name: {pair: _from_list(key, entry[key]) for pair, entry in pairs.items() if entry.get(key) is not None}
             for key, name in OF_PAIRS.items()
@@ -185,9 +185,7 @@ class State:
             bonds={name: Bond(**entry) for name, entry in data.get("bonds", {}).items()},
             work=Work(**data["work"]) if data.get("work") else None,
             forces={name: ContactForces(**entry) for name, entry in data.get("forces", {}).items()},
-            extrapolation=Extrapolation.from_dict(data["extrapolation"], u)
-            if "extrapolation" in data
-            else Extrapolation(),
+            extrapolation=Extrapolation() if extrapolation is None else Extrapolation.from_dict(extrapolation, u),
             touched=touched.union(data.get("touched", ())),
         )
 

@@ -105,7 +105,7 @@ def _has_two_equilibria(problem: Problem, state: State, after: State, index: int
     """Return whether the step has another equilibrium, in which bodies pass each other or slide instead of sticking.
 
     It is sought from the equilibrium without friction. Smaller steps find which of them the load path leads to. Steps that
-    begin with contact, and those in which contact surfaces move by less than the smallest facet, are assumed to have only one,
+    begin with contact, and those in which contact surfaces move by less than the smallest facet, are taken to have only one,
     and so are those with heat conduction or a fixed number of geometry updates.
     """
     pairs = {name: pair for name, pair in problem.pairs.items() if pair.friction and not pair.options.tied}

@@ -19,6 +19,7 @@ from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.linearised_geometry import Geometry
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import normals
+from fastcontact.contact.surface import by_block
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
@@ -28,15 +29,12 @@ class Compliance(Protocol):
 
     def block(self, rows: Indices) -> Array:
         """Return the submatrix (q, q) of C for the constraints `rows` (q,); if C is diagonal, only the diagonal (q,)."""
-        ...
 
     def among(self, rows: Indices) -> Array | FieldCompliance:
         """Return the value of `block`, or an equivalent object that linear solvers can use without forming the submatrix."""
-        ...
 
     def apply(self, multiplier: Array) -> Array:
         """Return ``C @ multiplier`` (m,) [length] for multipliers (m,) [force]."""
-        ...
 
 
 class NodalField(Protocol):
@@ -63,7 +61,6 @@ class NodalField(Protocol):
 
         In partly covered facets the pressure refers to the covered part of the area.
         """
-        ...
 
     def traction(self, force: Array) -> Array:
         """Return nodal tractions (n_nodes, dim) per unit reference area [pressure] for forces (m, dim) [force]."""
@@ -134,23 +131,19 @@ class Wetted(Protocol):
     @property
     def rows(self) -> Mask:
         """Constraints (m,) in the part that fluid fills."""
-        ...
 
     @property
     def pressure(self) -> Array:
         """Fluid pressure at the secondary nodes (n_nodes,) [pressure]."""
-        ...
 
     def force(self, displacement: Array) -> Array:
         """Return the nodal forces (n_points, dim) of the fluid on the secondary side [force].
 
         `displacement` (n_points, dim) are the displacements of all points [length].
         """
-        ...
 
     def stiffness(self, displacement: Array) -> csr_array:
         """Return the symmetric part (n_dofs, n_dofs) of the negative derivative of `force` [force / length]."""
-        ...
 
 
 class Tied(Protocol):
@@ -159,14 +152,12 @@ class Tied(Protocol):
     @property
     def directions(self) -> tuple[Array, ...]:
         """Tangents (m, dim) at the constraints of the formulation."""
-        ...
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
         """Return the normal (m,) and tangential (m, k) forces at the constraints of the formulation [force].
 
         `multiplier` are the multipliers of the equations [force].
         """
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -389,32 +380,25 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
     count, nodes = max(len(pair.tangents) for pair in pairs), [pair.nodes for pair in pairs if pair.nodes is not None]
     tangents = [pair.tangents or (csr_array(pair.B.shape),) * count for pair in pairs]
 
-    def joined(name: str) -> Any:
-        return np.concatenate([getattr(pair, name) for pair in pairs])
-
-    def of_tangents(name: str) -> Array:  # zero for pairs without tangents
-        return np.hstack([np.resize(getattr(pair, name), (count, len(pair))) for pair in pairs])
-
+    joined: dict[str, Any] = {
+        name: np.concatenate([getattr(pair, name) for pair in pairs])
+        for name in ("gap0", "positions", "friction", "equality", "softness", "tangential_softness")
+    }
+    for name in ("slip0", "elastic_slip"):  # zero for pairs without tangents
+        joined[name] = np.hstack([np.resize(getattr(pair, name), (count, len(pair))) for pair in pairs])
     factors = [np.zeros((1 + count, *pair.low_rank_compliance.shape[1:])) for pair in pairs]
     for factor, pair in zip(factors, pairs, strict=True):
         factor[: 1 + len(pair.tangents)] = pair.low_rank_compliance
     return StackedConstraints(
-        csr_array(vstack([pair.B for pair in pairs], format="csr")),
-        joined("gap0"),
-        joined("positions"),
-        _BlockDiagonal(pairs) if any(pair.compliance is not None for pair in pairs) else None,
-        tuple(csr_array(vstack(along, format="csr")) for along in zip(*tangents, strict=True)),
-        _stacked_directions(pairs),
-        joined("friction"),
-        of_tangents("slip0"),
-        joined("equality"),
-        joined("softness"),
-        np.stack([block_diag(*component) for component in zip(*factors, strict=True)]),
-        joined("tangential_softness"),
-        of_tangents("elastic_slip"),
+        B=csr_array(vstack([pair.B for pair in pairs], format="csr")),
+        compliance=_BlockDiagonal(pairs) if any(pair.compliance is not None for pair in pairs) else None,
+        tangents=tuple(csr_array(vstack(along, format="csr")) for along in zip(*tangents, strict=True)),
+        directions=_stacked_directions(pairs),
+        low_rank_compliance=np.stack([block_diag(*component) for component in zip(*factors, strict=True)]),
         nodes=None if len(nodes) < len(pairs) else np.concatenate(nodes),
         coupled_directions=_stacked_directions(pairs, coupled=True),
         parts=by_pair,
+        **joined,
     )
 
 
@@ -424,12 +408,9 @@ def _stacked_directions(pairs: list[Constraints], coupled: bool = False) -> tupl
     With `coupled`, `coupled_directions` take precedence over `directions`.
     """
     directions = [(pair.coupled_directions if coupled else ()) or pair.directions for pair in pairs]
-    return tuple(
-        np.vstack(
-            [along[j] if along else np.zeros_like(p.positions) for along, p in zip(directions, pairs, strict=True)]
-        )
-        for j in range(max(map(len, directions)))
-    )
+    count = max(map(len, directions))
+    filled = [along or (np.zeros_like(pair.positions),) * count for along, pair in zip(directions, pairs, strict=True)]
+    return tuple(np.vstack(of_axis) for of_axis in zip(*filled, strict=True))
 
 
 class _Softened:
@@ -458,30 +439,25 @@ class _BlockDiagonal:
 
     def __init__(self, pairs: list[Constraints]) -> None:
         self._compliances = [pair.compliance for pair in pairs]
-        self._start = np.cumsum([0] + [len(pair) for pair in pairs])
+        self._sizes = [len(pair) for pair in pairs]
 
     def block(self, rows: Indices) -> Array:
         values = np.zeros((len(rows), len(rows)))
-        for compliance, first, end in zip(self._compliances, self._start[:-1], self._start[1:], strict=True):
-            in_block = np.flatnonzero((rows >= first) & (rows < end))
+        for compliance, (in_block, numbers) in zip(self._compliances, by_block(rows, self._sizes), strict=True):
             if compliance is not None and len(in_block):
-                values[np.ix_(in_block, in_block)] = compliance.block(rows[in_block] - first)
+                values[np.ix_(in_block, in_block)] = compliance.block(numbers)
         return values
 
     def among(self, rows: Indices) -> Array | FieldCompliance:
         blocks = []
-        for inner, first, end in zip(self._compliances, self._start[:-1], self._start[1:], strict=True):
-            in_block = rows[(rows >= first) & (rows < end)] - first
-            n = len(in_block)
-            compliance = FieldCompliance.none(n) if inner is None or not n else inner.among(in_block)
+        for inner, (_, numbers) in zip(self._compliances, by_block(rows, self._sizes), strict=True):
+            n = len(numbers)
+            compliance = FieldCompliance.none(n) if inner is None or not n else inner.among(numbers)
             if not isinstance(compliance, FieldCompliance):
                 return self.block(rows)
             blocks.append(compliance)
         return FieldCompliance.stacked(blocks, lambda: self.block(rows))
 
     def apply(self, multiplier: Array) -> Array:
-        values = np.zeros(len(multiplier))
-        for inner, first, end in zip(self._compliances, self._start[:-1], self._start[1:], strict=True):
-            if inner is not None:
-                values[first:end] = inner.apply(multiplier[first:end])
-        return values
+        of_pairs = zip(self._compliances, np.split(multiplier, np.cumsum(self._sizes)[:-1]), strict=True)
+        return np.concatenate([np.zeros(len(own)) if inner is None else inner.apply(own) for inner, own in of_pairs])

@@ -24,7 +24,7 @@ from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.formulations._formulation import LEANING
-from fastcontact.contact.held_motions import TOGETHER
+from fastcontact.contact.held_motions import SAME_DIRECTION
 from fastcontact.contact.pairing import FACING
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
@@ -235,7 +235,7 @@ def symmetry_planes(pair: Formulation) -> list[tuple[Array, Indices]]:
         x = points @ axis
         if np.ptp(x) <= 10 * tolerance:
             continue
-        on_plane = partly_held & (np.einsum("d,nde,e->n", axis, held, axis) >= TOGETHER**2)
+        on_plane = partly_held & (np.einsum("d,nde,e->n", axis, held, axis) >= SAME_DIRECTION**2)
         on_plane &= ~driven[:, np.abs(axis) > SINGLE_PRECISION].any(axis=1)
         on_plane &= np.abs(normals @ axis) < LEANING  # otherwise the plane does not cut the surface
         for end, outward in ((x.min(), -1.0), (x.max(), 1.0)):

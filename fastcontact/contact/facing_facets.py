@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.projection import CORNER, closest_of_kinds
+from fastcontact.contact.surface import by_block
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.mesh.mesh import Mesh
@@ -122,12 +123,8 @@ class OuterFacets:
 
     def facets(self, numbers: Indices) -> dict[str, Numbers]:
         """Return the connectivity of the facets `numbers` by element type."""
-        blocks = {}
-        for (name, block), first in zip(self.blocks.items(), self.first):
-            inside = numbers[(numbers >= first) & (numbers < first + len(block))] - first
-            if len(inside):
-                blocks[name] = block[inside]
-        return blocks
+        of_blocks = zip(self.blocks.items(), by_block(numbers, map(len, self.blocks.values())), strict=True)
+        return {name: block[rows] for (name, block), (_, rows) in of_blocks if len(rows)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,8 +185,8 @@ def _faced_by(
         candidates = candidates[((at >= begin) & (at <= end)).all(axis=1)]
     if not others.any() or not len(candidates):
         return np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0)
-    kinds = [block[others[first : first + len(block)]] for block, first in zip(outside.blocks.values(), outside.first)]
-    closest = closest_of_kinds(point[candidates], [outside.mesh.points[block] for block in kinds if len(block)])
+    kinds = outside.facets(np.flatnonzero(others)).values()
+    closest = closest_of_kinds(point[candidates], [outside.mesh.points[block] for block in kinds])
     facet, opposite = facet_of_point[candidates], np.flatnonzero(others)[closest.facet]
     difference = point[candidates] - closest.position
     gap = np.einsum("nd,nd->n", difference, closest.normal)

@@ -166,10 +166,7 @@ def _along(B: csr_array, rows: Mask, side: Surface, vectors: Array) -> tuple[csr
 
 def reached(side: Surface, source: Mask, passable: Mask) -> Mask:
     """Return which `passable` nodes (n_nodes,) are connected with passable nodes of the `source` by facets of a side."""
-    count, n = side.n_facets, len(passable)
-    nodes = np.concatenate([block.local.ravel() for block in side.blocks])
-    facet = np.repeat(np.arange(count), np.concatenate([np.full(len(b.local), b.local.shape[1]) for b in side.blocks]))
-    kept = passable[nodes]
-    graph = csr_array((np.ones(kept.sum()), (nodes[kept], n + facet[kept])), shape=(n + count, n + count))
-    component = connected_components(graph, directed=False)[1][:n]
-    return passable & np.isin(component, component[source & passable])
+    nodes, connected = np.flatnonzero(passable), np.zeros(len(passable), bool)
+    component = connected_components(side.beside[nodes][:, nodes], directed=False)[1]
+    connected[nodes] = np.isin(component, component[source[nodes]])
+    return connected

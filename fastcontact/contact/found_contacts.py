@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 # Relative difference of node distances, moduli or areas below which two sides count as equal.
 ALIKE = 0.1
 _COLUMNS = (
-    "contact", "secondary", "primary", "facets secondary", "facets primary", "spacing secondary", "spacing primary",
-    "gap from", "gap to", "secondary since",
+    "contact", "secondary", "primary", "secondary facets", "primary facets", "secondary spacing", "primary spacing",
+    "smallest gap", "largest gap", "reason",
 )  # fmt: skip
 
 

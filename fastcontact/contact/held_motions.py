@@ -18,7 +18,7 @@ from fastcontact.contact.projection import CORNER
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION, TINY
 
 # Cosine of the largest angle between directions at two nodes that are joined into one field, such as along a curved rim.
-TOGETHER = float(np.cos(np.radians(0.5 * CORNER)))
+SAME_DIRECTION = float(np.cos(np.radians(0.5 * CORNER)))
 # Power of the inverse distance in the weights by which directions are interpolated to other nodes.
 NEAREST = 4
 
@@ -133,7 +133,7 @@ def alike(projectors: Array, positions: Array) -> list[tuple[Array, Mask]]:
         seeds = seeds[rank[seeds] == least]
         seeds = seeds if least == 1 else seeds[:1]  # several directions: an arbitrary choice
         axis = np.linalg.eigh(remaining[seeds])[1][:, :, -1]
-        away = np.where(np.abs(axis @ axis.T) >= TOGETHER, _distances(positions[seeds], positions[seeds]), 0.0)
+        away = np.where(np.abs(axis @ axis.T) >= SAME_DIRECTION, _distances(positions[seeds], positions[seeds]), 0.0)
         order, predecessor = breadth_first_order(minimum_spanning_tree(csr_array(away)), 0, directed=False)
         for child in order[1:]:  # orient each vector like its predecessor in the tree of nearest neighbours
             axis[child] *= np.sign(axis[child] @ axis[predecessor[child]])
@@ -143,7 +143,7 @@ def alike(projectors: Array, positions: Array) -> list[tuple[Array, Mask]]:
             away = _distances(positions, positions[seeds[order]])
             along = _unit((away.min(axis=1, keepdims=True) / away) ** NEAREST @ axis[order])
         along[seeds[order]] = axis[order]
-        held = np.einsum("nd,nde,ne->n", along, remaining, along) >= TOGETHER**2
+        held = np.einsum("nd,nde,ne->n", along, remaining, along) >= SAME_DIRECTION**2
         along[held] = _unit(np.einsum("nde,ne->nd", remaining[held], along[held]))
         directions.append((along, held))
         remaining[held] = without(remaining[held], along[held], 0.0)

@@ -68,14 +68,12 @@ class Candidates:
 
         `xi` is a list of arrays (n_q, dim - 1), one for each block of `side`.
         """
-        nodes, shapes, facets, coordinates, first = [], [], [], [], 0
-        for block, xi_of_block in zip(side.blocks, xi, strict=True):
-            nodes.append(np.repeat(block.facets, len(xi_of_block), axis=0))
-            shapes.append(np.tile(elements.get(block.element).shape(xi_of_block), (len(block.facets), 1)))
-            facets.append(np.repeat(first + np.arange(len(block.facets)), len(xi_of_block)))
-            coordinates.append(np.tile(xi_of_block, (len(block.facets), 1)))
-            first += len(block.facets)
-        return cls(filled_up(nodes), filled_up(shapes), np.concatenate(facets), np.concatenate(coordinates))
+        facet = np.repeat(np.arange(side.n_facets), np.repeat([len(of_block) for of_block in xi], side.sizes))
+        blocks = list(zip(side.blocks, side.sizes, xi, strict=True))
+        nodes = [np.repeat(block.facets, len(of_block), axis=0) for block, _, of_block in blocks]
+        shapes = [np.tile(elements.get(block.element).shape(of_block), (n, 1)) for block, n, of_block in blocks]
+        coordinates = [np.tile(of_block, (n, 1)) for _, n, of_block in blocks]
+        return cls(filled_up(nodes), filled_up(shapes), facet, np.concatenate(coordinates))
 
     @classmethod
     def nodes_of(cls, side: Surface) -> Candidates:

@@ -20,7 +20,7 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.search import search_2d_kernels
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import flat_triangles, tables
-from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
+from fastcontact.contact.surface import FacetBlock, Surface, by_block, line_neighbours
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
@@ -30,7 +30,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 # value lies between the exterior angles of octagons and heptagons, so that regular polygons do not depend on round-off.
 CORNER = 48.0
 # Number of consecutive points that need not be sorted for the search.
-TOGETHER = 16
+POINTS_PER_LEAF = 16
 # Overhang up to which a point faces the end of a side. Nodes on an axis or in a plane of symmetry lie slightly beyond
 # inclined facets, and nodes at the end of one side beyond that of the other if both sides strain differently.
 BESIDE = 0.05
@@ -59,16 +59,14 @@ class Places:
 
 def places(side: Surface, facet: Indices, xi: Array) -> Places:
     """Return the points of `side` at the reference coordinates `xi` (n, dim - 1) in the facets numbered `facet` (n,)."""
-    width, n, first = max(block.facets.shape[1] for block in side.blocks), len(facet), 0
+    width, n = max(block.facets.shape[1] for block in side.blocks), len(facet)
     nodes, local = np.empty((n, width), np.int32), np.empty((n, width), np.intp)
     shape, gradient = np.zeros((n, width)), np.zeros((n, width, xi.shape[1]))
-    for block in side.blocks:
-        rows = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
-        element, number, k = elements.get(block.element), facet[rows] - first, block.facets.shape[1]
+    for block, (rows, number) in zip(side.blocks, by_block(facet, side.sizes), strict=True):
+        element, k = elements.get(block.element), block.facets.shape[1]
         columns = np.minimum(np.arange(width), k - 1)
         nodes[rows], local[rows] = block.facets[number][:, columns], block.local[number][:, columns]
         shape[rows, :k], gradient[rows, :k] = element.shape(xi[rows]), element.gradient(xi[rows])
-        first += len(block.facets)
     return Places(nodes, local, shape, gradient)
 
 
@@ -95,19 +93,13 @@ def at_common_edges(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, 
     at = places(side, facet, xi)
     row, k = np.nonzero(np.abs(at.shape) > LENGTH_ROUND_OFF)
     around = csr_array((np.ones(len(row)), (row, at.local[row, k])), shape=(len(facet), len(side.points)))
-    local = [block.local for block in side.blocks]
-    ends = np.concatenate([[0], np.cumsum(np.concatenate([np.full(len(nodes), nodes.shape[1]) for nodes in local]))])
-    nodes = np.concatenate([nodes.ravel() for nodes in local])
-    of_facets = csr_array((np.ones(len(nodes)), nodes, ends), shape=(len(ends) - 1, len(side.points)))
-    common = coo_array(around @ of_facets.T)
+    common = coo_array(around @ side.incidence.T)
     contains_all = common.data == np.diff(around.indptr)[common.row]
     point, common_facet = common.row[contains_all].astype(np.intp), common.col[contains_all].astype(np.intp)
-    coordinates, first = np.empty((len(point), xi.shape[1])), 0
-    for block in side.blocks:
-        rows = np.flatnonzero((common_facet >= first) & (common_facet < first + len(block.local)))
-        same = block.local[common_facet[rows] - first][:, :, None] == at.local[point[rows]][:, None]
+    coordinates = np.empty((len(point), xi.shape[1]))
+    for block, (rows, number) in zip(side.blocks, by_block(common_facet, side.sizes), strict=True):
+        same = block.local[number][:, :, None] == at.local[point[rows]][:, None]
         coordinates[rows] = np.einsum("pkj,pj->pk", same, at.shape[point[rows]]) @ elements.get(block.element).nodes
-        first += len(block.local)
     return point, common_facet, coordinates
 
 
@@ -117,22 +109,21 @@ def nodal_normals(side: Surface, coordinates: Array) -> Array:
     The normal of a node is the mean of the unit normals of its facets, weighted by their angles at the node. With these
     weights it does not depend on how the surface is divided into facets (Thuermer and Wuethrich, 1998).
     """
-    normals = [facet_normals(block, coordinates) for block in side.blocks]
-    return _nodal_means(
-        side, normals, [facet_angles(elements.get(block.element), coordinates[block.facets]) for block in side.blocks]
-    )
+    return _nodal_means(side, *_at_nodes(side, coordinates))
 
 
-def _nodal_means(side: Surface, values: Sequence[Array], angles: Sequence[Array]) -> Array:
-    """Return the means (m, dim) of `nodal_normals`.
+def _at_nodes(side: Surface, coordinates: Array) -> tuple[Indices, Array, Array]:
+    """Return the node (p,), the unit normal (p, dim) and the angle (p,) [radian] of each facet at each of its nodes."""
+    node = np.concatenate([block.local.ravel() for block in side.blocks])
+    normals = [facet_normals(block, coordinates).reshape(-1, coordinates.shape[1]) for block in side.blocks]
+    angles = [facet_angles(elements.get(block.element), coordinates[block.facets]).ravel() for block in side.blocks]
+    return node, np.concatenate(normals), np.concatenate(angles)
 
-    `values` and `angles` are the normals (n_facets, k, dim) and the angles (n_facets, k) of the facets at their nodes, by
-    block.
-    """
-    n, dim = len(side.points), values[0].shape[2]
-    at = np.concatenate([block.local.ravel() for block in side.blocks])
-    weighted = [(angle[:, :, None] * normals).reshape(-1, dim) for normals, angle in zip(values, angles, strict=True)]
-    total: Array = np.column_stack([np.bincount(at, component, n) for component in np.concatenate(weighted).T])
+
+def _nodal_means(side: Surface, node: Indices, normal: Array, angle: Array) -> Array:
+    """Return the means (m, dim) of `nodal_normals`; the other arguments are the results of `_at_nodes`."""
+    weighted = (angle[:, None] * normal).T
+    total: Array = np.column_stack([np.bincount(node, component, len(side.points)) for component in weighted])
     side.add_across_ends(total)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.divide(total, length, out=np.zeros_like(total), where=length > 0.0)  # facets may degenerate to points
@@ -149,29 +140,18 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
     list of ndarray (n_facets, n_nodes, dim)
         Normals of each block.
     """
-    facet_normals_of_blocks = [facet_normals(block, coordinates) for block in side.blocks]
-    angles = [facet_angles(elements.get(block.element), coordinates[block.facets]) for block in side.blocks]
-    means = _nodal_means(side, facet_normals_of_blocks, angles)
-    smooth = [means[block.local] for block in side.blocks]
+    node, normal, angle = _at_nodes(side, coordinates)
+    smooth = _nodal_means(side, node, normal, angle)[node]
     # A node is a corner if the normal of one of its facets deviates from the mean by more than half of CORNER.
-    flat, corner = np.cos(np.radians(0.5 * CORNER)), np.zeros(len(side.points), bool)
-    for block, normals, mean in zip(side.blocks, facet_normals_of_blocks, smooth, strict=True):
-        corner[block.local[np.einsum("fad,fad->fa", normals, mean) < flat]] = True
-    if not corner.any():
-        return smooth
-    node = np.concatenate([block.local.ravel() for block in side.blocks])
-    weight = np.concatenate([angle.ravel() for angle in angles])
-    normal = np.concatenate([normals.reshape(-1, coordinates.shape[1]) for normals in facet_normals_of_blocks])
-    joined = np.concatenate([normals.reshape(-1, coordinates.shape[1]) for normals in smooth])
+    corners = np.unique(node[np.einsum("pd,pd->p", normal, smooth) < np.cos(np.radians(0.5 * CORNER))])
     by_node, start = np.argsort(node, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(node))])
-    for at in np.flatnonzero(corner):
+    for at in corners:
         entries = by_node[start[at] : start[at + 1]]
         similar = normal[entries] @ normal[entries].T > np.cos(np.radians(CORNER))
-        total = (similar * weight[entries]) @ normal[entries]
-        joined[entries] = total / np.linalg.norm(total, axis=1, keepdims=True)
-    blocks = facet_normals_of_blocks
-    ends = np.cumsum([normals.shape[0] * normals.shape[1] for normals in blocks])[:-1]
-    return [means.reshape(like.shape) for means, like in zip(np.split(joined, ends), blocks, strict=True)]
+        total = (similar * angle[entries]) @ normal[entries]
+        smooth[entries] = total / np.linalg.norm(total, axis=1, keepdims=True)
+    of_blocks = np.split(smooth, np.cumsum([block.local.size for block in side.blocks])[:-1])
+    return [values.reshape(*block.local.shape, -1) for values, block in zip(of_blocks, side.blocks, strict=True)]
 
 
 def at_nodes_of_facets(of_blocks: Sequence[Array]) -> Array:
@@ -264,7 +244,7 @@ def closest_of_kinds(points: Array, kinds: Sequence[Array]) -> Closest:
 
 
 def _on_lines(points: Array, corners: Array, closest: Closest) -> None:
-    numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, TOGETHER)
+    numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, POINTS_PER_LEAF)
     corners = corners[numbers]
     hull = corners
     if corners.shape[1] == 3:  # a parabola lies in the polygon of its ends and this point (Bezier)
@@ -282,7 +262,7 @@ def _on_faces(points: Array, corners: Array, closest: Closest) -> None:
     from fastcontact.contact.search.projection_3d_kernels import Domain, Facets
 
     n, table = len(corners), tables(corners.shape[1])
-    numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, TOGETHER)
+    numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, POINTS_PER_LEAF)
     centre = 0.5 * (corners.min(axis=0).min(axis=0) + corners.max(axis=0).max(axis=0))
     facets = Facets(corners[numbers], centre, np.empty(corners.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))
@@ -345,11 +325,8 @@ def along_normals(
     centre = 0.5 * (x.min(axis=0) + x.max(axis=0))
     heights = np.einsum("nd,nd->n", points - start.position, start.normal)
     relative_points, nodes_of_blocks = points - centre, [coordinates[block.facets] - centre for block in side.blocks]
-    sizes = np.cumsum([0] + [len(kind) for kind in nodes_of_blocks])
-    at_nodes = [
-        np.ascontiguousarray(normals[low:high, : kind.shape[1]])
-        for kind, low, high in zip(nodes_of_blocks, sizes[:-1], sizes[1:], strict=True)
-    ]
+    of_blocks = zip(np.split(normals, np.cumsum(side.sizes)[:-1]), nodes_of_blocks, strict=True)
+    at_nodes = [np.ascontiguousarray(values[:, : nodes.shape[1]]) for values, nodes in of_blocks]
     terms, directions = _polynomials(nodes_of_blocks), _polynomials(at_nodes)
     parallel_map(
         lambda portion: projection_kernels.along_normals(

@@ -38,14 +38,13 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
         )
     for side in (secondary, primary):
         _check_normals(mesh, name, side)
-    secondary_frames, primary_frames = _facet_frames(mesh, secondary), _facet_frames(mesh, primary)
-    difference = primary_frames[0][None] - secondary_frames[0][:, None]
-    facing = np.einsum("id,jd->ij", secondary_frames[1], primary_frames[1]) < 0
-    ahead = (np.einsum("ijd,id->ij", difference, secondary_frames[1]) > -0.1 * np.linalg.norm(difference, axis=2)) | (
-        np.linalg.norm(difference, axis=2) < np.minimum.outer(secondary_frames[2], primary_frames[2])
-    )
+    (centres, normals, sizes), opposite = _facet_frames(mesh, secondary), _facet_frames(mesh, primary)
+    difference = opposite[0][None] - centres[:, None]
+    height, distance = np.einsum("ijd,id->ij", difference, normals), np.linalg.norm(difference, axis=2)
+    facing = normals @ opposite[1].T < 0
+    ahead = (height > -0.1 * distance) | (distance < np.minimum.outer(sizes, opposite[2]))
     if not (facing & ahead).any():
-        behind = -np.einsum("ijd,id->ij", difference, secondary_frames[1])[facing]
+        behind = -height[facing]
         inside = f", or do the bodies lie inside each other, by {behind.min():.4g} or more" if len(behind) else ""
         raise ContactError(
             f"no facet of '{secondary.group}' faces '{primary.group}': the outer sides of the two groups face away from "
@@ -93,12 +92,9 @@ def shared_facets(mesh: Mesh, group: str, other: str) -> Numbers:
 
 def _facet_frames(mesh: Mesh, side: Surface) -> tuple[Array, Array, Array]:
     """Return centres, unit normals and sizes of about SAMPLE facets of each kind, given by their corners."""
-    centres, normals, sizes = [], [], []
-    for block in side.blocks:
-        sample = block.facets[:: max(1, len(block.facets) // SAMPLE), : elements.get(block.element).n_corners]
-        corners = mesh.points[sample]
-        normal = flat_area_vectors(corners)
-        centres.append(corners.mean(axis=1))
-        normals.append(normal / np.linalg.norm(normal, axis=1, keepdims=True))
-        sizes.append(np.linalg.norm(normal, axis=1) ** (1 / (mesh.dim - 1)))
-    return np.concatenate(centres), np.concatenate(normals), np.concatenate(sizes)
+    blocks = [(block.facets, elements.get(block.element).n_corners) for block in side.blocks]
+    corners = [mesh.points[facets[:: max(1, len(facets) // SAMPLE), :n]] for facets, n in blocks]
+    centres = np.concatenate([of_block.mean(axis=1) for of_block in corners])
+    normals = np.concatenate([flat_area_vectors(of_block) for of_block in corners])
+    areas = np.linalg.norm(normals, axis=1)
+    return centres, normals / areas[:, None], areas ** (1 / (mesh.dim - 1))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import ContactError, MeshError
@@ -80,9 +80,14 @@ class Surface:
             vectors[second] = (vectors[first][:, None] @ np.swapaxes(turn, -1, -2))[:, 0]
 
     @property
+    def sizes(self) -> list[int]:
+        """Number of facets of each block."""
+        return [len(block.facets) for block in self.blocks]
+
+    @property
     def n_facets(self) -> int:
         """Number of facets of all blocks."""
-        return sum(len(block.facets) for block in self.blocks)
+        return sum(self.sizes)
 
     @property
     def order(self) -> int:
@@ -119,12 +124,18 @@ class Surface:
         return np.asarray(np.bincount(ends.ravel())[ends] > 1)
 
     @cached_property
+    def incidence(self) -> csr_array:
+        """Incidence matrix (n_facets, m) of facets and nodes: one if a node belongs to a facet, otherwise zero."""
+        nodes = np.concatenate([block.local.ravel() for block in self.blocks])
+        sizes = np.concatenate([np.full(len(block.local), block.local.shape[1]) for block in self.blocks])
+        start = np.concatenate([[0], np.cumsum(sizes)])
+        return csr_array((np.ones(len(nodes)), nodes, start), shape=(self.n_facets, len(self.points)))
+
+    @cached_property
     def beside(self) -> csr_array:
         """Adjacency matrix (m, m) of the nodes: one if two nodes belong to the same facet, otherwise zero."""
-        rows = [np.repeat(block.local, block.local.shape[1], axis=1).ravel() for block in self.blocks]
-        columns = [np.tile(block.local, block.local.shape[1]).ravel() for block in self.blocks]
-        row, column, m = np.concatenate(rows), np.concatenate(columns), len(self.points)
-        adjacency = csr_array(coo_array((np.ones(len(row)), (row, column)), shape=(m, m)))
+        adjacency = csr_array(self.incidence.T @ self.incidence)
+        adjacency.sort_indices()
         adjacency.data[:] = 1.0
         return adjacency
 
@@ -146,11 +157,7 @@ class Surface:
 
         They are stored as offsets (n_facets + 1,) and numbers of facets, as in a CSR matrix.
         """
-        nodes = np.concatenate([block.local.ravel() for block in self.blocks])
-        sizes = np.concatenate([np.full(len(block.local), block.local.shape[1]) for block in self.blocks])
-        start = np.concatenate([[0], np.cumsum(sizes)])
-        incidence = csr_array((np.ones(len(nodes)), nodes, start), shape=(self.n_facets, len(self.points)))
-        adjacency = csr_array(incidence @ incidence.T)
+        adjacency = csr_array(self.incidence @ self.incidence.T)
         adjacency.setdiag(0.0)
         adjacency.eliminate_zeros()
         adjacency.sort_indices()
@@ -162,6 +169,18 @@ class Surface:
         `coordinates` (n_points, dim) are those of all points of the mesh [length].
         """
         return [coordinates[block.facets] for block in self.blocks]
+
+
+def by_block(numbers: Indices, sizes: Iterable[int]) -> Iterator[tuple[Indices, Indices]]:
+    """Yield, for blocks of the given sizes, the positions of their items in `numbers` (n,), and their rows in the block.
+
+    Items are numbered through all blocks.
+    """
+    first = 0
+    for size in sizes:
+        inside = np.flatnonzero((numbers >= first) & (numbers < first + size))
+        yield inside, numbers[inside] - first
+        first += size
 
 
 def line_neighbours(local: Indices) -> Indices:

@@ -51,7 +51,7 @@ class SmoothSide:
     heights: Array
     curvature: Array
 
-    def part(self, rows: slice) -> SmoothSide:
+    def of_facets(self, rows: slice) -> SmoothSide:
         """Return the smooth surface above some of the facets."""
         return SmoothSide(self.heights[rows], self.curvature[rows])
 
@@ -179,14 +179,10 @@ def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]
     The results are a matrix (n_facets, n_facets), including the diagonal, positions (n_facets, most) in the points of the
     side, and a mask of the entries of the latter that are filled.
     """
-    size = [block.local.shape[1] for block in side.blocks for _ in block.local]
-    nodes = np.concatenate([block.local.ravel() for block in side.blocks])
-    at = np.repeat(np.arange(side.n_facets), size), nodes
-    incidence = csr_array((np.ones(len(nodes)), at), shape=(side.n_facets, len(side.points)))
-    i, j = (incidence @ incidence.T).tocoo().coords
+    i, j = (side.incidence @ side.incidence.T).tocoo().coords
     smooth = np.einsum("nd,nd->n", normal[i], normal[j]) > np.cos(np.radians(CORNER))
     near = csr_array((np.ones(smooth.sum()), (i[smooth], j[smooth])), shape=(side.n_facets, side.n_facets))
-    around = csr_array(near @ incidence)
+    around = csr_array(near @ side.incidence)
     valid = np.arange(np.diff(around.indptr).max()) < np.diff(around.indptr)[:, None]
     padded = np.zeros(valid.shape, np.intp)
     padded[valid] = around.indices

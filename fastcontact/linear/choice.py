@@ -91,8 +91,7 @@ def tight_enough(tolerance: float, relative: float) -> float:
     check_tolerance(tolerance)
     if tolerance > relative:
         log.info("linear solver: the tolerance %.1e is reduced to the residual criterion %.1e", tolerance, relative)
-        return relative
-    return tolerance
+    return min(tolerance, relative)
 
 
 def chosen(dim: int, n_dofs: int, columns: bool = False, quadratic: bool = False) -> tuple[str, str]:

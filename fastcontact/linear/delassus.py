@@ -41,19 +41,19 @@ class TooManyColumnsError(ConvergenceError):
         )
 
 
-def check_rows(count: int, most: int | None = None) -> None:
+def check_rows(count: int, limit: int | None = None) -> None:
     """Check that the number of constraints whose Delassus operator is formed is not too large.
 
     Raises
     ------
     ContactError
-        If `count` exceeds `most`, by default MOST_ROWS.
+        If `count` exceeds `limit`, by default MOST_ROWS.
     """
-    most = MOST_ROWS if most is None else most
-    if count > most:
+    limit = MOST_ROWS if limit is None else limit
+    if count > limit:
         raise ContactError(
             f"the contact needs the full compliance of {count} constraints, a matrix of {8e-9 * count**2:.1f} GB that is "
-            f"factorised repeatedly (at most {most} constraints are accepted), since the solver is direct or since they "
+            f"factorised repeatedly (at most {limit} constraints are accepted), since the solver is direct or since they "
             f'cannot be eliminated: use {CHEAP}, with linear_solver="amg", or a coarser or smaller secondary side'
         )
 
@@ -68,7 +68,7 @@ class InverseColumns:
     entries : method
         Method of the solver or factors to which this object belongs, which returns the entries (m, k) of ``K^-1`` in given
         rows (m,) and columns (k,) [length / force].
-    most : int, optional
+    limit : int, optional
         Largest number of columns; unlimited by default.
 
     Attributes
@@ -78,8 +78,8 @@ class InverseColumns:
         depend on it.
     """
 
-    def __init__(self, n: int, entries: Callable[[Indices, Indices], Array], most: int | None = None) -> None:
-        self._most = n if most is None else most
+    def __init__(self, n: int, entries: Callable[[Indices, Indices], Array], limit: int | None = None) -> None:
+        self._limit = n if limit is None else limit
         # The reference is weak, because a reference cycle would keep the factors of the solver, which are large, in memory.
         self._entries = weakref.WeakMethod(entries)
         self._position = np.full(n, -1, np.intp)  # of each degree of freedom in `_dofs`
@@ -129,7 +129,7 @@ class InverseColumns:
     def _extend(self, new: Indices) -> None:
         """Compute the columns of the degrees of freedom `new` (k,), and store them."""
         old = len(self._dofs)
-        if old + len(new) > self._most:
+        if old + len(new) > self._limit:
             raise TooManyColumnsError(old + len(new))
         self.asked.append(new)
         self._dofs = np.concatenate([self._dofs, new])

@@ -32,11 +32,9 @@ class Product(Protocol):
 
     def __matmul__(self, u: Array) -> Array:
         """Return ``K @ u`` (n,) [force]."""
-        ...
 
     def row_sums(self, u: Array) -> Array:
         """Return ``abs(K) @ abs(u)`` (n,) [force]."""
-        ...
 
 
 @dataclass
@@ -88,11 +86,9 @@ class Loaded(Protocol):
         multiplier : ndarray (m,)
             [force].
         """
-        ...
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """Return ``R K^-1 f`` (m,) [length] and the Delassus operator ``R K^-1 R.T`` (m, m) [length / force] for R (m, n)."""
-        ...
 
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """Return ``K^-1 (f + force)`` (n,) [length], valid only at the `involved` unknowns of `LinearSolver.prepare`.
@@ -100,21 +96,18 @@ class Loaded(Protocol):
         If computing the other unknowns takes additional work, a solver copies them from `elsewhere` (n,), if this is given.
         Likewise, `solve` copies them from its `guess`.
         """
-        ...
 
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """Return ``K^-1 (f + force)`` (n,) [length].
 
         `u` (n,) is the result of `involved_solution` or `solve` with the same forces, if available [length].
         """
-        ...
 
     def condensed(self) -> Loaded | None:
         """Return the system after static condensation to the `involved` unknowns; None if the solver does not condense.
 
         The unknowns of the condensed system are the involved ones, in the order of `involved`.
         """
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,11 +139,9 @@ class LoadedNonsymmetric(Loaded, Protocol):
     @property
     def contrast(self) -> float:
         """See `LinearSolver`."""
-        ...
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of K [force / length]."""
-        ...
 
     def solve_nonsymmetric(
         self, B: csr_array, c: Array, nodes: Indices, guess: Array, tolerance: float,
@@ -187,7 +178,6 @@ class LoadedNonsymmetric(Loaded, Protocol):
         ConvergenceError
             If equations without compliance are linearly dependent, in B or in `rows`, or if the iteration does not converge.
         """
-        ...
 
 
 class LinearSolver(Protocol):
@@ -217,7 +207,6 @@ class LinearSolver(Protocol):
     @property
     def iterative(self) -> bool:
         """Whether a solution with a larger tolerance costs less."""
-        ...
 
     @property
     def condenses(self) -> bool:
@@ -246,7 +235,6 @@ class LinearSolver(Protocol):
         bsr_array or Product
             K, or the object that replaces it in products.
         """
-        ...
 
     def near(self) -> Self:
         """Return a copy of the solver that is to be prepared for a similar matrix of the same pattern, such as a tangent."""
@@ -254,18 +242,15 @@ class LinearSolver(Protocol):
 
     def load(self, f: Array) -> Loaded:
         """Return the prepared matrix with the right-hand side f (n,) [force]."""
-        ...
 
     def snapshot(self) -> dict[str, Any]:
         """Return all data on which later solutions depend, as numbers, strings and arrays.
 
         The state of an analysis includes the snapshot, and a restart saves it. Its arrays must not be modified later.
         """
-        ...
 
     def put_back(self, snapshot: Mapping[str, Any]) -> None:
         """Restore the data of a `snapshot`, taken of this solver or of one of the same class for the same matrix."""
-        ...
 
     def improve(self, excess: float) -> bool:
         """Reduce `tolerance`, as the residual exceeds its bound by the factor `excess`; return whether this is possible."""

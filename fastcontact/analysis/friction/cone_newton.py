@@ -132,7 +132,6 @@ class Linearised(Protocol):
         The gaps of `closed` constraints (m,) and the slips of `sticking` ones (m,) vanish. Sliding constraints satisfy
         ``t = mu n d`` with the direction d of t - s, which in 3D varies with t - s. Open constraints have no forces.
         """
-        ...
 
 
 def newton(

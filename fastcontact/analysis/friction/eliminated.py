@@ -10,19 +10,12 @@ diagonal compliance of these equations.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
-from fastcontact.analysis.friction.cone_newton import (
-    SLIP_COMPLIANCE,
-    Law,
-    aligning,
-    compliance_of_rows,
-    held_tangents,
-    newton,
-)
+from fastcontact.analysis.friction import cone_newton
 from fastcontact.analysis.solution import Accuracy, Forces
 from fastcontact.analysis.tolerances import RESIDUAL
 from fastcontact.arrays import Array, Indices, Mask, largest
@@ -85,10 +78,10 @@ def solve(
         if not state[0].any():  # if all were open, close those that penetrate in the solution without contact
             y, gaps = problem.step(y, gaps, gaps[0] < 0.0, gaps[0] < 0.0)
         exact = max(ROUND_OFF, ENOUGH * tolerance)
-        iterate = newton(problem, y, gaps, exact, 0 if accuracy.inexact else None)
+        iterate = cone_newton.newton(problem, y, gaps, exact, 0 if accuracy.inexact else None)
         if problem.finish():
             y, gaps = problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)
-            iterate = newton(problem, y, gaps, exact)
+            iterate = cone_newton.newton(problem, y, gaps, exact)
         if not (accuracy.inexact or iterate.settled):
             iterate = replace(iterate, settled=iterate.residual <= ACCEPTABLE * tolerance)
             if not iterate.settled:
@@ -126,22 +119,22 @@ class Eliminated:
         unknown_compliance = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
         self._compliance = diagonal_compliance(constraints)
         compliance = self._compliance_of_rows(rows, unknown_compliance)
-        self._turn = aligning(compliance, constraints.directions) if k == 2 else None
+        self._turn = cone_newton.aligning(compliance, constraints.directions) if k == 2 else None
         if self._turn is not None:
             turned = csr_array(self._turn @ vstack(rows, format="csr"))
             rows = tuple(turned[a * m : (a + 1) * m] for a in range(3))
             free = (self._turn @ free.ravel()).reshape(free.shape)
             compliance = self._compliance_of_rows(rows, unknown_compliance)
-        held_slips = held_tangents(compliance)
+        held_slips = cone_newton.held_tangents(compliance)
         prescribed = held_slips & constraints.moved_past(np.arange(m), self._turn)
-        self._compliance[1:] += np.where(prescribed, SLIP_COMPLIANCE * compliance[0, 0], 0.0)
+        self._compliance[1:] += np.where(prescribed, cone_newton.SLIP_COMPLIANCE * compliance[0, 0], 0.0)
         slip_rows = [scaled(T, np.where(is_held, 0.0, 1.0)) for T, is_held in zip(rows[1:], held_slips, strict=True)]
         self._rows = (rows[0], *slip_rows)
         self._free = np.vstack([free[0], np.where(held_slips & ~prescribed, 0.0, free[1:])])
         self._slips = ~held_slips | prescribed
         normal, softer = compliance[0, 0], SOFTER / np.sqrt(max(1.0, loaded.contrast / MILD))
         self._unit = np.sqrt(1.0 / (np.where(normal > 0.0, normal, 1.0) / softer + self._compliance[0]))
-        self.law = Law(np.where(usable, mu, 0.0), constraints.equality & usable)
+        self.law = cone_newton.Law(np.where(usable, mu, 0.0), constraints.equality & usable)
         self.u = u
         self.round_off = SUM_ROUND_OFF * largest((self._unit * self._gaps(u))[:, usable])
 
@@ -150,7 +143,7 @@ class Eliminated:
 
         Tangents with such a compliance are thus not held.
         """
-        compliance = compliance_of_rows(rows, unknown_compliance)
+        compliance = cone_newton.compliance_of_rows(rows, unknown_compliance)
         slips = np.arange(1, len(rows))
         compliance[slips, slips] += self._compliance[1:]
         return compliance
@@ -188,20 +181,16 @@ class Eliminated:
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
         """See `cone_newton.Linearised.step`."""
         closed = closed & self._usable
-        closed_rows = np.flatnonzero(closed)
-        equations = (closed_rows, *(np.flatnonzero(closed & sticking & slips) for slips in self._slips))
-        B = csr_array(vstack([taken(R, rows) for R, rows in zip(self._rows, equations, strict=True)], format="csr"))
-        c = -np.concatenate([free[rows] for free, rows in zip(self._free, equations, strict=True)])
+        # Equations of gaps and then of the slips along each tangent.
+        held = np.vstack([closed, closed & sticking & self._slips])
+        rows = [taken(R, np.flatnonzero(at)) for R, at in zip(self._rows, held, strict=True)]
+        B, nodes = csr_array(vstack(rows, format="csr")), self._nodes[held.nonzero()[1]]
         sliding = self._sliding(y, gaps, np.flatnonzero(closed & ~sticking & (self.law.mu > 0.0)))
-        friction_terms = self._friction_terms(B, closed_rows, sliding) if len(sliding.at) else None
-        nodes = self._nodes[np.concatenate(equations)]
-        C = np.concatenate([compliance[rows] for compliance, rows in zip(self._compliance, equations, strict=True)])
-        self._last = self._accuracy(y, gaps)
+        friction_terms = self._friction_terms(B, np.flatnonzero(closed), sliding) if len(sliding.at) else None
+        self._last, c, C = self._accuracy(y, gaps), -self._free[held], self._compliance[held]
         u, multiplier = self._loaded.solve_nonsymmetric(B, c, nodes, self.u, self._last, friction_terms, C)
-        forces, first = np.zeros_like(y), 0
-        for component, rows in zip(forces, equations, strict=True):
-            component[rows] = multiplier[first : first + len(rows)]
-            first += len(rows)
+        forces = np.zeros_like(y)
+        forces[held] = multiplier
         forces[1:, sliding.at] += sliding.force(forces[0, sliding.at], u)
         self.u, self.reached = u, forces / self._unit
         return self.reached, self._scaled(self._gaps(u, forces))
@@ -234,7 +223,7 @@ class Eliminated:
         spring = np.minimum(turning / np.maximum(1.0 - turning, TINY), STIFFEST) * self._unit[at] ** 2
         spring = spring / (1.0 + spring * self._compliance[1, at])  # in series with the compliance of the constraint
         free = (across * self._free[1:, at]).sum(axis=0)
-        return _Sliding(at, pull, _Across(across, Springs(csr_array(rows), spring), free))
+        return _Sliding(at, pull, Springs(csr_array(rows), spring), across, free)
 
     def _friction_terms(self, B: csr_array, closed_rows: Indices, sliding: _Sliding) -> FrictionTerms:
         """Return the friction terms of the linear system, whose equations `B` begin with the gaps of `closed_rows`."""
@@ -246,32 +235,13 @@ class Eliminated:
         force_rows = csr_array(vstack([force_rows, B[len(closed_rows) :]], format="csr"))
         if sliding.springs is None:
             return FrictionTerms(force_rows)
-        across = sliding.springs
-        preload = across.springs.rows.T @ (across.springs.stiffness * across.free)
-        return FrictionTerms(force_rows, across.springs, -preload)
+        springs = sliding.springs
+        return FrictionTerms(force_rows, springs, -springs.rows.T @ (springs.stiffness * sliding.free))
 
 
 def diagonal_compliance(constraints: Constraints) -> Array:
     """Return the diagonal compliance (1 + k, m) of constraints, along normals and then each tangent [length / force]."""
     return np.stack([constraints.softness, *[constraints.tangential_softness] * len(constraints.tangents)])
-
-
-@dataclass(frozen=True, eq=False)
-class _Across:
-    """Springs perpendicular to the slip directions of q sliding constraints in 3D.
-
-    Attributes
-    ----------
-    along : ndarray (k, q)
-        Unit vectors perpendicular to the slip directions, in components along the tangents.
-    springs : Springs
-    free : ndarray (q,)
-        Elongations at u = 0 [length].
-    """
-
-    along: Array
-    springs: Springs
-    free: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,18 +254,24 @@ class _Sliding:
         Numbers of the constraints.
     pull : ndarray (k, q)
         Ratios of the tangential forces to the normal force, ``mu d`` [-].
-    springs : _Across, optional
-        The springs perpendicular to the slip directions, in 3D.
+    springs : Springs, optional
+        Springs perpendicular to the slip directions, in 3D.
+    across : ndarray (k, q)
+        Unit vectors perpendicular to the slip directions, in components along the tangents.
+    free : ndarray (q,)
+        Elongations of the springs at u = 0 [length].
     """
 
     at: Indices
     pull: Array
-    springs: _Across | None = None
+    springs: Springs | None = None
+    across: Array = field(default_factory=lambda: np.empty(0))
+    free: Array = field(default_factory=lambda: np.empty(0))
 
     def force(self, normal: Array, u: Array) -> Array:
         """Return the tangential forces (k, q) for normal forces (q,) [force] and unknowns u (n,) [length]."""
         friction = self.pull * normal
         if self.springs is None:
             return friction
-        across, springs = self.springs, self.springs.springs
-        return np.asarray(friction - across.along * springs.stiffness * (springs.rows @ u + across.free))
+        elongation = self.springs.rows @ u + self.free
+        return np.asarray(friction - self.across * self.springs.stiffness * elongation)

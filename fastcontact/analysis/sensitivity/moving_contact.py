@@ -36,7 +36,7 @@ CHANGED = 1e-3
 SMOOTH = 1e-3
 # Error of the derivatives from simultaneous moves, relative to the largest derivative, above which points are moved one by
 # one.
-TOGETHER = 1e-5
+SEPARABLE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +164,7 @@ class MovingContact:
         derivatives = self._differences(_independent_groups(dofs, reached, self.problem.model.mesh.dim), reached)
         if self._agrees(0.5 * (derivatives[0] + derivatives[1]), dofs):
             return derivatives
-        return self._differences([np.array([dof]) for dof in dofs], None)
+        return self._differences([np.array([dof]) for dof in dofs], reached)
 
     def kinks(self, forward: csr_array, backward: csr_array) -> csr_array:
         """Return half the difference of the two `derivatives` where points project onto an edge between two facets."""
@@ -190,10 +190,8 @@ class MovingContact:
         """Incidence matrix (k, n_points), 0 or 1, of active constraints and the points that they involve."""
         dim, B = self.problem.model.mesh.dim, csr_array(self.constraints.B[self.active])
         keep = (B.indices < self.problem.model.n_dofs) & (B.data != 0.0)
-        row = entry_rows(B)[keep]
-        shape = len(self.active), self.problem.model.mesh.n_points
-        pattern = csr_array((np.ones(len(row)), (row, B.indices[keep] // dim)), shape=shape)
-        return _ones(pattern)
+        entries, n_points = (entry_rows(B)[keep], B.indices[keep] // dim), self.problem.model.mesh.n_points
+        return _ones(csr_array((np.ones(keep.sum()), entries), shape=(len(self.active), n_points)))
 
     def _reached(self) -> csr_array:
         """Return the incidence (k, n_points) of active constraints and the points they may depend on, neighbours included."""
@@ -203,14 +201,13 @@ class MovingContact:
             m = len(side.points)
             local = csr_array((np.ones(m), (side.points, np.arange(m))), (n, m))
             neighbours = neighbours + local @ side.near @ local.T
-        tied = [name for name, pair in self.problem.pairs.items() if pair.options.tied]
-        moving = np.ones(len(self.active))
-        for name in tied:  # paired once, before any load
-            rows = self.constraints.rows[name]
-            moving[(self.active >= rows.start) & (self.active < rows.stop)] = 0.0
-        return _ones(csr_array((self._involved * moving[:, None]) @ neighbours))
+        moving = np.ones(len(self.constraints))
+        for name, pair in self.problem.pairs.items():
+            if pair.options.tied:  # paired once, before any load
+                moving[self.constraints.rows[name]] = 0.0
+        return _ones(csr_array((self._involved * moving[self.active, None]) @ neighbours))
 
-    def _differences(self, groups: list[Indices], reached: csr_array | None) -> tuple[csr_array, csr_array]:
+    def _differences(self, groups: list[Indices], reached: csr_array) -> tuple[csr_array, csr_array]:
         base, n = self.at(self.u).all, len(self.u)
         columns: list[list[csr_array]] = [[], []]
         for dofs in groups:
@@ -219,10 +216,7 @@ class MovingContact:
             for side, sign in enumerate((1.0, -1.0)):
                 changed = sign * (self.at(self.u + sign * shift).all - base) / self.step
                 rows = np.flatnonzero(changed)
-                if reached is None or len(dofs) == 1:
-                    column = np.full(len(rows), dofs[0])
-                else:
-                    column = self._owners(rows, dofs, reached)
+                column = self._owners(rows, dofs, reached) if len(dofs) > 1 else np.full(len(rows), dofs[0])
                 columns[side].append(csr_array((changed[rows], (rows, column)), shape=(len(base), n)))
         forward, backward = (csr_array(sum(of_side[1:], of_side[0])) for of_side in columns)
         return forward, backward
@@ -252,7 +246,7 @@ class MovingContact:
         n, k = len(self.u), len(self.active)
         error = np.abs(difference - derivative @ shift)
         blocks = (slice(0, n), slice(n, n + k), slice(n + k, None))
-        return all(largest(error[block]) <= TOGETHER * largest(difference[block]) for block in blocks)
+        return all(largest(error[block]) <= SEPARABLE * largest(difference[block]) for block in blocks)
 
 
 def _independent_groups(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:

@@ -123,31 +123,16 @@ def _with_constant(material: Material, name: str, component: int | None, increme
 
 def _internal_forces(contact: MovingContact) -> Array:
     """Return the internal forces (n_dofs,) minus the equivalent forces of thermal expansion and initial states [force]."""
-    problem = contact.problem
-    model = problem.model
-    force = np.zeros(len(contact.u))
-    forces = model.internal_forces(problem.displacement(contact.u))
+    problem, force = contact.problem, np.zeros(len(contact.u))
+    model, displacement = problem.model, problem.displacement(contact.u)
+    forces = model.internal_forces(displacement)
     for by_ramp in (model.thermal_forces_by_ramp(), model.initial_forces_by_ramp()):
-        if by_ramp:
-            forces = forces - combined(by_ramp, problem.ramp, contact.instant, problem.displacement(contact.u).shape)
+        forces = forces - combined(by_ramp, problem.ramp, contact.instant, displacement.shape)
     force[: model.n_dofs] = forces.ravel()
     return force
 
 
 Item = TypeVar("Item", bound=Load | Temperature)
-FORMS = {
-    "E": '("E", material), or ("E", material, "1") along axis 1 of an Orthotropic',
-    "nu": '("nu", material), or ("nu", material, "12") for axes 1 and 2 of an Orthotropic',
-    "G": '("G", material, "12") for axes 1 and 2 of an Orthotropic',
-    "expansion": '("expansion", material), or ("expansion", material, "1") along axis 1',
-    "load": '("load", group)',
-    "speed": '("speed", group)',
-    "temperature": '("temperature", group)',
-    "pretension": '("pretension", name)',
-    "prescribed": '("prescribed", group) or ("prescribed", group, "y")',
-    "motion": '("motion", obstacle)',
-    "clearance": '("clearance", pair)',
-}
 WITH_COMPONENT = (*CONSTANTS, "prescribed")
 
 
@@ -159,11 +144,12 @@ def check_parameter(model: Model, parameter: Label) -> None:
             "results have no sensitivity to friction: if all nodes stick they do not depend on it, and if nodes slip they "
             "depend on all load steps. Use finite differences of two solutions"
         )
-    if kind not in FORMS:
-        raise ModelError(unknown("parameter", kind, FORMS))
+    if kind not in KINDS:
+        raise ModelError(unknown("parameter", kind, KINDS))
+    form, check, _ = KINDS[kind]
     if len(parameter) not in (2, 3 if kind in WITH_COMPONENT else 2):
-        raise ModelError(f"the parameter {parameter} must have the form {FORMS[kind]}")
-    KINDS[kind][0](model, parameter)
+        raise ModelError(f"the parameter {parameter} must have the form {form}")
+    check(model, parameter)
 
 
 def _item(kind: str, items: Mapping[str, Any], parameter: Label) -> Any:
@@ -175,8 +161,7 @@ def _item(kind: str, items: Mapping[str, Any], parameter: Label) -> Any:
 
 def _zero_change(contact: MovingContact) -> Change:
     """Return derivatives that are zero."""
-    n = len(contact.u)
-    nodes = 0 if contact.closed is None else len(contact.closed)
+    n, nodes = len(contact.u), 0 if contact.closed is None else len(contact.closed)
     return Change(np.zeros(n), np.zeros(n), np.zeros(n + len(contact.active) + nodes))
 
 
@@ -363,13 +348,19 @@ def _of_clearance(contact: MovingContact, parameter: Label) -> Change:
     return replace(_zero_change(contact), sample=contact.parameter_derivative(changed, contact.step))
 
 
-KINDS: dict[str, tuple[Callable[[Model, Label], object], Callable[[MovingContact, Label], Change]]] = {
-    **dict.fromkeys(CONSTANTS, (_constant_of, _by_constant)),
-    "load": (_loads, _of_load),
-    "speed": (_speeds, _of_speed),
-    "temperature": (_temperatures, _of_temperature),
-    "pretension": (_pretension, _of_pretension),
-    "prescribed": (_prescribing, _of_prescribed),
-    "motion": (_with_motion, _of_motion),
-    "clearance": (_with_clearance, _of_clearance),
+_BY_CONSTANT = _constant_of, _by_constant
+# The form of each kind of parameter, the function that raises ModelError if a model does not have the parameter, and the
+# function that returns the derivatives of the residual.
+KINDS: dict[str, tuple[str, Callable[[Model, Label], object], Callable[[MovingContact, Label], Change]]] = {
+    "E": ('("E", material), or ("E", material, "1") along axis 1 of an Orthotropic', *_BY_CONSTANT),
+    "nu": ('("nu", material), or ("nu", material, "12") for axes 1 and 2 of an Orthotropic', *_BY_CONSTANT),
+    "G": ('("G", material, "12") for axes 1 and 2 of an Orthotropic', *_BY_CONSTANT),
+    "expansion": ('("expansion", material), or ("expansion", material, "1") along axis 1', *_BY_CONSTANT),
+    "load": ('("load", group)', _loads, _of_load),
+    "speed": ('("speed", group)', _speeds, _of_speed),
+    "temperature": ('("temperature", group)', _temperatures, _of_temperature),
+    "pretension": ('("pretension", name)', _pretension, _of_pretension),
+    "prescribed": ('("prescribed", group) or ("prescribed", group, "y")', _prescribing, _of_prescribed),
+    "motion": ('("motion", obstacle)', _with_motion, _of_motion),
+    "clearance": ('("clearance", pair)', _with_clearance, _of_clearance),
 }

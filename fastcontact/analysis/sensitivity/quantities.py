@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.sensitivity.adjoint import Gradient
 from fastcontact.analysis.sensitivity.moving_contact import CHANGED, MovingContact
@@ -13,7 +12,6 @@ from fastcontact.errors import ModelError, unknown
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 
-Array = NDArray[np.float64]
 Label = tuple[str | int, ...]
 FORMS = {
     "displacement": '("displacement", point, "y")',
@@ -94,19 +92,16 @@ def _reaction(contact: MovingContact, zero: Gradient, quantity: Label) -> Gradie
 
 def _contact_force(contact: MovingContact, zero: Gradient, step: StepResult, quantity: Label) -> Gradient:
     contact_of_step, axis = step.contact[str(quantity[1])], _axis(contact.problem.model, quantity)
-    other_names = [name for name in contact.problem.pairs if name != quantity[1]]
     nodes = np.setdiff1d(contact_of_step.points, contact_of_step.primary_points)
-    for name in other_names:
-        other_pair = contact.problem.pairs[name]
-        shared = np.intersect1d(nodes, [*other_pair.secondary.points, *getattr(other_pair.primary, "points", ())])
-        if len(shared):
+    for name, other_pair in contact.problem.pairs.items():
+        shared = np.intersect1d(nodes, [*other_pair.secondary.points, *other_pair.primary.points])
+        if name != quantity[1] and len(shared):
             raise ModelError(
                 f"point {shared[0]} carries forces of both contact '{quantity[1]}' and contact '{name}': the force of a "
                 "single pair has no sensitivity here; use pairs that share no nodes"
             )
     dim, n = contact.problem.model.mesh.dim, len(contact.u)
-    size = n + len(contact.active)
-    sample = np.zeros(size)
+    sample = np.zeros(n + len(contact.active))
     sample[nodes * dim + axis] = 1.0
     rows = contact.constraints.B[contact.active]
     return replace(zero, value=float(contact_of_step.force[axis]), multiplier=rows @ sample[:n], sample=sample)

@@ -104,7 +104,7 @@ def _heights(
     if smoothing is None or axes is None:
         none = np.zeros((0, 0, 0))
         return none, none, np.zeros((len(pairs), 2))
-    secondary, primary = smoothing.secondary.part(rows[0]), smoothing.primary.part(rows[1])
+    secondary, primary = smoothing.secondary.of_facets(rows[0]), smoothing.primary.of_facets(rows[1])
     axes_of_facets = axes[0][rows[0]], axes[1][rows[1]]
     factors = Smoothing(secondary, primary).shared(pairs[:, 0], pairs[:, 1], axes_of_facets)
     return secondary.heights, primary.heights, factors

@@ -16,7 +16,7 @@ from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.cohesive_layer import bonded
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints
-from fastcontact.contact.held_motions import TOGETHER, HeldMotions, alike, spanned, without
+from fastcontact.contact.held_motions import SAME_DIRECTION, HeldMotions, alike, spanned, without
 from fastcontact.contact.linearised_geometry import (
     Closing,
     Geometry,
@@ -669,7 +669,7 @@ def _without_whole_facets(held: Array, side: Surface) -> Array:
     for block in side.blocks:
         around = held[block.local]
         vectors = np.linalg.eigh(around.mean(axis=1))[1]
-        is_common = np.einsum("fdk,fnde,fek->fnk", vectors, around, vectors).min(axis=1) >= TOGETHER**2
+        is_common = np.einsum("fdk,fnde,fek->fnk", vectors, around, vectors).min(axis=1) >= SAME_DIRECTION**2
         vectors = np.where(is_common[:, None], vectors, 0.0)
         np.add.at(span, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
     return spanned(held - held @ spanned(span, 0.5) @ held, 0.5)

@@ -28,7 +28,6 @@ class Obstacle(Protocol):
 
         The distance is infinite if a point cannot touch the obstacle.
         """
-        ...
 
 
 SHAPES: dict[str, Callable[..., Obstacle]] = {

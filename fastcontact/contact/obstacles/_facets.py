@@ -73,13 +73,10 @@ def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> Surface
     beyond = _neighbours(blocks, group)
     facet_normals_of_blocks = [block.normals() for block in blocks]
     smooth, at_points = _smooth_normals(blocks, facet_normals_of_blocks, crease)
-    on_border, first = np.zeros(len(at_points), bool), 0
-    for block in blocks:
-        ends = block.ridges()
-        open_ = beyond[first : first + len(block.nodes), : ends[0].shape[1]] < 0
-        for end in ends:
-            on_border[end[open_]] = True
-        first += len(block.nodes)
+    on_border, last = np.zeros(len(at_points), bool), np.cumsum([len(block.nodes) for block in blocks])
+    for block, neighbours in zip(blocks, np.split(beyond, last[:-1]), strict=True):
+        ends = np.stack(block.ridges(), axis=2)
+        on_border[ends[neighbours[:, : ends.shape[1]] < 0]] = True
     by_block = [normals for normals, _ in facet_normals_of_blocks]
     return SurfaceFacets(blocks, beyond, by_block, smooth, at_points, on_border)
 

@@ -10,6 +10,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.obstacles._facets import Block, SurfaceFacets, surface_facets
 from fastcontact.contact.projection import BESIDE, Closest, closest_of_kinds
+from fastcontact.contact.surface import by_block
 from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
@@ -120,10 +121,10 @@ class MeshedSurface:
         """
         pseudonormal, smooth = closest.normal.copy(), np.empty_like(closest.normal)
         on_edge, on_border = np.zeros(len(pseudonormal), bool), np.zeros(len(pseudonormal), bool)
-        facets, first = self._facets, 0
-        for block, normals in zip(facets.blocks, facets.smooth, strict=True):
-            in_block = np.flatnonzero((closest.facet >= first) & (closest.facet < first + len(block.nodes)))
-            rows, xi = closest.facet[in_block] - first, closest.xi[in_block]
+        facets = self._facets
+        of_blocks = by_block(closest.facet, [len(block.nodes) for block in facets.blocks])
+        for block, normals, (in_block, rows) in zip(facets.blocks, facets.smooth, of_blocks, strict=True):
+            xi = closest.xi[in_block]
             mean = np.einsum("nk,nkd->nd", block.element.shape(xi), normals[rows])
             smooth[in_block] = mean / np.linalg.norm(mean, axis=1, keepdims=True)
             corner, edge = _corners_and_edges(block, xi)
@@ -131,28 +132,24 @@ class MeshedSurface:
             node = block.nodes[rows[at], corner[at]]
             pseudonormal[in_block[at]], on_border[in_block[at]] = facets.at_points[node], facets.on_border[node]
             at = np.flatnonzero(edge >= 0)
-            pseudonormal[in_block[at]] += self._across(block, first, rows[at], edge[at], xi[at])
-            on_border[in_block[at]] = facets.beyond[first + rows[at], edge[at]] < 0
+            beyond = facets.beyond[closest.facet[in_block[at]], edge[at]]
+            pseudonormal[in_block[at]] += self._across(block, rows[at], edge[at], beyond, xi[at])
+            on_border[in_block[at]] = beyond < 0
             on_edge[in_block] = (corner >= 0) | (edge >= 0)
-            first += len(block.nodes)
         return pseudonormal, smooth, on_edge, on_border
 
-    def _across(self, block: Block, first: int, rows: Indices, edge: Indices, xi: Array) -> Array:
-        """Return the normals (n, 3) of the facets beyond edges, at the same points; zero where there is none."""
+    def _across(self, block: Block, rows: Indices, edge: Indices, beyond: Indices, xi: Array) -> Array:
+        """Return the normals (n, 3) of the facets `beyond` edges, at the same points; zero where there is none."""
         ends = np.array(block.element.edges)[edge]
         a, b = block.element.nodes[ends[:, 0]], block.element.nodes[ends[:, 1]]
         along = np.linalg.norm(xi - a, axis=1) / np.linalg.norm(b - a, axis=1)
-        beyond = self._facets.beyond[first + rows, edge]
         directions = np.zeros((len(rows), self.mesh.dim))
-        start = 0
-        for block_beyond, normals in zip(self._facets.blocks, self._facets.normals, strict=True):
-            in_block = np.flatnonzero((beyond >= start) & (beyond < start + len(block_beyond.nodes)))
-            facet = beyond[in_block] - start
+        facets, of_blocks = self._facets, by_block(beyond, [len(block.nodes) for block in self._facets.blocks])
+        for block_beyond, normals, (in_block, facet) in zip(facets.blocks, facets.normals, of_blocks, strict=True):
             for weight, end in ((1.0 - along, ends[:, 0]), (along, ends[:, 1])):
                 node = block.nodes[rows[in_block], end[in_block]]
                 local = np.argmax(block_beyond.nodes[facet] == node[:, None], axis=1)
                 directions[in_block] += weight[in_block, None] * normals[facet, local]
-            start += len(block_beyond.nodes)
         return directions
 
 

@@ -27,17 +27,17 @@ class Tree(NamedTuple):
 
 
 @interpretable_kernel
-def tree_order(points, together):
+def tree_order(points, leaf_size):
     """Return the permutation (n,) that sorts points (n, dim) by recursive bisection along the longest side.
 
     The number of points in the left half is a power of two, so that the facets below a box of the tree form one of these
-    parts. Parts of at most `together` points are not sorted, which suffices to process neighbours one after the other.
+    parts. Parts of at most `leaf_size` points are not sorted, which suffices to process neighbours one after the other.
     """
     n = points.shape[0]
     sorted_, order, size = points.copy(), np.arange(n), 1
     while size < n:
         size *= 2
-    while size > together:
+    while size > leaf_size:
         for begin in range(0, n, size):
             if begin + size // 2 < n:
                 _halve(sorted_, order, begin, begin + size // 2, min(begin + size, n))

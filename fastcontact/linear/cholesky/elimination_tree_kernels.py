@@ -165,16 +165,16 @@ def _joined(
 
 @interpretable_kernel
 def rows_below(
-    start: Numbers, rows: Numbers, order: Numbers, position: Numbers, parent: Numbers, first: Offsets, begin: Offsets,
+    start: Numbers, rows: Numbers, order: Numbers, position: Numbers, parent: Numbers, first: Offsets, row_start: Offsets,
     row_indices: Numbers,
 ) -> None:  # fmt: skip
-    """Fill `row_indices` with the rows below each supernode in ascending order; those of supernode s begin at ``begin[s]``.
+    """Fill `row_indices` with the rows below each supernode s in ascending order, from ``row_start[s]``.
 
     The matrix has its original numbering. In all other arrays columns are numbered in postorder: column k of the factor is
     column ``order[k]`` of the matrix, and `position` is the inverse of `order`.
     """
     n, count = len(order), len(first) - 1
-    members, seen, at = np.empty(n, np.int32), np.full(count, -1, np.int32), begin[:count].copy()
+    members, seen, at = np.empty(n, np.int32), np.full(count, -1, np.int32), row_start[:count].copy()
     for s in range(count):
         members[first[s] : first[s + 1]] = s
     for i in range(n):

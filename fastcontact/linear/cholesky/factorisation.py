@@ -94,17 +94,17 @@ class SymbolicFactors:
         A matrix with this pattern.
     last : ndarray of int (m,)
         Unknowns that are eliminated last.
-    many : bool, optional
+    repeated : bool, optional
         Whether many matrices will be factorised, so that it pays off to compute two orders and choose the better one.
     """
 
-    def __init__(self, K: bsr_array, last: Indices, many: bool = False) -> None:
+    def __init__(self, K: bsr_array, last: Indices, repeated: bool = False) -> None:
         n, is_last = K.shape[0], np.zeros(K.shape[0], bool)
         self._pattern, self._last = (K.indptr, K.indices), last
         self._previous = Previous(np.empty(0), np.empty(0, np.int64), NO_FACTORS)
         self._numbers: csc_array | None = None
         self._first: csc_array | None
-        orders = [fill_reducing(K, last, connected) for connected in (False, True)[: 1 + many]]
+        orders = [fill_reducing(K, last, connected) for connected in (False, True)[: 1 + repeated]]
         analysed = [(order, A := reordered(K, order), elimination_tree(A)) for order in orders]
         order, self._first, self._tree = min(analysed, key=lambda entry: np.square(entry[2].entries, dtype=float).sum())
         self._unknowns, self._position = order[self._tree.order], np.empty(n, np.intp)
@@ -128,10 +128,10 @@ class SymbolicFactors:
             If K is singular or not positive definite.
         """
         (A, *permutation), nodes, n = self._numbered(K), self._supernodes, K.shape[0]
-        width, below = np.diff(nodes.first), np.diff(nodes.begin)
+        width, below = np.diff(nodes.first), np.diff(nodes.row_start)
         start = np.concatenate([[0], np.cumsum(np.repeat(nodes.first[1:] + below, width) - np.arange(n))])
         values, d = np.empty(start[-1]), np.empty(n)
-        sizes = factorisation_kernels.work_sizes(self._tree.parent, nodes.first, nodes.begin)
+        sizes = factorisation_kernels.work_sizes(self._tree.parent, nodes.first, nodes.row_start)
         source, target, updates = self._planned(A, permutation[0])
         failed = factorisation_kernels.factorise(
             A.indptr, A.indices, A.data, *permutation, self._tree.parent, *nodes, sizes, start,
@@ -151,7 +151,7 @@ class SymbolicFactors:
         source, target = np.full((2, len(self._parent)), -1)
         if len(previous.entries):
             size = factorisation_kernels.plan(
-                A.indptr, A.data, previous.entries, order, self._parent, nodes.first, nodes.begin, previous.offsets,
+                A.indptr, A.data, previous.entries, order, self._parent, nodes.first, nodes.row_start, previous.offsets,
                 source, target,
             )  # fmt: skip
         return source, target, np.empty(size)
@@ -199,14 +199,14 @@ class Supernodes(NamedTuple):
     ----------
     first : ndarray of int (n_supernodes + 1,)
         First column of each supernode.
-    begin : ndarray of int (n_supernodes + 1,)
+    row_start : ndarray of int (n_supernodes + 1,)
         Offset of the rows of each supernode in `rows`.
     rows : ndarray of int
         Rows below the columns of the supernodes.
     """
 
     first: NDArray[np.int64]
-    begin: NDArray[np.int64]
+    row_start: NDArray[np.int64]
     rows: Numbers
 
 
@@ -227,7 +227,8 @@ def supernodes(A: csc_array, tree: Tree, is_last: Mask) -> Supernodes:
     n = A.shape[0]
     first, below = np.empty(n + 1, np.int64), np.empty(n + 1, np.int64)
     count = elimination_tree_kernels.supernodes(tree.parent, tree.entries, is_last, WIDTHS, SHARES, first, below)
-    first, begin = first[: count + 1].copy(), np.concatenate([[0], np.cumsum(below[:count])])
-    rows = np.empty(begin[-1], np.intc)
-    elimination_tree_kernels.rows_below(A.indptr, A.indices, tree.order, tree.position, tree.parent, first, begin, rows)
-    return Supernodes(first, begin, rows)
+    first, row_start = first[: count + 1].copy(), np.concatenate([[0], np.cumsum(below[:count])])
+    rows = np.empty(row_start[-1], np.intc)
+    order, position, parent = tree.order, tree.position, tree.parent
+    elimination_tree_kernels.rows_below(A.indptr, A.indices, order, position, parent, first, row_start, rows)
+    return Supernodes(first, row_start, rows)

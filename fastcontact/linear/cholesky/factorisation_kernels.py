@@ -17,23 +17,23 @@ from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.cholesky.triangular_kernels import PANEL, Offsets
 
 # Number of columns of L whose contributions are subtracted in one pass.
-TOGETHER = 4
+COLUMNS_PER_PASS = 4
 # Smallest number of multiplications for which a matrix product is computed by BLAS.
-SMALL = 20_000
+BLAS_THRESHOLD = 20_000
 
 
 @interpretable_kernel
-def work_sizes(parent: Numbers, first: Offsets, begin: Offsets) -> tuple[int, int]:
+def work_sizes(parent: Numbers, first: Offsets, row_start: Offsets) -> tuple[int, int]:
     """Return the numbers of entries of the largest front, and of the stack of update matrices at its peak."""
     count = len(first) - 1
     largest_front = peak = used = top = 0
     stacked = np.empty(count, np.int64)  # supernodes whose update matrix is on the stack
     for s in range(count):
-        below = begin[s + 1] - begin[s]
+        below = row_start[s + 1] - row_start[s]
         largest_front = max(largest_front, (first[s + 1] - first[s] + below) ** 2)
         while top > 0 and first[s] <= parent[first[stacked[top - 1] + 1] - 1] < first[s + 1]:
             top -= 1
-            used -= (begin[stacked[top] + 1] - begin[stacked[top]]) ** 2
+            used -= (row_start[stacked[top] + 1] - row_start[stacked[top]]) ** 2
         if below:
             stacked[top] = s
             top += 1
@@ -44,25 +44,25 @@ def work_sizes(parent: Numbers, first: Offsets, begin: Offsets) -> tuple[int, in
 
 @kernel
 def plan(
-    start: Numbers, values: Array, previous: Array, order: Numbers, supernode_parent: Offsets, first: Offsets, begin: Offsets,
-    kept_offsets: Offsets, source: Offsets, target: Offsets,
+    start: Numbers, values: Array, previous: Array, order: Numbers, supernode_parent: Offsets, first: Offsets,
+    row_start: Offsets, previous_offsets: Offsets, reused_offsets: Offsets, saved_offsets: Offsets,
 ) -> int:  # fmt: skip
     """Plan the factorisation of a matrix whose pattern is that of the previous one; return the size of the updates to keep.
 
     Parameters
     ----------
-    start, order, first, begin
+    start, order, first, row_start
         See `factorise`.
     values, previous : ndarray
         Entries of the new and of the previous matrix.
     supernode_parent : ndarray of int (n_supernodes,)
         Parents of supernodes, or -1.
-    kept_offsets : ndarray of int (n_supernodes,)
+    previous_offsets : ndarray of int (n_supernodes,)
         Offsets of the update matrices that were kept from the previous factorisation, or -1.
-    source : ndarray of int (n_supernodes,)
+    reused_offsets : ndarray of int (n_supernodes,)
         Filled with -1 for supernodes that are factorised. In subtrees that keep their columns, the root is assigned the
         offset of its update matrix, and the other supernodes -2.
-    target : ndarray of int (n_supernodes,)
+    saved_offsets : ndarray of int (n_supernodes,)
         Filled with the offsets of the update matrices to keep, which are those of the roots of the largest subtrees without
         a change, or -1.
     """
@@ -76,22 +76,22 @@ def plan(
             changed[supernode_parent[s]] = True
     for s in range(count - 1, -1, -1):
         root = supernode_parent[s] < 0
-        source[s], target[s] = -1, -1
-        if not root and source[supernode_parent[s]] != -1:
-            source[s] = -2
+        reused_offsets[s], saved_offsets[s] = -1, -1
+        if not root and reused_offsets[supernode_parent[s]] != -1:
+            reused_offsets[s] = -2
         elif not changed[s]:
-            source[s] = kept_offsets[s]
+            reused_offsets[s] = previous_offsets[s]
         if not changed[s] and (root or changed[supernode_parent[s]]):
-            target[s] = size
-            size += (begin[s + 1] - begin[s]) ** 2
+            saved_offsets[s] = size
+            size += (row_start[s + 1] - row_start[s]) ** 2
     return size
 
 
 @kernel
 def factorise(
     start: Numbers, rows: Numbers, values: Array, order: Numbers, position: Numbers, parent: Numbers, first: Offsets,
-    begin: Offsets, below: Numbers, sizes: tuple[int, int], begins: Offsets,
-    source: Offsets, previous: tuple[Array, Array, Array], target: Offsets, updates: Array, L: Array, d: Array,
+    row_start: Offsets, below: Numbers, sizes: tuple[int, int], column_start: Offsets,
+    reused_offsets: Offsets, previous: tuple[Array, Array, Array], saved_offsets: Offsets, updates: Array, L: Array, d: Array,
 ) -> int:  # fmt: skip
     """Fill L and `d` (n,); return -1, or the first column with a pivot that is not positive, which is then in `d`.
 
@@ -104,13 +104,13 @@ def factorise(
         Columns of the matrix in the order of elimination, and the inverse.
     parent : ndarray of int (n,)
         Elimination tree.
-    first, begin, below
+    first, row_start, below
         Supernodes and the rows below them, as in `triangular_kernels`.
     sizes : (int, int)
         See `work_sizes`.
-    begins : ndarray of int (n + 1,)
+    column_start : ndarray of int (n + 1,)
         Offsets of the columns of L.
-    source, target : ndarray of int (n_supernodes,)
+    reused_offsets, saved_offsets : ndarray of int (n_supernodes,)
         See `plan`.
     previous : (ndarray, ndarray, ndarray)
         L, `d` and `updates` of the previous factorisation.
@@ -127,19 +127,19 @@ def factorise(
     # Work space for a panel, the panel multiplied by its pivots, and the product of both.
     widest = 0
     for s in range(count):
-        widest = max(widest, first[s + 1] - first[s] + begin[s + 1] - begin[s])
+        widest = max(widest, first[s + 1] - first[s] + row_start[s + 1] - row_start[s])
     panel, scaled_panel, product = np.empty(PANEL * widest), np.empty(PANEL * widest), np.empty(2 * PANEL * widest)
     top = used = 0
     for s in range(count):
-        low, high, rows_below = first[s], first[s + 1], below[begin[s] : begin[s + 1]]
+        low, high, rows_below = first[s], first[s + 1], below[row_start[s] : row_start[s + 1]]
         m = len(rows_below)
-        if source[s] == -1:
+        if reused_offsets[s] == -1:
             size = high - low + m
             F = front[: size * size].reshape(size, size)
             _gather(start, rows, values, order, position, low, high, rows_below, local, F)
             while top > 0 and low <= parent[first[stacked[top - 1] + 1] - 1] < high:
                 top -= 1
-                child = below[begin[stacked[top]] : begin[stacked[top] + 1]]
+                child = below[row_start[stacked[top]] : row_start[stacked[top] + 1]]
                 n = len(child)
                 used -= n * n
                 _add(stack[used : used + n * n].reshape(n, n), child, local, F)
@@ -147,15 +147,15 @@ def factorise(
             if failed >= 0:
                 d[low + failed] = F[failed, failed]
                 return low + failed
-            _store(F, low, high - low, begins, L, d, stack[used : used + m * m].reshape(m, m))
+            _store(F, low, high - low, column_start, L, d, stack[used : used + m * m].reshape(m, m))
         else:
-            _copy(previous[0], begins[low], L, begins[low], begins[high] - begins[low])
+            _copy(previous[0], column_start[low], L, column_start[low], column_start[high] - column_start[low])
             _copy(previous[1], low, d, low, high - low)
-            if source[s] == -2:
+            if reused_offsets[s] == -2:
                 continue
-            _copy(previous[2], source[s], stack, used, m * m)
-        if target[s] >= 0:
-            _copy(stack, used, updates, target[s], m * m)
+            _copy(previous[2], reused_offsets[s], stack, used, m * m)
+        if saved_offsets[s] >= 0:
+            _copy(stack, used, updates, saved_offsets[s], m * m)
         if m:
             stacked[top] = s
             top += 1
@@ -191,12 +191,12 @@ def _gather(
 
 
 @kernel
-def _store(F: Array, low: int, width: int, begins: Offsets, L: Array, d: Array, update: Array) -> None:
+def _store(F: Array, low: int, width: int, column_start: Offsets, L: Array, d: Array, update: Array) -> None:
     """Move the eliminated columns of a front to L and `d`, and the update matrix to `update` (m, m)."""
     size = len(F)
     for j in range(width):
         d[low + j] = F[j, j]
-        at = begins[low + j]
+        at = column_start[low + j]
         L[at] = 1.0
         for k in range(j + 1, size):
             L[at + k - j] = F[j, k]
@@ -224,8 +224,8 @@ def _eliminated(F: Array, width: int, panel: Array, scaled_panel: Array, product
     size = len(F)
     for begin in range(0, width, PANEL):
         end = min(begin + PANEL, width)
-        for low in range(begin, end, TOGETHER):
-            high = min(low + TOGETHER, end)
+        for low in range(begin, end, COLUMNS_PER_PASS):
+            high = min(low + COLUMNS_PER_PASS, end)
             for j in range(low, high):
                 if not F[j, j] > 0.0:
                     return j
@@ -236,11 +236,11 @@ def _eliminated(F: Array, width: int, panel: Array, scaled_panel: Array, product
                 for k in range(j + 1, size):
                     F[j, k] /= pivot
         m = size - end
-        if (end - begin) * m * m >= SMALL:
+        if (end - begin) * m * m >= BLAS_THRESHOLD:
             _reduced_by_blocks(F, begin, end, panel, scaled_panel, product)
         else:
-            for low in range(begin, end, TOGETHER):
-                _subtract(F, low, min(low + TOGETHER, end), end, size, True)
+            for low in range(begin, end, COLUMNS_PER_PASS):
+                _subtract(F, low, min(low + COLUMNS_PER_PASS, end), end, size, True)
     return -1
 
 
@@ -248,11 +248,11 @@ def _eliminated(F: Array, width: int, panel: Array, scaled_panel: Array, product
 def _subtract(F: Array, low: int, high: int, begin: int, end: int, scaled: bool) -> None:
     """Subtract the contribution of the columns `low` to ``high - 1`` of L from the rows `begin` to ``end - 1`` of a front.
 
-    `scaled` is true if these columns have been divided by their pivots. `TOGETHER` columns are subtracted in one pass.
+    `scaled` is true if these columns have been divided by their pivots. One pass subtracts `COLUMNS_PER_PASS` columns.
     """
     size = len(F)
     for i in range(begin, end):
-        if high - low == TOGETHER:
+        if high - low == COLUMNS_PER_PASS:
             a, b = _factor(F, low, i, scaled), _factor(F, low + 1, i, scaled)
             c, d = _factor(F, low + 2, i, scaled), _factor(F, low + 3, i, scaled)
             for k in range(i, size):

@@ -13,7 +13,7 @@ from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.linear.cholesky import triangular_kernels
 
 # Largest number of right-hand sides that are solved for together.
-TOGETHER = 128
+BATCH = 128
 
 
 class LowerTriangle(NamedTuple):
@@ -22,7 +22,7 @@ class LowerTriangle(NamedTuple):
     start: NDArray[np.int64]
     values: Array
     first: NDArray[np.int64]
-    begin: NDArray[np.int64]
+    row_start: NDArray[np.int64]
     rows: Numbers
 
 
@@ -68,7 +68,7 @@ class SymmetricFactors:
         at_rows, at_columns = self._position[rows], self._position[columns]
         # Neighbouring columns of the factors have common ancestors in the elimination tree.
         entries, order = np.empty((len(rows), len(columns))), np.argsort(at_columns)
-        size = min(TOGETHER, max(1, self.nnz // self.n))  # the right-hand sides take no more memory than the factors
+        size = min(BATCH, max(1, self.nnz // self.n))  # the right-hand sides take no more memory than the factors
         for batch in (order[begin : begin + size] for begin in range(0, len(order), size)):
             X, loaded, required = np.zeros((self.n, len(batch))), np.zeros(self.n, bool), np.zeros(self.n, bool)
             X[at_columns[batch], np.arange(len(batch))] = 1.0

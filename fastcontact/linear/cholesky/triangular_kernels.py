@@ -3,7 +3,7 @@
 
 L (n, n) is lower triangular with a unit diagonal and stored by columns: column j is ``values[start[j] : start[j + 1]]``,
 with the diagonal first. The columns ``first[s]`` to ``first[s + 1] - 1`` of supernode s share the rows
-``rows[begin[s] : begin[s + 1]]`` below them; their diagonal block is full.
+``rows[row_start[s] : row_start[s + 1]]`` below them; their diagonal block is full.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ PANEL = 48
 
 @interpretable_kernel
 def block(
-    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, index: Offsets, out: Array
+    start: Offsets, values: Array, first: Offsets, row_start: Offsets, rows: Numbers, index: Offsets, out: Array
 ) -> None:
     """Copy the requested rows and columns of L to `out` (m, m), which is initially zero.
 
@@ -36,18 +36,18 @@ def block(
             for i in range(j, high):
                 if index[i] >= 0:
                     out[index[i], index[j]] = values[start[j] + i - j]
-            for k in range(begin[s], begin[s + 1]):
+            for k in range(row_start[s], row_start[s + 1]):
                 if index[rows[k]] >= 0:
-                    out[index[rows[k]], index[j]] = values[start[j] + high - j + k - begin[s]]
+                    out[index[rows[k]], index[j]] = values[start[j] + high - j + k - row_start[s]]
 
 
 @interpretable_kernel
-def forward(start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, x: Array) -> None:
+def forward(start: Offsets, values: Array, first: Offsets, row_start: Offsets, rows: Numbers, x: Array) -> None:
     """Replace x (n,) by ``L^-1 x``."""
     change = np.empty(len(x))
     for s in range(len(first) - 1):
         low, high = first[s], first[s + 1]
-        below = begin[s + 1] - begin[s]
+        below = row_start[s + 1] - row_start[s]
         j = low
         while j < high and x[j] == 0.0:  # right-hand sides are often sparse
             j += 1
@@ -63,12 +63,12 @@ def forward(start: Offsets, values: Array, first: Offsets, begin: Offsets, rows:
             for k in range(below):
                 change[k] += values[at + k] * xj
         for k in range(below):
-            x[rows[begin[s] + k]] -= change[k]
+            x[rows[row_start[s] + k]] -= change[k]
 
 
 @summing_kernel
 def backward(
-    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, given: Mask, x: Array
+    start: Offsets, values: Array, first: Offsets, row_start: Offsets, rows: Numbers, given: Mask, x: Array
 ) -> None:
     """Replace x (n,) by the solution of ``L.T y = x`` in which the entries `given` (n,) keep their values.
 
@@ -82,9 +82,9 @@ def backward(
             j -= 1
         if j < low:
             continue
-        below = begin[s + 1] - begin[s]
+        below = row_start[s + 1] - row_start[s]
         for k in range(below):
-            gathered[k] = x[rows[begin[s] + k]]
+            gathered[k] = x[rows[row_start[s] + k]]
         # Columns are processed in pairs that read the same entries of x. The last column may be single.
         while j >= low:
             single = j == low
@@ -109,7 +109,7 @@ def backward(
 
 @kernel
 def solve_together(
-    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, d: Array, loaded: Mask, required: Mask,
+    start: Offsets, values: Array, first: Offsets, row_start: Offsets, rows: Numbers, d: Array, loaded: Mask, required: Mask,
     X: Array,
 ) -> None:  # fmt: skip
     """Replace the rows `required` of X (n, k) by those of ``(L D L.T)^-1 X``, for all k columns at once.
@@ -120,25 +120,25 @@ def solve_together(
     """
     widest = 0
     for s in range(len(first) - 1):
-        widest = max(widest, first[s + 1] - first[s] + begin[s + 1] - begin[s])
+        widest = max(widest, first[s + 1] - first[s] + row_start[s + 1] - row_start[s])
     room, below = np.empty(PANEL * widest), np.empty(widest, np.int64)
     beside, product = np.empty((widest, X.shape[1])), np.empty((PANEL, X.shape[1]))
-    reached = _reached(first, begin, rows, loaded)
+    reached = _reached(first, row_start, rows, loaded)
     for s in range(len(reached)):
         for low in range(first[s], first[s + 1] if reached[s] else first[s], PANEL):
             high = min(low + PANEL, first[s + 1])
             for j in range(low, high):
                 for i in range(j + 1, high):
                     X[i] -= values[start[j] + i - j] * X[j]
-            size = _copied(start, values, low, high, first[s + 1], rows[begin[s] : begin[s + 1]], room, below)
+            size = _copied(start, values, low, high, first[s + 1], rows[row_start[s] : row_start[s + 1]], room, below)
             np.dot(room[: (high - low) * size].reshape(high - low, size).T, X[low:high], beside[:size])
             for k in range(size):
                 X[below[k]] -= beside[k]
-    reached = _reached(first, begin, rows, required)
+    reached = _reached(first, row_start, rows, required)
     for s in range(len(reached) - 1, -1, -1):
         for high in range(first[s + 1], first[s] if reached[s] else first[s + 1], -PANEL):
             low = max(high - PANEL, first[s])
-            size = _copied(start, values, low, high, first[s + 1], rows[begin[s] : begin[s + 1]], room, below)
+            size = _copied(start, values, low, high, first[s + 1], rows[row_start[s] : row_start[s + 1]], room, below)
             for k in range(size):
                 beside[k] = X[below[k]]
             np.dot(room[: (high - low) * size].reshape(high - low, size), beside[:size], product[: high - low])
@@ -149,7 +149,7 @@ def solve_together(
 
 
 @kernel
-def _reached(first: Offsets, begin: Offsets, rows: Numbers, marked: Mask) -> Mask:
+def _reached(first: Offsets, row_start: Offsets, rows: Numbers, marked: Mask) -> Mask:
     """Return which supernodes (n_supernodes,) contain `marked` columns (n,), or have descendants that do.
 
     Descendants and ancestors are those in the elimination tree. All ancestors of marked columns are marked as well.
@@ -158,23 +158,23 @@ def _reached(first: Offsets, begin: Offsets, rows: Numbers, marked: Mask) -> Mas
     for s in range(len(reached)):
         reached[s] = marked[first[s] : first[s + 1]].any()
         if reached[s]:
-            for k in range(begin[s], begin[s + 1]):
+            for k in range(row_start[s], row_start[s + 1]):
                 marked[rows[k]] = True
     return reached
 
 
 @kernel
 def _copied(
-    start: Offsets, values: Array, low: int, high: int, end: int, rest: Numbers, panel: Array, below: Offsets
+    start: Offsets, values: Array, low: int, high: int, end: int, rows_below: Numbers, panel: Array, below: Offsets
 ) -> int:
     """Copy columns `low` to ``high - 1`` of L, from row `high` on, to `panel` one by one; return their length.
 
-    The numbers of these rows are written to `below`: `high` to ``end - 1`` in the same supernode, then `rest`.
+    The numbers of these rows are written to `below`: `high` to ``end - 1`` in the same supernode, then `rows_below`.
     """
-    size = end - high + len(rest)
+    size = end - high + len(rows_below)
     for j in range(low, high):
         for k in range(size):
             panel[(j - low) * size + k] = values[start[j] + high - j + k]
     for k in range(size):
-        below[k] = high + k if high + k < end else rest[high + k - end]
+        below[k] = high + k if high + k < end else rows_below[high + k - end]
     return size

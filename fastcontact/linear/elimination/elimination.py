@@ -41,7 +41,7 @@ class Elimination:
         is B [-].
     inverse : SparseInverse or CoupledPivots
         Inverse of the columns of F that belong to the pivots.
-    own : SparseInverse or CoupledPivots
+    pivot_inverse : SparseInverse or CoupledPivots
         P^-1, the inverse of the columns of B that belong to the pivots; equal to `inverse` if F is B.
     compliance : ndarray (m,), optional
         Compliance of the equations, ``B u + compliance * multiplier = c`` [length / force].
@@ -52,13 +52,13 @@ class Elimination:
     offset: Array
     force_weights: csr_array
     inverse: Inverse = NONE
-    own: Inverse = NONE
+    pivot_inverse: Inverse = NONE
     compliance: Array | None = None
 
     @property
     def coupled(self) -> bool:
         """Whether pivots are coupled: equations of many nodes involve each other's pivots."""
-        return isinstance(self.own, CoupledPivots)
+        return isinstance(self.pivot_inverse, CoupledPivots)
 
     @cached_property
     def _entry_equations(self) -> tuple[Indices, Indices]:
@@ -75,7 +75,7 @@ class Elimination:
         W, m = self.weights, len(self.pivots)
         x[self.pivots] = np.bincount(self._entry_equations[0], W.data * x[W.indices], m)  # sums in double precision
         if self.coupled:
-            x[self.pivots] = self.own.solve(x[self.pivots])
+            x[self.pivots] = self.pivot_inverse.solve(x[self.pivots])
         if offset is not None:
             x[self.pivots] += offset
 
@@ -92,15 +92,15 @@ class Elimination:
         if not self.coupled:
             return self.weights
         columns = np.unique(self.weights.indices)
-        full = csr_array(self.own.solve(self.weights[:, columns].toarray()))
+        full = csr_array(self.pivot_inverse.solve(self.weights[:, columns].toarray()))
         return csr_array((full.data, columns[full.indices], full.indptr), shape=self.weights.shape)
 
     def with_sparse_weights(self) -> Elimination:
         """Return an elimination with sparse weights for a preconditioner: an approximation if pivots are coupled."""
         if not self.coupled:
             return self
-        weights = _weighted(self.own.sparse, self.weights)
-        return Elimination(self.pivots, weights, np.zeros(len(self.pivots)), weights, self.own.sparse)
+        weights = _weighted(self.pivot_inverse.sparse, self.weights)
+        return Elimination(self.pivots, weights, np.zeros(len(self.pivots)), weights, self.pivot_inverse.sparse)
 
 
 def eliminate(

@@ -20,7 +20,7 @@ from fastcontact.round_off import SUM_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
 # Ratio of a reduced tolerance to the tolerance at which the residual is expected to reach its bound.
-LEFT = 0.1
+REDUCTION = 0.1
 
 
 class LoadedIteration:
@@ -87,7 +87,7 @@ def tighten(solver: LinearSolver, excess: float) -> bool:
 
     Return False if the tolerance is already as small as round-off permits.
     """
-    tolerance = max(solver.tolerance * LEFT / excess, SUM_ROUND_OFF)
+    tolerance = max(solver.tolerance * REDUCTION / excess, SUM_ROUND_OFF)
     if not tolerance < solver.tolerance:
         return False
     log.info(

@@ -126,11 +126,9 @@ def invert_blocks(blocks, size, out):
             idle = not (a[p, p] > 1e-10 * pivot_before and pivot_before > 1e-12 * largest)
             if idle:
                 for k in range(size):
-                    a[k, p] = a[p, k] = 0.0
+                    a[k, p] = a[k, size + p] = 0.0
                 for k in range(2 * size):
                     a[p, k] = 0.0
-                for k in range(size):
-                    a[k, size + p] = 0.0
                 continue
             pivot = 1.0 / a[p, p]
             for k in range(2 * size):

@@ -22,7 +22,7 @@ from scipy.sparse import csr_matrix
 from fastcontact._jit.parallel import parallel_for
 from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
-from fastcontact.linear.multigrid.level import COARSEST, DEGREE, SAFETY, Coarse, Level, chebyshev, largest_eigenvalue
+from fastcontact.linear.multigrid.level import COARSEST, SAFETY, CoarseLevel, Level, chebyshev, largest_eigenvalue
 from fastcontact.linear.multigrid.matrix import ALL, WORK_OF_ROW, BlockMatrix, pointers
 
 
@@ -42,7 +42,7 @@ class Hierarchy:
         Number of unknowns of the finest level.
     levels : list of Level
         Levels, beginning with the finest.
-    coarse : Coarse
+    coarse : CoarseLevel
         Direct solver of the coarsest level.
     """
 
@@ -58,7 +58,7 @@ class Hierarchy:
                 break
             level.P, level.R, A, modes = coarser
             del coarser
-        self.coarse = Coarse(A.to_scipy().tocsc())
+        self.coarse = CoarseLevel(A.to_scipy().tocsc())
         self._free_bounds = [level.bound for level in self.levels]
         self.set_bounds()
 
@@ -73,7 +73,7 @@ class Hierarchy:
         new, finest = copy.copy(self), self._level(A)
         finest.P, finest.R = self.levels[0].P, self.levels[0].R
         new.levels = [finest, *(level.without_equations() for level in self.levels[1:])]
-        new.coarse = Coarse(self.coarse.matrix)
+        new.coarse = CoarseLevel(self.coarse.matrix)
         new._free_bounds = [finest.bound, *self._free_bounds[1:]]
         new.set_bounds()
         return new
@@ -149,7 +149,7 @@ class Hierarchy:
     def bounds(self, values: Sequence[float]) -> None:
         for level, bound in zip(self.levels, values, strict=True):
             level.bound = bound
-        self._factors = [chebyshev(bound, DEGREE) for bound in values]
+        self._factors = [chebyshev(bound) for bound in values]
 
     def raise_bounds(self, factor: float) -> None:
         """Multiply the bounds of the smoothers by `factor`, until the next call of `set_bounds`."""

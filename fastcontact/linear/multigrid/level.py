@@ -103,13 +103,13 @@ class Level:
     def relax(self, r: AnyArray, first: float, second: float, begin: bool = False) -> None:
         """Change `x` by a Chebyshev step for the residual r (n,), see `cycle_kernels.relax`, then its eliminated unknowns."""
         real = r.dtype.type
-        self.scale(r, real(first), real(second), self.d, self.x, begin)
+        self.chebyshev_step(r, real(first), real(second), self.d, self.x, begin)
         if self.free_motions is not None:
             self.free_motions.correct(r, second, self.d, self.x)
         if self.eliminated is not None:
             self.eliminated.complete(self.x)
 
-    def scale(
+    def chebyshev_step(
         self, r: AnyArray, first: np.floating, second: np.floating, d: AnyArray, x: AnyArray, begin: bool
     ) -> None:
         """Apply `cycle_kernels.relax` to the last step `d` (n,) and the iterate `x` (n,), in place, without corrections."""
@@ -157,7 +157,7 @@ class Level:
         return total + sum(A.nbytes for A in (self.P, self.R) if A is not None)
 
 
-def chebyshev(bound: float, degree: int) -> list[tuple[float, float]]:
+def chebyshev(bound: float, degree: int = DEGREE) -> list[tuple[float, float]]:
     """Return the coefficients of `degree` Chebyshev steps for eigenvalues between ``SMOOTHED * bound`` and `bound`.
 
     The coefficients of a step multiply the last step and the preconditioned residual, see `cycle_kernels.relax`.
@@ -187,7 +187,7 @@ def largest_eigenvalue(level: Level) -> float:
     old_alpha, beta, rz = 1.0, 0.0, 0.0
     real = r.dtype.type
     for step in range(min(LANCZOS_STEPS, level.n)):
-        level.scale(r, real(0), real(1), scratch, z, True)
+        level.chebyshev_step(r, real(0), real(1), scratch, z, True)
         if level.free_motions is not None:
             level.free_motions.correct(r, 1.0, scratch, z)
         if level.eliminated is not None:
@@ -209,7 +209,7 @@ def largest_eigenvalue(level: Level) -> float:
     return float(np.linalg.eigvalsh(T).max()) if diagonal else 1.0
 
 
-class Coarse:
+class CoarseLevel:
     """Direct solver for a symmetric positive semidefinite matrix; unknowns without stiffness are set to zero.
 
     Parameters

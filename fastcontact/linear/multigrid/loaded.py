@@ -21,7 +21,7 @@ from fastcontact.linear.elimination.pivot_order import RepeatedError
 from fastcontact.linear.field_compliance import FieldCompliance, FieldEquations
 from fastcontact.linear.multigrid.border import Border
 from fastcontact.linear.protocol import MILD, FrictionTerms, Monitor
-from fastcontact.linear.sparse_rows import scaled
+from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
@@ -136,8 +136,7 @@ class LoadedMultigrid(LoadedIteration):
         """
         size = self._solver.K.blocksize[0]
         if C is None or not C.any():
-            elimination = eliminate(B, c, through, nodes, size) if len(c) else None
-            return _Parts(np.ones(len(c), bool), elimination, None)
+            return _Parts.of(B, c, np.zeros(len(c)), np.ones(len(c), bool), nodes, size, through)
         diagonal = self._solver.diagonal()
         flexibility = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         softness = B.multiply(B) @ flexibility
@@ -175,14 +174,12 @@ class _Parts:
         For parameters see `eliminate` and `LoadedMultigrid._parts`. A RepeatedError is raised if the eliminated ones are
         linearly dependent.
         """
-        if stiff.all():
-            elimination = eliminate(B, c, through, nodes, size) if len(c) else None
-        else:
-            rows, force_rows = csr_array(B[stiff]), None if through is None else csr_array(through[stiff])
-            nodes_of_rows = None if nodes is None else nodes[stiff]
-            elimination = eliminate(rows, c[stiff], force_rows, nodes_of_rows, size) if stiff.any() else None
-        if elimination is not None and C[stiff].any():
-            elimination = dataclasses.replace(elimination, compliance=C[stiff])
+        rows, elimination = np.flatnonzero(stiff), None
+        if len(rows):
+            force_rows, nodes_of_rows = (None if a is None else taken(a, rows) for a in (through, nodes))
+            elimination = eliminate(taken(B, rows), c[rows], force_rows, nodes_of_rows, size)
+            if C[rows].any():
+                elimination = dataclasses.replace(elimination, compliance=C[rows])
         if stiff.all():
             return cls(stiff, elimination, None)
         force_rows = None if through is None else csr_array(through[~stiff])

@@ -62,10 +62,7 @@ class LocalChange:
 
     def scattered(self, n: int) -> csc_array:
         """Return the change as a matrix (n, n) of all unknowns."""
-        change, count = self.blocks, np.zeros(n // self.size, np.intp)
-        count[self.nodes] = np.diff(change.indptr)
-        indptr = np.r_[0, np.cumsum(count)]
-        return bsr_array((change.data, self.nodes[change.indices], indptr), shape=(n, n)).tocsc()
+        return self.spread(np.arange(n // self.size)).tocsc()
 
     def spread(self, nodes: Indices) -> bsr_array:
         """Return `blocks` with zero rows and columns added for a superset `nodes` (l,), in ascending order."""

@@ -133,7 +133,7 @@ class _Excess:
         compliant, self._compliance = compliance > 0.0, compliance
         self._stiffness = np.divide(1.0, compliance, out=np.zeros(len(compliance)), where=compliant)
         # Diagonal of the operator at the excesses: the stiffness of the equation plus that of the pivot.
-        of_pivots = elimination.own.sparse.matrix.power(2).T @ diagonal[self._pivots]
+        of_pivots = elimination.pivot_inverse.sparse.matrix.power(2).T @ diagonal[self._pivots]
         self._inverse = np.where(compliant, 1.0 / (self._stiffness + of_pivots), 0.0)
         self._compliant = compliant
         self._u = np.empty(len(diagonal))
@@ -144,7 +144,7 @@ class _Excess:
 
     def displacement(self, x: Array, offset: Array | None) -> Array:
         """Return the displacements (n,) of x (n,) [length]; the `offset` (m,) of the pivots is added if it is given."""
-        shift = self._elimination.own.solve(x[self._pivots])
+        shift = self._elimination.pivot_inverse.solve(x[self._pivots])
         u = self._u
         u[:] = x
         self._elimination.complete(u, shift if offset is None else shift + offset)

@@ -90,8 +90,8 @@ def followers(elimination: Elimination, nodes: Indices, size: int) -> Eliminatio
     # Displacement of each pivot due to unit translations of the opposite side along each direction.
     translation = csr_array((W.data[is_opposite], (W.row[is_opposite], direction[is_opposite])), shape=(m, size))
     moved = np.asarray((mean @ translation).toarray())
-    enough = moved[np.arange(len(unknowns)), unknowns % size] >= LEAST * np.asarray(mean.sum(axis=1))
-    unknowns, mean, moved = unknowns[enough], csr_array(mean[enough]), moved[enough]
+    moved_enough = moved[np.arange(len(unknowns)), unknowns % size] >= LEAST * np.asarray(mean.sum(axis=1))
+    unknowns, mean, moved = unknowns[moved_enough], csr_array(mean[moved_enough]), moved[moved_enough]
     of_pivots = csr_array((-W.data[~is_opposite], (W.row[~is_opposite], W.col[~is_opposite])), shape=(m, n))
     of_pivots = of_pivots + csr_array((np.ones(m), pivots, np.arange(m + 1)), shape=(m, n))
     dofs_of_nodes = unknowns[:, None] // size * size + np.arange(size)

@@ -52,8 +52,8 @@ def by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Arr
     last[first[1:] - 1] = True
     shared = np.repeat(last, entries)
     shared[start[:-1]] = False
-    begin = np.concatenate([[0], np.cumsum(entries[last] - 1)])
-    return LowerTriangle(start, values, first, begin, rows[shared].astype(np.intc))
+    row_start = np.concatenate([[0], np.cumsum(entries[last] - 1)])
+    return LowerTriangle(start, values, first, row_start, rows[shared].astype(np.intc))
 
 
 def lower_triangle(K: csr_array) -> Any:

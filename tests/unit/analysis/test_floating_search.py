@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, plates
+from models import elastic_model, plates, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -32,11 +32,11 @@ def solution(elongation, settled=True):
 def test_a_contact_problem_that_does_not_settle_is_returned():
     calls = []
 
-    def solve_at(position):
-        calls.append(position)
-        return solution(1.0 - position[0], settled=len(calls) != 2)
+    def solve_at(anchor):
+        calls.append(anchor)
+        return solution(1.0 - anchor[0], settled=len(calls) != 2)
 
-    found = bodies_at(DOFS).settle(lambda position: solve_at(0.5 * position), None, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
+    found = bodies_at(DOFS).settle(lambda anchor: solve_at(0.5 * anchor), None, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
     assert not found.slack
     assert not found.state.settled
     assert found.state.iterations == found.positions == len(calls) == 2
@@ -46,13 +46,13 @@ def test_anchors_follow_what_contact_holds():
     """A body of stiffness 1e3 beside its springs: each solution leaves a thousandth of their forces."""
     held, load = 1e3 * np.array([[2.0, 0.5, 0.0], [0.5, 1.0, 0.2], [0.0, 0.2, 0.7]]), np.array([1.0, -0.5, 0.3])
 
-    def solve_at(position):
-        return solution(np.linalg.solve(held + np.eye(3), load - held @ position))
+    def solve_at(anchor):
+        return solution(np.linalg.solve(held + np.eye(3), load - held @ anchor))
 
     found = bodies_at(np.arange(3)).settle(solve_at, None, np.arange(3), np.zeros(3), 1.0, 0.0, 0.0)
     assert found.slack
     assert found.positions <= 6
-    np.testing.assert_allclose(found.position, np.linalg.solve(held, load), rtol=1e-9)
+    np.testing.assert_allclose(found.anchor, np.linalg.solve(held, load), rtol=1e-9)
 
 
 @pytest.mark.parametrize("start", [1.5, 1.7, 6.0])
@@ -65,8 +65,8 @@ def test_newton_steps_that_overshoot_are_halved(start):
 
     slopes = []
 
-    def solve_at(position):
-        stretch, slope = response(position[0] - 0.1)
+    def solve_at(anchor):
+        stretch, slope = response(anchor[0] - 0.1)
         slopes.append(slope)
         return dataclasses.replace(solution(-stretch), response=lambda: None)
 
@@ -76,27 +76,22 @@ def test_newton_steps_that_overshoot_are_halved(start):
     found = bodies_at(DOFS).settle(solve_at, freed, DOFS, np.array([start]), 1.0, 0.0, 0.0)
     assert found.slack
     assert found.positions <= 6
-    np.testing.assert_allclose(found.position, [0.1], rtol=1e-12)
+    np.testing.assert_allclose(found.anchor, [0.1], rtol=1e-12)
 
 
 def test_a_body_moves_on_to_the_gap_that_stops_it():
     """A gap of a thousand times the elongation of a spring under the load; a gap behind the body does not stop it."""
     gap, stiffness, calls = 1000.0, 10.0, []
 
-    def solve_at(position):
-        calls.append(position[0])
-        pressed = (
-            position[0] + 1.0 > gap
-        )  # a spring of stiffness 1 bears the load 1, with contact of `stiffness` beside it
-        elongation = (1.0 - stiffness * (position[0] - gap) * pressed) / (1.0 + stiffness * pressed)
-        gaps = np.array([max(gap - position[0] - elongation, 0.0), 5.0])
-        open_gaps = {
-            "active": np.zeros(2, bool),
-            "sticking": np.zeros(2, bool),
-            "slip": np.zeros((2, 0)),
-            "tangential": np.zeros((2, 0)),
-        }
-        return dataclasses.replace(solution(elongation), gap=gaps, response=lambda: None, **open_gaps)
+    def solve_at(anchor):
+        calls.append(anchor[0])
+        # A spring of stiffness 1 bears the load 1, with contact of `stiffness` beside it.
+        pressed = anchor[0] + 1.0 > gap
+        elongation = (1.0 - stiffness * (anchor[0] - gap) * pressed) / (1.0 + stiffness * pressed)
+        gaps = np.array([max(gap - anchor[0] - elongation, 0.0), 5.0])
+        opened, none = np.zeros(2, bool), np.zeros((2, 0))
+        contact = {"active": opened, "sticking": opened, "slip": none, "tangential": none}
+        return dataclasses.replace(solution(elongation), gap=gaps, response=lambda: None, **contact)
 
     def freed(held):
         closed = calls[-1] + 1.0 > gap
@@ -106,11 +101,11 @@ def test_a_body_moves_on_to_the_gap_that_stops_it():
     found = bodies_at(DOFS).settle(solve_at, freed, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
     assert found.slack
     assert found.positions <= 4
-    np.testing.assert_allclose(found.position, [gap + 1.0 / stiffness], rtol=1e-12)
+    np.testing.assert_allclose(found.anchor, [gap + 1.0 / stiffness], rtol=1e-12)
 
 
 def test_what_nothing_holds_is_not_slack():
-    found = bodies_at(DOFS).settle(lambda position: solution(1.0), None, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
+    found = bodies_at(DOFS).settle(lambda anchor: solution(1.0), None, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
     assert not found.slack
     assert found.positions == MAX_NEWTON_ITERATIONS
     np.testing.assert_array_equal(found.spring_force, [1.0])
@@ -170,13 +165,13 @@ def test_plates_that_lie_loose_on_each_other_cost_few_solutions(friction, linear
 def test_slack_is_in_units_of_the_contact_forces(force):
     """Where motions drive the bodies there is no load: what round-off leaves is compared with what presses on them."""
 
-    def solve_at(position):
-        found = solution(1e-9 if position[0] > 0.5 else 1.0 - position[0])
+    def solve_at(anchor):
+        found = solution(1e-9 if anchor[0] > 0.5 else 1.0 - anchor[0])
         return dataclasses.replace(found, multiplier=np.array([force]))
 
     found = bodies_at(DOFS).settle(solve_at, None, DOFS, np.zeros(1), load=0.0, noise=0.0, round_off=0.0)
     assert found.slack == (force > 0.0)
-    assert found.position[0] > 0.5
+    assert found.anchor[0] > 0.5
 
 
 def carried(dim, options, angle):
@@ -188,11 +183,7 @@ def carried(dim, options, angle):
     corner = (8.0, 20.0) if dim == 2 else (8.0, 6.0, 20.0)
     lower = box(sizes[0], divisions[0])
     upper = box(sizes[1], divisions[1], "quad4" if dim == 2 else "hex8", corner)
-    boxes = [
-        fc.generate.renamed(mesh, {name: f"{body}_{name}" for name in mesh.group_names})
-        for body, mesh in (("A", lower), ("B", upper))
-    ]
-    mesh, turn = fc.generate.union(*boxes), np.eye(dim)
+    mesh, turn = united(A_=lower, B_=upper), np.eye(dim)
     turn[:: dim - 1, :: dim - 1] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     mesh = mesh.replace(points=mesh.points @ turn.T)
     low, high = ("BOTTOM", "TOP") if dim == 2 else ("ZMIN", "ZMAX")
@@ -207,14 +198,10 @@ def carried(dim, options, angle):
 @pytest.mark.parametrize(
     ("dim", "options"),
     [
-        (2, {}),
-        (2, {"formulation": "node_to_segment"}),
-        (2, {"formulation": "continuous"}),
-        (2, {"multipliers": "standard"}),
-        (2, {"friction": 0.9}),
-        (3, {}),
+        (2, {}), (2, {"formulation": "node_to_segment"}), (2, {"formulation": "continuous"}), (2, {"friction": 0.9}),
+        (2, {"multipliers": "standard"}), (3, {}),
     ],
-)
+)  # fmt: skip
 def test_a_box_rides_on_a_driven_one(dim, options, angle):
     """Friction carries a box that nothing else holds: it moves as far as the box below, and no shear remains."""
     model, turn = carried(dim, options, angle)

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
-from scipy.sparse import csr_array, random_array, vstack
+from models import elastic_model, united
+from scipy.sparse import csr_array, vstack
 from stepping import Stepping
 
 import fastcontact as fc
@@ -11,7 +11,6 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.friction import eliminated
 from fastcontact.contact.configuration import Configuration
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.krylov.iterations import KEPT, ConjugateResiduals
 from fastcontact.linear.multigrid import solver
 from fastcontact.linear.protocol import FrictionTerms
 from fastcontact.linear.solvers import amg
@@ -33,13 +32,7 @@ def rubbing(formulation="node_to_segment", mu=0.3):
 def small_blocks(mu=0.3):
     """Pressed, then dragged along both axes: sliding turns."""
     lower, upper = fc.generate.box(divisions=(3, 3, 2)), fc.generate.box(divisions=(2, 2, 2), origin=(0.0, 0.0, 1.0))
-    named = [
-        body.replace(
-            cell_groups={f"{name}_{group}": cells for group, cells in body.cell_groups.items()}, point_groups={}
-        )
-        for name, body in (("L", lower), ("U", upper))
-    ]
-    model = elastic_model(fc.generate.union(*named), "3d", L_ZMIN="xyz")
+    model = elastic_model(united(L_=lower, U_=upper), "3d", L_ZMIN="xyz")
     model.prescribe("U_ZMAX", z=-1e-2, ramp=[(0, 0), (0.5, 1), (1, 1)])
     model.prescribe("U_ZMAX", x=2e-2, y=8e-3, ramp=[(0, 0), (0.5, 0.1), (1, 1)])
     model.add_contact("pair", secondary="U_ZMIN", primary="L_ZMAX", formulation="node_to_segment", friction=mu)
@@ -84,34 +77,6 @@ def test_what_fails_on_eliminated_constraints_is_solved_on_their_compliance(monk
     assert np.abs(one.displacement - other.displacement).max() < 1e-7 * np.abs(one.displacement).max()
 
 
-@pytest.mark.parametrize("n", [30, 5000])
-def test_conjugate_residuals_solve_what_is_not_symmetric_and_never_grow(n):
-    rng = np.random.default_rng(n)
-    skew = random_array((n, n), density=min(1.0, 5 / n), random_state=rng)
-    A = csr_array(skew - skew.T) + csr_array((np.linspace(1, 3, n), (np.arange(n), np.arange(n))))
-    iteration = ConjugateResiduals(n)
-    iteration.r[:] = b = rng.normal(size=n)
-    iteration.start()
-    norms = [iteration.norm]
-
-    def multiply(p, q):
-        q[:] = A @ p
-
-    def precondition(r, norm, z):
-        z[:] = r / 2
-
-    while iteration.norm > 1e-10 * norms[0] and len(norms) < 200:
-        assert iteration.step(multiply, precondition)
-        norms.append(iteration.norm)
-    assert len(norms) < 100
-    assert np.all(np.diff(norms) < 1e-12)
-    assert np.abs(A @ iteration.x - b).max() < 1e-8
-    assert iteration.nbytes <= (4 + 2 * KEPT) * 8 * n + 8 * (n // 4096 + 1)
-    iteration.r[:] = 0.0
-    iteration.start()
-    assert not iteration.step(multiply, precondition)  # nowhere to go
-
-
 def test_nonsymmetric_equations_with_springs_against_a_dense_solution():
     analysis = Stepping(rubbing(), "amg", 1e-12, Criteria())
     solver, n = analysis.solver, analysis.model.n_dofs
@@ -144,15 +109,9 @@ def test_an_iteration_that_does_not_end_is_told(monkeypatch):
         analysis.solver.load(f).solve_nonsymmetric(rows, np.zeros(1), np.zeros(1, np.int64), np.zeros(n), 1e-12, drag)
 
 
-def stuck(monkeypatch, limit=None):
-    monkeypatch.setattr(solver, "MAX_ITERATIONS", 0)
-    if limit is not None:
-        monkeypatch.setattr(amg, "AFFORDABLE", {3: limit})
-    return small_blocks(0.0)
-
-
 def test_where_multigrid_stalls_factors_take_over_and_say_so(monkeypatch):
-    model, ramp = stuck(monkeypatch), fc.linear_ramp(4)
+    monkeypatch.setattr(solver, "MAX_ITERATIONS", 0)
+    model, ramp = small_blocks(0.0), fc.linear_ramp(4)
     exact = fc.solve(model, ramp, linear_solver="direct")
     with pytest.warns(fc.FastcontactWarning, match=r"multigrid gave up .* relative residual of .* after 0 iterations"):
         found = fc.solve(model, ramp, linear_solver="amg", on_step=(states := []).append)
@@ -204,9 +163,10 @@ def test_constraints_that_repeat_each_other_are_solved_on_their_compliance(caplo
 
 
 def test_a_matrix_too_large_for_factors_stays_an_error(monkeypatch):
-    model = stuck(monkeypatch, limit=10)
+    monkeypatch.setattr(solver, "MAX_ITERATIONS", 0)
+    monkeypatch.setattr(amg, "AFFORDABLE", {3: 10})
     with pytest.raises(ConvergenceError, match="conjugate gradients stall at"):
-        fc.solve(model, fc.linear_ramp(1), linear_solver="amg", criteria=fc.Criteria(max_halvings=0))
+        fc.solve(small_blocks(0.0), fc.linear_ramp(1), linear_solver="amg", criteria=fc.Criteria(max_halvings=0))
 
 
 def test_slips_that_supports_and_equations_hold_leave_no_spring():

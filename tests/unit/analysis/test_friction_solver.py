@@ -169,7 +169,8 @@ def test_pivots_against_all_bases():
         n = 5
         A = rng.normal(size=(n, n))
         M, q = A @ A.T + 0.1 * np.eye(n) + (A - A.T), rng.normal(size=n)
-        z, _ = dense.lemke(M, q, 100)
+        z, count = dense.lemke(M, q, 100)
+        assert count == 0 or dense.lemke(M, q, count - 1)[0] is None
         wanted = None
         for basis in itertools.product([False, True], repeat=n):
             on, x = np.flatnonzero(basis), np.zeros(n)
@@ -183,16 +184,6 @@ def test_pivots_tell_a_problem_without_a_solution():
     assert dense.lemke(np.array([[-1.0]]), np.array([-1.0]), 10)[0] is None
     z, count = dense.lemke(np.array([[1.0]]), np.array([2.0]), 10)
     assert (z.tolist(), count) == ([0.0], 0)
-
-
-def test_pivots_are_counted():
-    n = 6
-    A = np.random.default_rng(1).normal(size=(n, n))
-    problem = A @ A.T + np.eye(n), -np.ones(n)
-    z, needed = dense.lemke(*problem, 1000)
-    assert z is not None
-    assert needed > 1
-    assert dense.lemke(*problem, needed - 1)[0] is None
 
 
 def test_compliance_of_rows_against_dense_products():

@@ -87,13 +87,10 @@ def test_no_word_where_nothing_locks(name):
 @pytest.mark.parametrize(
     ("name", "n", "modes", "told"),
     [
-        ("tet4", (40, 4, 1), False, True),
-        ("wedge6", (40, 4, 2), False, True),
-        ("hex8", (20, 2, 1), False, True),
-        ("hex8", (20, 2, 2), True, False),
-        ("tet10", (20, 2, 1), False, False),
+        ("tet4", (40, 4, 1), False, True), ("wedge6", (40, 4, 2), False, True), ("hex8", (20, 2, 1), False, True),
+        ("hex8", (20, 2, 2), True, False), ("tet10", (20, 2, 1), False, False),
     ],
-)
+)  # fmt: skip
 def test_thin_parts_bend_right_or_it_is_told(name, n, modes, told):
     """Deflection of a cantilever by its end load, of Bernoulli's theory F L^3 / 3 E I."""
     model = fc.Model(fc.generate.box((1.0, 0.1, 0.02), n, name), "3d")

@@ -4,7 +4,7 @@ import logging
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 
 import fastcontact as fc
 
@@ -16,11 +16,7 @@ def pressed(pairs, element="hex8", **options):
     """A block on a larger one, whose lower side belongs to `pairs` = 1 or 2 contacts that meet along a line of nodes."""
     lower = fc.generate.box((1.4, 1.2, 0.5), (4, 3, 2), element, (-0.2, -0.1, -0.5), name="LOWER")
     upper = fc.generate.box((1.0, 1.0, 0.5), (4, 4, 2), element, (0.0, 0.0, 0.0), name="UPPER")
-    lower, upper = (
-        fc.generate.renamed(mesh, {name: letter + name for name in mesh.group_names if len(name) == 4})
-        for letter, mesh in (("L", lower), ("U", upper))
-    )
-    mesh = fc.generate.union(lower, upper)
+    mesh = united(L=lower, U=upper)
     mesh = mesh.with_facet_group("LEFT", lambda x: (abs(x[:, 2]) < 1e-9) & (x[:, 0] < 0.5))
     bottom = mesh.cell_groups["UZMIN"]
     left = np.intersect1d(bottom, mesh.cell_groups["LEFT"])
@@ -45,28 +41,6 @@ def together(step):
     for contact in step.contact.values():
         np.add.at(total, contact.points, contact.force_vectors)
     return total
-
-
-@pytest.mark.each_value
-@pytest.mark.parametrize("element", ["hex8", "tet4"])
-@pytest.mark.parametrize("penalty", [None, 1e5])
-@pytest.mark.parametrize("solver", ["direct", "amg"])
-def test_two_pairs_are_what_one_of_both_is(solver, penalty, element, caplog):
-    options = {"element": element} | ({} if penalty is None else {"penalty": penalty})
-    one = solved(pressed(1, **options), solver)
-    with caplog.at_level(logging.INFO, "fastcontact"):
-        two = solved(pressed(2, **options), solver)
-    assert not any("are linearly dependent" in record.message for record in caplog.records)  # columns of the inverse
-    size = np.abs(together(one)).max()
-    assert together(two) == pytest.approx(together(one), abs=1e-7 * size)
-    left, right = two.contact["LEFT"], two.contact["RIGHT"]
-    common, mine, theirs = np.intersect1d(left.points, right.points, return_indices=True)
-    assert len(common) == 5
-    for name in ("pressure", "gap"):
-        values = getattr(left, name)
-        assert getattr(right, name)[theirs] == pytest.approx(values[mine], abs=1e-7 * max(np.abs(values).max(), 1e-3))
-    assert (left.active[mine] == right.active[theirs]).all()
-    assert left.active[mine].any()
 
 
 @pytest.mark.each_value
@@ -109,8 +83,7 @@ def test_a_wall_at_the_same_nodes_is_no_third_of_them(overlap, solver, caplog):
 def beside_a_third_body(formulation):
     """The two blocks, and a third one that the upper block touches with part of a side."""
     third = fc.generate.box((0.4, 0.4, 0.3), (2, 2, 2), "hex8", (0.3, 1.0, 0.1), name="THIRD")
-    third = fc.generate.renamed(third, {name: f"T{name}" for name in third.group_names if len(name) == 4})
-    model = elastic_model(fc.generate.union(pressed(2).mesh, third), "3d", LZMIN="xyz", TYMAX="xyz")
+    model = elastic_model(fc.generate.union(pressed(2).mesh, united(T=third)), "3d", LZMIN="xyz", TYMAX="xyz")
     model.prescribe("UZMAX", x=0.004, y=0.0, z=-0.01)
     for name in ("LEFT", "RIGHT"):
         model.add_contact(name, secondary=name, primary="LZMAX", formulation="node_to_segment", normals="facet")

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, supported, united
 
 import fastcontact as fc
 
@@ -61,14 +61,11 @@ def compare(make: Make, quantities: list[tuple], changes: Changes, *, within: fl
 
 def two_blocks(element: str = "quad4", kinematics: str = "plane_strain", press: bool = False, **options) -> Make:
     """A block on a wider one, their nodes in different places."""
-    mesh = fc.generate.block_on_block(
-        element,
-        size_lower=(4.0, 2.0),
-        size_upper=(2.2, 1.5),
-        divisions_lower=(8, 4),
-        divisions_upper=(5, 3),
-        shift=0.83,
+    lower, upper = (
+        {"size_lower": (4.0, 2.0), "divisions_lower": (8, 4)},
+        {"size_upper": (2.2, 1.5), "divisions_upper": (5, 3)},
     )
+    mesh = fc.generate.block_on_block(element, shift=0.83, **lower, **upper)
 
     def make(E=1000.0, nu=0.3, load=1.0, moved=1.0, clearance=0.0):
         model = fc.Model(mesh, kinematics=kinematics)
@@ -123,10 +120,7 @@ def test_axisymmetric_spheres():
 @pytest.mark.parametrize("solver", [pytest.param("direct", marks=pytest.mark.slow), "amg"])
 def test_in_space_with_factors_and_with_a_hierarchy(solver):
     lower = fc.generate.box((4.0, 4.0, 2.0), (4, 4, 1))
-    upper = fc.generate.transformed(fc.generate.box((2.2, 2.4, 1.5), (2, 3, 1)), translate=(0.83, 0.72, 2.0))
-    mesh = fc.generate.union(
-        fc.generate.renamed(lower, lambda name: "L" + name), fc.generate.renamed(upper, lambda name: "U" + name)
-    )
+    mesh = united(L=lower, U=fc.generate.box((2.2, 2.4, 1.5), (2, 3, 1), "hex8", (0.83, 0.72, 2.0)))
 
     def make(E=1000.0, nu=0.3, moved=1.0, clearance=0.0):
         model = fc.Model(mesh, kinematics="3d")
@@ -152,7 +146,7 @@ def test_points_that_are_moved_together_give_what_each_gives_alone(monkeypatch):
         return fc.sensitivities(model, step, ("pressure_max", "c"), [("E", 0), ("nu", 1)], ramp=1, criteria=TIGHT)
 
     together = found()
-    monkeypatch.setattr(moving_contact, "TOGETHER", -1.0)  # no error is small enough
+    monkeypatch.setattr(moving_contact, "SEPARABLE", -1.0)  # no error is small enough
     alone = found()
     for parameter, value in alone.derivatives.items():
         assert together.derivatives[parameter] == pytest.approx(value, rel=1e-9)

@@ -6,7 +6,7 @@ import weakref
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model
 from stepping import Stepping
 
 import fastcontact as fc
@@ -14,17 +14,16 @@ from fastcontact.analysis import step_halving
 from fastcontact.analysis.criteria import Criteria
 
 
-@pytest.fixture
-def model():
-    found = fc.Model(fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3), "axisymmetric")
-    found.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    supported(found, A1A2="x", A2B2={"y": -0.5}, A1B1={"y": +0.5})
-    found.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
-    return found
+def spheres(formulation="node_to_segment"):
+    mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -0.5}, A1B1={"y": +0.5})
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation)
+    return model
 
 
 @pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
-def test_the_same_steps_as_all_at_once(model):
+def test_the_same_steps_as_all_at_once():
+    model = spheres()
     expected = fc.solve(model, fc.linear_ramp(4))
     found = list(fc.solve_steps(model, fc.linear_ramp(4)))
     assert [step.index for step in found] == [1, 2, 3, 4]
@@ -35,11 +34,11 @@ def test_the_same_steps_as_all_at_once(model):
 
 
 @pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
-def test_nothing_is_computed_before_it_is_asked_for_and_nothing_is_kept(model, monkeypatch):
+def test_nothing_is_computed_before_it_is_asked_for_and_nothing_is_kept(monkeypatch):
     computed = []
     step = step_halving.load_step
     monkeypatch.setattr(step_halving, "load_step", lambda *given: (computed.append(given[2]), step(*given))[1])
-    steps = fc.solve_steps(model, fc.linear_ramp(4))
+    steps = fc.solve_steps(spheres(), fc.linear_ramp(4))
     assert computed == []
     kept = [weakref.ref(step) for step in itertools.islice(steps, 2)]
     assert computed == [1, 2]
@@ -51,9 +50,7 @@ def test_nothing_is_computed_before_it_is_asked_for_and_nothing_is_kept(model, m
 @pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
 def test_no_cycle_keeps_a_finished_analysis(solver, formulation):
-    mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -0.5}, A1B1={"y": +0.5})
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation)
+    model = spheres(formulation)
 
     def solved():
         analysis = Stepping(model, solver, 1e-10, Criteria(geometry_updates=2), fc.linear_ramp(1))

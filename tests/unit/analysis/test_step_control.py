@@ -186,11 +186,6 @@ def test_parts_that_converged_before_one_failed_are_taken_back():
     assert step.iterations == expected.iterations
 
 
-def test_steps_that_converge_are_not_cut():
-    (step,) = fc.solve(spheres(), fc.linear_ramp(1), linear_solver="direct")
-    assert "substeps" not in step.iterations
-
-
 def test_a_step_that_fails_says_which_one_it_is():
     criteria = Criteria(max_active_set_iterations=1, max_halvings=0)
     message = (

@@ -34,23 +34,9 @@ def parts():
     random = np.random.default_rng(9)
     return [
         part(2, 1, equality=np.array([True, False])),
-        part(
-            3,
-            2,
-            compliance=True,
-            tangents=2,
-            friction=np.full(3, 0.3),
-            low_rank_compliance=random.normal(size=(3, 3, 2)),
-        ),
+        part(3, 2, True, 2, friction=np.full(3, 0.3), low_rank_compliance=random.normal(size=(3, 3, 2))),
         part(4, 3, softness=np.full(4, 0.1)),
-        part(
-            2,
-            4,
-            compliance=True,
-            tangents=2,
-            slip0=random.normal(size=(2, 2)),
-            low_rank_compliance=random.normal(size=(3, 2, 1)),
-        ),
+        part(2, 4, True, 2, slip0=random.normal(size=(2, 2)), low_rank_compliance=random.normal(size=(3, 2, 1))),
     ]
 
 

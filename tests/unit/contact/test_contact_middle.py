@@ -27,12 +27,16 @@ def whole(half):
     return mesh
 
 
+def placed(x0, angle, half):
+    """Return a block, or the right half of it, turned and shifted."""
+    mesh = fc.generate.graded_block("quad8", width=8.0, contact_radius=1.2, contact_size=SIZE)
+    return fc.generate.transformed(mesh if half else whole(mesh), rotate=angle, translate=(x0, -2 * x0))
+
+
 def pressed(x0, facing, half):
     """Return contact and step of a block whose top, turned to one side and shifted, a cylinder is pressed upon."""
     axis, sign, angle = SIDES[facing]
-    mesh = fc.generate.graded_block("quad8", width=8.0, contact_radius=1.2, contact_size=SIZE)
-    prefix = "" if half else "ALL_"
-    mesh = fc.generate.transformed(mesh if half else whole(mesh), rotate=angle, translate=(x0, -2 * x0))
+    prefix, mesh = "" if half else "ALL_", placed(x0, angle, half)
     centre = np.array([x0, -2 * x0])
     centre["xy".index(axis)] += sign * R
     model = elastic_model(mesh, "plane_strain", E=E)
@@ -219,9 +223,7 @@ def test_a_file_keeps_the_direction_of_half_widths(x0, facing, tmp_path):
     contact, step = pressed(x0, facing, half=False)
     assert abs(contact.tangent["xy".index(SIDES[facing][0])]) < 1e-3
     np.testing.assert_allclose(np.abs(contact.across), np.abs(contact.place), atol=1e-6)  # the block is flat
-    mesh = fc.generate.graded_block("quad8", width=8.0, contact_radius=1.2, contact_size=SIZE)
-    mesh = fc.generate.transformed(whole(mesh), rotate=SIDES[facing][2], translate=(x0, -2 * x0))
-    with fc.ResultWriter(tmp_path / "a.vtkhdf", mesh) as out:
+    with fc.ResultWriter(tmp_path / "a.vtkhdf", placed(x0, SIDES[facing][2], half=False)) as out:
         out.write(step)
     with fc.open_results(tmp_path / "a.vtkhdf") as results:
         read = results[0].contact["c"]

@@ -21,10 +21,7 @@ def solved(model: fc.Model) -> fc.ContactResult:
 def bent(element, radii, cells, ends):
     """A block bent to a part of a ring between two angles: BOTTOM at the first radius, TOP at the second."""
     mesh = fc.generate.block((1.0, 1.0), cells, element)
-    angle, radius = (
-        ends[0] + (ends[1] - ends[0]) * mesh.points[:, 0],
-        radii[0] + (radii[1] - radii[0]) * mesh.points[:, 1],
-    )
+    angle, radius = (a + (b - a) * x for (a, b), x in zip((ends, radii), mesh.points.T, strict=True))
     return mesh.replace(points=radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
 
 
@@ -129,16 +126,17 @@ def pressed(element, **options):
 
 @pytest.mark.parametrize(("element", "expected"), CHOICES.items())
 def test_the_choice_follows_the_cells(element, expected):
-    mesh = (fc.generate.block if elements.get(element).dim == 2 else fc.generate.box)(
-        (1.0,) * elements.get(element).dim, (1,) * elements.get(element).dim, element
-    ).with_facet_group("SIDE", lambda x: x[:, -1] == x[:, -1].max())
-    model = fc.Model(mesh, "plane_strain" if mesh.dim == 2 else "3d")
-    wall = fc.obstacles.HalfSpace((0.0,) * mesh.dim, (0.0,) * (mesh.dim - 1) + (-1.0,))
-    model.add_obstacle("wall", secondary="SIDE", obstacle=wall)
-    other = fc.obstacles.HalfSpace((0.0,) * (mesh.dim - 1) + (5.0,), (0.0,) * (mesh.dim - 1) + (-1.0,))
-    model.add_obstacle("field", secondary="SIDE", obstacle=other, integration="simpson")
-    another = fc.obstacles.HalfSpace((0.0,) * (mesh.dim - 1) + (6.0,), (0.0,) * (mesh.dim - 1) + (-1.0,))
-    model.add_obstacle("rubbing", secondary="SIDE", obstacle=another, friction=0.2)
+    dim = elements.get(element).dim
+    mesh = (fc.generate.block if dim == 2 else fc.generate.box)((1.0,) * dim, (1,) * dim, element)
+    mesh = mesh.with_facet_group("SIDE", lambda x: x[:, -1] == x[:, -1].max())
+    model = fc.Model(mesh, "plane_strain" if dim == 2 else "3d")
+    for name, height, options in (
+        ("wall", 0.0, {}),
+        ("field", 5.0, {"integration": "simpson"}),
+        ("rubbing", 6.0, {"friction": 0.2}),
+    ):
+        wall = fc.obstacles.HalfSpace((0.0,) * (dim - 1) + (height,), (0.0,) * (dim - 1) + (-1.0,))
+        model.add_obstacle(name, secondary="SIDE", obstacle=wall, **options)
     rubbing = "mortar" if mesh.dim == 3 and expected == "continuous" else expected
     assert [pair.formulation for pair in model.contact] == [expected, "continuous", rubbing]
 

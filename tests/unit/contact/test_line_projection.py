@@ -33,36 +33,31 @@ def wavy(element, n=8):
     return mesh, surface(mesh, "TOP")
 
 
+def projected(candidates, side, points, project=along_normals):
+    """Return the normals at the nodes of facets, the closest points, and the projection along the normals."""
+    normals = at_nodes_of_facets(smooth_normals(side, points))
+    start = closest_of_kinds(candidates, side.corners(points))
+    return normals, start, project(candidates, side, points, normals, start)
+
+
+def feet(side, points, facet, xi):
+    at = places(side, facet, xi)
+    return np.einsum("nk,nkd->nd", at.shape, points[at.nodes])
+
+
 def cross(a, b):
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-
-
-@pytest.mark.parametrize("element", ["quad4", "quad8"])
-def test_points_lie_along_the_normal_of_their_projection(element):
-    mesh, side = wavy(element)
-    rng = np.random.default_rng(3)
-    x = rng.uniform(0.1, 3.9, 400)
-    candidates = np.column_stack([x, 1.0 + 0.3 * np.sin(2.5 * x) + rng.uniform(-0.1, 0.25, 400)])
-    normals = at_nodes_of_facets(smooth_normals(side, mesh.points))
-    start = closest_of_kinds(candidates, side.corners(mesh.points))
-    facet, xi, overhang, _ = along_line_normals(candidates, side, mesh.points, normals, start)
-    at = places(side, facet, xi)
-    foot = np.einsum("nk,nkd->nd", at.shape, mesh.points[at.nodes])
-    assert (overhang == 0.0).all()
-    assert np.abs(cross(candidates - foot, interpolated(normals[facet], at))).max() < 1e-13
 
 
 @pytest.mark.parametrize("element", ["quad4", "quad8"])
 def test_against_a_plain_root_on_every_facet(element):
     """Height over the surface is small, so that each point has one projection: that of a bracketed root."""
     mesh, side = wavy(element)
-    normals = at_nodes_of_facets(smooth_normals(side, mesh.points))
     reference = elements.get(side.element)
     rng = np.random.default_rng(5)
     x = rng.uniform(0.1, 3.9, 60)
     candidates = np.column_stack([x, 1.0 + 0.3 * np.sin(2.5 * x) + rng.uniform(0.0, 0.1, 60)])
-    start = closest_of_kinds(candidates, side.corners(mesh.points))
-    facet, xi, _, _ = along_line_normals(candidates, side, mesh.points, normals, start)
+    normals, _, (facet, xi, _, _) = projected(candidates, side, mesh.points, along_line_normals)
     for i, point in enumerate(candidates):
 
         def aside(s, f, point=point):
@@ -85,8 +80,7 @@ def test_the_projection_moves_on_smoothly_over_folds(element):
     track = np.column_stack([x, 1.0 + 0.3 * np.sin(2.5 * x) + 0.15])
     for normals, most in (("averaged", 4.0), ("facet", np.inf)):
         found = pair(track, side, mesh.points, 1e-6, normals)
-        at = places(side, found.facet, found.xi)
-        foot = np.einsum("nk,nkd->nd", at.shape, mesh.points[at.nodes])
+        foot = feet(side, mesh.points, found.facet, found.xi)
         turned = np.linalg.norm(np.diff(found.normal, axis=0), axis=1)
         if normals == "averaged":
             assert found.paired.all()
@@ -180,50 +174,40 @@ def test_means_are_weighted_by_the_angles_at_corners(element):
 def test_points_lie_along_the_normal_of_their_projection_of_projection_kernels(element, shift):
     points, side = rough(element, by=0.02)
     points, candidates = points + shift, above(200, beside=-0.1) + shift
-    normals = at_nodes_of_facets(smooth_normals(side, points))
-    start = closest_of_kinds(candidates, side.corners(points))
-    facet, xi, overhang, normal = along_normals(candidates, side, points, normals, start)
-    at = places(side, facet, xi)
-    foot = np.einsum("nk,nkd->nd", at.shape, points[at.nodes])
+    normals, _, (facet, xi, overhang, normal) = projected(candidates, side, points)
     assert (overhang == 0.0).all()
-    assert normal == pytest.approx(interpolated(normals[facet], at), abs=1e-13)
-    assert np.abs(np.cross(candidates - foot, normal)).max() < 1e-12 * max(1.0, shift)
+    assert normal == pytest.approx(interpolated(normals[facet], places(side, facet, xi)), abs=1e-13)
+    assert np.abs(np.cross(candidates - feet(side, points, facet, xi), normal)).max() < 1e-12 * max(1.0, shift)
 
 
 def test_beyond_the_end_the_projection_stays_in_the_facet_and_tells_by_how_much():
     points, side = rough("hex8", 4, 0.0)
     candidates = np.array([[1.1, 0.3, 1.1], [0.3, -0.05, 1.2], [0.3, 0.3, 1.0]])
-    normals = at_nodes_of_facets(smooth_normals(side, points))
-    facet, xi, overhang, normal = along_normals(
-        candidates, side, points, normals, closest_of_kinds(candidates, side.corners(points))
-    )
+    _, _, (facet, xi, overhang, normal) = projected(candidates, side, points)
     assert overhang == pytest.approx([0.4, 0.2, 0.0], abs=1e-12)  # facets are a quarter long
     assert (np.abs(xi) <= 1.0).all()
     assert normal == pytest.approx(np.tile([0.0, 0, 1], (3, 1)), abs=1e-15)
-    foot = np.einsum("nk,nkd->nd", (at := places(side, facet, xi)).shape, points[at.nodes])
-    assert foot == pytest.approx(np.array([[1.0, 0.3, 1.0], [0.3, 0.0, 1.0], [0.3, 0.3, 1.0]]), abs=1e-12)
+    assert feet(side, points, facet, xi) == pytest.approx(
+        np.array([[1.0, 0.3, 1.0], [0.3, 0.0, 1.0], [0.3, 0.3, 1.0]]), abs=1e-12
+    )
 
 
 def test_a_facet_that_is_left_hands_on_to_the_one_beside_it_of_any_kind():
     """From a wrong start the same feet are found as from the closest points, over triangles and quadrangles."""
     points, side = mixed()
     candidates = above(150, beside=-0.05)
-    normals = at_nodes_of_facets(smooth_normals(side, points))
-    start = closest_of_kinds(candidates, side.corners(points))
-    facet, xi, overhang, _ = along_normals(candidates, side, points, normals, start)
+    normals, start, (facet, xi, overhang, _) = projected(candidates, side, points)
     begin, beside = side.neighbours
     wrong = np.array([beside[begin[f]] for f in facet])
     corner = np.where(side.triangular[wrong, None], 0.3, 0.0) * np.ones((1, 2))
     again = along_normals(candidates, side, points, normals, start._replace(facet=wrong, xi=corner))
-    feet = [
-        np.einsum("nk,nkd->nd", (at := places(side, f, x)).shape, points[at.nodes]) for f, x in ((facet, xi), again[:2])
-    ]
+    foot, same = feet(side, points, facet, xi), feet(side, points, *again[:2])
     # Where the facet of the start lies too far away for its plane to mean anything, the start is kept.
-    aside = np.abs(np.cross(candidates - feet[1], again[3])).max(axis=1)
+    aside = np.abs(np.cross(candidates - same, again[3])).max(axis=1)
     inner = (overhang == 0.0) & (again[2] == 0.0) & (aside < 1e-11)
     assert inner.mean() > 0.8
     assert len(np.unique(side.triangular[facet[inner]])) == 2
-    assert feet[0][inner] == pytest.approx(feet[1][inner], abs=1e-11)
+    assert foot[inner] == pytest.approx(same[inner], abs=1e-11)
 
 
 def test_where_no_step_is_possible_the_closest_point_stays():
@@ -260,9 +244,7 @@ def test_corners_are_taken_one_by_one():
 def test_threads_change_no_bit(monkeypatch):
     points, side = mixed()
     candidates = above(200)
-    normals = at_nodes_of_facets(smooth_normals(side, points))
-    start = closest_of_kinds(candidates, side.corners(points))
-    alone = along_normals(candidates, side, points, normals, start)
+    normals, start, alone = projected(candidates, side, points)
     monkeypatch.setattr(projection, "portions", lambda count, nodes=1: [(0, 3), (3, count // 2), (count // 2, count)])
     for one, other in zip(alone, along_normals(candidates, side, points, normals, start), strict=True):
         assert (one == other).all()

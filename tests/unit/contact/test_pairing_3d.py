@@ -143,9 +143,6 @@ def test_rules_that_make_no_sense_are_refused(element):
         bound(Continuous, element, integration="node")
     with pytest.raises(fc.ContactError, match=r"n_gauss = 2 .* undetermined: use at least 3"):
         bound(Continuous, element, n_gauss=2)
-
-
-def test_too_many_points_on_triangles_are_refused():
     with pytest.raises(fc.ContactError, match=r"n_gauss = 6 is too large for triangles"):
         bound(Continuous, "tet4", n_gauss=6)
 

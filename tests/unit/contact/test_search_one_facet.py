@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from test_search import grid
 
 from fastcontact.contact.search import facets_3d_kernels, straight_3d_kernels
 from fastcontact.contact.search import projection_3d_kernels as projection3d
@@ -35,13 +36,6 @@ def bent(m, seed, bend):
     return np.column_stack([nodes * rng.uniform(0.3, 2, 2), np.zeros(m)])[None] + bend * rng.normal(size=(1, m, 3)), rng
 
 
-def grid(m, n):
-    a = np.linspace(0, 1, n) if m in (3, 6) else np.linspace(-1, 1, n)
-    s, t = (x.ravel() for x in np.meshgrid(a, a, indexing="ij"))
-    inside = s + t <= 1 + 1e-12 if m in (3, 6) else slice(None)
-    return np.column_stack([s[inside], t[inside]])
-
-
 def on(corners, m, xi):
     return elements.get(OF_SIZE[m]).shape(np.atleast_2d(xi)) @ corners
 
@@ -50,7 +44,7 @@ def minima(facets, m, point):
     """Squared distances at the local minima that descents from all over the facet lead to."""
     shape = domain(m)
     found = []
-    for s, t in grid(m, 7):
+    for s, t in grid(OF_SIZE[m], 7):
         s, t, converged = projection3d.descend(facets.terms, 0, s, t, shape.sides, point)
         assert converged
         found.append((s, t, 2.0 * projection3d.half_square(facets.terms, 0, s, t, point)))
@@ -67,7 +61,7 @@ def test_within_the_bound_there_is_one_minimum(seed, m, bend, near):
     facets, _, _ = prepared(corners)
     if facets.convex[0] == 0.0:
         return
-    place = grid(m, 9)[rng.integers(len(grid(m, 9)))]
+    place = grid(OF_SIZE[m], 9)[rng.integers(len(grid(OF_SIZE[m], 9)))]
     foot, direction = on(corners[0], m, place)[0], rng.normal(size=3)
     if m == 4:
         # Along the normal at the foot, which then is a stationary point, as far as |(r - X) . c| stays below the bound.
@@ -109,7 +103,7 @@ def compare_bilinear(corners, point):
     assert np.sqrt(square) == pytest.approx(np.sqrt(2 * half), rel=1e-11, abs=1e-13 * size)
     assert np.abs(on(corners[0], 4, (s, t)) - on(corners[0], 4, (u, v))).max() < 1e-6 * (size + np.sqrt(square))
     # Brute force stays above.
-    away = np.linalg.norm(on(corners[0], 4, grid(4, 41)) - point, axis=1).min()
+    away = np.linalg.norm(on(corners[0], 4, grid("quad4", 41)) - point, axis=1).min()
     assert np.sqrt(square) <= away * (1 + 1e-12) + 1e-13 * size
     return True
 
@@ -182,7 +176,7 @@ def test_flat_triangles_in_closed_form(seed, shape, far):
 def test_facets_are_prepared_as_they_are(seed, m, bend):
     corners, _ = bent(m, seed, bend)
     facets, low, high = prepared(corners)
-    xi = grid(m, 21)
+    xi = grid(OF_SIZE[m], 21)
     places = on(corners[0], m, xi)
     polynomial = np.array([[projection3d.component(facets.terms, 0, d, *place)[0] for d in range(3)] for place in xi])
     assert np.abs(polynomial - places).max() < 1e-13

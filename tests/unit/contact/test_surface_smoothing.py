@@ -71,10 +71,8 @@ def test_what_a_strip_of_single_facets_leaves_open_does_not_depend_on_rounding(e
 
 
 def test_flats_stay_flat_beside_fillets_and_up_to_corners():
-    assert (
-        smooth_side(surface(fc.generate.box(divisions=(3, 3, 1)), "ZMAX"), fc.generate.box(divisions=(3, 3, 1)).points)
-        is None
-    )
+    flat = fc.generate.box(divisions=(3, 3, 1))
+    assert smooth_side(surface(flat, "ZMAX"), flat.points) is None
     mesh = fc.generate.block((2.0, 0.2), (20, 1))
     x, y = mesh.points.T
     angle = np.maximum(x - 1.0, 0.0)  # flat up to x = 1, then round with radius 1
@@ -129,18 +127,22 @@ def test_rings_touch_all_round_where_their_circles_do(options):
     assert np.abs(pair.nodal_gap(at)[0]).max() < 2e-4 * sag
 
 
+def warned(model):
+    """Solve a model; return the result of the fit and the warnings about the chords of its facets."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        contact = fc.solve(model, 1)[-1].contact["fit"]
+    return contact, [text for text in map(str, (w.message for w in caught)) if "deviate from their arcs" in text]
+
+
 @pytest.mark.parametrize(("options", "told"), [
     ({}, False), ({"surface_smoothing": False}, True), ({"formulation": "continuous"}, True),
     ({"formulation": "continuous", "divisions": (24, 24)}, False), ({"clearance": -5.0, "formulation": "continuous"}, False),
 ])  # fmt: skip
 def test_chords_that_push_sides_apart_are_told(options, told):
-    with warnings.catch_warnings(record=True) as found:
-        warnings.simplefilter("always")
-        fc.solve(fit(**options), 1)
-    texts = [str(warning.message) for warning in found if "deviate from their arcs" in str(warning.message)]
+    texts = warned(fit(**options))[1]
     assert bool(texts) == told
-    if told:
-        assert "surface_smoothing=True" in texts[0]
+    assert all("surface_smoothing=True" in text for text in texts)
 
 
 @pytest.mark.parametrize(("divisions", "secondary", "formulation"), [
@@ -161,20 +163,17 @@ def test_the_error_told_of_a_press_fit_is_right_within_a_factor_of_three(divisio
     primary = "CONT_OUTER" if secondary == "CONT_INNER" else "CONT_INNER"
     options = {} if formulation == "node_to_segment" else {"surface_smoothing": False}
     model.add_contact("fit", secondary=secondary, primary=primary, clearance=-0.05, formulation=formulation, **options)
-    with pytest.warns(fc.FastcontactWarning, match="deviate from their arcs") as found:
-        contact = fc.solve(model, 1)[-1].contact["fit"]
+    contact, texts = warned(model)
     error = np.abs(contact.pressure - 31.6319).max()  # Lame
-    told = float(re.search(r"pressures by about ([\d.]+),", " ".join(str(w.message) for w in found))[1])
+    told = float(re.search(r"pressures by about ([\d.]+),", texts[0])[1])
     assert 1.0 / 3.0 < told / error < 3.0
 
 
 def test_facets_of_nearly_equal_lengths_under_a_small_pressure_error_are_not_told():
     """A pin in a hole of nearly its radius: phases of facets drift slowly, which mean gaps hardly show."""
-    with warnings.catch_warnings(record=True) as found:
-        warnings.simplefilter("always")
-        contact = fc.solve(fit(divisions=(96, 97), clearance=-0.2, surface_smoothing=False), 1)[-1].contact["fit"]
+    contact, texts = warned(fit(divisions=(96, 97), clearance=-0.2, surface_smoothing=False))
     assert np.ptp(contact.pressure) < 0.05 * contact.pressure.mean()
-    assert not [warning for warning in found if "deviate from their arcs" in str(warning.message)]
+    assert not texts
 
 
 @pytest.mark.parametrize(("n", "told"), [(12, True), (48, False)])
@@ -183,10 +182,7 @@ def test_chords_against_exact_shapes_are_told(n, told):
     model.add_obstacle(
         "rod", secondary="BORE", obstacle=fc.obstacles.Sphere(centre=(0.0, 0.0), R=20.05), formulation="continuous"
     )
-    with warnings.catch_warnings(record=True) as found:
-        warnings.simplefilter("always")
-        fc.solve(model, 1)
-    texts = [str(warning.message) for warning in found if "deviate from their arcs" in str(warning.message)]
+    texts = warned(model)[1]
     assert bool(texts) == told
     assert all("formulation 'node_to_segment'" in text for text in texts)
 

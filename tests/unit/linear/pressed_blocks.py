@@ -1,9 +1,12 @@
 """A box and two non-matching blocks, for tests of linear solvers under contact."""
 
 import numpy as np
+import pytest
 from models import supported, united
 
 import fastcontact as fc
+from fastcontact.analysis.load_step import load_step
+from fastcontact.analysis.problem import prepare
 from fastcontact.elasticity.constrained_system import supports_apart
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 
@@ -32,3 +35,25 @@ def box(divisions=(7, 6, 5), E=10.0):
     K = stiffness(mesh, "3d", moduli, {"hex8": np.zeros(len(mesh.cells["hex8"]), np.int64)})
     fixed = np.repeat(mesh.points[:, 1] == 0, 3)
     return supports_apart(K, fixed)[0], np.where(fixed[:, None], 0.0, rigid_modes(mesh.points, "3d")), fixed
+
+
+def solved(model, name, steps=1):
+    """Return the linear solver and the result of the last of some load steps."""
+    problem = prepare(model, fc.linear_ramp(steps), fc.Criteria(), linear_solver=name)
+    state = problem.initial_state()
+    for index in range(1, steps + 1):
+        state, result = load_step(problem, state, index, index / steps)
+    return problem.solver, result
+
+
+def assert_agree(model, most, within=1e-8):
+    """Multigrid finds what factors find, without columns or factors, in `most` iterations."""
+    solver, step = solved(model, "amg")
+    assert not solver.gave_up
+    assert not solver.columns.asked
+    assert solver.counters.iterations <= most
+    found, exact = step.contact["c"], solved(model, "direct")[1].contact["c"]
+    size = np.abs(exact.force_vectors).max()
+    assert found.force_vectors == pytest.approx(exact.force_vectors, abs=within * size)
+    assert np.array_equal(found.active, exact.active)
+    assert np.array_equal(found.sticking, exact.sticking)

@@ -7,7 +7,6 @@ from scipy.sparse import block_diag, bsr_array, csc_array, csr_array, diags_arra
 
 from fastcontact.errors import ModelError
 from fastcontact.linear.cholesky import elimination_tree_kernels, factorisation, triangular_kernels
-from fastcontact.linear.cholesky import factorisation_kernels as kernels
 
 pytestmark = pytest.mark.pairwise
 
@@ -95,21 +94,6 @@ def test_supernodes_hold_every_entry_and_no_more_zeros_than_asked(A, rule, monke
         np.testing.assert_array_equal(shown, L)
 
 
-@pytest.mark.parametrize("size", [1, 2, 47, 48, 49, 130])
-@pytest.mark.parametrize("share", [0.3, 1.0])
-def test_fronts_are_eliminated_as_by_hand(size, share):
-    A = positive(size, 1.0, size).toarray()
-    width = max(1, int(share * size))
-    F, expected = np.triu(A), A.copy()
-    for j in range(width):
-        row = expected[j, j + 1 :] / expected[j, j]
-        expected[j + 1 :, j + 1 :] -= np.outer(row, expected[j, j + 1 :])
-        expected[j, j + 1 :] = row
-    room = (np.empty(count * size) for count in (kernels.PANEL, kernels.PANEL, 2 * kernels.PANEL))
-    assert kernels._eliminated(F, width, *room) == -1
-    np.testing.assert_allclose(np.triu(F), np.triu(expected), atol=1e-13 * np.abs(A).max())
-
-
 def factors(K, last):
     """Of a matrix twice as large, then of the matrix: order and pattern are those of the first."""
     symbolic = factorisation.SymbolicFactors(K, last)
@@ -118,7 +102,7 @@ def factors(K, last):
     return symbolic.factors(K)
 
 
-@pytest.mark.parametrize("A", [*MATRICES, positive(300, 0.3, 7)])
+@pytest.mark.parametrize("A", [*MATRICES, *(positive(n, 1.0, n) for n in (2, 47, 48, 49)), positive(300, 0.3, 7)])
 @pytest.mark.parametrize("m", [0, 1, 7])
 def test_factors_are_those_of_the_matrix(A, m):
     n = A.shape[0]

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from models import elastic_model
 from pairwise import first_of
-from pressed_blocks import box, pressed
+from pressed_blocks import assert_agree, box, pressed, solved
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 import fastcontact as fc
-from fastcontact.analysis.load_step import load_step
-from fastcontact.analysis.problem import prepare
 from fastcontact.elasticity.constrained_system import supports_apart
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.linear.multigrid import loaded
@@ -139,28 +137,10 @@ def on_wall(friction=0.0, n=8, **options):
     return model
 
 
-def step_of(model, name):
-    problem = prepare(model, fc.linear_ramp(1), fc.Criteria(), linear_solver=name)
-    return problem.solver, load_step(problem, problem.initial_state(), 1, 1.0)[1].contact["c"]
-
-
-def assert_agree(model, most):
-    """Multigrid finds what factors find, without columns or factors, in `most` iterations."""
-    solver, found = step_of(model, "amg")
-    assert not solver.gave_up
-    assert not solver.columns.asked
-    assert solver.counters.iterations <= most
-    factors = step_of(model, "direct")[1]
-    size = np.abs(factors.force_vectors).max()
-    assert found.force_vectors == pytest.approx(factors.force_vectors, abs=1e-8 * size)
-    assert np.array_equal(found.active, factors.active)
-    assert np.array_equal(found.sticking, factors.sticking)
-
-
 @cache
 def exact_iterations(friction, **options):
     """Return the iterations of pressed blocks without a penalty."""
-    return step_of(pressed(friction=friction, **options), "amg")[0].counters.iterations
+    return solved(pressed(friction=friction, **options), "amg")[0].counters.iterations
 
 
 DUAL = {"formulation": "mortar", "multipliers": "dual"}
@@ -193,7 +173,7 @@ def test_any_formulation_and_element_takes_a_penalty(options, friction, penalty)
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("penalty", [10.0, 1e4])
 def test_a_penalty_against_a_wall(friction, penalty):
-    exact = step_of(on_wall(friction), "amg")[0].counters.iterations
+    exact = solved(on_wall(friction), "amg")[0].counters.iterations
     assert_agree(on_wall(friction, penalty=penalty), 2 * exact)
 
 
@@ -208,15 +188,15 @@ def test_a_pair_with_a_penalty_beside_one_without(friction):
     model = pressed(friction=friction, penalty=100.0, **DUAL)
     wall = fc.obstacles.HalfSpace((1.001, 0.0, 0.0), (-1.0, 0.0, 0.0))
     model.add_obstacle("wall", secondary="U_XMAX", obstacle=wall, formulation="node_to_segment", friction=friction)
-    solver, _ = step_of(model, "amg")
+    solver, _ = solved(model, "amg")
     assert not solver.gave_up
     assert_agree(model, 100)
 
 
 def test_springs_that_are_far_too_stiff_for_the_cycle_are_eliminated(monkeypatch):
-    eliminated = step_of(pressed(penalty=1e4, **DUAL), "amg")[0].counters.iterations
+    eliminated = solved(pressed(penalty=1e4, **DUAL), "amg")[0].counters.iterations
     monkeypatch.setattr(loaded, "STIFF", np.inf)
-    assert step_of(pressed(penalty=1e4, **DUAL), "amg")[0].counters.iterations > 3 * eliminated
+    assert solved(pressed(penalty=1e4, **DUAL), "amg")[0].counters.iterations > 3 * eliminated
 
 
 @pytest.mark.parametrize("kind", ["K", "K of one level"])

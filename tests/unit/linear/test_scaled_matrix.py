@@ -8,7 +8,6 @@ from scipy.sparse import bsr_array
 from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact._jit import decorators, parallel
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.linear import choice as linear
 from fastcontact.linear.multigrid import matrix as matrices
@@ -129,22 +128,6 @@ def test_blocks_stored_once_multiply_as_if_all_were(size, length, monkeypatch):
         scale = np.abs(dense) @ np.abs(x) + np.abs(z)
         numbers = dense if kind is np.float64 else dense.astype(np.float32)
         assert (np.abs(y - 3.0 * z - factor * numbers @ x.astype(float)) <= 40 * digits * scale).all()
-
-
-def test_blocks_stored_once_give_the_same_bits_on_any_number_of_threads(monkeypatch):
-    monkeypatch.setattr(matrices, "SHORTEST", 64)
-    monkeypatch.setattr(parallel, "WORTHWHILE", 1000)
-    A = ScaledMatrix(matrix(1500, 3), "single").scaled
-    x, found = np.random.default_rng(0).normal(size=4500), []
-    threads = decorators.threads()
-    try:
-        for count in (1, 2, 3):
-            decorators.set_threads(count)
-            found.append(np.empty(4500))
-            A.multiply(x, found[-1])
-    finally:
-        decorators.set_threads(threads)
-    assert all(np.array_equal(found[0], other) for other in found)
 
 
 def test_a_pattern_that_is_not_symmetric_is_stored_whole():

@@ -2,26 +2,14 @@
 
 import numpy as np
 import pytest
-from pressed_blocks import pressed
+from pressed_blocks import pressed, solved
 from scipy.sparse import csr_array
 from test_grouped_pivots import mass_equations
 
-import fastcontact as fc
-from fastcontact.analysis.load_step import load_step
-from fastcontact.analysis.problem import prepare
 from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, RepeatedError, condition
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.solvers import amg
-
-
-def solved(model, name, steps=1):
-    """Return the solver and the last result."""
-    problem = prepare(model, fc.linear_ramp(steps), fc.Criteria(), linear_solver=name)
-    state = problem.initial_state()
-    for index in range(steps):
-        state, result = load_step(problem, state, index + 1, (index + 1) / steps)
-    return problem.solver, result
 
 
 def columns_with_friction():
@@ -83,19 +71,12 @@ def exactly(A):
 
 
 @pytest.mark.parametrize("m", [1, 2, 5, 30, 200])
-def test_the_estimate_is_a_close_lower_bound_of_the_condition_number(m):
+def test_the_estimate_is_a_close_lower_bound_of_the_condition_number_at_any_scale_of_rows(m):
     rng = np.random.default_rng(m)
     for _ in range(20):
         A = rng.normal(size=(m, m)) * 10.0 ** rng.uniform(-3, 3, m)
-        assert exactly(A) / 3 <= estimated(A) <= exactly(A) * (1 + 1e-6)
-
-
-@pytest.mark.parametrize("size", [1.0, 1e-3, 1e3])
-def test_condition_numbers_do_not_depend_on_the_scale_of_rows(size):
-    rng = np.random.default_rng(3)
-    A = rng.normal(size=(40, 40)) + 5 * np.eye(40)
-    scaled = A * (size ** rng.uniform(-1, 1, 40))[:, None]
-    assert exactly(A) / 3 <= estimated(scaled) <= exactly(A) * (1 + 1e-6)
+        for scaled in (A, A * 10.0 ** rng.uniform(-3, 3, (m, 1))):
+            assert exactly(A) / 3 <= estimated(scaled) <= exactly(A) * (1 + 1e-6)
 
 
 def test_what_overflows_has_no_finite_condition():
