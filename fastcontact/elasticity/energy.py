@@ -58,7 +58,13 @@ def slopes_at(values: Array, corners: Array, dN: Array) -> tuple[Array, Array]:
     last index of the gradients is that of the direction of differentiation.
     """
     J = derivatives_at(corners, dN)
-    return derivatives_at(values, dN) @ np.linalg.inv(J), np.linalg.det(J)
+    if J.shape[-1] == 2:
+        return derivatives_at(values, dN) @ np.linalg.inv(J), np.linalg.det(J)
+    # Cramer's rule takes a quarter of the time of `inv` and `det`.
+    a, b, c = np.moveaxis(J, 2, 0)
+    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=3)
+    determinant = np.einsum("cqk,cqk->cq", a, cofactors[..., 0])
+    return derivatives_at(values, dN) @ (cofactors / determinant[..., None, None]), determinant
 
 
 def derivatives_at(values: Array, dN: Array) -> Array:
