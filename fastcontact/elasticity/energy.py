@@ -19,8 +19,7 @@ def elastic_energy(stress: Array, compliance: Array) -> Array:
     compliance : ndarray (n_cells, m, n_components, n_components)
         Compliance of cells (m = 1) or of their points (m = n), see `Material.compliance_at` [1 / pressure].
     """
-    n_cells, n, n_components = stress.shape
-    m = compliance.shape[1]
+    (n_cells, n, n_components), m = stress.shape, compliance.shape[1]
     strain = stress.reshape(n_cells, m, n // m, n_components) @ compliance
     return np.einsum("cni,cni->cn", stress, strain.reshape(stress.shape))
 
