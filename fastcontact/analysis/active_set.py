@@ -23,12 +23,12 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy.linalg import lu_solve
+from scipy.sparse import csr_array
 
 from fastcontact.analysis.solution import Accuracy, Response, Solution, response
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.constraints import Constraints
-from fastcontact.linear.delassus import lu_factors
+from fastcontact.contact.constraints import Compliance, Constraints
+from fastcontact.linear.delassus import lu_solver
 from fastcontact.linear.protocol import Loaded
 
 
@@ -85,7 +85,7 @@ def solve(
             continue
         solution = _with_next_set(constraints, accuracy, equations, u, forces, active)
         if solution.settled or iteration == accuracy.max_iterations:
-            return replace(solution, iterations=iteration, response=partial(_response, loaded, constraints, rows))
+            return replace(solution, iterations=iteration, response=partial(_response, loaded, B, rows, compliance))
         earlier_sets.add(active.tobytes())
         least_index = least_index or solution.wanted.tobytes() in earlier_sets
         if least_index:
@@ -95,17 +95,19 @@ def solve(
         iteration += 1
 
 
-def _response(loaded: Loaded, constraints: Constraints, rows: Indices) -> Response:
-    """Return the linear response to additional forces and gaps, while the constraints `rows` (q,) stay active."""
-    R, compliance = constraints.B[rows], constraints.normal_compliance
-    F = loaded.delassus(R)[1]
+def _response(loaded: Loaded, B: csr_array, rows: Indices, compliance: Compliance | None) -> Response:
+    """Return the linear response to additional forces and gaps, while the constraints `rows` (q,) stay active.
+
+    `B` (q, n) contains the rows of these constraints, and `compliance` is that of all constraints.
+    """
+    F = loaded.delassus(B)[1]
     C = None if compliance is None else compliance.block(rows)
     if C is not None:
         F = F + (np.diag(C) if C.ndim == 1 else C)
     if not len(rows):
-        return response(loaded, R, rows, np.negative)
-    factors = lu_factors(F)
-    return response(loaded, R, rows, lambda gaps: -lu_solve(factors, gaps))
+        return response(loaded, B, rows, np.negative)
+    solve_dense = lu_solver(F)
+    return response(loaded, B, rows, lambda gaps: -solve_dense(gaps))
 
 
 def _with_next_set(

@@ -26,7 +26,7 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import recovery
-from fastcontact.elasticity.energy import gradients_at
+from fastcontact.elasticity.energy import slopes_at
 from fastcontact.elasticity.mass import portions
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
@@ -328,9 +328,8 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
     for name, rows in portions(mesh):
         element, nodes = elements.get(name), mesh.cells[name][rows]
         centre = element.nodes[: element.n_corners].mean(axis=0)[None]
-        gradient, _ = gradients_at(mesh.points[nodes], element.gradient(centre))
-        slopes = gradient[:, 0].transpose(0, 2, 1) @ displacement[nodes]
-        squares = ((slopes - slopes.transpose(0, 2, 1)) ** 2).sum(axis=(1, 2)) / 8.0
+        slopes, _ = slopes_at(displacement[nodes], mesh.points[nodes], element.gradient(centre))
+        squares = ((slopes - slopes.transpose(0, 1, 3, 2)) ** 2).sum(axis=(1, 2, 3)) / 8.0
         if squares.max() > square:
             square, point = squares.max(), mesh.points[nodes[squares.argmax()]].mean(axis=0)
     return float(square**0.5), point
@@ -567,19 +566,19 @@ def _works_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]
         xi, weights = element.quadrature
         N, dN = element.shape(xi), element.gradient(xi)
         for cells in np.array_split(block, len(block) * dN.nbytes // BATCH + 1):
-            gradient, volume = gradients_at(mesh.points[cells], dN)
+            slope, volume = slopes_at(last.displacement[cells], mesh.points[cells], dN)
             stress, volume = N @ last.stress[cells], np.abs(volume) * weights
-            slope = np.einsum("cad,cqak->cqdk", last.displacement[cells], gradient, optimize=True)
             tensor = np.zeros_like(slope)
             for column, (i, j) in enumerate(pairs[: stress.shape[2]]):
                 if max(i, j) < dim:
                     tensor[..., i, j] = tensor[..., j, i] = stress[..., column]
-            strain_work = (tensor * slope).sum(axis=(2, 3))
+            strain_work = np.einsum("cqij,cqij->cq", tensor, slope)
             if axisymmetric:
                 radius, radial_u = (values[cells][..., 0] @ N.T for values in (mesh.points, last.displacement))
                 volume, strain_work = volume * radius, strain_work + stress[..., 2] * radial_u / radius
             rotation = 0.5 * (slope - slope.transpose(0, 1, 3, 2))
-            neglected_work = 0.5 * (tensor * (rotation.transpose(0, 1, 3, 2) @ rotation)).sum(axis=(2, 3))
+            # The neglected strain is half the product of the transposed rotation, which is antisymmetric, with the rotation.
+            neglected_work = -0.5 * np.einsum("cqij,cqij->cq", tensor, rotation @ rotation)
             np.add.at(neglected, body[cells[:, 0]], (neglected_work * volume).sum(axis=1))
             np.add.at(strained, body[cells[:, 0]], (np.abs(strain_work) * volume).sum(axis=1))
     return neglected, strained

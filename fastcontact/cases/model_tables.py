@@ -103,8 +103,9 @@ def _constants() -> dict[str, tuple[type, ...]]:
     """Return the TOML types of the keys of all material laws, in the order in which messages list them."""
     known: dict[str, set[type]] = {}
     for law in _LAWS:
+        parameters = inspect.signature(law).parameters
         for key, annotation in {k: v for base in reversed(law.__mro__) for k, v in types_of(base).items()}.items():
-            if key in inspect.signature(law).parameters:
+            if key in parameters:
                 known.setdefault(key, set()).update(toml_types(annotation))
     return {key: tuple(sorted(kinds, key=[*NUMBER, list, dict, bool, str].index)) for key, kinds in known.items()}
 
@@ -132,6 +133,8 @@ _ADD: dict[str, Callable[..., None]] = {
 }  # fmt: skip
 # Functions for tables that refer to contact pairs and are therefore added after the pairs.
 _ADD_TO_CONTACT: dict[str, Callable[..., None]] = {"fluid_pressure": Model.add_fluid_pressure}
+# Kinds of tables of which a case file contains lists.
+LISTS = (*_ADD, *_ADD_TO_CONTACT)
 
 
 def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any], list[str]]:
@@ -153,24 +156,16 @@ def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any],
     return {**known, **further}, required
 
 
-# TOML types of the keys, and the required keys, by kind of table.
-LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
-    **{
-        kind: _keys(add)
-        for kind, add in {**_ADD, **_ADD_TO_CONTACT}.items()
-        if kind not in ("material", "temperature", "coupling")
-    },
-    "coupling": _keys(_add_coupling, place=list),
-    "support": _keys(Model.prescribe, rotation=dict),
-    "material": (  # its required keys depend on the law
-        _constants()
-        | {"groups": (list, str), "law": str, "D": list, "hardening": list}
-        | dict.fromkeys(("mu", "alpha"), (*NUMBER, list)),
-        (),
-    ),
-    # A temperature is given by a value or by a file, and no key is required in both cases.
-    "temperature": (_keys(Model.add_temperature, Model.add_temperature_file)[0], ()),
-}
+@functools.cache
+def keys_of_list(kind: str) -> tuple[dict[str, Any], Sequence[str]]:
+    """Return the TOML types of the keys of the tables of a kind, one of `LISTS`, and their required keys."""
+    if kind == "material":  # its required keys depend on the law
+        others = {"groups": (list, str), "law": str, "D": list, "hardening": list}
+        return _constants() | others | dict.fromkeys(("mu", "alpha"), (*NUMBER, list)), ()
+    if kind == "temperature":  # a value or a file gives it, and no key is required in both cases
+        return _keys(Model.add_temperature, Model.add_temperature_file)[0], ()
+    further: dict[str, Any] = {"coupling": {"place": list}, "support": {"rotation": dict}}
+    return _keys({**_ADD, **_ADD_TO_CONTACT}[kind], **further.get(kind, {}))
 
 
 def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
@@ -195,9 +190,8 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
 def _add_lists(model: Model, data: dict[str, Any], folder: Path, adding: Mapping[str, Callable[..., None]]) -> None:
     """Add the entries of the lists of tables to a model by the functions `adding`; CaseError if an entry is invalid."""
     for kind, add in adding.items():
-        known, required = LISTS[kind]
         for i, entry in enumerate(tables(kind, data.get(kind, []))):
-            where = f"{kind}[{i}]"
+            where, (known, required) = f"{kind}[{i}]", keys_of_list(kind)
             if kind == "material":
                 check_keys(where, entry, known)
                 law = _material_law(entry)

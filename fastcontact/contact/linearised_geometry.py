@@ -254,6 +254,8 @@ class _SurfacePoints:
     def _facet_bend(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, at: Places) -> Array:
         """Return the derivatives (n, dim - 1, dim) of facet normals along facets, and store the dual axes of the facets."""
         self._dual_axes = np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes)
+        if primary.order == 1 and xi.shape[1] == 1:
+            return np.zeros_like(self.axes)  # straight lines
         # Shape functions are at most quadratic along each axis, so that central differences of gradients are exact.
         steps = 0.5 * np.eye(xi.shape[1])
         above, below = ([places(primary, facet, xi + sign * h).gradient for h in steps] for sign in (1.0, -1.0))

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
-from scipy.linalg.lapack import dgetrf
+from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
@@ -153,18 +153,21 @@ def inverse_entries(n: int, solve: Callable[[Array], Array], rows: Indices, colu
     return entries
 
 
-def lu_factors(A: Array) -> tuple[Array, Array]:
-    """Return the LU factors of a matrix A (m, m), as `scipy.linalg.lu_factor` does.
+def lu_solver(A: Array) -> Callable[[Array], Array]:
+    """Return a function that solves systems with a matrix A (m, m), which is factorised once.
+
+    The functions of LAPACK are called directly, because those of `scipy.linalg` take longer than the solution of a small
+    system.
 
     Raises
     ------
     LinAlgError
         If A is singular up to round-off.
     """
-    lu, pivots, _ = dgetrf(A)  # `lu_factor` warns if a pivot is exactly zero, which is an error below
+    lu, pivots, _ = dgetrf(A)  # `scipy.linalg.lu_factor` warns if a pivot is exactly zero, which is an error below
     if not (np.abs(np.diag(lu)) > _round_off(A) * np.abs(A).max(axis=0)).all():
         raise LinAlgError("singular")
-    return lu, pivots
+    return lambda right_side: dgetrs(lu, pivots, right_side)[0]
 
 
 def symmetric(delassus: Array) -> Array:

@@ -22,7 +22,7 @@ def area_vectors(corners: Array, dN: Array) -> Array:
     """
     tangents = np.einsum("qkj,nkd->nqdj", dN, corners)
     if corners.shape[2] == 2:
-        return np.stack([tangents[..., 1, 0], -tangents[..., 0, 0]], axis=-1)
+        return np.asarray(tangents[..., ::-1, 0] * (1.0, -1.0))
     return np.cross(tangents[..., 0], tangents[..., 1])
 
 

@@ -329,4 +329,6 @@ def _write(table: Any, values: AnyArray, first: int) -> None:
     if values.size:
         rows = table.id.get_space()
         rows.select_hyperslab((first, *[0] * (values.ndim - 1)), values.shape)
-        table.id.write(h5s.create_simple(values.shape), rows, np.ascontiguousarray(values))
+        # The type in memory is that in the file. Without it, h5py would build it anew from the types of all columns.
+        memory = np.ascontiguousarray(values, table.id.dtype), table.id.get_type()
+        table.id.write(h5s.create_simple(values.shape), rows, *memory)

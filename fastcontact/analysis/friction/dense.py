@@ -18,13 +18,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from scipy.linalg import lu_solve
 
 from fastcontact.analysis.criteria import HALVINGS, NOTABLE
 from fastcontact.analysis.friction.cone_newton import Law, newton
 from fastcontact.analysis.solution import Forces
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.linear.delassus import lu_factors
+from fastcontact.linear.delassus import lu_solver
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION, SUM_ROUND_OFF
 
 # Numbers of edges of the polyhedral cones that are tried in 3D, and largest size of a linear complementarity problem.
@@ -195,11 +194,11 @@ def response(F: Array, law: Law, forces: Forces) -> Callable[[Array], Array]:
     unit = _units(F, len(law.mu))
     units = np.tile(unit, len(forces.y))
     A, D = _equations(law, units[:, None] * F * units, forces.y / unit, forces.gaps * unit, rows, forces.sticking)
-    factors = lu_factors(A)
+    solve_dense = lu_solver(A)
 
     def varied(gaps: Array) -> Array:
         change, right_side = np.zeros_like(gaps), -np.einsum("abq,bq->aq", D, (gaps * unit)[:, rows])
-        change[:, rows] = lu_solve(factors, right_side.ravel()).reshape(right_side.shape)
+        change[:, rows] = solve_dense(right_side.ravel()).reshape(right_side.shape)
         return change * unit
 
     return varied

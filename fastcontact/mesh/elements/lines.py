@@ -5,16 +5,18 @@ import numpy as np
 from fastcontact.mesh.elements._element import Array, Element, quadratic, with_middles
 from fastcontact.mesh.quadrature import gauss_line
 
+# Coordinates of both ends.
+ENDS = np.array([-1.0, 1.0])
+
 
 def shape(xi: Array) -> Array:
     """Return the shape functions (m, 2) [-] of the linear line at `xi` (m, 1) [-]."""
-    s = xi[:, 0]
-    return np.stack([(1 - s) / 2, (1 + s) / 2], axis=1)
+    return np.asarray(0.5 * (1.0 + xi * ENDS))
 
 
 def gradient(xi: Array) -> Array:
     """Return the derivatives (m, 2, 1) [-] of the linear line at `xi` (m, 1) [-]."""
-    return np.broadcast_to(np.array([[-0.5], [0.5]]), (len(xi), 2, 1)).copy()
+    return np.full((len(xi), 2, 1), 0.5 * ENDS[:, None])
 
 
 def shape_3(xi: Array) -> Array:
@@ -30,7 +32,7 @@ def gradient_3(xi: Array) -> Array:
 
 
 LINE2 = Element(
-    "line2", np.array([[-1.0], [1.0]]), edges=((0, 1),), facets=((0,), (1,)), shape=shape, gradient=gradient,
+    "line2", ENDS[:, None], edges=((0, 1),), facets=((0,), (1,)), shape=shape, gradient=gradient,
     quadrature=gauss_line(2), meshio="line", med="SE2", vtk=3, quadratic="line3",
 )  # fmt: skip
 LINE3 = quadratic(

@@ -425,11 +425,12 @@ def read_families(folder: Any, level: int = 0) -> Families:
 def _names_in(family: Any) -> tuple[str, ...]:
     if "GRO" not in family:
         return ()
-    padded_names = values(family["GRO"], "NOM").tobytes()
+    groups = family["GRO"]
+    padded_names = values(groups, "NOM").tobytes()
     # MED 2 stores one string for all names, later versions one row per name. The bytes differ only by a zero at the end.
     count = -(-len(padded_names) // GROUP_NAME_SIZE)
-    if "NBR" in family["GRO"].attrs:
-        count = min(count, int(attribute(family["GRO"], "NBR")))
+    if "NBR" in groups.attrs:
+        count = min(count, int(attribute(groups, "NBR")))
     fields = (padded_names[i * GROUP_NAME_SIZE : (i + 1) * GROUP_NAME_SIZE] for i in range(count))
     return tuple(name for name in map(decoded, fields) if name)
 

@@ -14,7 +14,7 @@ from fastcontact import cli
 from fastcontact._tools.toml_text import written
 from fastcontact.cases import checks, keys
 from fastcontact.cases.case import read_case
-from fastcontact.cases.model_tables import LISTS
+from fastcontact.cases.model_tables import LISTS, keys_of_list
 
 CASE = {
     "kinematics": "plane_strain",
@@ -69,7 +69,7 @@ def places():
         for key in [*known, "unknown_key"]:
             yield f"{name}.{key}", lambda data, name=name, key=key: (data.setdefault(name, {}), key)
     lists = {
-        **{kind: (known, ENTRIES[kind]) for kind, (known, _) in LISTS.items()},
+        **{kind: (keys_of_list(kind)[0], ENTRIES[kind]) for kind in LISTS},
         "check": (checks.CHECK, {"quantity": "pair.force", "value": 3.0, "tolerance": 0.1}),
         "sensitivity": (keys.SENSITIVITY, {"quantity": ["force", "pair"], "by": [["E", "UPPER"]]}),
     }
