@@ -34,6 +34,7 @@ from fastcontact.analysis.tolerances import DECLINE, WINDOW
 from fastcontact.arrays import Array, largest
 from fastcontact.elasticity.nonlinear_bodies import WHOLE
 from fastcontact.errors import ConvergenceError, ModelError
+from fastcontact.linear.choice import LOOSEST
 from fastcontact.linear.protocol import TOLERANCE, Loaded
 from fastcontact.round_off import SINGLE_PRECISION
 
@@ -42,9 +43,6 @@ log = logging.getLogger("fastcontact")
 # contact does not constrain, such as gaps between the nodes of a pressure field. An O-ring takes 5 iterations with 5e-5 and
 # 7 with 2e-4. An O-ring under fluid pressure takes 13 with 2e-4, and 5e-5 is too soft for it.
 HELD = 2e-4
-# The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement. In
-# iterations without contact that are not the last, residuals of linear solutions fall to this fraction.
-FORCING = 1e-3
 
 
 def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = None) -> StepEquilibrium:
@@ -310,7 +308,8 @@ class _Newton:
         load = replace(self._load, force=force)
         iterate.u, iterate.history = u.copy(), []
         self._linear_tolerance = self._forcing(problem, load, u, unbalanced)
-        tolerance = min(max(problem.criteria.geometry, FORCING * changes[-1]), NOTABLE)
+        # The contact geometry is iterated no further than the linearisation of the bodies is accurate.
+        tolerance = min(max(problem.criteria.geometry, LOOSEST * changes[-1]), NOTABLE)
         inner_problem = replace(problem, criteria=replace(problem.criteria, geometry=tolerance))
         solution = self._contact(inner_problem, load, with_loads(problem, load), u, Extrapolation())
         self._reusable = problem if regularisation.geometric == WHOLE else None
@@ -333,7 +332,7 @@ class _Newton:
             return None
         missing = largest(system.displacement(system.unknowns(u, lift), lift) - u)  # prescribed displacements
         ratio = max(largest(system.reduced(unbalanced)) / scale, missing and missing / max(largest(u), largest(lift)))
-        return FORCING * ratio if ratio**2 > self._tolerance else None
+        return LOOSEST * ratio if ratio**2 > self._tolerance else None
 
     def _contact(
         self, problem: Problem, load: StepLoad, loaded: Loaded, u: Array, start: Extrapolation
