@@ -224,6 +224,10 @@ class FloatingBodies:
         """Return the displacements (n_dofs,) of the rigid-body motion with the values `position` (k,) at `dofs` [length]."""
         return np.asarray(self.motions.displacement @ position)
 
+    def strained(self, u: Array) -> Array:
+        """Return displacements u (n_dofs,) less the rigid-body motion of the springs [length]."""
+        return u - self.rigid(u[self.dofs])
+
     def freed(self, constraints: Constraints, dofs: ActiveDofs, respond: Response) -> Freed:
         """Return the linear response to positions of the springs, given `respond` for springs at a fixed position."""
         modes, springs = self.motions.displacement, dofs.numbers(self.dofs)

@@ -301,10 +301,8 @@ class _Newton:
             contact = self._stiffness_of_contact(K, u, regularisation) if regularisation.geometric == WHOLE else None
             problem = linearised(self._problem, K, u, contact, regularisation.stiff, regularisation.replaces)
         unbalanced, floating = self._load.force - terms.residual(u)[0], problem.floating_bodies
-        force = unbalanced + problem.system.K @ u
-        if floating is not None and iterate.rigid is not None:
-            # Under load, the tangent resists rigid-body rotations, which the unknowns of floating bodies do not include.
-            force -= problem.system.K @ floating.rigid(u[floating.dofs])
+        # Under load, the tangent resists rigid-body rotations, which the unknowns of floating bodies do not include.
+        force = unbalanced + problem.system.K @ (u if floating is None else floating.strained(u))
         load = replace(self._load, force=force)
         iterate.u, iterate.history = u.copy(), []
         self._linear_tolerance = self._forcing(problem, load, u, unbalanced)
@@ -368,7 +366,9 @@ class _Newton:
             sticking_rows = [tangent[np.flatnonzero(closed & solution.sticking)] for tangent in constraints.tangents]
             rows = csr_array(vstack([constraints.B[np.flatnonzero(closed)], *sticking_rows]))
             squares = np.asarray(rows.multiply(rows).sum(axis=1)).ravel()  # zero for tangents of pairs without friction
-            stiffness = regularisation.held * float(K.diagonal().max()) / np.where(squares > 0.0, squares, np.inf)
+            nodal = K.data[K.indices == np.repeat(np.arange(len(K.indptr) - 1), np.diff(K.indptr))]
+            stiffest = float(np.linalg.eigvalsh(nodal).max())  # the largest entry would depend on the axes
+            stiffness = regularisation.held * stiffest / np.where(squares > 0.0, squares, np.inf)
             matrices.append(csr_array(rows.T @ diags_array(stiffness) @ rows))
         for matrix in matrices:
             matrix.resize((len(u), len(u)))
