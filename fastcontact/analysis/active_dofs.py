@@ -12,16 +12,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.arrays import Array, Indices, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.linear.sparse_rows import without_remnants
-
-# If supports hold both sides of a constraint, its force can neither close its gap nor stop its slip. After the supported
-# unknowns are eliminated, its row contains only small entries of neighbouring nodes. Rows whose entries are all below this
-# fraction of the largest entry before the elimination are set to zero. With remaining entries of 1e-16, multipliers of a
-# mortar joint between two flanges with a fixed edge reached 1e23; with entries of 1e-7, active sets did not converge.
-HELD = 1e-2
 
 
 class ActiveDofs:
@@ -88,13 +83,18 @@ class ActiveDofs:
     def constraints(self, constraints: Constraints, lift: Array, start: Array) -> Constraints:
         """Return constraints on all displacements as constraints on the active unknowns.
 
-        Constraints whose two sides are held by supports get empty rows, see HELD. `start` (n,) are the displacements at the
-        beginning of the load step, relative to which slips are measured [length].
+        `start` (n,) are the displacements at the beginning of the load step, relative to which slips are measured [length].
+
+        If supports hold both sides of a constraint, its force can neither close its gap nor stop its slip. After the
+        supported unknowns are eliminated, its row contains only small entries of neighbouring nodes. Rows whose entries are
+        all below the fraction NOTABLE of the largest entry before the elimination are set to zero. With remaining entries of
+        1e-16, multipliers of a mortar joint between two flanges with a fixed edge reached 1e23; with entries of 1e-7, active
+        sets did not converge.
         """
 
         def on_unknowns(rows: csr_array, offset: Array) -> tuple[csr_array, Array]:
             reduced, offset = self._system.rows(rows, offset, lift)
-            return without_remnants(csr_array(reduced[:, self._unknowns]), rows, HELD), offset
+            return without_remnants(csr_array(reduced[:, self._unknowns]), rows, NOTABLE), offset
 
         B, gap0 = on_unknowns(constraints.B, constraints.gap0)
         slips = [slip - T @ start for T, slip in zip(constraints.tangents, constraints.slip0, strict=True)]

@@ -227,10 +227,6 @@ class Terms:
         return state
 
 
-# A force is significant if it exceeds this multiple of the round-off of the internal forces in other rows.
-SIGNIFICANT = 100.0
-
-
 @dataclass(frozen=True, eq=False)
 class Balance:
     """Forces at the end of a load step.
@@ -359,7 +355,7 @@ def _round_off(problem: Problem, row_sums: Array, forces: tuple[Array, ...], sca
         [force].
     """
     force_round_off = ROUND_OFF * scale
-    noise = max(force_round_off, SIGNIFICANT * SUM_ROUND_OFF * largest(row_sums))
+    noise = max(force_round_off, SUM_ROUND_OFF * largest(row_sums) / NOTABLE)
     for magnitudes in map(np.abs, forces):
         if ((magnitudes > noise) & (magnitudes * problem.criteria.relative > SUM_ROUND_OFF * row_sums)).any():
             return force_round_off, noise

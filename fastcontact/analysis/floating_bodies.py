@@ -30,7 +30,7 @@ from scipy.sparse import bsr_array
 
 from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.anderson import Anderson
-from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS
+from fastcontact.analysis.criteria import DECREASE, HALVINGS, MAX_NEWTON_ITERATIONS, NOTABLE
 from fastcontact.analysis.solution import Response, Solution
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
@@ -46,10 +46,6 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 # body, because a contact is not stiffer than the softer one of its bodies (for a layer that is softer by a
 # factor of 2e5, 100 positions did not suffice with the stiffness of the other body).
 SOFT = 1e-3
-# Singular value of `stretched`, about 1 for motions that contact restrains, up to which a motion is restrained only because
-# the friction force turns with the slip direction (without this, the iteration fails for a box that rides on a driven one in
-# 3D).
-WEAK = 1e-2
 
 
 @dataclass(frozen=True)
@@ -120,7 +116,10 @@ class Freed:
         # The linear response is not valid for motions that reverse slips.
         if unrestrained or largest(moved) > largest(slip):
             U, s, V = np.linalg.svd(self.stretched)
-            firm = s > WEAK
+            # A motion with a small singular value, which is about 1 if contact restrains it, is restrained only because the
+            # friction force turns with the slip direction. Otherwise the iteration fails for a box that rides on a driven
+            # one in 3D.
+            firm = s > NOTABLE
             slide = self._slide(V[~firm].T, elongation, solution, sliding)
             if largest(slide) > largest(elongation):
                 return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), np.inf
@@ -224,6 +223,10 @@ class FloatingBodies:
     def rigid(self, anchor: Array) -> Array:
         """Return the displacements (n_dofs,) of the rigid-body motion with the values `anchor` (k,) at `dofs` [length]."""
         return np.asarray(self.motions.displacement @ anchor)
+
+    def strained(self, u: Array) -> Array:
+        """Return displacements u (n_dofs,) less the rigid-body motion of the springs [length]."""
+        return u - self.rigid(u[self.dofs])
 
     def freed(self, constraints: Constraints, dofs: ActiveDofs, respond: Response) -> Freed:
         """Return the linear response to positions of the springs, given `respond` for springs at a fixed position."""

@@ -271,8 +271,11 @@ def _with_floating_bodies(
 
     start, modes = iterate.u[bodies.dofs], bodies.motions.displacement
     model_size = float(np.ptp(problem.model.mesh.points, axis=0).max())
+    force = step.load.force
+    if (u := problem.linearised_at) is not None:  # residual forces, since a loaded tangent resists rigid-body rotations
+        force = force - problem.system.K @ bodies.strained(u)
     # Work of the loads on each free rigid-body motion, and the size of the model.
-    loads = generalised(bodies.motions, step.load.force, state.largest_rigid_force), model_size
+    loads = generalised(bodies.motions, force, state.largest_rigid_force), model_size
     if not iterate.history:
         rows, gap0 = resisting(constraints)
         shift = stopped_at(rows @ modes, gap0 + rows @ iterate.u, *loads)

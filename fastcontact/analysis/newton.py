@@ -34,6 +34,7 @@ from fastcontact.analysis.tolerances import DECLINE, WINDOW
 from fastcontact.arrays import Array, largest
 from fastcontact.elasticity.nonlinear_bodies import WHOLE
 from fastcontact.errors import ConvergenceError, ModelError
+from fastcontact.linear.choice import LOOSEST
 from fastcontact.linear.protocol import TOLERANCE, Loaded
 from fastcontact.round_off import SINGLE_PRECISION
 
@@ -42,9 +43,6 @@ log = logging.getLogger("fastcontact")
 # contact does not constrain, such as gaps between the nodes of a pressure field. An O-ring takes 5 iterations with 5e-5 and
 # 7 with 2e-4. An O-ring under fluid pressure takes 13 with 2e-4, and 5e-5 is too soft for it.
 HELD = 2e-4
-# The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement. In
-# iterations without contact that are not the last, residuals of linear solutions fall to this fraction.
-FORCING = 1e-3
 
 
 def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = None) -> StepEquilibrium:
@@ -303,14 +301,13 @@ class _Newton:
             contact = self._stiffness_of_contact(K, u, regularisation) if regularisation.geometric == WHOLE else None
             problem = linearised(self._problem, K, u, contact, regularisation.stiff, regularisation.replaces)
         unbalanced, floating = self._load.force - terms.residual(u)[0], problem.floating_bodies
-        force = unbalanced + problem.system.K @ u
-        if floating is not None and iterate.rigid is not None:
-            # Under load, the tangent resists rigid-body rotations, which the unknowns of floating bodies do not include.
-            force -= problem.system.K @ floating.rigid(u[floating.dofs])
+        # Under load, the tangent resists rigid-body rotations, which the unknowns of floating bodies do not include.
+        force = unbalanced + problem.system.K @ (u if floating is None else floating.strained(u))
         load = replace(self._load, force=force)
         iterate.u, iterate.history = u.copy(), []
         self._linear_tolerance = self._forcing(problem, load, u, unbalanced)
-        tolerance = min(max(problem.criteria.geometry, FORCING * changes[-1]), NOTABLE)
+        # The contact geometry is iterated no further than the linearisation of the bodies is accurate.
+        tolerance = min(max(problem.criteria.geometry, LOOSEST * changes[-1]), NOTABLE)
         inner_problem = replace(problem, criteria=replace(problem.criteria, geometry=tolerance))
         solution = self._contact(inner_problem, load, with_loads(problem, load), u, Extrapolation())
         self._reusable = problem if regularisation.geometric == WHOLE else None
@@ -333,7 +330,7 @@ class _Newton:
             return None
         missing = largest(system.displacement(system.unknowns(u, lift), lift) - u)  # prescribed displacements
         ratio = max(largest(system.reduced(unbalanced)) / scale, missing and missing / max(largest(u), largest(lift)))
-        return FORCING * ratio if ratio**2 > self._tolerance else None
+        return LOOSEST * ratio if ratio**2 > self._tolerance else None
 
     def _contact(
         self, problem: Problem, load: StepLoad, loaded: Loaded, u: Array, start: Extrapolation
@@ -369,7 +366,9 @@ class _Newton:
             sticking_rows = [tangent[np.flatnonzero(closed & solution.sticking)] for tangent in constraints.tangents]
             rows = csr_array(vstack([constraints.B[np.flatnonzero(closed)], *sticking_rows]))
             squares = np.asarray(rows.multiply(rows).sum(axis=1)).ravel()  # zero for tangents of pairs without friction
-            stiffness = regularisation.held * float(K.diagonal().max()) / np.where(squares > 0.0, squares, np.inf)
+            nodal = K.data[K.indices == np.repeat(np.arange(len(K.indptr) - 1), np.diff(K.indptr))]
+            stiffest = float(np.linalg.eigvalsh(nodal).max())  # the largest entry would depend on the axes
+            stiffness = regularisation.held * stiffest / np.where(squares > 0.0, squares, np.inf)
             matrices.append(csr_array(rows.T @ diags_array(stiffness) @ rows))
         for matrix in matrices:
             matrix.resize((len(u), len(u)))

@@ -45,11 +45,6 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 # excess of the largest nodal pressure near the edge over means of neighbouring facets where bodies yield.
 # The fraction of a strain that linear kinematics neglect is about as large as the strain.
 NEGLECTED = 0.1
-# Rotation [radian] beyond which linear kinematics give a warning: they neglect a strain of half its square.
-ROTATION = 0.3
-# Error of the moment of friction above which a warning is given. Where bodies rotate, linear kinematics apply forces at
-# undeformed positions, by which moments are out of balance by about the angle divided by the coefficient of friction.
-OUT_OF_BALANCE = 0.03
 # Largest recommended factor on the number of steps. A larger factor indicates a wrong coefficient of wear.
 MANY_STEPS = 1000
 # Alternation of nodal pressures on quadratic lines above which a warning is given, see `oscillating`; elsewhere ALTERNATING.
@@ -58,8 +53,6 @@ ALTERNATING_ON_LINES = 0.15
 ACROSS = 4
 # Relative residual of the displacement or of the forces above which a warning is given.
 LOOSE = 1e-4
-# Smallest number of nodes for which the median is meaningful.
-MANY = 10
 
 
 def result_warnings(
@@ -310,12 +303,12 @@ def _large_stress_free_strain(problem: Problem, last: StepResult) -> Iterator[st
 
 def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterator[str]:
     angle, where = largest_rotation(problem.model.mesh, problem.displacement(state.u))
-    if angle > ROTATION:
+    if angle**2 > NEGLECTED:  # the change of area that linear kinematics neglect
         yield (
             f"the largest rotation is {angle:.3f} radian, near {np.array2string(where, precision=4)}: linear kinematics "
             f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
         )
-    elif angle > 0.5 * OUT_OF_BALANCE * min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0):
+    elif angle > 0.5 * NOTABLE * min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0):
         yield from neglected_rotation(problem, last, angle)
 
 
@@ -442,7 +435,7 @@ def oscillating(pair: Formulation, contact: ContactResult, mesh: Mesh) -> Iterat
     others = _alternating(side)
     count = np.asarray(others.sum(axis=1)).ravel()
     inside = contact.active & (side.beside @ ~contact.active == 0) & (count > 0)
-    if inside.sum() < MANY:
+    if inside.sum() < 2 * ACROSS:  # too few for a median
         return
     pressure = contact.pressure[inside]
     deviation = pressure - (others @ contact.pressure)[inside] / count[inside]
@@ -519,7 +512,7 @@ def neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Iter
     # The moment out of balance does twice the neglected work in a rotation. The neglected strain also changes pressures.
     error = ratio + np.divide(2.0 * np.abs(neglected), capacity, out=np.zeros(len(capacity)), where=capacity > 0.0)
     worst = int(np.argmax(np.where(capacity > 0.0, error, 0.0)))
-    if capacity[worst] > 0.0 and error[worst] > OUT_OF_BALANCE:
+    if capacity[worst] > 0.0 and error[worst] > NOTABLE:
         name = body_name(mesh, bodies(mesh)[1], worst)
         yield (
             f"moments of friction on body {name} are wrong by up to {error[worst]:.1%}: it rotates by {angle:.2g} radian, "

@@ -19,8 +19,6 @@ from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION, TINY
 
 # Cosine of the largest angle between directions at two nodes that are joined into one field, such as along a curved rim.
 SAME_DIRECTION = float(np.cos(np.radians(0.5 * CORNER)))
-# Power of the inverse distance in the weights by which directions are interpolated to other nodes.
-NEAREST = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,11 +135,12 @@ def alike(projectors: Array, positions: Array) -> list[tuple[Array, Mask]]:
         order, predecessor = breadth_first_order(minimum_spanning_tree(csr_array(away)), 0, directed=False)
         for child in order[1:]:  # orient each vector like its predecessor in the tree of nearest neighbours
             axis[child] *= np.sign(axis[child] @ axis[predecessor[child]])
-        # Elsewhere, directions are interpolated with the inverse distances to the power NEAREST as weights.
+        # Elsewhere, directions are interpolated with powers of the inverse distances as weights. With this power, the
+        # contributions of distant nodes decrease faster than their number increases.
         along = np.tile(axis[order][0], (len(positions), 1))
         if not (axis[order] @ axis[order][0] > 1.0 - ROUND_OFF).all():
             away = _distances(positions, positions[seeds[order]])
-            along = _unit((away.min(axis=1, keepdims=True) / away) ** NEAREST @ axis[order])
+            along = _unit((away.min(axis=1, keepdims=True) / away) ** (1 + axis.shape[1]) @ axis[order])
         along[seeds[order]] = axis[order]
         held = np.einsum("nd,nde,ne->n", along, remaining, along) >= SAME_DIRECTION**2
         along[held] = _unit(np.einsum("nde,ne->nd", remaining[held], along[held]))

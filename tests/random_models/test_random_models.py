@@ -56,7 +56,7 @@ def test_more_random_models_end_right(first):
 @pytest.mark.parametrize(
     "seeds",
     [
-        range(4),
+        [*range(4), 71],
         *(pytest.param(k, marks=pytest.mark.slow) for k in (range(4, 24), range(24, 44), range(44, 64), [70238])),
     ],
 )

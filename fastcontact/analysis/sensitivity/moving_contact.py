@@ -29,14 +29,9 @@ from fastcontact.linear.sparse_rows import entry_rows
 from fastcontact.round_off import DIFFERENCES
 
 REMEDY = "Change the load slightly, or use one-sided finite differences between two solutions"
-# Increment of finite differences, relative to the admissible range of a constant or to the largest force.
+# Increment of finite differences, relative to the admissible range of a constant or to the largest force. One-sided
+# differences of smooth functions have errors of this order, and central differences have errors of the order of its square.
 CHANGED = 1e-3
-# Half the difference of one-sided derivatives above which there is a kink. It is relative to the largest force over the
-# shortest edge for forces, and absolute for gaps.
-SMOOTH = 1e-3
-# Error of the derivatives from simultaneous moves, relative to the largest derivative, above which points are moved one by
-# one.
-SEPARABLE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,9 +166,10 @@ class MovingContact:
         jump, n = csr_array(0.5 * (forward - backward)), len(self.u)
         force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * DIFFERENCES / self.step
         row = entry_rows(jump)
-        # Pressures follow from forces: they are smooth where forces are.
+        # Half the difference of one-sided derivatives is larger at a kink. Pressures follow from forces: they are smooth
+        # where forces are.
         scale = np.where(row < n, force, np.where(row < n + len(self.active), 1.0, np.inf))
-        jump.data[np.abs(jump.data) <= SMOOTH * scale] = 0.0
+        jump.data[np.abs(jump.data) <= CHANGED * scale] = 0.0
         jump.eliminate_zeros()
         return jump
 
@@ -246,7 +242,7 @@ class MovingContact:
         n, k = len(self.u), len(self.active)
         error = np.abs(difference - derivative @ shift)
         blocks = (slice(0, n), slice(n, n + k), slice(n + k, None))
-        return all(largest(error[block]) <= SEPARABLE * largest(difference[block]) for block in blocks)
+        return all(largest(error[block]) <= CHANGED**2 * largest(difference[block]) for block in blocks)
 
 
 def _independent_groups(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:

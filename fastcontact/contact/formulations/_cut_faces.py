@@ -18,7 +18,7 @@ from fastcontact.contact.formulations._overlap import Coupling, Overlap
 from fastcontact.contact.pairing import FACING
 from fastcontact.contact.projection import closest_of_kinds
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
-from fastcontact.contact.search.facet_tables import tables
+from fastcontact.contact.search.facet_tables import polynomial_degree, tables
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.errors import ContactError
@@ -29,8 +29,6 @@ from fastcontact.mesh import elements, quadrature
 REACH = 3.0
 # Work per secondary facet relative to the unit of work in `parallel.portions`, for the choice of the number of threads.
 EFFORT = 400
-# Degree, by the number of nodes of a facet, of its shape functions as polynomials of both reference coordinates.
-DEGREE = {3: 1, 4: 2, 6: 2, 8: 3, 9: 4}
 
 
 def face_overlap(
@@ -201,7 +199,7 @@ def _integrated(
     n, k = secondary.block.facets.shape
     mass, integrals = np.empty((len(pairs), k, k)), np.empty((len(pairs), k, opposite.n_nodes))
     closer, start = np.empty((n, k)), np.searchsorted(pairs[:, 0], np.arange(n + 1))
-    degree = DEGREE[element.n_nodes] + max(DEGREE[element.n_nodes], DEGREE[opposite.n_nodes])
+    degree = polynomial_degree(element.n_nodes) + polynomial_degree(max(element.n_nodes, opposite.n_nodes))
     # Between triangles the quadrature is exact, so that the result does not depend on the choice of a first corner.
     if element.n_nodes == opposite.n_nodes == 3:
         degree = max(degree, heights[0].shape[1])

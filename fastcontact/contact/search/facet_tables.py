@@ -68,6 +68,11 @@ def terms(places: Array, n_nodes: int) -> Array:
     return np.prod(places[:, None] ** _POWERS[None, :n_nodes], axis=2)
 
 
+def polynomial_degree(n_nodes: int) -> int:
+    """Return the degree of a facet's polynomial in both reference coordinates together."""
+    return int(_POWERS[:n_nodes].sum(axis=1).max())
+
+
 def _bend(nodes: Array) -> Array:
     """Return, for each term of the polynomial, the largest error of its interpolation on the flat triangles."""
     weights = np.array([[i, j, 20 - i - j] for i in range(21) for j in range(21 - i)]) / 20.0

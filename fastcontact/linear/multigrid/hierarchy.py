@@ -22,8 +22,15 @@ from scipy.sparse import csr_matrix
 from fastcontact._jit.parallel import parallel_for
 from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
-from fastcontact.linear.multigrid.level import COARSEST, SAFETY, CoarseLevel, Level, chebyshev, largest_eigenvalue
-from fastcontact.linear.multigrid.matrix import ALL, WORK_OF_ROW, BlockMatrix, pointers
+from fastcontact.linear.multigrid.level import (
+    COARSEST,
+    SAFETY,
+    CoarseLevel,
+    Level,
+    chebyshev,
+    largest_eigenvalue,
+)
+from fastcontact.linear.multigrid.matrix import ALL, BlockMatrix, pointers
 
 
 class Hierarchy:
@@ -117,7 +124,7 @@ class Hierarchy:
         # the Galerkin product with the prolongator that the cycle uses.
         columns, blocks = pattern.indices, np.empty(pattern.nnz * size * n_modes, self.dtype)
         parallel_for(
-            galerkin_kernels.smooth_prolongator, n, WORK_OF_ROW, A.indptr, A.indices, A.storage, A.exact, level.inverse,
+            galerkin_kernels.smooth_prolongator, n, A.work_of_row, A.indptr, A.indices, A.storage, A.exact, level.inverse,
             aggregate, tentative.ravel(), omega, pattern.indptr, columns, blocks, A.rows, cols,
         )  # fmt: skip
         del tentative
@@ -225,7 +232,7 @@ def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Numbers, Numbers, Numbe
     """Return the Galerkin product ``P.T A P`` for a symmetric matrix A; `index` is ``by_columns(P, n)``."""
     n_coarse = len(index[0]) - 1
     count, near_count = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
-    work = WORK_OF_ROW * len(A.indptr) // max(1, n_coarse)
+    work = len(A.indices) / max(1, n_coarse)
     patterns = A.indptr, A.indices, P.indptr, P.indices, *index[:2]
     parallel_for(galerkin_kernels.count_galerkin, n_coarse, work, *patterns, count, near_count)
     indptr = pointers(count)

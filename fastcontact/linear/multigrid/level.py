@@ -22,7 +22,7 @@ from fastcontact._jit.parallel import NODES, parallel_for
 from fastcontact.arrays import AnyArray
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
-from fastcontact.linear.multigrid.matrix import WORK_OF_ROW, BlockMatrix
+from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions
 from fastcontact.linear.springs import Springs
 from fastcontact.round_off import ROUND_OFF
@@ -128,7 +128,9 @@ class Level:
         if self.springs is not None:
             self.springs.subtract_forces(x, r)
         if self.change is not None:
-            parallel_for(cycle_kernels.subtract_rows, len(self.change[0]), WORK_OF_ROW, *self.change, x, r, self.A.rows)
+            parallel_for(
+                cycle_kernels.subtract_rows, len(self.change[0]), self.A.work_of_row, *self.change, x, r, self.A.rows
+            )
 
     def restrict(self, coarse: AnyArray) -> None:
         """Fill `coarse`, the right-hand side of the next coarser level, with the restricted residual; `r` may be changed."""

@@ -25,8 +25,6 @@ ALL: Storage = (np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, np.int
 # Number of parts into which the rows of a symmetric matrix are divided, and their smallest number of rows. The parts suffice
 # for many threads, and their results stay in the cache. With more parts, more blocks would be stored twice.
 PARTS, SHORTEST = 32, 1024
-# Work of kernels for a row of blocks, see `_jit.parallel.portions`.
-WORK_OF_ROW = 20
 
 
 @dataclass(eq=False)
@@ -79,14 +77,19 @@ class BlockMatrix:
         if self.storage is not ALL:
             length, n = self.storage[3], len(self.indptr) - 1
             parallel_for(
-                symmetric_storage_kernels.multiply, -(-n // length), WORK_OF_ROW * length, self.storage, numbers, x,
+                symmetric_storage_kernels.multiply, -(-n // length), self.work_of_row * length, self.storage, numbers, x,
                 real(factor), real(share), z, y, self.rows,
             )  # fmt: skip
             return
         parallel_for(
-            cycle_kernels.multiply, len(self.indptr) - 1, WORK_OF_ROW, self.indptr, self.indices, numbers, x, real(factor),
-            real(share), z, y, self.rows, self.cols,
+            cycle_kernels.multiply, len(self.indptr) - 1, self.work_of_row, self.indptr, self.indices, numbers, x,
+            real(factor), real(share), z, y, self.rows, self.cols,
         )  # fmt: skip
+
+    @property
+    def work_of_row(self) -> float:
+        """Number of blocks of a row on average, see `_jit.parallel.portions`."""
+        return len(self.indices) / max(1, len(self.indptr) - 1)
 
     def diagonal_blocks(self) -> Array:
         """Return the diagonal blocks (n_rows, size, size) of a square matrix, in double precision."""
@@ -105,8 +108,8 @@ class BlockMatrix:
         """Return ``abs(A) @ abs(u)`` (n,) for a square matrix, computed with its high part."""
         out = np.empty(len(u))
         parallel_for(
-            symmetric_storage_kernels.row_sums, len(self.indptr) - 1, WORK_OF_ROW, self.indptr, self.indices, self.storage,
-            (self.data,), u, len(self.rows), out,
+            symmetric_storage_kernels.row_sums, len(self.indptr) - 1, self.work_of_row, self.indptr, self.indices,
+            self.storage, (self.data,), u, len(self.rows), out,
         )  # fmt: skip
         return out
 
@@ -127,7 +130,7 @@ class BlockMatrix:
         size, n = len(self.rows), len(self.indptr) - 1
         data = np.empty(len(self.indices) * size * size)
         arrays = self.indptr, self.indices, self.storage, self.exact
-        parallel_for(symmetric_storage_kernels.expand, n, WORK_OF_ROW, *arrays, size, data)
+        parallel_for(symmetric_storage_kernels.expand, n, self.work_of_row, *arrays, size, data)
         return bsr_array((data.reshape(-1, size, size), self.indices, self.indptr), shape=2 * (n * size,))
 
 
@@ -262,7 +265,7 @@ def _store(
         first = end
         safe_end = int(np.searchsorted(start, 2 * int(indptr[first]), side="right")) - 1
         end = max(min(n, safe_end), min(n, first + SHORTEST))
-        work = WORK_OF_ROW if end == safe_end else 0
+        work = len(indices) / n if end == safe_end else 0
         parallel_for(
             symmetric_storage_kernels.store_rows, end - first, work, first, widest, indptr, indices, storage, unit, numbers,
             square, high, low,
