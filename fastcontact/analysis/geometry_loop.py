@@ -8,7 +8,8 @@ method solves
 for the change v of the displacements, see `newton_step`. The last term is the response of the solution, with fixed active
 set, to the variation of forces and gaps with the geometry along v, see `contact.linearised_geometry`. Its norm is usually at
 most a third of that of v, so that a few iterations of GMRES suffice, each at the cost of a back substitution. Slips and
-integrals over facets are linearised at the displacements S(u), all other terms at u; the difference is of second order.
+integrals over facets are linearised at the displacements S(u) or between u and S(u), all other terms at u; the difference is
+of second order.
 """
 
 from __future__ import annotations
@@ -30,8 +31,7 @@ from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.tolerances import Scatter, Tolerances, Watch
 from fastcontact.analysis.touching import Touching
 from fastcontact.arrays import Array, largest
-from fastcontact.contact.constraints import StackedConstraints
-from fastcontact.contact.linearised_geometry import Linearised
+from fastcontact.contact.constraints import Linearised, StackedConstraints
 from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import SINGLE_PRECISION
 

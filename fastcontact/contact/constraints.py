@@ -6,7 +6,7 @@ secondary nodes, and k the number of tangents, which is one in 2D, two in 3D, an
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -16,7 +16,6 @@ from scipy.linalg import block_diag
 from scipy.sparse import csr_array, diags_array, vstack
 
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
-from fastcontact.contact.linearised_geometry import Geometry
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import normals
 from fastcontact.contact.surface import by_block
@@ -144,6 +143,19 @@ class Wetted(Protocol):
 
     def stiffness(self, displacement: Array) -> csr_array:
         """Return the symmetric part (n_dofs, n_dofs) of the negative derivative of `force` [force / length]."""
+
+
+class Linearised(Protocol):
+    """Contact forces, gaps and slips of one pair, linearised about a pairing and its solution; see `linearised_geometry`."""
+
+    def along(self, du: Array) -> tuple[Array, Array]:
+        """Return the variation of nodal forces (n_points, dim) [force] and of gaps and slips (1 + k, m) [length] along du."""
+        ...
+
+
+# A function that returns the linearised geometry for the multipliers (m,) [force], the tangential forces (m, k) [force] and
+# the displacements (n_points, dim) [length] of a solution.
+Geometry = Callable[[Array, Array, Array], Linearised]
 
 
 class Tied(Protocol):

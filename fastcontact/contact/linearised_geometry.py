@@ -23,11 +23,13 @@ from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, largest
+from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import Candidates, Pairing, tangents
+from fastcontact.contact.pairing import Candidates, Pairing, normals, tangents
 from fastcontact.contact.projection import (
     Places,
     at_nodes_of_facets,
@@ -315,41 +317,7 @@ class _ObstaclePoints:
         return Variation(np.zeros((len(normal), 0)), csr_array(self.motion.shape), foot, normal)
 
 
-class MeanMotions:
-    """Weighted means of relative motions, and their variation by differences of the weights.
-
-    The means are used like points, whose attributes are described in `_SurfacePoints`.
-
-    Parameters
-    ----------
-    means : Callable
-        Function from the coordinates (n_points, dim) of all points [length] to the means: their weights `motion`
-        (m, n_points) [-], the mean vectors (m, dim) by which smooth surfaces are closer than facets [length], and the unit
-        normals (m, dim) [-].
-    coordinates : ndarray (n_points, dim)
-        Coordinates at which the means are linearised [length].
-    sides : ndarray of int (k,)
-        Points on which the means depend.
-    """
-
-    def __init__(
-        self, means: Callable[[Array], tuple[csr_array, Array, Array]], coordinates: Array, sides: Indices
-    ) -> None:
-        self._means, self._coordinates, self._sides, self.averaged = means, coordinates, sides, None
-        self.motion, self._closer, self.normal = means(coordinates)
-        self.apart = self.motion @ coordinates - self._closer
-        self._step = DIFFERENCES**1.5 * float(np.ptp(coordinates[sides], axis=0).max())
-
-    def along(self, du: Array) -> Variation:
-        """See `_SurfacePoints.along`; there are no reference coordinates."""
-        rate = (largest(du[self._sides]) or 1.0) / self._step
-        motion, closer, normal = self._means(self._coordinates + du / rate)
-        varied = rate * csr_array(motion - self.motion)
-        foot = rate * (closer - self._closer) - varied @ self._coordinates
-        return Variation(np.zeros((len(normal), 0)), varied, foot, across(self.normal, rate * (normal - self.normal)))
-
-
-Points: TypeAlias = _SurfacePoints | _ObstaclePoints | MeanMotions
+Points: TypeAlias = _SurfacePoints | _ObstaclePoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -502,7 +470,7 @@ def _turned(multiplier: Array, tangential: Array | None, normal: Array, varied: 
 
 
 @dataclass(frozen=True, eq=False)
-class Linearised:
+class LinearisedPoints:
     """Contact forces, gaps and slips of one pair, linearised about a pairing and its solution.
 
     Attributes
@@ -544,7 +512,7 @@ class Linearised:
     compliance: Callable[[Array], Array] | None = None
 
     def along(self, du: Array) -> tuple[Array, Array]:
-        """Return the variation of nodal forces (n_points, dim) [force] and of gaps and slips (1 + k, m) [length] along du."""
+        """See `constraints.Linearised`."""
         varied = self.points.along(du)
         normal = self._normals(du, varied.normal)
         gaps = np.einsum("md,md->m", _weighted(self.functions, self.points.apart), normal)[None]
@@ -618,9 +586,66 @@ class Linearised:
         return total
 
 
-# A function that returns the linearised geometry for the multipliers (m,) [force], the tangential forces (m, k) [force] and
-# the displacements (n_points, dim) [length] of a solution.
-Geometry = Callable[[Array, Array, Array], Linearised]
+@dataclass(frozen=True, eq=False)
+class Differences:
+    """Contact forces, gaps and slips of one pair, linearised by one-sided differences.
+
+    The differences are taken at the mean of the displacements of the pairing and of its solution, where the error of a Newton
+    step is a tenth of that at either of them.
+
+    Attributes
+    ----------
+    constraints : Constraints
+    moved : Callable
+        Function from motions (n_points, dim) after the pairing of `constraints` [length] to constraints that are paired then.
+    forces : (ndarray (m,), ndarray (m, k))
+        Multipliers and tangential forces of the solution with `constraints` [force].
+    motions : (ndarray (n_points, dim), ndarray (n_points, dim), ndarray (n_points, dim))
+        Displacements of the solution, their increments in the load step, and their changes since the pairing [length].
+    sides : ndarray of int (q,)
+        Points on which the constraints depend.
+    step : float
+        Largest motion of these points in a difference [length].
+    """
+
+    constraints: Constraints
+    moved: Callable[[Array], Constraints]
+    forces: tuple[Array, Array]
+    motions: tuple[Array, Array, Array]
+    sides: NDArray[np.integer]
+    step: float
+
+    def along(self, du: Array) -> tuple[Array, Array]:
+        """See `constraints.Linearised`."""
+        rate = (largest(du[self.sides]) or 1.0) / self.step
+        force, gaps = (rate * (moved - mean) for moved, mean in zip(self._values(du / rate), self._mean, strict=True))
+        return force.reshape(du.shape), gaps
+
+    @cached_property
+    def _mean(self) -> tuple[Array, Array]:
+        return self._values(np.zeros_like(self.motions[0]))
+
+    def _values(self, motion: Array) -> tuple[Array, Array]:
+        """Return nodal forces (n_dofs,) [force], and gaps and slips (1 + k, m) [length], for a motion from the mean.
+
+        Tangents follow the normals.
+        """
+        (multiplier, tangential), (displacement, slid, change) = self.forces, self.motions
+        at = self.moved(0.5 * change + motion)
+        gap = at.gaps(displacement)[None]
+        if not at.tangents:
+            return at.force(multiplier), gap
+        before, now, tangents = (
+            normals(self.constraints.directions),
+            normals(at.directions),
+            self.constraints.directions,
+        )
+        mean = (before + now) / (1.0 + np.einsum("md,md->m", before, now))[:, None]
+        following = [t - np.einsum("md,md->m", t, now)[:, None] * mean for t in tangents]
+        turned = np.einsum("kmd,jmd->mkj", at.directions, following)
+        slip = np.stack([T @ slid.ravel() for T in at.tangents]) + at.slip0
+        force = at.force(multiplier, np.einsum("mkj,mj->mk", turned, tangential))
+        return force, np.vstack([gap, np.einsum("mkj,km->jm", turned, slip)])
 
 
 def faced(

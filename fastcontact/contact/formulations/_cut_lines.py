@@ -139,6 +139,12 @@ def _opposite_ends(
     return np.concatenate(facets), np.concatenate(coordinates)
 
 
+def facets_at_ends(block: FacetBlock, primary: Surface, deformed: Array, tolerance: float) -> Indices:
+    """Return the facets of a block inside which the primary side, or the side of one of several bodies, ends."""
+    facet, xi = _opposite_ends(block, primary, deformed, nodal_normals(primary, deformed), tolerance)
+    return facet[np.abs(xi) < 1.0 - SINGLE_PRECISION]
+
+
 def _zeros(values: Array) -> tuple[Indices, Array]:
     """Return (row, xi) of the zeros inside lines of two or three nodes with nodal `values` (n, k)."""
     a, b = values[:, 0], values[:, 1]

@@ -15,13 +15,12 @@ from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.cohesive_layer import bonded
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.constraints import Compliance, Constraints
+from fastcontact.contact.constraints import Compliance, Constraints, Geometry, Linearised
 from fastcontact.contact.held_motions import SAME_DIRECTION, HeldMotions, alike, spanned, without
 from fastcontact.contact.linearised_geometry import (
     Closing,
-    Geometry,
     InterpolatedNormals,
-    Linearised,
+    LinearisedPoints,
     NodalNormals,
     Slips,
     faced,
@@ -360,7 +359,7 @@ class Formulation(ABC):
             rise = self.rise(candidates, pairing, rows, coordinates)
             points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, at.pose, rise=rise)
             at_rows = rows, len(multiplier)
-            forces = Linearised(self.secondary, points, None, points.normal, multiplier[rows], place=at_rows)
+            forces = LinearisedPoints(self.secondary, points, None, points.normal, multiplier[rows], place=at_rows)
             if not directions:
                 return forces
             moved = replace(at, displacement=displacement)

@@ -33,10 +33,10 @@ from scipy.sparse.linalg import splu
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.constraints import Constraints, NodalField
+from fastcontact.contact.constraints import Constraints, Geometry, Linearised, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.integration import NO_AREA
-from fastcontact.contact.linearised_geometry import Geometry, Linearised
+from fastcontact.contact.linearised_geometry import LinearisedPoints
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.errors import ContactError
@@ -303,6 +303,7 @@ def _coupled(
     The first three arguments are the geometry without compliance, the multiplier field, and its `PressureField.axes`.
     """
     linearised = geometry(multiplier, tangential, displacement)
+    assert isinstance(linearised, LinearisedPoints)
     assert linearised.place is not None
     rows, count = linearised.place
 

@@ -26,22 +26,23 @@ from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.constraints import Constraints, NodalField
+from fastcontact.contact.constraints import Constraints, Linearised, NodalField
 from fastcontact.contact.formulations._cut_faces import face_overlap
-from fastcontact.contact.formulations._cut_lines import line_overlap
+from fastcontact.contact.formulations._cut_lines import facets_at_ends, line_overlap
 from fastcontact.contact.formulations._dual_basis import COVERED, LEAST, dual_functions, positive
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.integration import NO_AREA, areas_of_rule, nodal_areas
-from fastcontact.contact.linearised_geometry import Closing, Linearised, MeanMotions, NodalNormals, Points, faced
+from fastcontact.contact.linearised_geometry import Closing, Differences, LinearisedPoints, NodalNormals, Points, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import FACING, Candidates, Normals, filled_up, pair, tangents
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.contact.search.limits import BEYOND
+from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, scaled
 from fastcontact.mesh import elements
-from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
+from fastcontact.round_off import DIFFERENCES, LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
 MULTIPLIERS = ("standard", "dual")
 
@@ -156,6 +157,18 @@ class WeightedMortar(Formulation):
     def unilateral(self, at: Configuration) -> Constraints:
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
         means = self._means(self.points + at.displacement, at)
+        # Ties have separate equations in the directions in which both sides are held.
+        held = self.without_slip(at) if self.slides and not self.options.tied else []
+        constraints, slipping = self._weighted_gaps(at, means, held)
+        return replace(constraints, geometry=partial(self._linearised, at, means, held, constraints, slipping))
+
+    def _weighted_gaps(
+        self, at: Configuration, means: Means, held: list[tuple[Array, Mask]]
+    ) -> tuple[Constraints, tuple[Array, Array] | None]:
+        """Return the constraints without their derivatives, the tangents (k, m, dim), and the lengths (m,) of closing gaps.
+
+        `held` are the directions `without_slip`. The second result is None without tangents.
+        """
         coverage, rows, across, weight, mean, closer, normal = means
         B = rows_of(mean, normal)
         gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(rows, across, weight)
@@ -163,20 +176,17 @@ class WeightedMortar(Formulation):
         if at.worn is not None:
             gap0 += rows @ at.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
-        geometry = partial(self._linearised, at, means)
         constraints = Constraints(
             B,
             gap0,
             self.points[points],
             areas=weight,
             nodes=nodes,
-            geometry=geometry,
             nodal=WeightedPressures(weight, *self._whole_side),
         )
         if not self.slides:
-            return constraints
+            return constraints, None
         candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
-        held = [] if self.options.tied else self.without_slip(at)  # ties have separate equations there
         projectors = np.zeros((*normal.shape, normal.shape[1]))
         for along, nodes_held in held:
             projectors[nodes_held] += along[nodes_held, :, None] * along[nodes_held, None, :]
@@ -195,14 +205,8 @@ class WeightedMortar(Formulation):
             remaining = closing - np.where(is_held, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
             apparent_slip = np.einsum("md,md->m", motion @ remaining, along)
             slip0 += np.stack([np.einsum("md,md->m", t, along) * apparent_slip for t in rubbing])
-        return replace(
-            constraints,
-            tangents=slips,
-            directions=directions,
-            friction=friction,
-            slip0=slip0,
-            geometry=partial(geometry, slipping=(np.stack(rubbing), length)),
-        )
+        constraints = replace(constraints, tangents=slips, directions=directions, friction=friction, slip0=slip0)
+        return constraints, (np.stack(rubbing), length)
 
     def _means(self, deformed: Array, at: Configuration, kept: Mask | None = None) -> Means:
         """Return the mean relative motions of nodes at the coordinates `deformed` (n_points, dim) [length].
@@ -223,27 +227,26 @@ class WeightedMortar(Formulation):
         return Means(coverage, rows, across, weight, mean, closer / weight[:, None], normal)
 
     def _linearised(
-        self, at: Configuration, means: Means, multiplier: Array, tangential: Array, displacement: Array,
-        slipping: tuple[Array, Array] | None = None,
+        self, at: Configuration, means: Means, held: list[tuple[Array, Mask]], constraints: Constraints,
+        slipping: tuple[Array, Array] | None, multiplier: Array, tangential: Array, displacement: Array,
     ) -> Linearised:  # fmt: skip
         """Return the linearisation of contact forces, mean gaps and slips; see `linearised_geometry`.
 
-        `slipping` are tangents (k, m, dim), and lengths (m,) by which gaps close.
+        `constraints` and `slipping` are the results of `_weighted_gaps` for the other arguments.
         """
-        at, deformed = replace(at, displacement=displacement), self.points + displacement
-        if isinstance(self.primary, RigidSide) or (
-            deformed.shape[1] == 2 and not self._partly_covered(means, multiplier)
-        ):
-            linearised = self._at_points(at, means, multiplier)
-        else:
+        kept = means.coverage.kept
+        if isinstance(self.primary, Surface) and (self.points.shape[1] == 3 or self._ends_within(at, multiplier)):
+
+            def moved(motion: Array) -> Constraints:
+                here = replace(at, displacement=at.displacement + motion)
+                return self._weighted_gaps(here, self._means(self.points + here.displacement, at, kept), held)[0]
+
             sides = np.concatenate([self.secondary.points, self.primary.points])
-
-            def means_at(moved: Array) -> tuple[csr_array, Array, Array]:
-                varied = self._means(moved, at, means.coverage.kept)
-                return varied.motion, varied.closer, varied.normal
-
-            points = MeanMotions(means_at, deformed, sides)
-            linearised = Linearised(self.secondary, points, None, means.normal, multiplier)
+            motions = displacement, displacement - at.start, displacement - at.displacement
+            step = DIFFERENCES**1.5 * float(np.ptp(self.points[sides], axis=0).max())
+            return Differences(constraints, moved, (multiplier, tangential), motions, sides, step)
+        at, deformed = replace(at, displacement=displacement), self.points + displacement
+        linearised = self._at_points(at, means, multiplier)
         if slipping is None:
             return linearised
         directions, length = slipping
@@ -254,15 +257,14 @@ class WeightedMortar(Formulation):
             slips = replace(slips, total=slips.total + closing.vector, closing=closing)
         return replace(linearised, slips=slips)
 
-    def _partly_covered(self, means: Means, multiplier: Array) -> bool:
-        """Return whether facets that carry forces are partly covered."""
-        partly = False
-        for block, weights, whole in zip(self.secondary.blocks, means.coverage.weights, self._whole, strict=True):
-            covered, full, loaded = weights.sum(axis=1), whole.sum(axis=1), multiplier[block.local].any(axis=1)
-            partly |= bool((loaded & (covered > NO_AREA * full) & (covered < (1.0 - NO_AREA) * full)).any())
-        return partly
+    def _ends_within(self, at: Configuration, multiplier: Array) -> bool:
+        """Return whether the primary side, or that of one of its bodies, ends within facets that carry forces."""
+        assert isinstance(self.primary, Surface)
+        deformed, tolerance = self.points + at.displacement, self.projection_tolerance or 0.0
+        ends = ((b.local, facets_at_ends(b, self.primary, deformed, tolerance)) for b in self.secondary.blocks)
+        return any(multiplier[local[facets]].any() for local, facets in ends)
 
-    def _at_points(self, at: Configuration, means: Means, multiplier: Array) -> Linearised:
+    def _at_points(self, at: Configuration, means: Means, multiplier: Array) -> LinearisedPoints:
         """Return the linearisation of contact forces and mean gaps by the projections of the integration points.
 
         Segments are constant, because the variation of the cuts has no effect if the integrand is continuous across them, as
@@ -298,7 +300,7 @@ class WeightedMortar(Formulation):
             separate_normals = faced(at_nodes, pairing, all_nodes, self.primary, deformed, self.normals, at.pose)
         elif self.normals == "secondary":
             separate_normals = NodalNormals(self.secondary, deformed)
-        return Linearised(self.secondary, points, weighted, means.normal, multiplier, mean, separate_normals)
+        return LinearisedPoints(self.secondary, points, weighted, means.normal, multiplier, mean, separate_normals)
 
     @cached_property
     def _whole_side(self) -> tuple[Array, Array, list[Any], Mask]:
