@@ -73,21 +73,15 @@ def _at_point(maps, q, dim, rows, inverse, gradient, F):
     c00, c01, c02, c10, c11, c12, c20, c21, c22 = cofactors(j00, j01, j02, j10, j11, j12, j20, j21, j22)
     det = j00 * c00 + j01 * c01 + j02 * c02
     factor = 1.0 / det
-    i00, i01, i02, i10, i11, i12 = factor * c00, factor * c01, factor * c02, factor * c10, factor * c11, factor * c12
-    i20, i21, i22 = factor * c20, factor * c21, factor * c22
-    inverse[0, 0], inverse[0, 1], inverse[0, 2] = i00, i01, i02
-    inverse[1, 0], inverse[1, 1], inverse[1, 2] = i10, i11, i12
-    inverse[2, 0], inverse[2, 1], inverse[2, 2] = i20, i21, i22
+    inverse[0, 0], inverse[0, 1], inverse[0, 2] = factor * c00, factor * c01, factor * c02
+    inverse[1, 0], inverse[1, 1], inverse[1, 2] = factor * c10, factor * c11, factor * c12
+    inverse[2, 0], inverse[2, 1], inverse[2, 2] = factor * c20, factor * c21, factor * c22
     for a in range(0, gradient.shape[1], 4):
         tile(inverse, 0, 0, rows, k, a, 3, gradient, k, True)
     for i in range(3):
         r, s, t = maps[k, 4 + i], maps[k + 1, 4 + i], maps[k + 2, 4 + i]
-        F[i, 0], F[i, 1], F[i, 2] = (
-            r * i00 + s * i10 + t * i20,
-            r * i01 + s * i11 + t * i21,
-            r * i02 + s * i12 + t * i22,
-        )
-        F[i, i] += 1.0
+        for j in range(3):
+            F[i, j] = r * inverse[0, j] + s * inverse[1, j] + t * inverse[2, j] + (1.0 if i == j else 0.0)
     return det
 
 

@@ -90,11 +90,8 @@ class ConstrainedMotion:
         held: Array = np.where(self.fixed, prescribed, 0.0)
         if not self.relations:
             return held
-        relations = zip(self.relations, multipliers, strict=True)
-        right_sides = [
-            np.full(relation.rows.shape[0], np.asarray(relation.value) * factor) for relation, factor in relations
-        ]
-        values = np.concatenate(right_sides)
+        right_sides = [np.broadcast_to(relation.value, relation.rows.shape[0]) for relation in self.relations]
+        values = np.concatenate([side * factor for side, factor in zip(right_sides, multipliers, strict=True)])
         conditions, known = self._elimination.conditions, np.concatenate([held, values])
         violation = np.abs(conditions @ known)
         violated = np.flatnonzero(violation > CONFLICT * (np.abs(conditions) @ np.abs(known)))

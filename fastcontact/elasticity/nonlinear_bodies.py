@@ -245,9 +245,7 @@ class NonlinearBodies:
         size, change : float
             Both are zero if no point yields, or if a cell is inverted in the middle [pressure].
         """
-        yielding = {
-            name: bodies.history[name][..., PLASTIC_STRAIN] > old[..., PLASTIC_STRAIN] for name, old in before.items()
-        }
+        yielding = {k: bodies.history[k][..., PLASTIC_STRAIN] > before[k][..., PLASTIC_STRAIN] for k in before}
         if not any(points.any() for points in yielding.values()):
             return 0.0, 0.0
         try:

@@ -27,7 +27,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 Indices = NDArray[np.int64]
-# Element loops `add_stiffness`, `stress` and `add_internal_force` by the number of coordinates.
+# Element loops `add_stiffness` and `stress` by the number of coordinates.
 LOOPS = {2: element_2d_kernels, 3: element_3d_kernels}
 
 

@@ -81,18 +81,16 @@ def matched(
         shift = finite_vector(translation, mesh.dim)
     if shift is None:
         raise ModelError(f"the translation {translation} of '{name}' must be {mesh.dim} numbers")
-    found = coincident(mesh, first, second, np.eye(mesh.dim), shift)
-    worst = int(np.argmax(found.distance))
-    if found.distance[worst] > found.tolerance:
+    rows, distance, tolerance = coincident(mesh, first, second, np.eye(mesh.dim), shift)
+    worst, joined = int(np.argmax(distance)), "groups are joined node by node"
+    if distance[worst] > tolerance:
         raise ModelError(
-            f"point {nodes[worst]} of '{name}', moved by {shift}, lies {found.distance[worst]:.3g} from the nearest node of "
-            f"'{other}': groups are joined node by node; give the translation between them, or use another mesh"
+            f"point {nodes[worst]} of '{name}', moved by {shift}, lies {distance[worst]:.3g} from the nearest node of "
+            f"'{other}': {joined}; give the translation between them, or use another mesh"
         )
-    if len(np.unique(found.rows)) < len(nodes):
-        raise ModelError(
-            f"several nodes of '{name}', moved by {shift}, meet one node of '{other}': groups are joined node by node"
-        )
-    return found.rows
+    if len(np.unique(rows)) < len(nodes):
+        raise ModelError(f"several nodes of '{name}', moved by {shift}, meet one node of '{other}': {joined}")
+    return rows
 
 
 class Coincident(NamedTuple):
@@ -149,8 +147,8 @@ def to_facets(mesh: Mesh, nodes: Indices) -> Array:
     inside, total, count = np.zeros(mesh.n_points, bool), np.zeros_like(mesh.points), np.zeros(mesh.n_points)
     inside[nodes] = True
     for facets in outer_facets(mesh).values():
-        own = facets[inside[facets].all(axis=1)]
-        np.add.at(total, own, mesh.points[own].mean(axis=1)[:, None])
-        np.add.at(count, own, 1.0)
+        facets_of_nodes = facets[inside[facets].all(axis=1)]
+        np.add.at(total, facets_of_nodes, mesh.points[facets_of_nodes].mean(axis=1)[:, None])
+        np.add.at(count, facets_of_nodes, 1.0)
     total, count = total[nodes], count[nodes, None]
     return np.where(count > 0.0, total / np.maximum(count, 1.0) - mesh.points[nodes], 0.0)
