@@ -171,9 +171,8 @@ def _warn_of_omissions(gmsh: Any, dim: int) -> None:
     """Warn of solid cells without a physical group, which gmsh omits if the model has physical groups."""
     if not gmsh.model.getPhysicalGroups():
         return
-    ungrouped = [
-        tag for _, tag in gmsh.model.getEntities(dim) if not len(gmsh.model.getPhysicalGroupsForEntity(dim, tag))
-    ]
+    groups_of = gmsh.model.getPhysicalGroupsForEntity
+    ungrouped = [tag for _, tag in gmsh.model.getEntities(dim) if not len(groups_of(dim, tag))]
     count = sum(sum(map(len, gmsh.model.mesh.getElements(dim, tag)[1])) for tag in ungrouped)
     if count:
         kind = "volumes" if dim == 3 else "surfaces"
