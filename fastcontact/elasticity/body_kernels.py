@@ -14,10 +14,8 @@ from fastcontact.elasticity.constitutive_kernels import (
     INVARIANTS,
     cofactor,
     determinant,
-    extreme_eigenvalues,
     first_invariant,
     respond,
-    right_cauchy_green,
     sum_products,
     voigt,
 )
@@ -472,34 +470,3 @@ def linearise(
             _stiffness(left, right, n_factors, dim, bulk_mean, slopes if bulk_mean > 0.0 else slopes[:0], local)
             _assemble(local, slots[c], inside, data)
     return 0, -1
-
-
-@kernel
-def strains(points, cells, N, dN, weights, axisymmetric, across, displacement, J, ratio, logarithm):
-    """Fill J (n_cells, n_q), the volume `ratio` (n_cells,), and the `logarithm` (n_cells,) of the extreme principal stretch.
-
-    `across` (n_cells, n_q) is F_zz - 1 in plane stress, zero otherwise. `logarithm` is the principal logarithmic strain of
-    largest magnitude at the points of a cell.
-    """
-    n_nodes, dim, n_q, F = cells.shape[1], points.shape[1], len(N), np.empty((3, 3))
-    columns, rows = np.empty((n_nodes, -(-3 * n_q // 4) * 4)), np.empty((3 * n_q, -(-n_nodes // 4) * 4))
-    _tables(dN, columns, rows)
-    x, maps, inverse = np.zeros((n_nodes, 8)), np.empty((columns.shape[1], 8)), np.zeros((3, 4))
-    gradient, C = np.empty((3 * n_q + 1, rows.shape[1])), np.empty((3, 3))
-    for c in range(len(cells)):
-        _map(points, displacement, cells, c, columns, x, maps)
-        least, most, before, after = np.inf, 0.0, 0.0, 0.0
-        for q in range(n_q):
-            volume = weights[q] * _at_point(maps, q, dim, rows, inverse, gradient, F)
-            if axisymmetric:
-                volume *= _about_axis(x, N, q, gradient, F)
-            F[2, 2] += across[c, q]
-            J[c, q] = determinant(F)
-            before += volume
-            after += volume * J[c, q]
-            right_cauchy_green(F, C)
-            low, high = extreme_eigenvalues(C)
-            least, most = min(least, low), max(most, high)
-        ratio[c] = after / before
-        least, most = 0.5 * np.log(least), 0.5 * np.log(most)
-        logarithm[c] = most if most >= -least else least

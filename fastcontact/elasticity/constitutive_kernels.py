@@ -26,8 +26,6 @@ YIELDING = 1e-12
 EQUAL = 1e-7
 # Relative difference of squared stretches below which second divided differences are computed by a series.
 CLOSE = 1e-3
-# Largest cosine for the trigonometric formula for eigenvalues: its arc cosine then loses at most one digit.
-DISTINCT = 0.99
 
 
 @kernel
@@ -84,24 +82,6 @@ def right_cauchy_green(F, C):
     for i in range(3):
         for j in range(3):
             C[i, j] = F[0, i] * F[0, j] + F[1, i] * F[1, j] + F[2, i] * F[2, j]
-
-
-@kernel
-def extreme_eigenvalues(C):
-    """Return the smallest and largest eigenvalue of a symmetric C (3, 3).
-
-    They are computed by the trigonometric formula (Smith, 1961), which is faster than LAPACK, unless two eigenvalues are so
-    close that it is inaccurate.
-    """
-    mean = (C[0, 0] + C[1, 1] + C[2, 2]) / 3.0
-    x, y, z, a, b, c = C[0, 0] - mean, C[1, 1] - mean, C[2, 2] - mean, C[0, 1], C[1, 2], C[0, 2]
-    size = np.sqrt((x * x + y * y + z * z + 2.0 * (a * a + b * b + c * c)) / 6.0)
-    cubed = 0.5 * (x * (y * z - b * b) - a * (a * z - b * c) + c * (a * b - y * c))
-    if abs(cubed) < DISTINCT * size**3:
-        angle = np.arccos(cubed / size**3) / 3.0
-        return mean + 2.0 * size * np.cos(angle + 2.0 * np.pi / 3.0), mean + 2.0 * size * np.cos(angle)
-    values = np.linalg.eigvalsh(C)
-    return values[0], values[2]
 
 
 @kernel
