@@ -151,7 +151,8 @@ class System(ConstrainedMotion):
 
     def renewed(self, K: bsr_array) -> System:
         """Return the system with another stiffness K (n, n) [force / length], which is modified as in the constructor."""
-        if self.T is None and not (self._entries and self._entries.are_of(K)):
+        pattern = self._entries.pattern if self._entries else ()
+        if self.T is None and not (pattern and all(map(np.array_equal, pattern, (K.indptr, K.indices)))):
             K = _with_diagonal(K)
             self._entries = _SupportedEntries(K, self.fixed)
         system = copy.copy(self)
@@ -256,7 +257,7 @@ class _SupportedEntries:
     """
 
     def __init__(self, K: bsr_array, fixed: Mask) -> None:
-        self._pattern, size = (K.indptr, K.indices), K.blocksize[0]
+        self.pattern, size = (K.indptr, K.indices), K.blocksize[0]
         supported, row = fixed.reshape(-1, size), entry_rows(K)
         on_support, on_diagonal = np.asarray(supported.any(axis=1)), np.flatnonzero(row == K.indices)
         affected = np.flatnonzero(on_support[row] | on_support[K.indices])
@@ -269,10 +270,6 @@ class _SupportedEntries:
         self._start = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(fixed)))]).astype(np.int32)
         self._diagonal = np.flatnonzero((rows == columns)[order])
         self._whole_diagonal = (size**2 * on_diagonal[:, None] + (size + 1) * np.arange(size)).ravel()
-
-    def are_of(self, K: bsr_array) -> bool:
-        """Return whether K has the pattern of these entries."""
-        return all(map(np.array_equal, self._pattern, (K.indptr, K.indices)))
 
     def diagonal_of(self, K: bsr_array) -> Array:
         """Return the diagonal (n,) of K."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import typed
-from fastcontact.arrays import Array, Indices, Numbers
+from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.elasticity import dilatation, dilatation_kernels, incompatible_modes, incompatible_modes_kernels
 from fastcontact.elasticity.energy import cell_volumes, gradients_at
 from fastcontact.elasticity.incompatible_modes import PAIRS
@@ -92,14 +92,9 @@ class CellStress:
         The points `xi` (n, dim) [-] and the integer arrays `cells` (n_cells, n_nodes), `material` (n_cells,) or
         (n_cells, n_q) and `rows` (n_cells,) are described for `at`.
         """
-        element, split = elements.get(name), None
-        if self._averaged is not None:
-            split = dilatation.split(name, self._moduli, self._averaged)
+        element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
         moduli = self._moduli if split is None else split.moduli
-        if xi is element.quadrature[0]:
-            N, dN, _ = element.tables
-        else:
-            N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
+        N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
         loops, points, cells = LOOPS[self._mesh.dim], self._mesh.points, parallel.read_only(cells)
 
         def fill_rows(span: tuple[int, int]) -> None:
@@ -114,8 +109,9 @@ class CellStress:
                 bases = dilatation.basis(name, element.quadrature[0]), dilatation.basis(name, xi)
                 element_tables = *element.tables, bases[0], split.bulk
                 dilatation_kernels.add_pressure(points, nodes, *element_tables, *shared, bases[1], stress)
-            if self._averaged is not None:
-                self._add_modes((name, xi, dN), nodes, numbers, stress, rows[portion])
+            with_modes = incompatible_modes.with_modes(name, self._averaged)
+            if with_modes is not None:
+                self._add_modes((name, xi, dN), with_modes, nodes, numbers, stress, rows[portion])
 
         parallel.shared(fill_rows, parallel.portions(len(out), cells.shape[1]))
         if self._offset is not None:
@@ -138,15 +134,17 @@ class CellStress:
             out[portion] = _times(moduli, name, xi, material[portion], strain[portion])
 
     def _add_modes(
-        self, at: tuple[str, Array, Array], cells: Numbers, material: Numbers, out: Array, rows: Indices
+        self,
+        at: tuple[str, Array, Array],
+        with_modes: Mask,
+        cells: Numbers,
+        material: Numbers,
+        out: Array,
+        rows: Indices,
     ) -> None:
-        """Add the stresses of incompatible modes."""
+        """Add the stresses of incompatible modes of the moduli `with_modes` (n_materials,)."""
         name, xi, dN = at
-        with_modes = incompatible_modes.with_modes(name, self._averaged)
-        if with_modes is None:
-            return
-        numbers = material.reshape(len(cells), -1)
-        subtracted = np.empty((0, 0, 0))
+        numbers, subtracted = material.reshape(len(cells), -1), np.empty((0, 0, 0))
         if self._offset is not None:
             quadrature_points = name, elements.get(name).quadrature[0], rows
             strain = self._stress_free(self._offset, quadrature_points, cells, material)

@@ -117,19 +117,13 @@ def bodies(mesh: Mesh) -> tuple[int, Numbers]:
 
     A body is a set of solid cells that are connected by common nodes.
     """
-    rows, columns, used = [], [], np.zeros(mesh.n_points, bool)
-    for block in mesh.solids.values():
-        rows.append(np.repeat(block[:, 0], block.shape[1]))
-        columns.append(block.ravel())
-        used[block] = True
-    if not rows:
-        return 0, np.full(mesh.n_points, -1, np.int32)
-    row, column = np.concatenate(rows), np.concatenate(columns)
+    blocks, none = mesh.solids.values(), np.empty(0, np.int32)
+    row = np.concatenate([none, *(np.repeat(block[:, 0], block.shape[1]) for block in blocks)])
+    column = np.concatenate([none, *(block.ravel() for block in blocks)])
     graph = coo_array((np.ones(len(row), np.int8), (row, column)), shape=(mesh.n_points, mesh.n_points))
-    _, label = connected_components(graph, directed=False)
-    labels, number = np.unique(label[used], return_inverse=True)
-    body = np.full(mesh.n_points, -1, np.int32)
-    body[used] = number
+    label, body = connected_components(graph, directed=False)[1], np.full(mesh.n_points, -1, np.int32)
+    used = np.bincount(column, minlength=mesh.n_points) > 0
+    labels, body[used] = np.unique(label[used], return_inverse=True)
     body.setflags(write=False)
     return len(labels), body
 

@@ -405,8 +405,7 @@ def _indicator(case: Case, last: StepResult, error: ErrorEstimate, quantity: str
 
 def _position(case: Case, last: StepResult, quantity: str, pair: str | None) -> Array | None:
     """Return the position (dim,) [length] at which a quantity is evaluated; None for quantities of the entire model."""
-    probe = quantity.split(".")[0]
-    if probe in case.probes:
+    if (probe := quantity.split(".")[0]) in case.probes:
         return case.mesh.points[case.probes[probe]]
     if quantity.startswith("von_mises"):
         return case.mesh.points[int(np.argmax(last.von_mises))]
