@@ -434,9 +434,8 @@ def linearise(
             _copy(Gs, 3 * q, G, 0)
             if direct:
                 total = pressure[q] + bulk[row, 1] * (ratio[q] - 1.0)
-                density, factor, d2J_factor, _, _ = first_invariant(
-                    law, F, ratio[q], G, (total, bulk[row, 1], total), stiff, P, A
-                )
+                volumetric = total, bulk[row, 1], total
+                density, factor, d2J_factor, _, _ = first_invariant(law, F, ratio[q], G, volumetric, stiff, P, A)
                 sum_products(2, factor, d2J_factor, stiff, F, A)
                 density += 0.5 * bulk[row, 1] * (ratio[q] - 1.0) ** 2
             else:

@@ -44,8 +44,8 @@ class Stiffness:
 
     def row_sums(self, u: Array) -> Array:
         """Return ``|K| |u|`` (n,), summed over the parts, to which the round-off of ``K u`` is proportional [force]."""
-        return np.sum(
-            [abs(K) @ np.abs(u) if isinstance(K, csr_array | bsr_array) else K.row_sums(u) for K in self.parts], axis=0
+        return sum(
+            (K.row_sums(u) if hasattr(K, "row_sums") else abs(K) @ np.abs(u) for K in self.parts), np.zeros(u.shape)
         )
 
 

@@ -112,9 +112,8 @@ def _add_isotropic(g, coupling, shear, slots, c, inside, flat):
             products = (
                 g[0, a, b], g[3, a, b], g[5, a, b], g[1, a, b], g[2, a, b], g[4, a, b], g[1, b, a], g[2, b, a], g[4, b, a],
             )  # fmt: skip
-            _add_isotropic_block(
-                flat, a != b, inside[a], inside[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
-            )
+            upper, lower = slots[c, a, b], slots[c, b, a]
+            _add_isotropic_block(flat, a != b, inside[a], inside[b], upper, lower, coupling, shear, products)
 
 
 @kernel

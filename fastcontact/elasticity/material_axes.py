@@ -102,10 +102,8 @@ def checked_axes(axes: Any) -> Axes:
     if not lengths.min() > 0.0:
         raise ModelError(f"the axes of a material {vectors.tolist()} contain a zero vector")
     vectors = vectors / lengths
-    caption, cosine = (
-        f"the axes of a material {vectors.tolist()}",
-        np.abs(vectors @ vectors.T - np.eye(len(vectors))).max(),
-    )
+    caption = f"the axes of a material {vectors.tolist()}"
+    cosine = np.abs(vectors @ vectors.T - np.eye(len(vectors))).max()
     if cosine > SINGLE_PRECISION:
         raise ModelError(f"{caption} are not at right angles: the cosine between two is {cosine:.3g}")
     first, second = vectors[0], vectors[1] - (vectors[1] @ vectors[0]) * vectors[0]

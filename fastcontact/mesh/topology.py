@@ -26,6 +26,7 @@ from fastcontact.mesh.mesh import Mesh, facets_of_cells
 
 Result = TypeVar("Result")
 Arguments = ParamSpec("Arguments")
+OfMesh = Callable[Concatenate[Mesh, Arguments], Result]
 # Distance, relative to the size of the mesh, below which nodes are regarded as coincident or collinear.
 COLLINEAR = 1e-6
 
@@ -94,9 +95,7 @@ def _direction(facets: Indices) -> Indices:
     return np.column_stack([facets[rows, first], following, preceding if count > 2 else first])
 
 
-def remembered(
-    function: Callable[Concatenate[Mesh, Arguments], Result],
-) -> Callable[Concatenate[Mesh, Arguments], Result]:
+def remembered(function: OfMesh[Arguments, Result]) -> OfMesh[Arguments, Result]:
     """Decorate `function` such that its results are cached by mesh, which is immutable, and by the other arguments."""
     results: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Result]] = WeakKeyDictionary()
 

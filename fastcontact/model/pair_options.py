@@ -162,9 +162,7 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
         )
     if kind != "unilateral" and "wear" in options:
         raise ContactError(f"contact '{name}' is {kind}, which does not wear: leave out 'wear' or 'kind'")
-    excess = [
-        option for option in ("clearance", "clearance_primary", "penalty", "search_distance") if option in options
-    ]
+    excess = [name for name in ("clearance", "clearance_primary", "penalty", "search_distance") if name in options]
     if kind == "tied" and excess:
         raise ContactError(f"contact '{name}' is tied, which keeps the initial gaps exactly: leave out '{excess[0]}'")
     return str(kind)

@@ -21,6 +21,7 @@ from fastcontact.mesh.topology import bodies, outer_facets
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
 NORMAL = "normal"
+NodeGroup = tuple[str, Indices]  # name, nodes
 
 
 def normals_of(mesh: Mesh, group: str) -> tuple[Indices, Array]:
@@ -59,9 +60,7 @@ def less_first(rows: csr_array) -> csr_array:
     return csr_array(rows[1:] - csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr")))
 
 
-def matched(
-    mesh: Mesh, first: tuple[str, Indices], second: tuple[str, Indices], translation: Sequence[float] | None
-) -> Indices:
+def matched(mesh: Mesh, first: NodeGroup, second: NodeGroup, translation: Sequence[float] | None) -> Indices:
     """Return, for each node of the first group, the index of the node of the second with which it coincides when moved.
 
     The first group is moved by `translation` (dim,) [length], by default from the centre of its bounding box to that of the
@@ -101,9 +100,7 @@ class Coincident(NamedTuple):
     tolerance: float  # largest distance of coincident nodes [length]
 
 
-def coincident(
-    mesh: Mesh, first: tuple[str, Indices], second: tuple[str, Indices], turn: Array, shift: Array
-) -> Coincident:
+def coincident(mesh: Mesh, first: NodeGroup, second: NodeGroup, turn: Array, shift: Array) -> Coincident:
     """Return the nodes of the second group that lie at those of the first one, turned by `turn` and moved by `shift`.
 
     Each group is given as (name, nodes). Several nodes of a group may lie at one place, those of bodies in contact or of the

@@ -56,9 +56,8 @@ def _quantity_sentences(series: Series, quantity: str) -> list[str]:
             f"({bar}) is model error, which no mesh removes, and {mesh_error}, which goes to zero."
         )
     else:
-        text = (
-            f"{start} agrees with theory within the error bar of its limit, {percent(split.model)} {bar}; {mesh_error}."
-        )
+        model_error = f"{percent(split.model)} {bar}"
+        text = f"{start} agrees with theory within the error bar of its limit, {model_error}; {mesh_error}."
     texts = [text, *_convergence_sentences(series, quantity, name)]
     return texts + _cancellation_sentences(series, quantity, split) + _reference_sentences(series, quantity)
 
@@ -114,10 +113,8 @@ def _equal_force_sentences(series: Series) -> list[str]:
     at_force, at_approach = series.split_equal_force("pressure_max"), series.split("pressure_max")
     if at_force is None or at_approach is None:
         return []
-    splits = {
-        "of the largest pressure is": at_force,
-        ", that of the contact radius": series.split_equal_force("contact_radius"),
-    }
+    of_radius = series.split_equal_force("contact_radius")
+    splits = {"of the largest pressure is": at_force, ", that of the contact radius": of_radius}
     errors = [f"{name} {percent(s.model)} (+- {100 * s.uncertainty:.2g} %)" for name, s in splits.items() if s]
     text = f"{series.combination}: at equal force the model error {''.join(errors)}"
     if abs(at_force.model) < 0.3 * abs(at_approach.model) and at_approach.resolved:

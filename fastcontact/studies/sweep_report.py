@@ -231,7 +231,7 @@ class Sweep(Report):
         values = [{point.values.get(name) for point in self.points} for name in self._main_quantities()]
         if any(len(theory) == 1 < len(computed) for theory, computed in zip(theories, values, strict=True)):
             remarks += [
-                "the theory is the same for all points: a parameter in [study.parameters] can change its keys, too"
+                "the theory is the same for all points: a parameter of [study.parameters] can change its keys, too"
             ]
         return remarks
 
@@ -263,10 +263,10 @@ class Sweep(Report):
 
     def tables(self) -> list[tuple[str, Rows]]:
         """See `Report`; each point has a row with parameters, DOF, main quantities and differences from theory."""
-        choices = [
-            {k: number(v) if isinstance(v, float) else str(v) for k, v in p.parameters.items()} for p in self.points
-        ]
-        columns = [(name, [choice[name] for choice in choices]) for name in self.parameters]
+        columns = []
+        for name in self.parameters:
+            choices = [point.parameters[name] for point in self.points]
+            columns.append((name, [number(v) if isinstance(v, float) else str(v) for v in choices]))
         columns.append(("DOF", [str(point.n_dofs) for point in self.points]))
         for name in self._main_quantities():
             compared = {}

@@ -150,9 +150,8 @@ def quadratic(name: str, linear: Element, functions: Functions, **others: Any) -
         midpoints = (corners + np.roll(corners, -1, axis=0)) / 2
         on_facet = [np.flatnonzero((nodes == node).all(axis=1)) for node in (*midpoints, corners.mean(axis=0))]
         facets.append(tuple(dict.fromkeys((*facet, *np.concatenate(on_facet).tolist()))))
-    return Element(
-        name, nodes, linear.edges, tuple(facets), shape, gradient, quadratic=name, corner_element=linear, **others
-    )
+    others |= {"quadratic": name, "corner_element": linear}
+    return Element(name, nodes, linear.edges, tuple(facets), shape, gradient, **others)
 
 
 def with_middles(linear: Element) -> Array:

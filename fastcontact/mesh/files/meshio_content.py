@@ -159,9 +159,8 @@ def check_kinds(foreign: Mapping[str, int], known: Iterable[str]) -> None:
     if foreign:
         listed = [f"{count} cells of kind {kind[:MOST_SHOWN]}" for kind, count in list(foreign.items())[:MOST_SHOWN]]
         more = [f"{len(foreign) - MOST_SHOWN} kinds more"] if len(foreign) > MOST_SHOWN else []
-        raise MeshError(
-            f"it has {', '.join([*listed, *more])}, which fastcontact does not know: use only {', '.join(sorted(known))}"
-        )
+        kinds = ", ".join([*listed, *more])
+        raise MeshError(f"it has {kinds}, which fastcontact does not know: use only {', '.join(sorted(known))}")
 
 
 def merged(blocks: Iterable[Block]) -> list[Block]:
