@@ -56,6 +56,13 @@ def assert_same_mesh(found, mesh):
     }
 
 
+def body_of(element, size=(2.0, 1.0, 1.5), divisions=(2, 2, 2), *options):
+    """Return a block or a box of an element."""
+    dim = elements.get(element).dim
+    generate = fc.generate.block if dim == 2 else fc.generate.box
+    return generate(size[:dim], divisions[:dim], element, *options)
+
+
 def row_of(names, groups=True):
     """Two sheared cells of each element side by side, and groups: overlapping, of several elements, empty."""
     points, cells, count = [], {}, 0

@@ -222,8 +222,7 @@ def test_a_coupled_group_follows_one_node_which_a_support_may_prescribe():
 def model():
     mesh = block("quad4", bend=False)
     mesh = mesh.with_groups(points={"NONE": [], "TOP_NODES": mesh.points_of("TOP")})
-    model = elastic_model(mesh, "plane_strain")
-    model.fix("BOTTOM", "xy")
+    model = elastic_model(mesh, "plane_strain", BOTTOM="xy")
     return model
 
 
@@ -283,8 +282,7 @@ def test_a_pressure_inside_the_solid_is_refused():
 def test_a_force_on_a_point_outside_all_solids_is_refused(model):
     mesh = model.mesh.replace(points=np.vstack([model.mesh.points, [[2.0, 5.0]]]))
     mesh = mesh.with_groups(points={"REFERENCE": [len(model.mesh.points)]})
-    lone = elastic_model(mesh, "plane_strain")
-    lone.fix("BOTTOM", "xy")
+    lone = elastic_model(mesh, "plane_strain", BOTTOM="xy")
     lone.add_force("REFERENCE", y=-1.0)
     with pytest.raises(fc.ModelError, match=r"nodal force on 'REFERENCE' acts on points .*number: 1"):
         lone.check()
@@ -331,8 +329,7 @@ def test_supports_with_other_histories_clash(model):
 
 def test_motions_that_relations_stop_are_no_longer_free():
     mesh = block("quad4", bend=False)
-    model = elastic_model(mesh, "plane_strain")
-    model.fix("BOTTOM_LEFT", "xy")
+    model = elastic_model(mesh, "plane_strain", BOTTOM_LEFT="xy")
     with pytest.raises(fc.ModelError, match=r"1 rigid-body motion is not supported: body 'BLOCK'.*rotation"):
         model.check()
     model.relate([("BOTTOM_RIGHT", "y", 1.0)])
@@ -340,9 +337,7 @@ def test_motions_that_relations_stop_are_no_longer_free():
 
 
 def test_bodies_tied_by_relations_move_together():
-    model = elastic_model(fc.generate.block_on_block("quad4"), "plane_strain")
-    model.fix("LOWER_BOTTOM", "y")
-    model.fix("LOWER_LEFT", "x")
+    model = elastic_model(fc.generate.block_on_block("quad4"), "plane_strain", LOWER_BOTTOM="y", LOWER_LEFT="x")
     model.fix("UPPER_LEFT", "x")
     with pytest.raises(fc.ModelError, match=r"1 rigid-body motion is not supported: body 'UPPER': translation along y"):
         model.check()

@@ -5,7 +5,7 @@ import sys
 import meshio
 import numpy as np
 import pytest
-from models import assert_same_mesh
+from models import assert_same_mesh, body_of
 
 import fastcontact as fc
 from fastcontact.mesh import elements
@@ -15,9 +15,7 @@ FLAT, SOLIDS = ([name for name, element in elements.ELEMENTS.items() if element.
 
 
 def bar(element):
-    if element in FLAT:
-        return fc.generate.block((1.0, 2.0), (2, 4), element)
-    return fc.generate.box((1.0, 2.0, 1.0), (2, 4, 2), element)
+    return body_of(element, (1.0, 2.0, 1.0), (2, 4, 2))
 
 
 def at(height):
@@ -101,10 +99,7 @@ def test_what_is_refused(call, said):
 
 def a_body(element):
     """Return a mesh with groups of solids, facets and points."""
-    generate = fc.generate.block if elements.get(element).dim == 2 else fc.generate.box
-    size = (2.0, 1.0, 1.5)[: elements.get(element).dim]
-    mesh = generate(size, (2,) * len(size), element)
-    return mesh.with_groups(points={"CORNER": [0], "A name, with signs/": [1, 2]})
+    return body_of(element).with_groups(points={"CORNER": [0], "A name, with signs/": [1, 2]})
 
 
 @pytest.mark.parametrize("element", ["tri3", "quad8", "quad9", *SOLIDS])

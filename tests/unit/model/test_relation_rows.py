@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import body_of, elastic_model, supported
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case
@@ -27,9 +27,7 @@ def turn(dim):
 
 
 def block(dim, element=None):
-    if dim == 3:
-        return fc.generate.box((2.0, 3.0, 1.0), (2, 3, 1), element or "hex8")
-    return fc.generate.block((2.0, 3.0), (2, 3), element or "quad4")
+    return body_of(element or ("quad4" if dim == 2 else "hex8"), (2.0, 3.0, 1.0), (2, 3, 1))
 
 
 def model_of(mesh):
