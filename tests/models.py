@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import fastcontact as fc
+from fastcontact.mesh import elements
 
 
 def elastic_model(mesh, kinematics=None, E=1000.0, nu=0.3, **held):
@@ -41,6 +42,43 @@ def members(mesh):
         group: {(name, row) for name, rows in mesh.split(numbers).items() for row in rows.tolist()}
         for group, numbers in mesh.cell_groups.items()
     }
+
+
+def assert_same_mesh(found, mesh):
+    """The same points, cells and groups; element types may be in another order."""
+    np.testing.assert_allclose(found.points, mesh.points, rtol=0.0, atol=1e-15)
+    assert {name: block.tolist() for name, block in found.cells.items()} == {
+        name: block.tolist() for name, block in mesh.cells.items()
+    }
+    assert members(found) == members(mesh)
+    assert {name: points.tolist() for name, points in found.point_groups.items()} == {
+        name: points.tolist() for name, points in mesh.point_groups.items()
+    }
+
+
+def body_of(element, size=(2.0, 1.0, 1.5), divisions=(2, 2, 2), *options):
+    """Return a block or a box of an element."""
+    dim = elements.get(element).dim
+    generate = fc.generate.block if dim == 2 else fc.generate.box
+    return generate(size[:dim], divisions[:dim], element, *options)
+
+
+def row_of(names, groups=True):
+    """Two sheared cells of each element side by side, and groups: overlapping, of several elements, empty."""
+    points, cells, count = [], {}, 0
+    dim = max(2, *(elements.get(name).dim for name in names))
+    shear = np.array([[1.0, 0.3, 0.0], [0.0, 1.2, 0.4], [0.2, 0.0, 0.9]])[:dim, :dim]
+    for column, name in enumerate(names):
+        nodes = elements.get(name).nodes
+        nodes = np.pad(nodes, [(0, 0), (0, dim - nodes.shape[1])]) @ shear + 5.0 * column * np.eye(dim)[0]
+        points += [nodes, nodes + 5.0 * np.eye(dim)[1]]
+        cells[name] = count + np.arange(2 * len(nodes)).reshape(2, -1)
+        count += 2 * len(nodes)
+    mesh = fc.Mesh(np.concatenate(points), cells)
+    if not groups:
+        return mesh
+    every = np.arange(mesh.n_cells)
+    return mesh.with_groups({"every": every, "upper": every[1::2], "nobody": []}, {"P": [0], "Q": [0, 2], "none": []})
 
 
 class DenseCompliance:

@@ -14,10 +14,8 @@ from fastcontact.elasticity.constitutive_kernels import (
     INVARIANTS,
     cofactor,
     determinant,
-    extreme_eigenvalues,
     first_invariant,
     respond,
-    right_cauchy_green,
     sum_products,
     voigt,
 )
@@ -73,21 +71,15 @@ def _at_point(maps, q, dim, rows, inverse, gradient, F):
     c00, c01, c02, c10, c11, c12, c20, c21, c22 = cofactors(j00, j01, j02, j10, j11, j12, j20, j21, j22)
     det = j00 * c00 + j01 * c01 + j02 * c02
     factor = 1.0 / det
-    i00, i01, i02, i10, i11, i12 = factor * c00, factor * c01, factor * c02, factor * c10, factor * c11, factor * c12
-    i20, i21, i22 = factor * c20, factor * c21, factor * c22
-    inverse[0, 0], inverse[0, 1], inverse[0, 2] = i00, i01, i02
-    inverse[1, 0], inverse[1, 1], inverse[1, 2] = i10, i11, i12
-    inverse[2, 0], inverse[2, 1], inverse[2, 2] = i20, i21, i22
+    inverse[0, 0], inverse[0, 1], inverse[0, 2] = factor * c00, factor * c01, factor * c02
+    inverse[1, 0], inverse[1, 1], inverse[1, 2] = factor * c10, factor * c11, factor * c12
+    inverse[2, 0], inverse[2, 1], inverse[2, 2] = factor * c20, factor * c21, factor * c22
     for a in range(0, gradient.shape[1], 4):
         tile(inverse, 0, 0, rows, k, a, 3, gradient, k, True)
     for i in range(3):
         r, s, t = maps[k, 4 + i], maps[k + 1, 4 + i], maps[k + 2, 4 + i]
-        F[i, 0], F[i, 1], F[i, 2] = (
-            r * i00 + s * i10 + t * i20,
-            r * i01 + s * i11 + t * i21,
-            r * i02 + s * i12 + t * i22,
-        )
-        F[i, i] += 1.0
+        for j in range(3):
+            F[i, j] = r * inverse[0, j] + s * inverse[1, j] + t * inverse[2, j] + (1.0 if i == j else 0.0)
     return det
 
 
@@ -442,9 +434,8 @@ def linearise(
             _copy(Gs, 3 * q, G, 0)
             if direct:
                 total = pressure[q] + bulk[row, 1] * (ratio[q] - 1.0)
-                density, factor, d2J_factor, _, _ = first_invariant(
-                    law, F, ratio[q], G, (total, bulk[row, 1], total), stiff, P, A
-                )
+                volumetric = total, bulk[row, 1], total
+                density, factor, d2J_factor, _, _ = first_invariant(law, F, ratio[q], G, volumetric, stiff, P, A)
                 sum_products(2, factor, d2J_factor, stiff, F, A)
                 density += 0.5 * bulk[row, 1] * (ratio[q] - 1.0) ** 2
             else:
@@ -478,34 +469,3 @@ def linearise(
             _stiffness(left, right, n_factors, dim, bulk_mean, slopes if bulk_mean > 0.0 else slopes[:0], local)
             _assemble(local, slots[c], inside, data)
     return 0, -1
-
-
-@kernel
-def strains(points, cells, N, dN, weights, axisymmetric, across, displacement, J, ratio, logarithm):
-    """Fill J (n_cells, n_q), the volume `ratio` (n_cells,), and the `logarithm` (n_cells,) of the extreme principal stretch.
-
-    `across` (n_cells, n_q) is F_zz - 1 in plane stress, zero otherwise. `logarithm` is the principal logarithmic strain of
-    largest magnitude at the points of a cell.
-    """
-    n_nodes, dim, n_q, F = cells.shape[1], points.shape[1], len(N), np.empty((3, 3))
-    columns, rows = np.empty((n_nodes, -(-3 * n_q // 4) * 4)), np.empty((3 * n_q, -(-n_nodes // 4) * 4))
-    _tables(dN, columns, rows)
-    x, maps, inverse = np.zeros((n_nodes, 8)), np.empty((columns.shape[1], 8)), np.zeros((3, 4))
-    gradient, C = np.empty((3 * n_q + 1, rows.shape[1])), np.empty((3, 3))
-    for c in range(len(cells)):
-        _map(points, displacement, cells, c, columns, x, maps)
-        least, most, before, after = np.inf, 0.0, 0.0, 0.0
-        for q in range(n_q):
-            volume = weights[q] * _at_point(maps, q, dim, rows, inverse, gradient, F)
-            if axisymmetric:
-                volume *= _about_axis(x, N, q, gradient, F)
-            F[2, 2] += across[c, q]
-            J[c, q] = determinant(F)
-            before += volume
-            after += volume * J[c, q]
-            right_cauchy_green(F, C)
-            low, high = extreme_eigenvalues(C)
-            least, most = min(least, low), max(most, high)
-        ratio[c] = after / before
-        least, most = 0.5 * np.log(least), 0.5 * np.log(most)
-        logarithm[c] = most if most >= -least else least

@@ -26,10 +26,6 @@ YIELDING = 1e-12
 EQUAL = 1e-7
 # Relative difference of squared stretches below which second divided differences are computed by a series.
 CLOSE = 1e-3
-# Largest number of sweeps of Jacobi's method, and ratio of squared off-diagonal to diagonal entries at which it ends.
-SWEEPS, NEGLIGIBLE = 20, 1e-34
-# Largest cosine for the trigonometric formula for eigenvalues: its arc cosine then loses at most one digit.
-DISTINCT = 0.99
 
 
 @kernel
@@ -86,42 +82,6 @@ def right_cauchy_green(F, C):
     for i in range(3):
         for j in range(3):
             C[i, j] = F[0, i] * F[0, j] + F[1, i] * F[1, j] + F[2, i] * F[2, j]
-
-
-@kernel
-def extreme_eigenvalues(C):
-    """Return the smallest and largest eigenvalue of a symmetric C (3, 3), which is overwritten.
-
-    They are computed by the trigonometric formula (Smith, 1961) or, if two eigenvalues are so close that this is inaccurate,
-    by Jacobi's method (Golub and Van Loan, 2013, section 8.5), which takes three or four sweeps.
-    """
-    mean = (C[0, 0] + C[1, 1] + C[2, 2]) / 3.0
-    x, y, z, a, b, c = C[0, 0] - mean, C[1, 1] - mean, C[2, 2] - mean, C[0, 1], C[1, 2], C[0, 2]
-    size = np.sqrt((x * x + y * y + z * z + 2.0 * (a * a + b * b + c * c)) / 6.0)
-    cubed = 0.5 * (x * (y * z - b * b) - a * (a * z - b * c) + c * (a * b - y * c))
-    if abs(cubed) < DISTINCT * size**3:
-        angle = np.arccos(cubed / size**3) / 3.0
-        return mean + 2.0 * size * np.cos(angle + 2.0 * np.pi / 3.0), mean + 2.0 * size * np.cos(angle)
-    for _ in range(SWEEPS):
-        off_diagonal = C[0, 1] * C[0, 1] + C[0, 2] * C[0, 2] + C[1, 2] * C[1, 2]
-        if off_diagonal <= NEGLIGIBLE * (C[0, 0] * C[0, 0] + C[1, 1] * C[1, 1] + C[2, 2] * C[2, 2]):
-            break
-        for k in range(3):
-            i, j = (k + 1) % 3, (k + 2) % 3
-            i, j = min(i, j), max(i, j)
-            if C[i, j] == 0.0:
-                continue
-            tau = (C[j, j] - C[i, i]) / (2.0 * C[i, j])
-            t = (1.0 if tau >= 0.0 else -1.0) / (abs(tau) + np.sqrt(1.0 + tau * tau))
-            cosine = 1.0 / np.sqrt(1.0 + t * t)
-            sine = t * cosine
-            C[i, i] -= t * C[i, j]
-            C[j, j] += t * C[i, j]
-            C[i, j] = 0.0
-            ik, jk = (min(i, k), max(i, k)), (min(j, k), max(j, k))
-            C_ik, C_jk = C[ik], C[jk]
-            C[ik], C[jk] = cosine * C_ik - sine * C_jk, sine * C_ik + cosine * C_jk
-    return min(C[0, 0], C[1, 1], C[2, 2]), max(C[0, 0], C[1, 1], C[2, 2])
 
 
 @kernel
@@ -281,7 +241,7 @@ def _logarithmic(constants, F, everywhere, old, new, P, A):
     map, in the principal axes of C. Derivatives of the strain in principal axes are divided differences of the logarithm
     (Daleckii and Krein).
     """
-    C, T, D, turn, L = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9)), np.empty((9, 9)), np.eye(3)
+    C, T, D, L = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9)), np.eye(3)
     for i in range(3):
         for j in range(i + 1):
             L[i, j] += old[voigt(i, j)]
@@ -296,8 +256,7 @@ def _logarithmic(constants, F, everywhere, old, new, P, A):
     for a in range(3):
         for b in range(3):
             slope[a, b] = 2.0 * _first_difference(squared[a], squared[b])
-    _fill_turn(axes, turn)
-    T, factor = axes.T @ T @ axes, slope.reshape(9)
+    turn, T, factor = _turn(axes), axes.T @ T @ axes, slope.reshape(9)
     S = carried @ (slope * T) @ carried.T
     _first_piola_kirchhoff(F, S, P)
     if not everywhere:
@@ -313,19 +272,19 @@ def _logarithmic(constants, F, everywhere, old, new, P, A):
                     for column in (3 * b + c, 3 * c + b):
                         moduli[row, column] += value
                         moduli[column, row] += value
-    _fill_turn(carried, turn)
+    turn = _turn(carried)
     _push_forward(F, S, turn @ moduli @ turn.T, A)
     return energy
 
 
 @kernel
-def _fill_turn(axes, turn):
-    """Fill `turn` (9, 9) such that it transforms a tensor M, as 9 components, to `axes` (3, 3) M `axes`^T."""
-    for a in range(3):
-        for b in range(3):
-            for i in range(3):
-                for j in range(3):
-                    turn[3 * i + j, 3 * a + b] = axes[i, a] * axes[j, b]
+def _turn(axes):
+    """Return the matrix (9, 9) that transforms a tensor M, as 9 components, to `axes` (3, 3) M `axes`^T."""
+    turn = np.empty((9, 9))
+    for row in range(9):
+        for column in range(9):
+            turn[row, column] = axes[row // 3, column // 3] * axes[row % 3, column % 3]
+    return turn
 
 
 @kernel
@@ -493,33 +452,20 @@ def _ogden(constants, F, everywhere, P, A):
             for b in range(3):
                 gamma[a, b] += 2.0 * mu * (total / 9.0 - (powers[a] + powers[b]) / 3.0)
             gamma[a, a] += 2.0 * mu * powers[a]
-    S, moduli = np.zeros((3, 3)), np.zeros((9, 9))
-    for a in range(3):
-        for i in range(3):
-            for j in range(3):
-                S[i, j] += beta[a] / squared[a] * axes[i, a] * axes[j, a]
+    S, moduli, turn = (axes * (beta / squared)) @ axes.T, np.zeros((9, 9)), _turn(axes)
     _first_piola_kirchhoff(F, S, P)
     if not everywhere:
         return energy
     for a in range(3):
         for b in range(3):
-            normal = (gamma[a, b] - (2.0 * beta[a] if a == b else 0.0)) / (squared[a] * squared[b])
-            shear = 0.0
+            moduli[4 * a, 4 * b] = (gamma[a, b] - (2.0 * beta[a] if a == b else 0.0)) / (squared[a] * squared[b])
             if a != b:
                 difference = squared[b] - squared[a]
+                shear = 0.5 * (gamma[b, b] - 2.0 * beta[b] - gamma[a, b]) / (squared[b] * squared[b])
                 if abs(difference) > EQUAL * squared[b]:
                     shear = (beta[b] / squared[b] - beta[a] / squared[a]) / difference
-                else:
-                    shear = 0.5 * (gamma[b, b] - 2.0 * beta[b] - gamma[a, b]) / (squared[b] * squared[b])
-            for row in range(9):
-                i, j = row // 3, row % 3
-                left, mixed = axes[i, a] * axes[j, a], axes[i, a] * axes[j, b]
-                for column in range(9):
-                    k, m = column // 3, column % 3
-                    moduli[row, column] += normal * left * axes[k, b] * axes[m, b]
-                    if a != b:
-                        moduli[row, column] += shear * mixed * (axes[k, a] * axes[m, b] + axes[k, b] * axes[m, a])
-    _push_forward(F, S, moduli, A)
+                moduli[3 * a + b, 3 * a + b] = moduli[3 * a + b, 3 * b + a] = shear
+    _push_forward(F, S, turn @ moduli @ turn.T, A)
     return energy
 
 

@@ -44,8 +44,8 @@ class Stiffness:
 
     def row_sums(self, u: Array) -> Array:
         """Return ``|K| |u|`` (n,), summed over the parts, to which the round-off of ``K u`` is proportional [force]."""
-        return np.sum(
-            [abs(K) @ np.abs(u) if isinstance(K, csr_array | bsr_array) else K.row_sums(u) for K in self.parts], axis=0
+        return sum(
+            (K.row_sums(u) if hasattr(K, "row_sums") else abs(K) @ np.abs(u) for K in self.parts), np.zeros(u.shape)
         )
 
 
@@ -90,11 +90,8 @@ class ConstrainedMotion:
         held: Array = np.where(self.fixed, prescribed, 0.0)
         if not self.relations:
             return held
-        relations = zip(self.relations, multipliers, strict=True)
-        right_sides = [
-            np.full(relation.rows.shape[0], np.asarray(relation.value) * factor) for relation, factor in relations
-        ]
-        values = np.concatenate(right_sides)
+        right_sides = [np.broadcast_to(relation.value, relation.rows.shape[0]) for relation in self.relations]
+        values = np.concatenate([side * factor for side, factor in zip(right_sides, multipliers, strict=True)])
         conditions, known = self._elimination.conditions, np.concatenate([held, values])
         violation = np.abs(conditions @ known)
         # Coefficients may be round-off, such as the cosine of a right angle.
@@ -156,7 +153,8 @@ class System(ConstrainedMotion):
 
     def renewed(self, K: bsr_array) -> System:
         """Return the system with another stiffness K (n, n) [force / length], which is modified as in the constructor."""
-        if self.T is None and not (self._entries and self._entries.are_of(K)):
+        pattern = self._entries.pattern if self._entries else ()
+        if self.T is None and not (pattern and all(map(np.array_equal, pattern, (K.indptr, K.indices)))):
             K = _with_diagonal(K)
             self._entries = _SupportedEntries(K, self.fixed)
         system = copy.copy(self)
@@ -261,7 +259,7 @@ class _SupportedEntries:
     """
 
     def __init__(self, K: bsr_array, fixed: Mask) -> None:
-        self._pattern, size = (K.indptr, K.indices), K.blocksize[0]
+        self.pattern, size = (K.indptr, K.indices), K.blocksize[0]
         supported, row = fixed.reshape(-1, size), entry_rows(K)
         on_support, on_diagonal = np.asarray(supported.any(axis=1)), np.flatnonzero(row == K.indices)
         affected = np.flatnonzero(on_support[row] | on_support[K.indices])
@@ -274,10 +272,6 @@ class _SupportedEntries:
         self._start = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(fixed)))]).astype(np.int32)
         self._diagonal = np.flatnonzero((rows == columns)[order])
         self._whole_diagonal = (size**2 * on_diagonal[:, None] + (size + 1) * np.arange(size)).ravel()
-
-    def are_of(self, K: bsr_array) -> bool:
-        """Return whether K has the pattern of these entries."""
-        return all(map(np.array_equal, self._pattern, (K.indptr, K.indices)))
 
     def diagonal_of(self, K: bsr_array) -> Array:
         """Return the diagonal (n,) of K."""

@@ -134,29 +134,22 @@ def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmet
     dim, size = points.shape[1], basis.shape[1]
     x, u, gradient = np.empty((n_nodes, dim)), np.empty((n_nodes, dim)), np.empty((n_nodes, dim))
     J, inverse = np.empty((dim, dim)), np.empty((dim, dim))
-    mass, g, coefficient = np.empty((size, size)), np.empty((size, 1)), np.empty(size)
+    mass, g = np.empty((size, size)), np.empty((size, n_nodes * dim))
+    moment, coefficient = np.empty((size, 1)), np.empty(size)
     for c in range(n_cells):
         bulk_mean, bulk_rest = bulk[material[c], 0], bulk[material[c], 1]
         if bulk_mean == 0.0:
             continue
         at_nodes(points, cells, c, x)
         at_nodes(displacement, cells, c, u)
-        mass[:] = 0.0
-        g[:] = 0.0
-        for q in range(weights.shape[0]):
-            measure = weights[q] * _measure(x, N, dN, q, axisymmetric, J, inverse, gradient)
-            dilatation = 0.0
-            for a in range(n_nodes):
-                for i in range(dim):
-                    dilatation += gradient[a, i] * u[a, i]
-            for m in range(size):
-                factor = measure * basis[q, m]
-                for n in range(m + 1):
-                    mass[m, n] += factor * basis[q, n]
-                g[m, 0] += factor * dilatation
-        reduce(mass, g)
+        _integrate(x, N, dN, weights, basis, axisymmetric, J, inverse, gradient, mass, g)
+        moment[:] = 0.0
         for m in range(size):
-            coefficient[m] = g[m, 0] * (bulk_mean if m == 0 else bulk_rest)
+            for k in range(n_nodes * dim):
+                moment[m, 0] += g[m, k] * u[k // dim, k % dim]
+        reduce(mass, moment)
+        for m in range(size):
+            coefficient[m] = moment[m, 0] * (bulk_mean if m == 0 else bulk_rest)
         back_substitute(mass, coefficient)
         for k in range(basis_out.shape[0]):
             mean_stress = 0.0

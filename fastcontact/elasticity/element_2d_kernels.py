@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loops of plane and axisymmetric solids: stiffness, stresses, internal forces; and nodal sums.
+"""Element loops of plane and axisymmetric solids: stiffness and stresses; and nodal sums.
 
 Shared arguments: ``points`` (n_points, 2) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes),
 ``dN`` (n_q, n_nodes, 2), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 4, 4) [pressure] for
@@ -158,22 +158,3 @@ def add_nodal(cells, extrapolation, at_points, low, high, total, count):
                 for q in range(at_points.shape[1]):
                     value += extrapolation[a, q] * at_points[c, q, i]
                 total[p, i] += value
-
-
-@kernel
-def add_internal_force(points, cells, N, dN, weights, axisymmetric, stresses, force):
-    """Add the nodal forces of `stresses` (n_cells, n_q, 4) to `force` (n_points, 2), in place."""
-    n_cells, n_nodes = cells.shape
-    gradient = np.empty((n_nodes, 2))
-    for c in range(n_cells):
-        for q in range(weights.shape[0]):
-            det, radius = _map(points, cells[c], N, dN, q, gradient)
-            weight = weights[q] * det
-            if axisymmetric:
-                weight *= TWO_PI * radius
-            xx, yy, zz, xy = stresses[c, q, 0], stresses[c, q, 1], stresses[c, q, 2], stresses[c, q, 3]
-            for a in range(n_nodes):
-                p = cells[c, a]
-                hoop = zz * N[q, a] / radius if axisymmetric else 0.0
-                force[p, 0] += weight * (xx * gradient[a, 0] + xy * gradient[a, 1] + hoop)
-                force[p, 1] += weight * (yy * gradient[a, 1] + xy * gradient[a, 0])

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loops of three-dimensional solids: stiffness, stresses, and internal forces.
+"""Element loops of three-dimensional solids: stiffness and stresses.
 
 Shared arguments: ``points`` (n_points, 3) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
 n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6) [pressure], symmetric, for strains
@@ -112,9 +112,8 @@ def _add_isotropic(g, coupling, shear, slots, c, inside, flat):
             products = (
                 g[0, a, b], g[3, a, b], g[5, a, b], g[1, a, b], g[2, a, b], g[4, a, b], g[1, b, a], g[2, b, a], g[4, b, a],
             )  # fmt: skip
-            _add_isotropic_block(
-                flat, a != b, inside[a], inside[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
-            )
+            upper, lower = slots[c, a, b], slots[c, b, a]
+            _add_isotropic_block(flat, a != b, inside[a], inside[b], upper, lower, coupling, shear, products)
 
 
 @kernel
@@ -161,10 +160,8 @@ def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, inside, g
         gx, gy, gz = weight * gradient[b, 0], weight * gradient[b, 1], weight * gradient[b, 2]
         for a in range(b + 1):
             x, y, z = gradient[a, 0], gradient[a, 1], gradient[a, 2]
-            products = x * gx, y * gy, z * gz, x * gy, x * gz, y * gz, y * gx, z * gx, z * gy
-            _add_isotropic_block(
-                flat, a != b, inside[a], inside[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
-            )
+            g = x * gx, y * gy, z * gz, x * gy, x * gz, y * gz, y * gx, z * gx, z * gy
+            _add_isotropic_block(flat, a != b, inside[a], inside[b], slots[c, a, b], slots[c, b, a], coupling, shear, g)
     return True
 
 
@@ -231,23 +228,3 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
             for i in range(6):
                 normal = D[i, 0] * exx + D[i, 1] * eyy + D[i, 2] * ezz
                 out[c, q, i] = normal + D[i, 3] * gxy + D[i, 4] * gyz + D[i, 5] * gxz
-
-
-@kernel
-def add_internal_force(points, cells, N, dN, weights, axisymmetric, stresses, force):
-    """Add the nodal forces of `stresses` (n_cells, n_q, 6) to `force` (n_points, 3), in place."""
-    n_cells, n_nodes = cells.shape
-    slopes = transposed(dN)
-    x, gradient = np.empty((3, n_nodes)), np.empty((3, n_nodes))
-    for c in range(n_cells):
-        _gather(points, cells, c, x)
-        for q in range(weights.shape[0]):
-            weight = weights[q] * map_3d(x, slopes, q, gradient)
-            xx, yy, zz = weight * stresses[c, q, 0], weight * stresses[c, q, 1], weight * stresses[c, q, 2]
-            xy, yz, xz = weight * stresses[c, q, 3], weight * stresses[c, q, 4], weight * stresses[c, q, 5]
-            for a in range(n_nodes):
-                p = cells[c, a]
-                gx, gy, gz = gradient[0, a], gradient[1, a], gradient[2, a]
-                force[p, 0] += xx * gx + xy * gy + xz * gz
-                force[p, 1] += xy * gx + yy * gy + yz * gz
-                force[p, 2] += xz * gx + yz * gy + zz * gz

@@ -92,10 +92,7 @@ class Gravity(InertiaLoad):
 
     def acceleration(self, x: Array, kinematics: str) -> Array:
         """Return the same vector (..., dim) [length / time^2] at all positions `x` (..., dim) [length]."""
-        acceleration = np.zeros(x.shape)
-        for axis, value in self.components.items():
-            acceleration[..., axis] = value
-        return acceleration
+        return np.broadcast_to([float(self.components.get(axis, 0.0)) for axis in range(x.shape[-1])], x.shape)
 
 
 @dataclass(frozen=True)

@@ -102,19 +102,15 @@ def checked_axes(axes: Any) -> Axes:
     if not lengths.min() > 0.0:
         raise ModelError(f"the axes of a material {vectors.tolist()} contain a zero vector")
     vectors = vectors / lengths
+    caption = f"the axes of a material {vectors.tolist()}"
     cosine = np.abs(vectors @ vectors.T - np.eye(len(vectors))).max()
     if cosine > SINGLE_PRECISION:
-        raise ModelError(
-            f"the axes of a material {vectors.tolist()} are not at right angles: the cosine between two is {cosine:.3g}"
-        )
-    first = vectors[0]
-    second = vectors[1] - (vectors[1] @ first) * first
+        raise ModelError(f"{caption} are not at right angles: the cosine between two is {cosine:.3g}")
+    first, second = vectors[0], vectors[1] - (vectors[1] @ vectors[0]) * vectors[0]
     second /= np.linalg.norm(second)
     third = np.cross(first, second)
     if len(vectors) == 3 and vectors[2] @ third < 0.0:
-        raise ModelError(
-            f"the axes of a material {vectors.tolist()} are left-handed: change the sign of the third, or leave it out"
-        )
+        raise ModelError(f"{caption} are left-handed: change the sign of the third, or leave it out")
     return tuple(tuple(row) for row in np.array([first, second, third]).tolist())
 
 
@@ -134,22 +130,21 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
             "(0, 1, 0)"
         )
     returned = values_at(axes, points, "the axes of a material", ModelError)
+    caption = "the function of a material's axes returned"
     try:
         frame = np.asarray(returned, complex if np.iscomplexobj(returned) else float)
     except (TypeError, ValueError):
-        raise ModelError(f"the function of a material's axes returned {returned!r:.80}, not numbers") from None
+        raise ModelError(f"{caption} {returned!r:.80}, not numbers") from None
     if frame.shape != (len(points), 3, 3):
         raise ModelError(
-            f"the function of a material's axes returned numbers of shape {frame.shape} for {len(points)} points: it must "
-            f"return three vectors in rows for each, shape ({len(points)}, 3, 3)"
+            f"{caption} numbers of shape {frame.shape} for {len(points)} points: it must return three vectors in rows for "
+            f"each, shape ({len(points)}, 3, 3)"
         )
     difference = np.abs(frame @ frame.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
     wrong = np.flatnonzero(~(difference <= SINGLE_PRECISION) | np.iscomplexobj(frame))
     if len(wrong):
-        raise ModelError(
-            f"the function of a material's axes returned {frame[wrong[0]].tolist()} at {points[wrong[0]]}: these are not "
-            "unit vectors at right angles"
-        )
+        vectors = f"{frame[wrong[0]].tolist()} at {points[wrong[0]]}"
+        raise ModelError(f"{caption} {vectors}: these are not unit vectors at right angles")
     return frame
 
 

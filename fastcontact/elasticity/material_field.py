@@ -26,8 +26,8 @@ class EvaluationPoints:
     ----------
     material : int
         Number of the material.
-    first : int
-        Row of the first of these points in `MaterialField.moduli`.
+    rows : slice
+        Rows of these points in `MaterialField.moduli`.
     points : ndarray (n, dim)
         The centres of cells, or their quadrature points [length].
     constants : SimpleNamespace
@@ -35,14 +35,9 @@ class EvaluationPoints:
     """
 
     material: int
-    first: int
+    rows: slice
     points: Array
     constants: Any
-
-    @property
-    def rows(self) -> slice:
-        """Rows of these points in `MaterialField.moduli`."""
-        return slice(self.first, self.first + len(self.points))
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,32 +183,34 @@ def material_field(
     size = 6 if kinematics == "3d" else 4
     moduli = [np.zeros((1, size, size)) if m.varies else m.moduli(kinematics)[None] for m in materials]
     owner = [np.arange(len(materials), dtype=np.int32)]
-    rows, inside = {name: values.copy() for name, values in number.items()}, {}
+    rows, inside = {name: values.copy() for name, values in number.items()}, dict[str, Numbers]()
     evaluations: list[EvaluationPoints] = []
 
     def added(index: int, points: Array, constants: Any) -> Numbers:
         """Add the moduli of a material at `points`; return their rows."""
-        evaluations.append(EvaluationPoints(index, sum(map(len, moduli)), points, constants))
+        first = sum(map(len, moduli))
+        evaluations.append(EvaluationPoints(index, slice(first, first + len(points)), points, constants))
         moduli.append(materials[index].moduli_at(points, kinematics, constants))
         owner.append(np.full(len(points), index, np.int32))
-        return evaluations[-1].first + np.arange(len(points), dtype=np.int32)
+        return first + np.arange(len(points), dtype=np.int32)
 
-    for index, material in enumerate(materials):
-        for name, block in mesh.solids.items() if material.varies else ():
-            cells = np.flatnonzero(number[name] == index)
+    of_materials = [
+        (index, material, name, block, np.flatnonzero(number[name] == index))
+        for index, material in enumerate(materials)
+        for name, block in mesh.solids.items()
+    ]
+    for index, material, name, block, cells in of_materials:
+        if material.varies:
             centres = mesh.points[block[cells]].mean(axis=1)
             rows[name][cells] = added(index, centres, material.constants_at(name, cells, centre(name)))
-    for index, material in enumerate(materials):
-        for name, block in mesh.solids.items() if material.varies_inside else ():
-            cells = np.flatnonzero(number[name] == index)
+    for index, material, name, block, cells in of_materials:
+        if material.varies_inside:
             N = elements.get(name).tables[0]
-            if name not in inside:
-                inside[name] = np.repeat(rows[name][:, None], len(N), axis=1)
+            inside.setdefault(name, np.repeat(rows[name][:, None], len(N), axis=1))
             at_points = added(index, positions(mesh, block[cells], N), material.constants_at(name, cells, N))
             inside[name][cells] = at_points.reshape(len(cells), len(N))
-    return MaterialField(
-        materials, kinematics, np.concatenate(moduli), evaluations, np.concatenate(owner), dict(number), rows, inside
-    )
+    all_moduli, owners = np.concatenate(moduli), np.concatenate(owner)
+    return MaterialField(materials, kinematics, all_moduli, evaluations, owners, dict(number), rows, inside)
 
 
 def _law(material: Material, moduli: Array) -> tuple[object, ...]:

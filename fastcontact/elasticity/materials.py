@@ -197,9 +197,10 @@ class Material:
         """Return the matrix (4, 4), in 3D (6, 6) [pressure] from strains (xx, yy, zz, 2xy, in 3D 2yz, 2xz) to stresses.
 
         In axisymmetry x, y and z denote the radial, axial and circumferential directions. In plane stress the rows and
-        columns of zz are zero. ModelError if material axes, moduli or thermal expansion depend on position.
+        columns of zz are zero (Timoshenko and Goodier, 1970, section 16). ModelError if material axes or moduli depend on
+        position.
         """
-        if self.varies:
+        if callable(self.axes) or varying(self.axes) or self.graded:
             raise ModelError(
                 "axes or constants of the material depend on the position: call moduli_at(points, kinematics, constants)"
             )
@@ -318,9 +319,8 @@ def check_positive(name: str, value: Any) -> None:
     if not 0.0 < number < math.inf:
         raise ModelError(f"{name} = {value!r} must be a positive number")
     if not 1.0 / LARGEST <= number <= LARGEST:
-        raise ModelError(
-            f"{name} is out of range: it must lie between {1.0 / LARGEST:g} and {LARGEST:g}, whatever its unit"
-        )
+        limits = f"{1.0 / LARGEST:g} and {LARGEST:g}"
+        raise ModelError(f"{name} is out of range: it must lie between {limits}, whatever its unit")
 
 
 def check_expansion(value: Any, most: int) -> None:
@@ -467,18 +467,6 @@ class LinearElastic(Material):
     def shear_modulus(self) -> float:
         """Shear modulus [pressure]."""
         return self.E / (2 * (1 + self.nu))
-
-    def moduli(self, kinematics: str) -> Array:
-        """Return the matrix (4, 4), in 3D (6, 6) [pressure] from strains (xx, yy, zz, 2xy, in 3D 2yz, 2xz) to stresses.
-
-        In plane stress the rows and columns of zz are zero (Timoshenko and Goodier, 1970, section 16). ModelError if E or nu
-        depends on position.
-        """
-        if self.graded:
-            raise ModelError(
-                "constants of the material depend on the position: call moduli_at(points, kinematics, ...)"
-            )
-        return np.asarray(isotropic_moduli(np.array([self.E], float), np.array([self.nu], float), kinematics)[0])
 
     def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `Material.moduli_at`."""

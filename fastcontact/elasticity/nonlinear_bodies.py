@@ -14,11 +14,11 @@ from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity import dilatation
 from fastcontact.elasticity.constitutive_kernels import LINEAR, LOGARITHMIC, PLASTIC, SAINT_VENANT
 from fastcontact.elasticity.dilatation import REMAINDER
-from fastcontact.elasticity.energy import gradients_at
+from fastcontact.elasticity.energy import cell_volumes, gradients_at
 from fastcontact.elasticity.material_field import MaterialField, material_field
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, NonlinearElastic
-from fastcontact.elasticity.recovery import von_mises
+from fastcontact.elasticity.recovery import AT_ONCE, von_mises
 from fastcontact.elasticity.stiffness import Sparsity, sparsity
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.mesh import elements
@@ -245,9 +245,7 @@ class NonlinearBodies:
         size, change : float
             Both are zero if no point yields, or if a cell is inverted in the middle [pressure].
         """
-        yielding = {
-            name: bodies.history[name][..., PLASTIC_STRAIN] > old[..., PLASTIC_STRAIN] for name, old in before.items()
-        }
+        yielding = {k: bodies.history[k][..., PLASTIC_STRAIN] > before[k][..., PLASTIC_STRAIN] for k in before}
         if not any(points.any() for points in yielding.values()):
             return 0.0, 0.0
         try:
@@ -266,20 +264,22 @@ class NonlinearBodies:
         from fastcontact.elasticity import body_kernels
 
         where = self.mesh.points[self.mesh.cells[name][cell]].mean(axis=0)
-        failure = f"is inverted (J = {self._volume_ratios(name, cell, displacement).min():.3g})"
+        J = np.linalg.det(self._deformation(name, slice(cell, cell + 1), displacement)).min()
+        failure = f"is inverted (J = {J:.3g})"
         if status != body_kernels.INVERTED:
             failure = "has no out-of-plane strain of zero stress"
         return f"cell {cell} of {name} near {where} {failure}: smaller load steps, or a mesh that is coarser there, may help"
 
-    def _volume_ratios(self, name: str, cell: int, displacement: Array) -> Array:
-        """Return J (n_q,) at the quadrature points of a cell."""
+    def _deformation(self, name: str, rows: slice, displacement: Array) -> Array:
+        """Return the deformation gradients (n, n_q, 3, 3) [-] of cells; in plane stress F_zz is 1."""
         N, dN, _ = elements.get(name).tables
-        nodes, dim, F = self.mesh.cells[name][cell], self.mesh.dim, np.tile(np.eye(3), (len(N), 1, 1))
+        nodes, dim = self.mesh.cells[name][rows], self.mesh.dim
         points, u = self.mesh.points[nodes], displacement[nodes]
-        F[:, :dim, :dim] += np.einsum("ai,qaj->qij", u, gradients_at(points[None], dN)[0][0])
+        F = np.tile(np.eye(3), (len(nodes), len(N), 1, 1))
+        F[..., :dim, :dim] += np.einsum("cai,cqaj->cqij", u, gradients_at(points, dN)[0], optimize=True)
         if self.kinematics == "axisymmetric":
-            F[:, 2, 2] += (N @ u[:, 0]) / (N @ points[:, 0])
-        return np.linalg.det(F)
+            F[..., 2, 2] += (u[..., 0] @ N.T) / (points[..., 0] @ N.T)
+        return F
 
     def cell_fields(self, bodies: DeformedBodies, displacement: Array) -> dict[str, Array]:
         """Return the fields of `field_names` (n_solids,): extremes over the points of each cell, and its volume ratio."""
@@ -291,32 +291,25 @@ class NonlinearBodies:
         """Return the values (n_cells,) of `field_names` for the cells of an element."""
         J, fields = np.ones(self._cells[name].shape), list[Array]()
         if self.finite:
-            J, ratio, logarithm = self._strains(name, bodies, displacement)
-            fields = [ratio, logarithm]
+            J, *fields = self._strains(name, bodies, displacement)
         if self.yields:
             fields += self._yielding(name, bodies, J)
         return fields
 
-    def _strains(self, name: str, bodies: DeformedBodies, displacement: Array) -> tuple[Array, Array, Array]:
-        """Return J (n_cells, n_q), and the volume ratios and largest logarithmic strains (n_cells,) of cells."""
-        from fastcontact.elasticity import body_kernels
-
-        N, dN, weights = elements.get(name).tables
-        cells, across = self.mesh.cells[name], np.zeros(self._cells[name].shape)
-        if self.kinematics == "plane_stress":
-            across = np.ascontiguousarray(bodies.history[name][..., ACROSS])
-        J, ratio, logarithm = np.empty_like(across), np.empty(len(cells)), np.empty(len(cells))
-        axisymmetric = self.kinematics == "axisymmetric"
-
-        def fill_rows(portion: tuple[int, int]) -> None:
-            rows = slice(*portion)
-            body_kernels.strains(
-                self.mesh.points, cells[rows], N, dN, weights, axisymmetric, across[rows], displacement, J[rows], ratio[rows],
-                logarithm[rows],
-            )  # fmt: skip
-
-        parallel.parallel_map(fill_rows, parallel.portions(len(cells), len(N)))
-        return J, ratio, logarithm
+    def _strains(self, name: str, bodies: DeformedBodies, displacement: Array) -> list[Array]:
+        """Return J (n_cells, n_q), and the volume ratios and the logarithmic strains of largest magnitude (n_cells,)."""
+        (N, dN, weights), cells, results = elements.get(name).tables, self.mesh.cells[name], []
+        for first in range(0, len(cells), AT_ONCE):
+            rows = slice(first, first + AT_ONCE)
+            F = self._deformation(name, rows, displacement)
+            if self.kinematics == "plane_stress":
+                F[..., 2, 2] += bodies.history[name][rows, :, ACROSS]
+            J, squared = np.linalg.det(F), np.linalg.eigvalsh(np.swapaxes(F, 2, 3) @ F)
+            volume = cell_volumes(self.mesh.points[cells[rows]], N, dN, self.kinematics == "axisymmetric") * weights
+            ratio = (volume * J).sum(axis=1) / volume.sum(axis=1)
+            low, high = 0.5 * np.log(squared[..., 0].min(axis=1)), 0.5 * np.log(squared[..., 2].max(axis=1))
+            results.append((J, ratio, np.where(high >= -low, high, low)))
+        return [np.concatenate(parts) for parts in zip(*results, strict=True)]
 
     def _yielding(self, name: str, bodies: DeformedBodies, J: Array) -> list[Array]:
         """Return the largest equivalent plastic strain and the largest ratio of stress to yield stress (n_cells,) in cells.

@@ -8,8 +8,9 @@ import numpy as np
 
 from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import typed
-from fastcontact.arrays import Array, Indices, Numbers
+from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.elasticity import dilatation, dilatation_kernels, incompatible_modes, incompatible_modes_kernels
+from fastcontact.elasticity.energy import cell_volumes, gradients_at
 from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.material_sides import MaterialSides
@@ -29,8 +30,8 @@ Materials = dict[str, Numbers]
 BATCH = 16_000_000
 # Every SAMPLED-th cell is used to estimate the distribution of node numbers.
 SAMPLED = 16
-# Number of cells processed at a time where moduli vary within cells, which limits the memory for local moduli.
-VARYING = 2_000
+# Number of cells processed at a time in NumPy, which limits the memory for moduli and gradients at their points.
+AT_ONCE = 2_000
 
 
 def interpolation(name: str, xi: Array) -> Array:
@@ -39,6 +40,12 @@ def interpolation(name: str, xi: Array) -> Array:
     if xi is element.quadrature[0]:
         return np.eye(len(xi))
     return np.asarray(element.shape(xi) @ element.extrapolation)
+
+
+def _times(moduli: Array, name: str, xi: Array, material: Numbers, strain: Array) -> Array:
+    """Return varying moduli, given at quadrature points by `material` (n_cells, n_q), times the strains at points `xi`."""
+    local = np.einsum("nq,cqij->cnij", interpolation(name, xi), moduli[material], optimize=True)
+    return np.asarray(np.einsum("cnij,cnj->cni", local, strain))
 
 
 class CellStress:
@@ -85,14 +92,9 @@ class CellStress:
         The points `xi` (n, dim) [-] and the integer arrays `cells` (n_cells, n_nodes), `material` (n_cells,) or
         (n_cells, n_q) and `rows` (n_cells,) are described for `at`.
         """
-        element, split = elements.get(name), None
-        if self._averaged is not None:
-            split = dilatation.split(name, self._moduli, self._averaged)
+        element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
         moduli = self._moduli if split is None else split.moduli
-        if xi is element.quadrature[0]:
-            N, dN, _ = element.tables
-        else:
-            N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
+        N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
         loops, points, cells = LOOPS[self._mesh.dim], self._mesh.points, parallel.read_only(cells)
 
         def fill_rows(span: tuple[int, int]) -> None:
@@ -107,8 +109,9 @@ class CellStress:
                 bases = dilatation.basis(name, element.quadrature[0]), dilatation.basis(name, xi)
                 element_tables = *element.tables, bases[0], split.bulk
                 dilatation_kernels.add_pressure(points, nodes, *element_tables, *shared, bases[1], stress)
-            if self._averaged is not None:
-                self._add_modes((name, xi, dN), nodes, numbers, stress, rows[portion])
+            with_modes = incompatible_modes.with_modes(name, self._averaged)
+            if with_modes is not None:
+                self._add_modes((name, xi, dN), with_modes, nodes, numbers, stress, rows[portion])
 
         parallel.parallel_map(fill_rows, parallel.portions(len(out), cells.shape[1]))
         if self._offset is not None:
@@ -120,37 +123,28 @@ class CellStress:
     ) -> None:  # fmt: skip
         """Fill `out` if moduli vary within cells.
 
-        If the points are the quadrature points, they are processed one after the other, each in all cells. At other points
-        the moduli are interpolated from the quadrature points, and the strains are the stresses of unit moduli.
+        The moduli are interpolated from the quadrature points, and the strains are the stresses of unit moduli.
         """
         name, xi, N, dN = at
-        loops, shared = LOOPS[self._mesh.dim], (self._axisymmetric, self._displacement)
-        if xi is elements.get(name).quadrature[0]:
-            at_point = np.empty((len(cells), 1, out.shape[2]))
-            for q in range(len(xi)):
-                tables, of_moduli = (N[q : q + 1], dN[q : q + 1]), np.ascontiguousarray(material[:, q])
-                loops.stress(self._mesh.points, cells, *tables, moduli, of_moduli, *shared, at_point)
-                out[:, q] = at_point[:, 0]
-            return
-        unit_moduli, row_of_moduli = np.eye(self._moduli.shape[1])[None], np.zeros(len(cells), np.int32)
-        strain = np.empty_like(out)
-        loops.stress(self._mesh.points, cells, N, dN, unit_moduli, row_of_moduli, *shared, strain)
-        weights = interpolation(name, xi)
-        for first_cell in range(0, len(cells), VARYING):
-            portion = slice(first_cell, first_cell + VARYING)
-            local = np.einsum("nq,cqij->cnij", weights, moduli[material[portion]], optimize=True)
-            out[portion] = np.einsum("cnij,cnj->cni", local, strain[portion])
+        unit_moduli, row_of_moduli = np.eye(moduli.shape[1])[None], np.zeros(len(cells), np.int32)
+        strain, shared = np.empty_like(out), (self._axisymmetric, self._displacement)
+        LOOPS[self._mesh.dim].stress(self._mesh.points, cells, N, dN, unit_moduli, row_of_moduli, *shared, strain)
+        for first in range(0, len(cells), AT_ONCE):
+            portion = slice(first, first + AT_ONCE)
+            out[portion] = _times(moduli, name, xi, material[portion], strain[portion])
 
     def _add_modes(
-        self, at: tuple[str, Array, Array], cells: Numbers, material: Numbers, out: Array, rows: Indices
+        self,
+        at: tuple[str, Array, Array],
+        with_modes: Mask,
+        cells: Numbers,
+        material: Numbers,
+        out: Array,
+        rows: Indices,
     ) -> None:
-        """Add the stresses of incompatible modes."""
+        """Add the stresses of incompatible modes of the moduli `with_modes` (n_materials,)."""
         name, xi, dN = at
-        with_modes = incompatible_modes.with_modes(name, self._averaged)
-        if with_modes is None:
-            return
-        numbers = material.reshape(len(cells), -1)
-        subtracted = np.empty((0, 0, 0))
+        numbers, subtracted = material.reshape(len(cells), -1), np.empty((0, 0, 0))
         if self._offset is not None:
             quadrature_points = name, elements.get(name).quadrature[0], rows
             strain = self._stress_free(self._offset, quadrature_points, cells, material)
@@ -189,8 +183,7 @@ class CellStress:
         if material.ndim == 1:
             out -= strain @ moduli[material]  # moduli are symmetric
         else:
-            local = np.einsum("nq,cqij->cnij", interpolation(name, xi), moduli[material], optimize=True)
-            out -= np.einsum("cnij,cnj->cni", local, strain)
+            out -= _times(moduli, name, xi, material, strain)
         if split is None:
             return
         bulk = split.bulk[of_cells(material)]
@@ -336,9 +329,17 @@ def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> 
     The stresses are `at_points` (n_cells, n_q, n_components) [pressure], by solid element type.
     """
     force, axisymmetric = np.zeros((mesh.n_points, mesh.dim)), kinematics == "axisymmetric"
-    for name, values in at_points.items():
-        tables = elements.get(name).tables
-        LOOPS[mesh.dim].add_internal_force(mesh.points, mesh.cells[name], *tables, axisymmetric, values, force)
+    for name, stress in at_points.items():
+        N, dN, weights = elements.get(name).tables
+        for first in range(0, len(stress), AT_ONCE):
+            cells = mesh.cells[name][first : first + AT_ONCE]
+            corners, (gradient, _) = mesh.points[cells], gradients_at(mesh.points[cells], dN)
+            volume = cell_volumes(corners, N, dN, axisymmetric) * weights
+            weighted = volume[..., None] * stress[first : first + AT_ONCE]
+            nodal = np.einsum("cqaj,cqij->cai", gradient, weighted[..., PAIRS[mesh.dim]], optimize=True)
+            if axisymmetric:
+                nodal[..., 0] += weighted[..., 2] / np.einsum("qa,ca->cq", N, corners[..., 0]) @ N
+            np.add.at(force, cells, nodal)
     return force
 
 

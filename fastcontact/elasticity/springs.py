@@ -186,8 +186,4 @@ def _stiffness_ratio(spring: Springs, diagonal: Array, dim: int) -> tuple[float,
 
 def ground_force(springs: Sequence[Springs], u: Array) -> Array:
     """Return the nodal forces (n_dofs,) [force] of springs to the ground at the displacements `u` (n_dofs,) [length]."""
-    total = np.zeros(len(u))
-    for spring in springs:
-        if spring.grounded:
-            total -= spring.rows.T @ spring.tension(u)
-    return total
+    return -spring_force([spring for spring in springs if spring.grounded], u)

@@ -27,7 +27,8 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 Indices = NDArray[np.int64]
-# Element loops `add_stiffness`, `stress` and `add_internal_force` by the number of coordinates.
+Tables = tuple[Array, Array, Array]  # N, dN and weights at quadrature points
+# Element loops `add_stiffness` and `stress` by the number of coordinates.
 LOOPS = {2: element_2d_kernels, 3: element_3d_kernels}
 
 
@@ -175,9 +176,7 @@ def of_cells(material: Numbers) -> Numbers:
     return material if material.ndim == 1 else np.ascontiguousarray(material[:, 0])
 
 
-def _passes(
-    tables: tuple[Array, Array, Array], material: Numbers
-) -> Iterator[tuple[tuple[Array, Array, Array], Numbers]]:
+def _passes(tables: Tables, material: Numbers) -> Iterator[tuple[Tables, Numbers]]:
     """Yield quadrature tables and the material (n_cells,) at their points: of each point if it varies within cells.
 
     Otherwise there is one pass with all points.

@@ -95,14 +95,13 @@ class Cells:
 
     def samples(self) -> Iterator[tuple[str, Indices, Array]]:
         """Yield element type, cells and shape functions (n, n_nodes) [-]: first at centres, then at quadrature points."""
-        for name, rows in self.rows.items():
-            yield name, rows, centre(name)
-        for name, rows in self.rows.items():
-            yield name, rows, elements.get(name).tables[0]
+        for shapes in (centre, lambda name: elements.get(name).tables[0]):
+            for name, rows in self.rows.items():
+                yield name, rows, shapes(name)
 
 
 def centre(name: str) -> Array:
-    """Return the shape functions (1, n_nodes) [-] of an element type at the centre of the cell."""
+    """Return the weights (1, n_nodes) [-] of the nodes in the centre of a cell, the mean of its nodes."""
     n = elements.get(name).n_nodes
     return np.full((1, n), 1.0 / n)
 
@@ -168,8 +167,8 @@ class Varying:
             raise ModelError(f"{self._name} is not finite at row {int(np.flatnonzero(~np.isfinite(values))[0])}")
         if len(values) == mesh.n_points and not column:
             self._nodal = values.astype(float)
-            return
-        self._by_cell = _by_cell(values, cells)
+        else:
+            self._by_cell = _by_cell(values, cells)
 
     @property
     def inside(self) -> bool:

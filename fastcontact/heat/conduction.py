@@ -90,10 +90,8 @@ class Conduction:
         k, number = np.zeros((*volume.shape, mesh.dim, mesh.dim)), self.number[name][rows]
         for index in np.unique(number):
             cells = np.flatnonzero(number == index)
-            constants = self.materials[index].constants_at(name, rows[cells], N)
-            k_cells = self.materials[index].conductivity_at(
-                positions(mesh, nodes[cells], N), self.kinematics, constants
-            )
+            material, x = self.materials[index], positions(mesh, nodes[cells], N)
+            k_cells = material.conductivity_at(x, self.kinematics, material.constants_at(name, rows[cells], N))
             k[cells] = k_cells.reshape(len(cells), *k.shape[1:])
         return gradient, k, volume
 

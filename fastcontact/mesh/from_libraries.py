@@ -96,9 +96,8 @@ def from_pyvista(grid: Any) -> Mesh:
         raise MeshError(f"from_pyvista takes a pyvista.UnstructuredGrid, not {type(grid).__name__}")
     types = np.asarray(grid.celltypes)
     kinds = {int(kind): np.flatnonzero(types == kind) for kind in dict.fromkeys(types.tolist())}
-    names = {
-        kind: VERTEX if kind == 1 else elements.BY_VTK[kind].meshio for kind in kinds if kind in (1, *elements.BY_VTK)
-    }
+    known = {1: VERTEX} | {kind: element.meshio for kind, element in elements.BY_VTK.items()}
+    names = {kind: known[kind] for kind in kinds if kind in known}
     if len(names) < len(kinds):
         unknown = ", ".join(f"{len(kinds[kind])} of VTK's type {kind}" for kind in kinds if kind not in names)
         raise MeshError(
@@ -171,9 +170,8 @@ def _warn_of_omissions(gmsh: Any, dim: int) -> None:
     """Warn of solid cells without a physical group, which gmsh omits if the model has physical groups."""
     if not gmsh.model.getPhysicalGroups():
         return
-    ungrouped = [
-        tag for _, tag in gmsh.model.getEntities(dim) if not len(gmsh.model.getPhysicalGroupsForEntity(dim, tag))
-    ]
+    groups_of = gmsh.model.getPhysicalGroupsForEntity
+    ungrouped = [tag for _, tag in gmsh.model.getEntities(dim) if not len(groups_of(dim, tag))]
     count = sum(sum(map(len, gmsh.model.mesh.getElements(dim, tag)[1])) for tag in ungrouped)
     if count:
         kind = "volumes" if dim == 3 else "surfaces"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterable, Mapping, Sized
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -202,14 +202,10 @@ class Mesh(Suggesting):
         """
         if group in self.point_groups and group not in self.cell_groups:
             similar = difflib.get_close_matches(group, self.cell_groups, n=2, cutoff=0.3) or [*self.cell_groups][:6]
-            remedy = (
-                f": name one such as {' or '.join(map(repr, similar))}"
-                if similar
-                else ", and the mesh has none of cells"
-            )
-            raise MeshError(
-                f"'{group}' is a group of points, but here one of cells is needed (lines, faces, solids){remedy}"
-            )
+            names = " or ".join(map(repr, similar))
+            remedy = f": name one such as {names}" if names else ", and the mesh has none of cells"
+            needed = "here one of cells is needed (lines, faces, solids)"
+            raise MeshError(f"'{group}' is a group of points, but {needed}{remedy}")
         if group not in self.cell_groups:
             raise MeshError(self._no_group("group of cells", group, self.cell_groups))
         rows = self.split(self.cell_groups[group])
@@ -263,18 +259,11 @@ class Mesh(Suggesting):
         The mappings `cells` (n,) of int and `points` (n,) of int contain the cell numbers of cell groups and the point
         numbers of point groups, by name.
         """
-        return self.replace(
-            cell_groups={**self.cell_groups, **(cells or {})},
-            point_groups={**self.point_groups, **(points or {})},
-        )
+        cell_groups, point_groups = {**self.cell_groups, **(cells or {})}, {**self.point_groups, **(points or {})}
+        return self.replace(cell_groups=cell_groups, point_groups=point_groups)
 
     def with_facet_group(
-        self,
-        name: str,
-        where: Callable[[Array], ArrayLike],
-        *,
-        between: bool = False,
-        of: str | None = None,
+        self, name: str, where: Callable[[Array], ArrayLike], *, between: bool = False, of: str | None = None
     ) -> Mesh:
         """Return the mesh with a new group of facets of its solid cells, which are selected by position.
 
@@ -314,7 +303,13 @@ class Mesh(Suggesting):
                 f"the function of facet group '{name}' returned {selected.dtype} of shape {selected.shape}: it must return "
                 f"True or False for each point, shape ({self.n_points},)"
             )
-        facets = _facets_with_nodes(self.solids, selected, between, None if of is None else self._cells_in(name, of))
+        considered = np.ones(self.n_cells, bool)
+        if of is not None:
+            if not self.cells_of(of, dim=self.dim):
+                remedy = "which has no solid cells: name a body's group"
+                raise MeshError(f"facet group '{name}' cannot be taken from '{of}', {remedy}")
+            considered = np.isin(np.arange(self.n_cells), self.cell_groups[of])
+        facets = _facets_with_nodes(self, selected, between, considered)
         if not facets:
             of_group = f" of '{of}'" if of else ""
             raise MeshError(
@@ -323,18 +318,6 @@ class Mesh(Suggesting):
                 "compare coordinates with a tolerance, or define a group of points with with_groups"
             )
         return self.with_facets({name: facets})
-
-    def _cells_in(self, name: str, group: str) -> dict[str, Mask]:
-        """Return the mask (n_cells,) of the solid cells in a group, by element type.
-
-        Raises MeshError, whose message contains the name of the facet group, if the group contains no solid cells.
-        """
-        if not self.cells_of(group, dim=self.dim):
-            raise MeshError(
-                f"facet group '{name}' cannot be taken from '{group}', which has no solid cells: name a body's group"
-            )
-        rows = self.split(self.cell_groups[group])
-        return {kind: np.isin(np.arange(len(block)), rows.get(kind, [])) for kind, block in self.solids.items()}
 
     def with_facets(self, groups: Mapping[str, Mapping[str, ArrayLike]]) -> Mesh:
         """Return the mesh with new groups of facets, which replace groups of the same names.
@@ -365,41 +348,46 @@ class Mesh(Suggesting):
         return self.with_groups(cells={name: np.concatenate([self.cell_groups[member] for member in members])})
 
 
-def _facets_with_nodes(
-    solids: Mapping[str, AnyArray], selected: Mask, between: bool, in_group: Mapping[str, Mask] | None = None
-) -> dict[str, AnyArray]:
+def facets_of_cells(mesh: Mesh) -> Iterator[tuple[str, AnyArray, AnyArray]]:
+    """Yield the element types and the nodes (n_cells, n_nodes) of the facets of solid cells, and the numbers of the cells.
+
+    The facets are those at the same place in all cells of an element type; their normals point out of the cells.
+    """
+    for name, block in mesh.solids.items():
+        element, numbers = elements.get(name), mesh.offsets[name] + np.arange(len(block), dtype=np.int32)
+        for facet, kind in zip(element.facets, element.facet_elements, strict=True):
+            yield kind, block[:, list(facet)], numbers
+
+
+def _facets_with_nodes(mesh: Mesh, selected: Mask, between: bool, considered: Mask) -> dict[str, AnyArray]:
     """Return the facets (n_facets, n_nodes) of solid cells whose nodes are all selected, by element type of the facet.
 
     Each facet appears once, with the orientation of its first cell. This is outward for facets of a single cell.
 
     Parameters
     ----------
-    solids : mapping of str to ndarray of int (n_cells, n_nodes)
-        Connectivity by element type.
+    mesh : Mesh
     selected : ndarray of bool (n_points,)
         Whether each point is selected.
     between : bool
         If True, return the facets between two cells; if False, the facets of a single cell.
-    in_group : mapping of str to ndarray of bool (n_cells,), optional
-        Whether the facets of each cell are considered; by default those of all cells.
+    considered : ndarray of bool (n_cells,)
+        Whether the facets of each cell are considered.
     """
     candidates: dict[str, list[AnyArray]] = {}
     flags: dict[str, list[Mask]] = {}
-    for name, block in solids.items():
-        element, considered = elements.get(name), np.ones(len(block), bool) if in_group is None else in_group[name]
-        for facet, kind in zip(element.facets, element.facet_elements, strict=True):
-            nodes = block[:, list(facet)]
-            rows = selected[nodes].all(axis=1)
-            candidates.setdefault(kind, []).append(nodes[rows])
-            flags.setdefault(kind, []).append(considered[rows])
+    for kind, nodes, cells in facets_of_cells(mesh):
+        rows = selected[nodes].all(axis=1)
+        candidates.setdefault(kind, []).append(nodes[rows])
+        flags.setdefault(kind, []).append(considered[cells[rows]])
     facets_by_kind, n_cells = {}, 2 if between else 1
     for kind, blocks in candidates.items():
-        facets, considered = np.concatenate(blocks), np.concatenate(flags[kind])
+        facets = np.concatenate(blocks)
         _, first, group, count = np.unique(
             np.sort(facets, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
         )
-        count_in_group = np.bincount(group.ravel(), considered, len(count))
-        rows = np.sort(first[(count == n_cells) & (count_in_group == n_cells)])
+        count_considered = np.bincount(group.ravel(), np.concatenate(flags[kind]), len(count))
+        rows = np.sort(first[(count == n_cells) & (count_considered == n_cells)])
         if len(rows):
             facets_by_kind[kind] = facets[rows]
     return facets_by_kind

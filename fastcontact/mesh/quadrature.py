@@ -121,9 +121,7 @@ def quartered_triangle(rule: Rule) -> Rule:
 
 def square(rule: Rule) -> Rule:
     """Return the product of a rule on [-1, 1] with itself."""
-    x, w = rule
-    X, Y = np.meshgrid(x[:, 0], x[:, 0], indexing="xy")
-    return np.column_stack([X.ravel(), Y.ravel()]), np.outer(w, w).ravel()
+    return prism(rule, rule)
 
 
 def _merged(points: Array, weights: Array) -> Rule:
@@ -136,9 +134,8 @@ def _merged(points: Array, weights: Array) -> Rule:
 
 def gauss_cube(n: int) -> Rule:
     """Return the tensor-product Gauss rule with n x n x n points on [-1, 1]^3, exact to degree 2n - 1 in each coordinate."""
-    x, w = np.polynomial.legendre.leggauss(n)
-    X, Y, Z = np.meshgrid(x, x, x, indexing="ij")
-    return np.column_stack([X.ravel(), Y.ravel(), Z.ravel()]), np.einsum("i,j,k->ijk", w, w, w).ravel()
+    points, weights = prism(gauss_square(n), gauss_line(n))
+    return points[:, ::-1].copy(), weights  # the points along z are consecutive
 
 
 def tetrahedron_1() -> Rule:
@@ -156,10 +153,10 @@ def tetrahedron_5() -> Rule:
     return np.array(points), np.array([-2.0 / 15.0] + [3.0 / 40.0] * 4)
 
 
-def prism(triangle: Rule, line: Rule) -> Rule:
-    """Return the product of a rule on the triangle, in x and y, with a rule on the line [-1, 1], in z."""
-    (xy, w), (z, v) = triangle, line
-    points = np.column_stack([np.tile(xy, (len(z), 1)), np.repeat(z[:, 0], len(xy))])
+def prism(base: Rule, line: Rule) -> Rule:
+    """Return the product of a rule on a base in the first coordinates with a rule on the line [-1, 1] in the last one."""
+    (x, w), (z, v) = base, line
+    points = np.column_stack([np.tile(x, (len(z), 1)), np.repeat(z[:, 0], len(x))])
     return points, np.outer(v, w).ravel()
 
 

@@ -138,9 +138,8 @@ def poorest_cell(mesh: Mesh) -> str:
         criteria = [(LEAST_JACOBIAN_RATIO - ratio, ratio, text)]
         if mesh.dim == 2:
             angle = np.degrees(corner_angles(_corners(mesh, name)).max(axis=1))
-            criteria.append(
-                (angle - LARGEST_ANGLE, angle, "it has an angle of {:.1f} degrees; move its nodes or remesh")
-            )
+            text = "it has an angle of {:.1f} degrees; move its nodes or remesh"
+            criteria.append((angle - LARGEST_ANGLE, angle, text))
         else:
             text = "its volume is only {:.1e} of its longest edge cubed; remesh there"
             criteria.append((LEAST_VOLUME_RATIO - volume, volume, text))

@@ -58,11 +58,11 @@ def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
             smallest, largest = min(smallest, det), max(largest, det)
             total += weights[q] * det
         low[c], high[c], measure[c] = smallest, largest, total
-        square = 0.0
+        largest_square = 0.0
         for e in range(edges.shape[0]):
-            length = 0.0
+            length_squared = 0.0
             for i in range(dim):
                 component = x[i, edges[e, 1]] - x[i, edges[e, 0]]
-                length += component * component
-            square = max(square, length)
-        longest[c] = np.sqrt(square)
+                length_squared += component * component
+            largest_square = max(largest_square, length_squared)
+        longest[c] = np.sqrt(largest_square)

@@ -22,10 +22,11 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import Mesh, facets_of_cells
 
 Result = TypeVar("Result")
 Arguments = ParamSpec("Arguments")
+OfMesh = Callable[Concatenate[Mesh, Arguments], Result]
 # Distance, relative to the size of the mesh, below which nodes are regarded as coincident or collinear.
 COLLINEAR = 1e-6
 
@@ -68,12 +69,9 @@ def oriented(mesh: Mesh) -> tuple[Mesh, int]:
 def _check_folds(mesh: Mesh) -> None:
     """Raise MeshError if two oriented solid cells have a common facet with the same orientation."""
     folds, owners = [], []
-    for name, block in mesh.solids.items():
-        element = elements.get(name)
-        numbers = mesh.offsets[name] + np.arange(len(block))
-        for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
-            folds.append(_direction(block[:, list(facet)[: elements.get(facet_element).n_corners]].astype(np.int64)))
-            owners.append(numbers)
+    for kind, nodes, numbers in facets_of_cells(mesh):
+        folds.append(_direction(nodes[:, : elements.get(kind).n_corners].astype(np.int64)))
+        owners.append(numbers)
     keys, owner = np.concatenate(folds), np.concatenate(owners)
     rows, others = equal_rows(keys)
     if len(rows):
@@ -97,9 +95,7 @@ def _direction(facets: Indices) -> Indices:
     return np.column_stack([facets[rows, first], following, preceding if count > 2 else first])
 
 
-def remembered(
-    function: Callable[Concatenate[Mesh, Arguments], Result],
-) -> Callable[Concatenate[Mesh, Arguments], Result]:
+def remembered(function: OfMesh[Arguments, Result]) -> OfMesh[Arguments, Result]:
     """Decorate `function` such that its results are cached by mesh, which is immutable, and by the other arguments."""
     results: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Result]] = WeakKeyDictionary()
 
@@ -120,19 +116,13 @@ def bodies(mesh: Mesh) -> tuple[int, Numbers]:
 
     A body is a set of solid cells that are connected by common nodes.
     """
-    rows, columns, used = [], [], np.zeros(mesh.n_points, bool)
-    for block in mesh.solids.values():
-        rows.append(np.repeat(block[:, 0], block.shape[1]))
-        columns.append(block.ravel())
-        used[block] = True
-    if not rows:
-        return 0, np.full(mesh.n_points, -1, np.int32)
-    row, column = np.concatenate(rows), np.concatenate(columns)
+    blocks, none = mesh.solids.values(), np.empty(0, np.int32)
+    row = np.concatenate([none, *(np.repeat(block[:, 0], block.shape[1]) for block in blocks)])
+    column = np.concatenate([none, *(block.ravel() for block in blocks)])
     graph = coo_array((np.ones(len(row), np.int8), (row, column)), shape=(mesh.n_points, mesh.n_points))
-    _, label = connected_components(graph, directed=False)
-    labels, number = np.unique(label[used], return_inverse=True)
-    body = np.full(mesh.n_points, -1, np.int32)
-    body[used] = number
+    label, body = connected_components(graph, directed=False)[1], np.full(mesh.n_points, -1, np.int32)
+    used = np.bincount(column, minlength=mesh.n_points) > 0
+    labels, body[used] = np.unique(label[used], return_inverse=True)
     body.setflags(write=False)
     return len(labels), body
 
@@ -166,11 +156,9 @@ def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Nu
     """Return `outer_facets`, `cells_joined_by_facets` and `cells_of_outer_facets`."""
     facets_of_kind: dict[str, list[Numbers]] = {}
     owners: dict[str, list[Numbers]] = {}
-    for name, block in mesh.solids.items():
-        element, numbers = elements.get(name), mesh.offsets[name] + np.arange(len(block), dtype=np.int32)
-        for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
-            facets_of_kind.setdefault(facet_element, []).append(block[:, list(facet)])
-            owners.setdefault(facet_element, []).append(numbers)
+    for kind, nodes, numbers in facets_of_cells(mesh):
+        facets_of_kind.setdefault(kind, []).append(nodes)
+        owners.setdefault(kind, []).append(numbers)
     outer, behind, pairs = {}, {}, [np.empty((2, 0), np.int32)]
     for name, blocks in facets_of_kind.items():
         facets, owner = np.concatenate(blocks), np.concatenate(owners[name])
@@ -267,16 +255,13 @@ def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> Orde
     ends = np.flatnonzero(degree == 1)
     if len(ends) != 2 or degree.max() > 2:
         raise MeshError(f"group '{group}' is not one open line: it has {len(ends)} ends, not 2")
-    if start is None:
-        first = ends[np.argmin(np.abs(mesh.points[nodes[ends], 0]))]
-    else:
-        number = mesh.point(start) if isinstance(start, str) else int(start)
-        matches = ends[nodes[ends] == number]
-        if not len(matches):
-            raise MeshError(
-                f"point {number} is not an end of '{group}': its ends are {nodes[ends[0]]}, {nodes[ends[1]]}"
-            )
-        first = matches[0]
+    number = mesh.point(start) if isinstance(start, str) else start
+    if number is None:
+        number = nodes[ends[np.argmin(np.abs(mesh.points[nodes[ends], 0]))]]
+    if number not in nodes[ends]:
+        first, last = nodes[ends]
+        raise MeshError(f"point {number} is not an end of '{group}': its ends are {first}, {last}")
+    first = ends[nodes[ends] == number][0]
     graph = coo_array((np.ones(len(local), np.int8), tuple(local.T)), shape=(len(nodes), len(nodes)))
     order = breadth_first_order(graph, int(first), directed=False, return_predecessors=False)
     if len(order) != len(nodes):
@@ -354,9 +339,7 @@ def _shared_nodes(mesh: Mesh, label: Indices) -> tuple[Indices, Indices, Indices
         part[block] = owners[:, None]
     for block, owners in owned:
         shared[block[part[block] != owners[:, None]]] = True
-    rows = [
-        (block[shared[block]], np.broadcast_to(owners[:, None], block.shape)[shared[block]]) for block, owners in owned
-    ]
+    rows = [(block[shared[block]], np.repeat(owners, shared[block].sum(axis=1))) for block, owners in owned]
     node, part_of_node = np.unique(np.concatenate([np.stack(pair) for pair in rows], axis=1), axis=1).astype(np.intp)
     _, lowest = np.unique(node, return_index=True)
     part[node[lowest]] = part_of_node[lowest]

@@ -76,11 +76,9 @@ def _curvature_tolerance(name: str, nodes: Array) -> Array:
     element = elements.get(name)
     if element.order == 1:
         return np.zeros(len(nodes))
-    edges = np.array(element.edges)
-    middle = nodes[:, element.n_corners : element.n_corners + len(edges)]
-    chord = nodes[:, edges[:, 1]] - nodes[:, edges[:, 0]]
-    length = np.linalg.norm(chord, axis=2)
-    rise = np.linalg.norm(middle - 0.5 * (nodes[:, edges[:, 0]] + nodes[:, edges[:, 1]]), axis=2)
+    middle, ends = nodes[:, element.n_corners :][:, : len(element.edges)], nodes[:, element.edges]
+    length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    rise = np.linalg.norm(middle - ends.mean(axis=2), axis=2)
     return np.asarray((rise**2 / length).max(axis=1))
 
 

@@ -89,9 +89,8 @@ def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = N
         shares = weigh(mesh.points[points])
     total = float(shares.sum())
     if len(points) and not total > 0.0:
-        raise ModelError(
-            f"no part of '{group}' lies within the radius of the distribution: use a larger radius, or another point"
-        )
+        remedy = "use a larger radius, or another point"
+        raise ModelError(f"no part of '{group}' lies within the radius of the distribution: {remedy}")
     return points, shares / total if len(points) else shares
 
 
@@ -146,9 +145,7 @@ class SpreadForce(Load):
         self.vector(mesh, kinematics)
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
-        force = np.zeros(mesh.dim)
-        for axis, value in self.components.items():
-            force[axis] = value
+        force = np.array([self.components.get(axis, 0.0) for axis in range(mesh.dim)])
         points, weight = shares_of(mesh, kinematics, self.group, self.spread)
         positions = mesh.points[points]
         nodal = weight[:, None] * force
@@ -176,9 +173,7 @@ class Moment(Load):
         check_points(mesh, self.group, f"{self.name} acts nowhere")
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
-        moment = np.zeros(1 if mesh.dim == 2 else 3)
-        for axis, value in self.components.items():
-            moment[0 if mesh.dim == 2 else axis] = value
+        moment = np.array([self.components.get(axis, 0.0) for axis in ((2,) if mesh.dim == 2 else range(3))])
         if self.group + ROTATION in mesh.point_groups:
             forces[mesh.point(self.group + ROTATION), : len(moment)] += moment
             return

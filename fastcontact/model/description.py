@@ -81,10 +81,8 @@ def _solved(model: Any) -> str:
 def _supports(model: Any) -> Iterator[str]:
     by_place: dict[tuple[str, Any], list[str]] = {}
     for support in model.supports:
-        value = "a function of position" if callable(support.value) else f"{support.value:g}"
-        component = f"{'xyz'[support.component]} = {value}"
         texts = by_place.setdefault((support.group, support.ramp), [])
-        texts.append(component)
+        texts.append(f"{'xyz'[support.component]} = {_value(support.value)}")
         if support.rotation is not None and support.component == model.mesh.dim - 1:
             turn = support.rotation
             texts.append(f"turned by {turn.angle:g} radian about {turn.centre}{_history(support.rotation_ramp)}")

@@ -80,8 +80,6 @@ def _joined(mesh: Mesh, nodes_of: str, facets_of: str, node: Indices, corners: N
 def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     """Return hanging nodes (m,), the facets (m,) of their own body on which they lie, and all outer facets."""
     outer = _outer_facets(mesh)
-    if not len(outer.size):
-        return np.empty(0, np.intp), np.empty(0, np.intp), outer
     outward = np.zeros(mesh.points.shape)
     for column in outer.nodes.T:
         used = column >= 0
@@ -174,9 +172,8 @@ def _closed_at_corners(outer: OuterFacets, facet: Indices) -> Mask:
 
 
 def _outer_facets(mesh: Mesh) -> OuterFacets:
-    facets = outer_facets(mesh)
-    width = max((block.shape[1] for block in facets.values()), default=1)
-    n_corners = 2 if mesh.dim == 2 else 4
+    facets, n_corners = outer_facets(mesh), 2 if mesh.dim == 2 else 4
+    width = max(block.shape[1] for block in facets.values())
     nodes, corners, centres, rises = [], [], [], []
     for name, block in facets.items():
         element, x = elements.get(name), mesh.points[block]
@@ -184,16 +181,15 @@ def _outer_facets(mesh: Mesh) -> OuterFacets:
         corners.append(block[:, np.minimum(np.arange(n_corners), element.n_corners - 1)])
         centres.append(x[:, : element.n_corners].mean(axis=1))
         rises.append(_rise(element, x))
-    corner = np.concatenate([np.full((0, n_corners), -1, np.int32), *corners])
+    corner = np.concatenate(corners)
     x = mesh.points[corner]
     normal = flat_area_vectors(x)
     length = np.linalg.norm(normal, axis=1)
     normal /= np.where(length > 0.0, length, 1.0)[:, None]
-    return OuterFacets(
-        np.concatenate([np.full((0, width), -1, np.int32), *nodes]), corner, np.concatenate([x[:, 0][:0], *centres]),
-        normal, np.concatenate([np.zeros(0), *rises]), np.linalg.norm(np.ptp(x, axis=1), axis=1), tuple(facets),
-        np.repeat(np.arange(len(facets)), [len(block) for block in facets.values()]),
-    )  # fmt: skip
+    size = np.linalg.norm(np.ptp(x, axis=1), axis=1)
+    kind = np.repeat(np.arange(len(facets)), [len(block) for block in facets.values()])
+    centre, rise = np.concatenate(centres), np.concatenate(rises)
+    return OuterFacets(np.concatenate(nodes), corner, centre, normal, rise, size, tuple(facets), kind)
 
 
 def _rise(element: Element, x: Array) -> Array:

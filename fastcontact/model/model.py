@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -12,16 +13,12 @@ from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
-from fastcontact.elasticity.initial_states import InitialState
-from fastcontact.elasticity.loads import Load
-from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
-from fastcontact.elasticity.temperature import Temperature
+from fastcontact.elasticity.multipoint_constraints import TemporaryConstraint
 from fastcontact.errors import ModelError
 from fastcontact.heat.loads import TemporaryHeat
 from fastcontact.model.checks import check_motions, check_overlap, check_penetration, check_ramps, check_supports
 from fastcontact.model.contact_pair import check_turns
 from fastcontact.model.description import sentences
-from fastcontact.model.parts.base import Support
 from fastcontact.model.parts.supports import ModelSupports
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
 from fastcontact.model.pretension import check_locks
@@ -147,10 +144,8 @@ class Model(ModelSupports):
         self.thermal_forces_by_ramp()
         self._check_changes(self._check_heat_of)
         if ramp is not None:
-            items: list[Support | Load | MultiPointConstraint | Temperature | InitialState] = [
-                *self.supports, *self.loads, *self.relations, *self.temperatures, *self.initial_states,
-                *self.heat_loads,
-            ]  # fmt: skip
+            items: list[Any] = [*self.supports, *self.loads, *self.relations]
+            items += [*self.temperatures, *self.initial_states, *self.heat_loads]
             named = [(item.name, item.ramp) for item in items]
             named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
             named += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]

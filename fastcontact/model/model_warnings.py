@@ -75,10 +75,8 @@ def _split_sides(model: Model, pairs: Pairs) -> Iterator[str]:
         if pair.primary
     }
     points, count = np.unique(np.concatenate([*nodes.values(), np.empty(0, np.int32)]), return_counts=True)
-    common = points[count > 1]
-    return split_side_warnings(
-        [(pair, bound) for pair, bound in pairs if pair.primary and np.isin(nodes[pair.name], common).any()]
-    )
+    adjoining = [name for name in nodes if np.isin(nodes[name], points[count > 1]).any()]
+    return split_side_warnings([(pair, bound) for pair, bound in pairs if pair.name in adjoining])
 
 
 def _different_ends(model: Model) -> Iterator[str]:

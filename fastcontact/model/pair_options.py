@@ -162,9 +162,9 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
         )
     if kind != "unilateral" and "wear" in options:
         raise ContactError(f"contact '{name}' is {kind}, which does not wear: leave out 'wear' or 'kind'")
-    for option in ("clearance", "clearance_primary", "penalty", "search_distance"):
-        if kind == "tied" and option in options:
-            raise ContactError(f"contact '{name}' is tied, which keeps the initial gaps exactly: leave out '{option}'")
+    excess = [name for name in ("clearance", "clearance_primary", "penalty", "search_distance") if name in options]
+    if kind == "tied" and excess:
+        raise ContactError(f"contact '{name}' is tied, which keeps the initial gaps exactly: leave out '{excess[0]}'")
     return str(kind)
 
 
@@ -243,22 +243,19 @@ def _tangential_penalty(name: str, value: Any) -> Field | None:
 def _all_positive(penalty: Field, name: str, positions: Array) -> Array:
     values = penalty(positions)
     if not (values > 0).all():
-        raise ContactError(
-            f"the tangential_penalty {values.min():g} of contact '{name}' must be positive; leave it out for stick without "
-            "elastic slip"
-        )
+        remedy = "leave it out for stick without elastic slip"
+        raise ContactError(f"the tangential_penalty {values.min():g} of contact '{name}' must be positive; {remedy}")
     return values
 
 
 def _check_friction_ramp(name: str, options: Mapping[str, Any]) -> None:
     """Raise ContactError for a ramp of friction without a coefficient of friction, or with negative multipliers."""
-    table = table_of(options.get("friction_ramp"), f"the friction_ramp of contact '{name}'")
+    caption = f"the friction_ramp of contact '{name}'"
+    table = table_of(options.get("friction_ramp"), caption)
     if table is not None and not options.get("friction"):
         raise ContactError(f"contact '{name}' has a friction_ramp, but no friction that it could multiply")
     if table is not None and min(factor for _, factor in table) < 0.0:
-        raise ContactError(
-            f"the friction_ramp of contact '{name}' has negative multipliers: coefficients are 0 or more"
-        )
+        raise ContactError(f"{caption} has negative multipliers: coefficients are 0 or more")
 
 
 def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side: Surface) -> Mask | None:

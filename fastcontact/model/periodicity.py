@@ -186,11 +186,11 @@ def _projected(positions: Array, inward: Array, other: Surface, corners: list[Ar
     Where bodies are in contact, a position lies on facets of both. It belongs to that toward which `inward` (n, dim) points.
     """
     near, inside = (closest_of_kinds(positions + shift, corners) for shift in (0.0, LARGEST_DISTANCE * inward))
-    nodes, nodes_inside = (places(other, found.facet, found.xi).nodes for found in (near, inside))
-    first = np.cumsum([0] + [len(block) for block in corners])
+    nodes, nodes_inside = (places(other, closest.facet, closest.xi).nodes for closest in (near, inside))
+    first_facet = np.cumsum([0] + [len(block) for block in corners])
     for row in np.flatnonzero((nodes[:, :, None] != nodes_inside[:, None]).all(axis=(1, 2))):
-        kind = int(np.searchsorted(first, inside.facet[row], side="right")) - 1
-        on_facet = closest_of_kinds(positions[[row]], [corners[kind][[inside.facet[row] - first[kind]]]])
+        kind = int(np.searchsorted(first_facet, inside.facet[row], side="right")) - 1
+        on_facet = closest_of_kinds(positions[[row]], [corners[kind][[inside.facet[row] - first_facet[kind]]]])
         for values, value in zip(near, on_facet, strict=True):
             values[row] = value[0]
         near.facet[row] = inside.facet[row]

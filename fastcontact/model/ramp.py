@@ -127,9 +127,8 @@ class Ramp:
             raise ModelError(f"the instants of the ramp must ascend, not {self.instants}")
         outside = instants[(instants < times[0]) | (instants > times[-1])]
         if len(outside):
-            raise ModelError(
-                f"instant {outside[0]:g} lies outside the table of the ramp, which covers {times[0]:g} to {times[-1]:g}"
-            )
+            covered = f"{times[0]:g} to {times[-1]:g}"
+            raise ModelError(f"instant {outside[0]:g} lies outside the table of the ramp, which covers {covered}")
         object.__setattr__(self, "instants", tuple(float(t) for t in instants))
         object.__setattr__(self, "table", table)
 
@@ -204,9 +203,8 @@ def ramp_of(steps: RampLike | None) -> Ramp:
         table = checked_table(values)
         return Ramp(tuple(instant for instant, _ in table[1:]), table)
     if values.ndim != 1:
-        raise ModelError(
-            "the ramp must be a number of steps, load factors (n,), pairs (instant, multiplier) (n, 2), or a Ramp"
-        )
+        forms = "a number of steps, load factors (n,), pairs (instant, multiplier) (n, 2), or a Ramp"
+        raise ModelError(f"the ramp must be {forms}")
     end = max(1.0, values.max(initial=1.0))
     return Ramp(tuple(values), ((0.0, 0.0), (end, end)))
 

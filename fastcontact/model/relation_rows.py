@@ -21,6 +21,7 @@ from fastcontact.mesh.topology import bodies, outer_facets
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
 NORMAL = "normal"
+NodeGroup = tuple[str, Indices]  # name, nodes
 
 
 def normals_of(mesh: Mesh, group: str) -> tuple[Indices, Array]:
@@ -59,9 +60,7 @@ def less_first(rows: csr_array) -> csr_array:
     return csr_array(rows[1:] - csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr")))
 
 
-def matched(
-    mesh: Mesh, first: tuple[str, Indices], second: tuple[str, Indices], translation: Sequence[float] | None
-) -> Indices:
+def matched(mesh: Mesh, first: NodeGroup, second: NodeGroup, translation: Sequence[float] | None) -> Indices:
     """Return, for each node of the first group, the index of the node of the second with which it coincides when moved.
 
     The first group is moved by `translation` (dim,) [length], by default from the centre of its bounding box to that of the
@@ -81,18 +80,16 @@ def matched(
         shift = finite_vector(translation, mesh.dim)
     if shift is None:
         raise ModelError(f"the translation {translation} of '{name}' must be {mesh.dim} numbers")
-    found = coincident(mesh, first, second, np.eye(mesh.dim), shift)
-    worst = int(np.argmax(found.distance))
-    if found.distance[worst] > found.tolerance:
+    rows, distance, tolerance = coincident(mesh, first, second, np.eye(mesh.dim), shift)
+    worst, joined = int(np.argmax(distance)), "groups are joined node by node"
+    if distance[worst] > tolerance:
         raise ModelError(
-            f"point {nodes[worst]} of '{name}', moved by {shift}, lies {found.distance[worst]:.3g} from the nearest node of "
-            f"'{other}': groups are joined node by node; give the translation between them, or use another mesh"
+            f"point {nodes[worst]} of '{name}', moved by {shift}, lies {distance[worst]:.3g} from the nearest node of "
+            f"'{other}': {joined}; give the translation between them, or use another mesh"
         )
-    if len(np.unique(found.rows)) < len(nodes):
-        raise ModelError(
-            f"several nodes of '{name}', moved by {shift}, meet one node of '{other}': groups are joined node by node"
-        )
-    return found.rows
+    if len(np.unique(rows)) < len(nodes):
+        raise ModelError(f"several nodes of '{name}', moved by {shift}, meet one node of '{other}': {joined}")
+    return rows
 
 
 class Coincident(NamedTuple):
@@ -103,9 +100,7 @@ class Coincident(NamedTuple):
     tolerance: float  # largest distance of coincident nodes [length]
 
 
-def coincident(
-    mesh: Mesh, first: tuple[str, Indices], second: tuple[str, Indices], turn: Array, shift: Array
-) -> Coincident:
+def coincident(mesh: Mesh, first: NodeGroup, second: NodeGroup, turn: Array, shift: Array) -> Coincident:
     """Return the nodes of the second group that lie at those of the first one, turned by `turn` and moved by `shift`.
 
     Each group is given as (name, nodes). Several nodes of a group may lie at one place, those of bodies in contact or of the
@@ -149,8 +144,8 @@ def to_facets(mesh: Mesh, nodes: Indices) -> Array:
     inside, total, count = np.zeros(mesh.n_points, bool), np.zeros_like(mesh.points), np.zeros(mesh.n_points)
     inside[nodes] = True
     for facets in outer_facets(mesh).values():
-        own = facets[inside[facets].all(axis=1)]
-        np.add.at(total, own, mesh.points[own].mean(axis=1)[:, None])
-        np.add.at(count, own, 1.0)
+        facets_of_nodes = facets[inside[facets].all(axis=1)]
+        np.add.at(total, facets_of_nodes, mesh.points[facets_of_nodes].mean(axis=1)[:, None])
+        np.add.at(count, facets_of_nodes, 1.0)
     total, count = total[nodes], count[nodes, None]
     return np.where(count > 0.0, total / np.maximum(count, 1.0) - mesh.points[nodes], 0.0)

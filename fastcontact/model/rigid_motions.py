@@ -167,15 +167,15 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
     """
     dofs = mesh.n_points * mesh.dim
     motions = _body_motions(mesh, kinematics, fixed)
-    columns, matrices, labels = [motions.displacement], [motions.parts], list(motions.labels)
-    if relations is not None:
-        reference = bodies(mesh)[1][relations.indices // mesh.dim] < 0
-        for dof in np.unique(relations.indices[reference & ~fixed.ravel()[relations.indices]]):
-            columns.append(np.eye(dofs, 1, -int(dof)))
-            matrices.append(np.ones((1, 1)))
-            labels.append(Label(f"point {dof // mesh.dim}", f"translation along {'xyz'[dof % mesh.dim]}"))
-    motions = FreeMotions(np.hstack(columns), np.asarray(block_diag(*matrices), float), labels, motions.hinges)
-    if relations is None or not relations.shape[0] or not len(motions):
+    if relations is None:
+        return motions
+    without_body = bodies(mesh)[1][relations.indices // mesh.dim] < 0
+    points = np.unique(relations.indices[without_body & ~fixed.ravel()[relations.indices]])
+    columns = [motions.displacement, *(np.eye(dofs, 1, -int(dof)) for dof in points)]
+    labels = [Label(f"point {dof // mesh.dim}", f"translation along {'xyz'[dof % mesh.dim]}") for dof in points]
+    parts = np.asarray(block_diag(motions.parts, np.eye(len(points))), float)
+    motions = FreeMotions(np.hstack(columns), parts, [*motions.labels, *labels], motions.hinges)
+    if not relations.shape[0] or not len(motions):
         return motions
     return motions.combined(_null_space(relations @ motions.displacement))
 
@@ -392,8 +392,6 @@ def _extreme(along: Array, gaps: Array, gap: Array, held: Array, bound: float) -
     """
     from scipy.optimize import linprog
 
-    optimum = linprog(
-        -along, A_ub=-gaps, b_ub=gap, A_eq=held if len(held) else None, b_eq=np.zeros(len(held)) if len(held) else None,
-        bounds=(-bound, bound), method="highs",
-    )  # fmt: skip
+    equalities = {"A_eq": held, "b_eq": np.zeros(len(held))} if len(held) else {}
+    optimum = linprog(-along, A_ub=-gaps, b_ub=gap, bounds=(-bound, bound), method="highs", **equalities)
     return np.zeros(len(along)) if optimum.x is None else np.asarray(optimum.x)

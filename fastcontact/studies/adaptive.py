@@ -138,21 +138,13 @@ class AdaptiveStudy(Report):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the study as numbers, strings, lists and dictionaries, as ``--json`` writes it; errors are relative [-]."""
-        numbers = {
-            "combination": self.combination,
-            "quantity": self.quantity,
-            "tolerance": self.tolerance,
-            "reached": self.reached,
-            "value": self.rounds[-1].values[self.quantity],
-            "rounds": [self._round(k) for k in range(len(self.rounds))],
-        }
-        return self.framed(numbers)
-
-    def _round(self, k: int) -> dict[str, Any]:
-        """Return the results on a mesh for JSON."""
-        round_, errors = self.rounds[k], {name: finite(values[k]) for name, values in self._errors().items()}
-        counts = {"n_dofs": round_.n_dofs, "n_cells": round_.n_cells}
-        return {**counts, **round_.values, **errors, "seconds": round_.seconds}
+        numbers = {name: getattr(self, name) for name in ("combination", "quantity", "tolerance", "reached")}
+        errors = {name: list(map(finite, values)) for name, values in self._errors().items()}
+        rounds = [
+            {"n_dofs": r.n_dofs, "n_cells": r.n_cells, **r.values, **dict(zip(errors, of_round)), "seconds": r.seconds}
+            for r, of_round in zip(self.rounds, zip(*errors.values(), strict=True), strict=True)
+        ]
+        return self.framed({**numbers, "value": self.rounds[-1].values[self.quantity], "rounds": rounds})
 
     def table(self) -> AnyArray:
         """Return a structured array (n_rounds,) with a row for each mesh, as ``--csv`` writes it.
@@ -164,16 +156,12 @@ class AdaptiveStudy(Report):
         values = [round_.values[self.quantity] for round_ in self.rounds]
         return structured({**counts, self.quantity: values, **self._errors()})
 
-    def tables(self) -> list[tuple[str, Rows]]:
-        """See `Report`."""
-        return [(self.combination, self._rows())]
-
     def figure(self) -> Any:
         """Return a Matplotlib figure with the errors over degrees of freedom and the error of each cell of the last mesh."""
         heading = f"{self.title}: {self.combination}, refined for the {title(self.quantity)}"
         width, height = np.ptp(self.case.mesh.points, axis=0)
         width_of_map = float(np.clip(4.2 * width / height, 2.0, 8.0)) + 1.3  # with colour bar [inch]
-        errors, mesh = panels(1, 2, (6.2 + width_of_map, 5.2), heading, widths=(6.2, width_of_map))[0]
+        errors, mesh = panels((1, 2), (6.2 + width_of_map, 5.2), heading, widths=(6.2, width_of_map))[0]
         self._draw_errors(errors)
         self._draw_mesh(mesh)
         return mesh.figure
@@ -187,8 +175,8 @@ class AdaptiveStudy(Report):
             "effectivity": [self.effectivity(k) for k in range(len(self.rounds))],
         }
 
-    def _rows(self) -> Rows:
-        """Return a header and a row for each mesh."""
+    def tables(self) -> list[tuple[str, Rows]]:
+        """See `Report`; the table has a row for each mesh."""
         q, errors = self.quantity, self._errors()
         headers = {"estimated error": "estimate", "energy error": "energy_error"}
         if math.isfinite(errors["true_error"][-1]):
@@ -199,7 +187,8 @@ class AdaptiveStudy(Report):
             ("DOF", [str(round_.n_dofs) for round_ in self.rounds]),
             (column(q, q, self.units), [number(round_.values[q], 8) for round_ in self.rounds]),
         ]
-        return by_columns(columns + [(label, [number(v, 2) for v in errors[name]]) for label, name in headers.items()])
+        columns += [(label, [number(v, 2) for v in errors[name]]) for label, name in headers.items()]
+        return [(self.combination, by_columns(columns))]
 
     def sentences(self) -> list[str]:
         """See `Report`."""
@@ -235,10 +224,8 @@ class AdaptiveStudy(Report):
         mesh, cells = self.case.mesh, self.error.cells
         shapes = [polygon for name, block in mesh.solids.items() for polygon in outlines(name, mesh.points[block])]
         error = np.maximum(cells, 1e-6 * cells.max())
-        polygons = PolyCollection(
-            shapes, array=error, norm=LogNorm(), cmap="viridis", edgecolors="white", linewidths=0.1
-        )
-        ax.add_collection(polygons)
+        style: dict[str, Any] = {"cmap": "viridis", "edgecolors": "white", "linewidths": 0.1}
+        polygons = ax.add_collection(PolyCollection(shapes, array=error, norm=LogNorm(), **style))
         ax.autoscale_view()
         ax.set_aspect("equal")
         bar = ax.figure.colorbar(polygons, ax=ax)
@@ -327,8 +314,8 @@ def adaptive_study(
             started = time.perf_counter()
             linear, leaf = forest.mesh()
             solved = _case_on(linear, curves, case, setup, combination)
-            last, error, round_ = _solved(solved, quantity, setup.pair, rounds, started)
-            rounds.append(round_)
+            last, error = _solved(solved, quantity, setup.pair, rounds, started)
+            round_ = rounds[-1]
             if on_round is not None:
                 on_round(round_)
             line.draw(f"{round_.n_dofs} degrees of freedom, estimated error {round_.estimate:.1e}")
@@ -359,9 +346,9 @@ def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, setup: Settings, c
 
 
 def _solved(
-    case: Case, quantity: str, pair: str | None, rounds: Sequence[Round], started: float
-) -> tuple[StepResult, ErrorEstimate, Round]:
-    """Return the last step of a case, the errors of its cells, and the results of the round, which follows `rounds`.
+    case: Case, quantity: str, pair: str | None, rounds: list[Round], started: float
+) -> tuple[StepResult, ErrorEstimate]:
+    """Return the last step of a case and the errors of its cells, and append the results of the round to `rounds`.
 
     Only the first round issues warnings.
     """
@@ -372,19 +359,11 @@ def _solved(
     error = estimate_error(case.model, last)
     values = quantities.measure(case, last, pair)
     check_known("quantity", quantity, values, CaseError)
-    exact = quantities.by_theory(case, pair, 0.0)
+    exact, n_cells = quantities.by_theory(case, pair, 0.0), sum(map(len, case.mesh.solids.values()))
     estimate = _estimate([*(earlier.values[quantity] for earlier in rounds), values[quantity]])
-    round_ = Round(
-        n_dofs=case.model.n_dofs,
-        n_cells=sum(map(len, case.mesh.solids.values())),
-        values=values,
-        theory=exact["theory"],
-        reference=exact["reference"],
-        energy_error=error.relative,
-        estimate=estimate,
-        seconds=time.perf_counter() - started,
-    )
-    return last, error, round_
+    errors, seconds = (error.relative, estimate), time.perf_counter() - started
+    rounds.append(Round(case.model.n_dofs, n_cells, values, exact["theory"], exact["reference"], *errors, seconds))
+    return last, error
 
 
 def _estimate(values: Sequence[float]) -> float:
@@ -426,8 +405,7 @@ def _indicator(case: Case, last: StepResult, error: ErrorEstimate, quantity: str
 
 def _position(case: Case, last: StepResult, quantity: str, pair: str | None) -> Array | None:
     """Return the position (dim,) [length] at which a quantity is evaluated; None for quantities of the entire model."""
-    probe = quantity.split(".")[0]
-    if probe in case.probes:
+    if (probe := quantity.split(".")[0]) in case.probes:
         return case.mesh.points[case.probes[probe]]
     if quantity.startswith("von_mises"):
         return case.mesh.points[int(np.argmax(last.von_mises))]

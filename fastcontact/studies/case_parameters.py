@@ -15,18 +15,19 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LAW = re.compile(rf"\s*(?:({_NUMBER})\s*\*\s*)?value(?:\s*\^\s*({_NUMBER}))?\s*$")
 
 
-def substituted(data: Mapping[str, Any], parameter: str, value: Any, linked: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a copy of a parsed case file with a new value of a parameter.
+def substituted(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a copy of a parsed case file with new values of parameters.
 
-    The parameter is a path, or a name in the table ``[study.parameters]``, which is `linked`. A name sets several paths, each
-    by a law ``"a*value^p"``. Raises CaseError if the path or the name does not exist, or if a law is invalid.
+    A parameter is a path, or a name in the table ``[study.parameters]``. A name sets several paths, each by a law
+    ``"a*value^p"``. Raises CaseError if a path or a name does not exist, or if a law is invalid.
     """
     case: dict[str, Any] = copy.deepcopy(dict(data))
-    if parameter not in linked:
-        _set(case, parameter, value, [*linked, *case])
-        return case
-    for path, law in linked[parameter].items():
-        _set(case, path, by_law(law, value, f"study.parameters.{parameter}.'{path}'"), case)
+    linked = data.get("study", {}).get("parameters", {})
+    for parameter, value in values.items():
+        if parameter not in linked:
+            _set(case, parameter, value, [*linked, *case])
+        for path, law in linked.get(parameter, {}).items():
+            _set(case, path, by_law(law, value, f"study.parameters.{parameter}.'{path}'"), case)
     return case
 
 
@@ -47,16 +48,13 @@ def by_law(law: Any, value: Any, where: str) -> Any:
 
 def _set(data: dict[str, Any], path: str, value: Any, names: Iterable[str]) -> None:
     """Set the value at a path of a parsed case file; messages about unknown paths suggest one of `names`."""
-    keys = _keys(path)
-    pairs = [
-        f"{kind}.{name}" for kind in ("contact", "obstacle") if isinstance(data.get(kind), dict) for name in data[kind]
-    ]
+    keys, kinds = _keys(path), [kind for kind in ("contact", "obstacle") if isinstance(data.get(kind), dict)]
+    pairs = [f"{kind}.{name}" for kind in kinds for name in data[kind]]
     if pairs and path in ("friction", *SHARED_OPTIONS):
         raise CaseError(f"'{path}' belongs to a pair: write {' or '.join(f'{pair}.{path}' for pair in pairs)}")
     if len(keys) == 1:
-        raise CaseError(
-            unknown("parameter", path, [name for name in names if not isinstance(data.get(name), (dict, list))])
-        )
+        values = [name for name in names if not isinstance(data.get(name), (dict, list))]
+        raise CaseError(unknown("parameter", path, values))
     entry: Any = data
     for key in keys[:-1]:
         entry = _member(entry, key, path)

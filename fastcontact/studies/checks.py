@@ -64,13 +64,12 @@ def check_study(case: Case) -> None:
     study = setup.data.get("study", {})
     _check_finite("study", study)
     check_names(case, setup.quantities)
-    linked = study.get("parameters", {})
     with in_file("[study.parameters]"):
-        for name in linked:
-            substituted(setup.data, name, 1.0, linked)
+        for name in study.get("parameters", {}):
+            substituted(setup.data, {name: 1.0})
     for member in setup.combinations if study else ():
         with in_file(f"[study], {member}"):
-            job = job_of(case, setup, member, 0, label="", marks={}, size=0.0)
+            job = job_of(case, setup, member, 0, label="", marks={})
             if setup.by_shape and shape_of(member.element or "") == "quadrangles":
                 make_mesh(job.recipe, None)
             if member.formulation in setup.options or setup.load_steps is not None:

@@ -28,12 +28,14 @@ MAIN = ("pressure_max", "force")
 def sentences(series: Series) -> list[str]:
     """Return sentences on the mesh errors of a combination of element and formulation, and on its difference from theory."""
     if not series.limits:
-        return [
-            f"{series.combination}: {len(series.levels)} levels were solved, and an extrapolated limit needs three."
-        ]
+        return [f"{series.combination}: {_without_limits(series)}."]
     names = [name for name in series.shown(MAIN) if name in series.limits]
     texts = [text for name in names for text in _quantity_sentences(series, name)]
     return texts + _equal_force_sentences(series)
+
+
+def _without_limits(series: Series) -> str:
+    return f"{len(series.levels)} levels were solved, and an extrapolated limit needs three"
 
 
 def _quantity_sentences(series: Series, quantity: str) -> list[str]:
@@ -44,22 +46,19 @@ def _quantity_sentences(series: Series, quantity: str) -> list[str]:
         text = f"{series.combination}: the mesh error of the {name} is {error} on the finest mesh."
         return [text, *_convergence_sentences(series, quantity, name)]
     start = f"{series.combination}: " + ("" if series.exact_theory else f"{series.compared} ") + f"the {name}"
-    finest = f"({series.finest.n_dofs} degrees of freedom)"
-    bar = f"{100 * split.uncertainty:.2g} %"
+    bar, mesh_error = f"+- {100 * split.uncertainty:.2g} %", f"{percent(split.mesh)} is mesh error on the finest mesh"
+    mesh_error += f" ({series.finest.n_dofs} degrees of freedom)"
     if series.converges_to_theory(quantity) is False:
-        texts = [_not_to_theory(series, quantity, start, split)]
+        text = _not_to_theory(series, quantity, start, split)
     elif split.resolved and not series.exact_theory:
-        texts = [
-            f"{start} differs from theory by {percent(split.total)}. Of that, "
-            f"{percent(split.model, split.uncertainty)} (+- {bar}) is model error, which no mesh removes, and "
-            f"{percent(split.mesh)} is mesh error on the finest mesh {finest}, which goes to zero."
-        ]
+        text = (
+            f"{start} differs from theory by {percent(split.total)}. Of that, {percent(split.model, split.uncertainty)} "
+            f"({bar}) is model error, which no mesh removes, and {mesh_error}, which goes to zero."
+        )
     else:
-        texts = [
-            f"{start} agrees with theory within the error bar of its limit, {percent(split.model)} +- {bar}; "
-            f"{percent(split.mesh)} is mesh error on the finest mesh {finest}."
-        ]
-    texts += _convergence_sentences(series, quantity, name)
+        model_error = f"{percent(split.model)} {bar}"
+        text = f"{start} agrees with theory within the error bar of its limit, {model_error}; {mesh_error}."
+    texts = [text, *_convergence_sentences(series, quantity, name)]
     return texts + _cancellation_sentences(series, quantity, split) + _reference_sentences(series, quantity)
 
 
@@ -114,13 +113,10 @@ def _equal_force_sentences(series: Series) -> list[str]:
     at_force, at_approach = series.split_equal_force("pressure_max"), series.split("pressure_max")
     if at_force is None or at_approach is None:
         return []
-    text = (
-        f"{series.combination}: at equal force the model error of the largest pressure is {percent(at_force.model)} (+- "
-        f"{100 * at_force.uncertainty:.2g} %)"
-    )
-    radius = series.split_equal_force("contact_radius")
-    if radius is not None:
-        text += f", that of the contact radius {percent(radius.model)} (+- {100 * radius.uncertainty:.2g} %)"
+    of_radius = series.split_equal_force("contact_radius")
+    splits = {"of the largest pressure is": at_force, ", that of the contact radius": of_radius}
+    errors = [f"{name} {percent(s.model)} (+- {100 * s.uncertainty:.2g} %)" for name, s in splits.items() if s]
+    text = f"{series.combination}: at equal force the model error {''.join(errors)}"
     if abs(at_force.model) < 0.3 * abs(at_approach.model) and at_approach.resolved:
         text += ": most of the difference at equal approach is in the force, not in its distribution"
     return [text + "."]
@@ -157,18 +153,16 @@ def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
 
 def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], units: Mapping[str, str]) -> Rows:
     """Return a header and a row for each combination with the limits, mesh errors and model errors of the quantities."""
-    header, cells = ["combination", "levels", "finest DOF"], []  # type: list[str], list[tuple[str, tuple[str, ...]]]
+    header, cells = ["combination", "levels", "finest DOF"], []  # type: list[str], list[tuple[str, str]]
     for name in quantities:
         header += [column(name, name, units), "+-", "order", "mesh error", "model error"]
-        cells += [(name, ("limit", "+-", "order alone", "mesh error", "model error"))]
+        cells += [(name, text) for text in ("limit", "+-", "order alone", "mesh error", "model error")]
     if "pressure_max" in quantities:
         header.append("p at equal force")
-        cells.append(("pressure_max", ("at equal force",)))
-    rows = [header]
-    for series in all_series:
-        rows.append([str(series.combination), str(len(series.levels)), str(series.finest.n_dofs)])
-        rows[-1] += [text for name, columns in cells for text in _cells(series, name, columns)]
-    return rows
+        cells.append(("pressure_max", "at equal force"))
+    sizes = [[str(series.combination), str(len(series.levels)), str(series.finest.n_dofs)] for series in all_series]
+    limits = [[_cells(series, name, [text])[0] for name, text in cells] for series in all_series]
+    return [header, *(size + row for size, row in zip(sizes, limits, strict=True))]
 
 
 def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
@@ -193,27 +187,18 @@ def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
 
 def csv_columns(all_series: Sequence[Series]) -> dict[str, list[Any]]:
     """Return the columns (n_rows,) of `Study.table` by name."""
-    quantities = dict.fromkeys(name for series in all_series for name in series.quantities)
-    columns: dict[str, list[Any]] = {}
-    for series in all_series:
-        count = len(series.levels)
-        of_series: dict[str, list[Any]] = {
-            "element": [series.combination.element or ""] * count,
-            "formulation": [series.combination.formulation or ""] * count,
-            "level": [level.number for level in series.levels],
-            "h": series.h,
-            "n_dofs": [level.n_dofs for level in series.levels],
-            "seconds": [level.seconds for level in series.levels],
-        }
-        for name in quantities:
-            of_series |= {
-                name: series.values(name),
-                f"{name}_error": series.errors(name),
-                f"{name}_order": series.orders(name),
-                f"{name}_from_theory": series.from_theory(name),
-            }
-        for name, values in of_series.items():
-            columns.setdefault(name, []).extend(values)
+    levels = [(series.combination, level) for series in all_series for level in series.levels]
+    columns: dict[str, list[Any]] = {
+        "element": [combination.element or "" for combination, _ in levels],
+        "formulation": [combination.formulation or "" for combination, _ in levels],
+        "level": [level.number for _, level in levels],
+    }
+    columns |= {name: [getattr(level, name) for _, level in levels] for name in ("h", "n_dofs", "seconds")}
+    for name in dict.fromkeys(name for series in all_series for name in series.quantities):
+        columns[name] = [value for series in all_series for value in series.values(name)]
+        for kind in ("errors", "orders", "from_theory"):
+            values = [value for series in all_series for value in getattr(series, kind)(name)]
+            columns[f"{name}_{kind.removesuffix('s')}"] = values
     return columns
 
 
@@ -243,10 +228,9 @@ def _fields(values: Limit | Split | None, **names: str) -> dict[str, Any]:
 def _quantity_dict(series: Series, name: str) -> dict[str, Any]:
     """Return limit, order, theory and errors of a quantity, with None for missing numbers."""
     limit, split, reference = series.limits.get(name), series.split(name), series.reference.get(name)
+    same = {key: key for key in ("uncertainty", "order", "order_uncertainty", "converging")}
     entry: dict[str, Any] = {
-        **_fields(
-            limit, limit="value", **{key: key for key in ("uncertainty", "order", "order_uncertainty", "converging")}
-        ),
+        **_fields(limit, limit="value", **same),
         "converges_to_theory": series.converges_to_theory(name),
         "theory": series.theory.get(name),
         **_fields(split, model_error="model", model_error_uncertainty="uncertainty"),
@@ -332,10 +316,8 @@ def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]
         label = f"level {level.number}, {level.n_dofs} DOF"
         ax.plot(r[visible], pressure[visible], style, ms=3, lw=1.0, label=label, color=color)
     _draw_theory(ax, theory, series, np.linspace(low, reach, 600))
-    labels = (
-        labelled("distance from the middle of the contact", units, "length"),
-        labelled("contact pressure", units, "pressure"),
-    )
+    x_label = labelled("distance from the middle of the contact", units, "length")
+    labels = x_label, labelled("contact pressure", units, "pressure")
     frame(ax, f"Contact pressure, {series.combination}", labels, grid=0.3)
     ax.set_xlim(low, reach or None)
     top = float(ax.dataLim.y1)
@@ -356,10 +338,9 @@ def _draw_theory(ax: Any, theory: Any, series: Series, x: Array) -> None:
         ax.plot(x, curve.pressure(np.abs(x)), style, lw=1.2, label=f"{name} ($p_0$ = {curve.pressure_max:.1f})")
 
 
-def draw_differences(
-    ax: Any, all_series: Sequence[Series], best: Series, quantity: str, units: Mapping[str, str]
-) -> None:
-    """Draw the difference from theory over h, which tends to the model error as the mesh error vanishes."""
+def draw_differences(ax: Any, all_series: Sequence[Series], best: Series, units: Mapping[str, str]) -> None:
+    """Draw the difference of the largest pressure from theory over h, which tends to the model error."""
+    quantity = "pressure_max"
     compared = [(k, series) for k, series in enumerate(all_series) if series.split(quantity)]
     if not compared:
         return message(ax, f"no theory of the {title(quantity)}, or no limit")
@@ -372,14 +353,12 @@ def draw_differences(
     model, bar = 100 * split.model, 100 * split.uncertainty
     ax.axhline(model, color="tab:red", lw=1.2, label=f"model error {model:+.3f} % (mesh-independent)")
     ax.axhspan(model - bar, model + bar, color="tab:red", alpha=0.15, lw=0)
-    if at_force is not None and quantity != "force":
+    if at_force is not None:
         label = f"model error at equal force {100 * at_force.model:+.3f} %"
         ax.axhline(100 * at_force.model, color="tab:green", ls="--", lw=1.2, label=label)
     ax.axhline(0.0, color="black", lw=1.0, label="theory")
-    labels = (
-        labelled("facet length at the contact h", units, "length"),
-        "difference from theory [%]" if best.exact_theory else f"difference from theory {best.compared} [%]",
-    )
+    y_label = "difference from theory [%]" if best.exact_theory else f"difference from theory {best.compared} [%]"
+    labels = labelled("facet length at the contact h", units, "length"), y_label
     frame(ax, f"Model and mesh error of the {title(quantity)}", labels, scales=("plain log", "linear"))
 
 
@@ -432,13 +411,9 @@ class Study(Report):
         and ``model_error + mesh_error`` is its difference from theory. ``uncertainty`` is the half-width of the 95 % interval
         of the limit [unit of the quantity].
         """
-        numbers = {
-            "confidence": CONFIDENCE,
-            **series_dict(self.best),
-            "combinations": [series_dict(series) for series in self.series],
-            "failed_combinations": dict(self.failed),
-        }
-        return self.framed(numbers)
+        combinations = [series_dict(series) for series in self.series]
+        numbers = {"confidence": CONFIDENCE, **series_dict(self.best), "combinations": combinations}
+        return self.framed({**numbers, "failed_combinations": dict(self.failed)})
 
     def table(self) -> AnyArray:
         """Return a structured array (n_rows,) with a row for each level of each combination, as ``--csv`` writes it.
@@ -456,10 +431,9 @@ class Study(Report):
             captioned.append((str(series.combination), level_rows(series, self.units)))
             if series.limits:
                 captioned.append((f"{series.combination}: limits", limit_rows(series, self.units)))
-        if len(self.series) > 1:
-            rows = comparison_rows(self.series, self.best.shown(COMPARED), self.units)
-            captioned.append((f"all combinations: limits and model errors {self.best.compared}", rows))
-        return captioned
+        rows = comparison_rows(self.series, self.best.shown(COMPARED), self.units)
+        comparison = [(f"all combinations: limits and model errors {self.best.compared}", rows)]
+        return captioned + (comparison if len(self.series) > 1 else [])
 
     def sentences(self) -> list[str]:
         """See `Report`."""
@@ -471,9 +445,7 @@ class Study(Report):
         for series in self.series:
             warnings = sorted({text for level in series.levels for text in level.warnings})
             remarks += [f"warning: {text}" for text in warnings]
-            if not series.limits:
-                n_levels = len(series.levels)
-                remarks.append(f"no limits: {n_levels} levels were solved, and an extrapolated limit needs three")
+            remarks += [] if series.limits else [f"no limits: {_without_limits(series)}"]
             remarks += [f"level {number} failed: {text}" for number, text in series.failed.items()]
         return remarks + [f"{name} failed: {text}" for name, text in self.failed.items()]
 
@@ -486,9 +458,9 @@ class Study(Report):
         if of_case or self.best.finest.profile:
             plots.append(partial(draw_pressure, series=self.best, theory=self.theory, units=self.units))
         if of_case:
-            plots.append(partial(draw_differences, best=self.best, quantity="pressure_max", **options))
+            plots.append(partial(draw_differences, best=self.best, **options))
         rows, columns = (len(plots) + 1) // 2, min(2, len(plots))
-        axes = panels(rows, columns, (6.0 * columns, 4.6 * rows), self.title)
+        axes = panels((rows, columns), (6.0 * columns, 4.6 * rows), self.title)
         for ax, draw in itertools.zip_longest(axes.flat, plots, fillvalue=partial(message, text="")):
             draw(ax)
         return axes[0, 0].figure

@@ -39,6 +39,7 @@ from fastcontact.results.step import ContactResult, StepResult
 
 # Number of quadrature points that are evaluated at a time, to limit the memory of intermediate arrays.
 AT_ONCE = 100_000
+CellArrays = tuple[Array, Array, Array, Array]  # see `_stress_in_cells`
 
 
 class Theory(Protocol):
@@ -154,10 +155,8 @@ def error_against(
     """
     model.refuse_nonlinear("norms of errors are")
     u = np.asarray(displacement, float)
-    if u.shape != model.mesh.points.shape:
-        raise ModelError(
-            f"displacement has shape {u.shape}: it must be {model.mesh.points.shape}, a row for each point"
-        )
+    if u.shape != (shape := model.mesh.points.shape):
+        raise ModelError(f"displacement has shape {u.shape}: it must be {shape}, a row for each point")
     if n_points is not None and n_points < 1:
         raise ModelError(f"n_points = {n_points} points along each direction of a cell must be at least 1")
     names = (groups,) if isinstance(groups, str) else groups
@@ -167,18 +166,15 @@ def error_against(
     for name, rows in solid_rows(model.mesh, names).items():
         n_cells = max(1, AT_ONCE // len(integration_rule(elements.get(name), n_points)[1]))
         for first in range(0, len(rows), n_cells):
-            total += _squared_norms(theory, model, u, name, rows[first : first + n_cells], n_points, offset)
+            portion = rows[first : first + n_cells]
+            in_cells = _stress_in_cells(model, name, portion, u, n_points, offset)
+            total += _squared_norms(theory, model.mesh.cells[name][portion], model.mesh.points, u, in_cells)
     return ErrorNorms(*np.sqrt(total).tolist())
 
 
-def stress_in_cells(
-    model: Model,
-    name: str,
-    rows: Indices | slice,
-    displacement: Array,
-    n_points: int | None,
-    offset: StressOffset | None = None,
-) -> tuple[Array, Array, Array, Array]:
+def _stress_in_cells(
+    model: Model, name: str, rows: Indices | slice, displacement: Array, n_points: int | None, offset: StressOffset | None
+) -> CellArrays:  # fmt: skip
     """Return shape functions, stresses, volumes and compliances at the quadrature points of cells of one element type.
 
     The shape functions are (n_q, n_nodes) [-], the stresses (n_cells, n_q, n_components) [pressure], and the volumes of the
@@ -199,20 +195,10 @@ def stress_in_cells(
     return N, stress, cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights, elastic
 
 
-def _squared_norms(
-    theory: Theory,
-    model: Model,
-    u: Array,
-    name: str,
-    rows: Indices,
-    n_points: int | None,
-    offset: StressOffset | None,
-) -> Array:
+def _squared_norms(theory: Theory, cells: Numbers, points: Array, u: Array, in_cells: CellArrays) -> Array:
     """Return the squares (4,) of the norms over some cells, in the order of the attributes of `ErrorNorms`."""
-    N, stress, volume, elastic = stress_in_cells(model, name, rows, u, n_points, offset)
-    cells = model.mesh.cells[name][rows]
-    positions = np.einsum("qa,cad->cqd", N, model.mesh.points[cells])
-    exact_u, exact_stress = _exact(theory, positions, stress.shape[2])
+    N, stress, volume, elastic = in_cells
+    exact_u, exact_stress = _exact(theory, np.einsum("qa,cad->cqd", N, points[cells]), stress.shape[2])
     error_u = np.einsum("qa,cad->cqd", N, u[cells]) - exact_u
     densities = (
         elastic_energy(stress - exact_stress, elastic), (error_u**2).sum(axis=-1),
@@ -308,25 +294,15 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     smooth = smoothed_stress(model.mesh, model.kinematics, model.material_field(), step.displacement, offset)
     squares, energy = [], 0.0
     for name in model.mesh.solids:
-        difference, total = _differences(model, step.displacement, name, smooth[name], offset)
-        squares.append(difference)
-        energy += total
+        order, u = elements.get(name).order, step.displacement
+        N, stress, volume, elastic = _stress_in_cells(model, name, slice(None), u, order + 1, offset)
+        difference = np.einsum("qa,cai->cqi", N, smooth[name]) - stress
+        squares.append((elastic_energy(difference, elastic) * volume).sum(axis=1))
+        energy += float((elastic_energy(stress, elastic) * volume).sum())
     contact = np.zeros(sum(map(len, squares)))
     for result in step.contact.values():
         _add_contact(model, result, smooth, contact)
     return ErrorEstimate(np.sqrt(np.concatenate(squares) + contact), np.sqrt(contact), math.sqrt(energy))
-
-
-def _differences(
-    model: Model, displacement: Array, name: str, smooth: Array, offset: StressOffset | None
-) -> tuple[Array, float]:
-    """Return the squared energy norms of smoothed minus computed stress (n_cells,), and of the computed stress in total."""
-    N, stress, volume, elastic = stress_in_cells(
-        model, name, slice(None), displacement, elements.get(name).order + 1, offset
-    )
-    difference = np.einsum("qa,cai->cqi", N, smooth) - stress
-    squares = (elastic_energy(difference, elastic) * volume).sum(axis=1)
-    return squares, float((elastic_energy(stress, elastic) * volume).sum())
 
 
 def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], contact: Array) -> None:

@@ -61,20 +61,14 @@ def marker(number: int) -> str:
 
 
 def panels(
-    rows: int,
-    columns: int,
-    size: tuple[float, float],
-    title: str = "",
-    widths: Sequence[float] | None = None,
-    **style: Any,
+    shape: tuple[int, int], size: tuple[float, float], title: str, widths: Sequence[float] | None = None, **style: Any
 ) -> Any:
     """Return the axes (rows, columns) of a new figure of `size` [inch]; `style` are options of its title.
 
     `widths` are the relative widths of the columns [-]; by default all columns have the same width.
     """
-    axes = new_panels(rows, columns, size, 130, width_ratios=widths)
-    if title:
-        axes[0, 0].figure.suptitle(title, **style)
+    axes = new_panels(*shape, size, 130, width_ratios=widths)
+    axes[0, 0].figure.suptitle(title, **style)
     return axes
 
 
@@ -298,9 +292,8 @@ class Report:
 
     def _repr_html_(self) -> str:
         """Return the tables as HTML for notebooks."""
-        return "".join(
-            html_table(rows[1:], rows[0], f"{self.title}: {caption}".strip(": ")) for caption, rows in self.tables()
-        )
+        captions = ((f"{self.title}: {caption}".strip(": "), rows) for caption, rows in self.tables())
+        return "".join(html_table(rows[1:], rows[0], caption) for caption, rows in captions)
 
     def framed(self, numbers: dict[str, Any]) -> dict[str, Any]:
         """Return the numbers of a study with the name of its case and the versions of the software, as ``--json`` does."""

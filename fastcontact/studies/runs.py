@@ -162,19 +162,16 @@ def _of_function(
     if not descending or len({*descending}) < len(descending) or not (descending[-1] > 0 and descending[0] < np.inf):
         raise CaseError(f"the mesh sizes must be positive and all different, not {[*sizes]}")
     name, measures = function_name(function), measures_of(quantities)
-    argument = first_parameter(function)
+    shared: Any = {"name": name, "function": function, "measures": measures, "named": {}}
+    labels = [f"{first_parameter(function)} = {size:g}" for size in descending]
     runs = [
-        FunctionRun(
-            label=f"{argument} = {size:g}", name=name, marks={"level": level}, size=level,
-            function=function, positional=(size,), named={}, measures=measures,
-        )
+        FunctionRun(label=labels[level], marks={"level": level}, positional=(size,), size=level, **shared)
         for level, size in enumerate(descending)
-    ]  # fmt: skip
+    ]
     results = run_functions(runs, "no size could be solved", **options)
     solved = [(level, {**result, "h": descending[level], "theory": {**theory}}) for level, result in enumerate(results)]
-    series = _series(
-        Named(None, None, name), solved, [*quantities], (), (None, 1.0, "under the given load"), asked=tuple(quantities)
-    )
+    no_theory = None, 1.0, "under the given load"
+    series = _series(Named(None, None, name), solved, [*quantities], (), no_theory, asked=tuple(quantities))
     for coarse, fine in pairwise(series.levels):
         if fine.n_dofs <= coarse.n_dofs:
             warn(
@@ -215,13 +212,9 @@ def study_of_runs(case: Case, jobs: Sequence[Job], results: Sequence[Result], fu
 
 
 def _series(
-    member: Combination,
-    results: list[tuple[int, Result]],
-    further: Sequence[str],
-    checked: Sequence[str],
-    theory: tuple[Any, float, str],
-    asked: tuple[str, ...] = (),
-) -> Series:
+    member: Combination, results: list[tuple[int, Result]], further: Sequence[str], checked: Sequence[str],
+    theory: tuple[Any, float, str], asked: tuple[str, ...] = (),
+) -> Series:  # fmt: skip
     """Return the series of one element type and formulation with its limits.
 
     The quantities in `further` must be in the results; those in `checked` are fitted if they are. `theory` consists of the
@@ -360,21 +353,20 @@ def _sweep_of_function(
     function: Function,
     parameters: Mapping[str, Sequence[Value]] | Sequence[Value],
     quantities: Quantities,
-    options: dict[str, Any],
+    options: Any,
 ) -> Sweep:
     """Return the sweep of a function that returns models; `options` are passed to `run_functions`."""
     named = isinstance(parameters, Mapping)
-    by_name = parameters if isinstance(parameters, Mapping) else {first_parameter(function): [*parameters]}
-    choices, name, measures = _choices(by_name), function_name(function), measures_of(quantities)
+    values = parameters if isinstance(parameters, Mapping) else {first_parameter(function): [*parameters]}
+    choices, name, measures = _choices(values), function_name(function), measures_of(quantities)
+    shared: Any = {"name": name, "function": function, "measures": measures}
+    arguments = [((), choice) if named else (tuple(choice.values()), {}) for choice in choices]
     runs = [
-        FunctionRun(
-            label=label_of(choice), name=name, marks=choice, function=function,
-            positional=() if named else tuple(choice.values()), named=choice if named else {}, measures=measures,
-        )
-        for choice in choices
-    ]  # fmt: skip
+        FunctionRun(label=label_of(choice), marks=choice, positional=positional, named=by_name, **shared)
+        for choice, (positional, by_name) in zip(choices, arguments, strict=True)
+    ]
     results = run_functions(runs, "no point of the sweep could be solved", **options)
-    points = _points(by_name, choices, results)
+    points = _points(values, choices, results)
     return Sweep(**of_function(function, results), **points, combination=name, asked=tuple(quantities), compared="")
 
 
@@ -404,31 +396,23 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
     There are none if the values of this parameter are not numbers or are all equal.
     """
     first, varied = drawn_over(parameters)
-    values, others = parameters[first], [(name, parameters[name]) for name in parameters if name != first]
+    values, others = parameters[first], {name: parameters[name] for name in parameters if name != first}
     numbers = [float(value) for value in values if not isinstance(value, (str, bool))]
     if len(numbers) < len(values) or min(numbers) == max(numbers):
         return ()
     low, high = min(numbers), max(numbers)
     x = np.geomspace(low, high, CURVE) if low > 0 else np.linspace(low, high, CURVE)
-    data = data_of(case)
-    linked = data.get("study", {}).get("parameters", {})
-    curves = []
-    for combination in itertools.product(*(other_values for _, other_values in others)):
-        choice = dict(zip((name for name, _ in others), combination, strict=True))
-        rows = [_theory_at(data, {first: float(value), **choice}, linked, pair) for value in x]
+    data, curves = data_of(case), []
+    for choice in (dict(zip(others, combination, strict=True)) for combination in itertools.product(*others.values())):
+        rows = [_theory_at(substituted(data, {first: float(value), **choice}), pair) for value in x]
         names = [name for name in rows[0] if all(name in row for row in rows)]
-        curves.append(
-            TheoryCurve(label_of(choice, varied), x, {name: np.array([row[name] for row in rows]) for name in names})
-        )
+        theory = {name: np.array([row[name] for row in rows]) for name in names}
+        curves.append(TheoryCurve(label_of(choice, varied), x, theory))
     return tuple(curves)
 
 
-def _theory_at(
-    data: dict[str, Any], choice: Mapping[str, Value], linked: Mapping[str, Any], pair: str | None
-) -> dict[str, float]:
-    """Return the quantities of the theory of a contact pair for a choice of parameters; empty if it is undefined there."""
-    for parameter, value in choice.items():
-        data = substituted(data, parameter, value, linked)
+def _theory_at(data: dict[str, Any], pair: str | None) -> dict[str, float]:
+    """Return the quantities of the theory of a contact pair of a parsed case file; empty if it is undefined."""
     try:
         theories = described(data)["theories"].get(pair or "", {})
     except FastcontactError:  # for example because Poisson's ratio is outside the range of the theory
@@ -438,11 +422,7 @@ def _theory_at(
 
 def _job(case: Case, choice: dict[str, Value], element: str | None, formulation: str | None, level: int | None) -> Job:
     """Return the job that solves a case for one choice of parameter values."""
-    data = data_of(case)
-    linked = data.get("study", {}).get("parameters", {})
-    for parameter, value in choice.items():
-        data = substituted(data, parameter, value, linked)
-    setup = settings(case, data)
+    setup = settings(case, substituted(data_of(case), choice))
     member = one_combination(setup, element, formulation)
     level = (LEVEL if setup.by_shape else 0) if level is None else level
     # Runs with the largest meshes start first, which the number of points on level 0 determines.

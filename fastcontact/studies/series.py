@@ -71,12 +71,8 @@ def split(finest: float, limit: Limit, theory: float) -> Split:
     >>> round(found.model, 12), round(found.mesh, 12)
     (0.04, 0.005)
     """
-    return Split(
-        theory=theory,
-        model=limit.value / theory - 1.0,
-        mesh=(finest - limit.value) / theory,
-        uncertainty=limit.uncertainty / abs(theory),
-    )
+    errors = limit.value / theory - 1.0, (finest - limit.value) / theory
+    return Split(theory, *errors, uncertainty=limit.uncertainty / abs(theory))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

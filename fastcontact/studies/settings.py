@@ -85,9 +85,8 @@ def data_of(case: Case) -> dict[str, Any]:
         data = {}
     if "mesh" not in data:
         kind = "an input deck" if case.deck is not None else "made of data that a case file cannot represent"
-        raise CaseError(
-            f"'{case.name}' is {kind}: studies change the mesh and the values of a case file (TOML); write such a file"
-        )
+        studies = "studies change the mesh and the values of a case file (TOML); write such a file"
+        raise CaseError(f"'{case.name}' is {kind}: {studies}")
     return data
 
 
@@ -108,21 +107,12 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
     for name in study.get("options", {}):
         check_known("formulation in study.options", name, FORMULATIONS, CaseError)
     curves = tuple(_circle(i, entry) for i, entry in enumerate(study.get("curves", ())))
+    combinations = tuple(_parsed_combination(entry) for entry in study.get("combinations", ())) or (combination,)
     return Settings(
-        data=data,
-        case_combination=combination,
-        pair=pair,
-        formulations=formulations,
-        generator=generator,
-        arguments=arguments,
-        halve=tuple(study.get("halve", ())),
-        double=tuple(study.get("double", ())),
-        curves=curves if "curves" in study else None,
-        load_steps=study.get("load_steps"),
-        options=study.get("options", {}),
-        quantities=tuple(study.get("quantities", ())),
-        combinations=tuple(_parsed_combination(entry) for entry in study.get("combinations", ())) or (combination,),
-    )
+        data, combination, pair, formulations, generator, arguments, curves=curves if "curves" in study else None,
+        load_steps=study.get("load_steps"), options=study.get("options", {}), combinations=combinations,
+        **{name: tuple(study.get(name, ())) for name in ("halve", "double", "quantities")},
+    )  # fmt: skip
 
 
 def _generator(data: dict[str, Any], study: dict[str, Any]) -> tuple[str | None, dict[str, dict[str, Any]]]:
@@ -156,14 +146,15 @@ def _parsed_combination(entry: Any) -> Combination:
     words = entry.split() if isinstance(entry, str) else list(entry)
     if len(words) != 2:
         raise CaseError(f"an entry of study.combinations must name an element and a formulation, not {entry!r}")
-    return _checked_combination(words[0], words[1].replace("-", "_"))
+    return _checked_combination(*words)
 
 
 def _checked_combination(element: str | None, formulation: str | None) -> Combination:
-    """Return a combination; CaseError if its element or its formulation is unknown."""
+    """Return a combination, whose formulation may be written with hyphens; CaseError if one of the names is unknown."""
     if element is not None:
         check_known("element", element, elements.ELEMENTS, CaseError)
     if formulation is not None:
+        formulation = formulation.replace("-", "_")
         check_known("contact formulation", formulation, FORMULATIONS, CaseError)
     return Combination(element, formulation)
 
@@ -184,8 +175,7 @@ def combinations(
         return tuple(_checked_combination(element, settings.case_combination.formulation) for element in selected)
     if settings.pair is None:
         raise CaseError("this case has no contact pair, so there are no formulations to compare")
-    compared = [name.replace("-", "_") for name in formulations]
-    compared = list(FORMULATIONS) if compared == ["all"] else compared
+    compared = list(FORMULATIONS) if list(formulations) == ["all"] else formulations
     return tuple(_checked_combination(element, formulation) for element in selected for formulation in compared)
 
 
@@ -328,19 +318,15 @@ def _refined_arguments(settings: Settings, element: str, level_0: Mapping[str, A
             "halve = [...] or double = [...]"
         )
     arguments = {**rule.defaults, **level_0, **({"element": element} if "element" in signature else {})}
-    for names, factor in ((halve, 0.5**level), (double, 2**level)):
-        for key in names:
-            value = arguments.get(key, signature[key].default if key in signature else None)
-            if value is not None:
-                arguments[key] = _scaled(value, factor)
+    for key in (*halve, *double):
+        factor = 0.5**level if key in halve else 2**level
+        value = arguments.get(key, signature[key].default if key in signature else None)
+        if value is not None:
+            is_sequence = isinstance(value, (list, tuple))
+            arguments[key] = [entry * factor for entry in value] if is_sequence else value * factor
     for key in () if explicit else rule.root:
         arguments[key] = arguments.get(key, signature[key].default) ** (0.5**level)
     return {key: list(value) if isinstance(value, tuple) else value for key, value in arguments.items()}
-
-
-def _scaled(value: Any, factor: float) -> Any:
-    """Return a number or the entries of a sequence times a factor."""
-    return [entry * factor for entry in value] if isinstance(value, (list, tuple)) else value * factor
 
 
 def make_mesh(recipe: Recipe, base: Mesh | None) -> Mesh:

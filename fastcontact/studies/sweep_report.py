@@ -84,15 +84,14 @@ class Drawing:
         for k, (label, x, points) in enumerate(self._curves()):
             y = [point.values.get(quantity, math.nan) for point in points]
             ax.plot(x, y, marker(k), ms=5, label=label or "computed", color=f"C{k}")
-            self._draw_theory(ax, quantity, label, x, points, k)
+            self._draw_theory(ax, quantity, k)
         positive = all(point.values.get(quantity, 1.0) > 0 for point in self.points)
         scale = self.scale if positive else "linear"
         self._frame(ax, title(quantity), column(title(quantity), quantity, self.units), scale)
 
-    def _draw_theory(
-        self, ax: Any, quantity: str, label: str, x: Sequence[Any], points: Sequence[Point], k: int
-    ) -> None:
-        """Draw the theory for one choice of the other parameters, as a curve or at the points."""
+    def _draw_theory(self, ax: Any, quantity: str, k: int) -> None:
+        """Draw the theory for choice `k` of the other parameters, as a curve or at the points."""
+        label, x, points = self._curves()[k]
         name = (self.theory + self._unmoved(quantity)) if k == 0 else None
         color = "black" if not self.others else f"C{k}"
         for curve in self.theories:
@@ -199,13 +198,12 @@ class Sweep(Report):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the sweep as numbers, strings, lists and dictionaries, as ``--json`` writes it; differences are relative."""
-        numbers = {
+        return self.framed({
             "combination": self.combination,
             "parameters": {name: list(values) for name, values in self.parameters.items()},
             "points": [_point_dict(point) for point in self.points],
             "failed": [{"parameters": choice, "error": text} for choice, text in self.failed],
-        }
-        return self.framed(numbers)
+        })  # fmt: skip
 
     def table(self) -> AnyArray:
         """Return a structured array (n_points,) with a row for each solved point, as ``--csv`` writes it.
@@ -216,41 +214,26 @@ class Sweep(Report):
         and ``..._from_reference`` [-]. A result that has the name of a parameter, such as ``force``, is in the field
         ``computed_force``.
         """
-        columns: dict[str, list[Any]] = {
-            name: [getattr(point, name) for point in self.points] for name in ("h", "n_dofs", "seconds")
-        }
+        points = self.points
+        columns = {name: [getattr(point, name) for point in points] for name in ("h", "n_dofs", "seconds")}
         for name in self.quantities:
-            columns[name] = [point.values.get(name, math.nan) for point in self.points]
+            columns[name] = [point.values.get(name, math.nan) for point in points]
             for other, key in DIFFERENCES.items():
-                columns[f"{name}_{key}"] = [point.ratio(name, other) - 1.0 for point in self.points]
+                columns[f"{name}_{key}"] = [point.ratio(name, other) - 1.0 for point in points]
         results = {f"computed_{name}" if name in self.parameters else name: values for name, values in columns.items()}
-        return self.structured_known(
-            {name: [p.parameters[name] for p in self.points] for name in self.parameters} | results
-        )
-
-    def tables(self) -> list[tuple[str, Rows]]:
-        """See `Report`."""
-        return [(self.combination if self.combination != self.title else "", self._rows())]
+        return self.structured_known({name: [p.parameters[name] for p in points] for name in self.parameters} | results)
 
     def remarks(self) -> list[str]:
         """See `Report`."""
-        warnings = sorted({text for point in self.points for text in point.warnings})
-        failures = [(label_of(choice), text) for choice, text in self.failed]
-        return [
-            *(f"warning: {text}" for text in warnings), *(f"{label} failed: {text}" for label, text in failures),
-            *self._same_theory(),
-        ]  # fmt: skip
-
-    def _same_theory(self) -> list[str]:
-        """Return a remark if no parameter changes the theory, although values change."""
-        constant = any(
-            len({point.theory.get(name) for point in self.points} - {None}) == 1
-            and len({point.values.get(name) for point in self.points}) > 1
-            for name in self._main_quantities()
-        )
-        if not constant:
-            return []
-        return ["the theory is the same for all points: a parameter in [study.parameters] can change its keys, too"]
+        remarks = [f"warning: {text}" for text in sorted({text for point in self.points for text in point.warnings})]
+        remarks += [f"{label_of(choice)} failed: {text}" for choice, text in self.failed]
+        theories = [{point.theory.get(name) for point in self.points} - {None} for name in self._main_quantities()]
+        values = [{point.values.get(name) for point in self.points} for name in self._main_quantities()]
+        if any(len(theory) == 1 < len(computed) for theory, computed in zip(theories, values, strict=True)):
+            remarks += [
+                "the theory is the same for all points: a parameter of [study.parameters] can change its keys, too"
+            ]
+        return remarks
 
     def figure(self) -> Any:
         """Return a Matplotlib figure with the values over a parameter and their ratios to theory.
@@ -262,12 +245,11 @@ class Sweep(Report):
         with_theory = any(name in point.theory for point in self.points for name in names)
         legend_width = 1.7 * (1 + with_theory) * bool(drawing.others)  # [inch]
         size = ((8.8 if with_theory else 5.2) + legend_width, 0.5 + 3.1 * len(names))
-        fixed = {
-            name: values[0] for name, values in self.parameters.items() if name not in (drawing.first, *drawing.others)
-        }
+        varied = (drawing.first, *drawing.others)
+        fixed = {name: values[0] for name, values in self.parameters.items() if name not in varied}
         heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # for a function both may be its name
         heading += f"\n{label_of(fixed)}" if fixed else ""
-        axes = panels(len(names), 1 + with_theory, size, heading, fontsize=11)
+        axes = panels((len(names), 1 + with_theory), size, heading, fontsize=11)
         for row, name in zip(axes, names, strict=True):
             drawing.draw_values(row[0], name)
             if with_theory:
@@ -279,9 +261,12 @@ class Sweep(Report):
         names = dict.fromkeys((*STANDARD, *self.asked))
         return [name for name in names if name in self.quantities] or self.quantities[:3]
 
-    def _rows(self) -> Rows:
-        """Return a header and a row for each point with parameters, DOF, main quantities and differences from theory."""
-        columns = [(name, [_value_text(point.parameters[name]) for point in self.points]) for name in self.parameters]
+    def tables(self) -> list[tuple[str, Rows]]:
+        """See `Report`; each point has a row with parameters, DOF, main quantities and differences from theory."""
+        columns = []
+        for name in self.parameters:
+            choices = [point.parameters[name] for point in self.points]
+            columns.append((name, [number(v) if isinstance(v, float) else str(v) for v in choices]))
         columns.append(("DOF", [str(point.n_dofs) for point in self.points]))
         for name in self._main_quantities():
             compared = {}
@@ -291,7 +276,7 @@ class Sweep(Report):
             columns.append((column(name, name, self.units), values))
             for other, label in compared.items():
                 columns.append((label, [percent(point.ratio(name, other) - 1.0) for point in self.points]))
-        return by_columns(columns)
+        return [(self.combination if self.combination != self.title else "", by_columns(columns))]
 
 
 def _point_dict(point: Point) -> dict[str, Any]:
@@ -301,8 +286,3 @@ def _point_dict(point: Point) -> dict[str, Any]:
         differences = {name: point.ratio(name, other) - 1.0 for name in getattr(point, other)}
         entry[key] = {name: value for name, value in differences.items() if math.isfinite(value)}
     return entry
-
-
-def _value_text(value: Value) -> str:
-    """Return the value of a parameter as text."""
-    return number(value) if isinstance(value, float) else str(value)

@@ -85,7 +85,7 @@ def no_matplotlib_for_outputs(patch):
 
 def no_matplotlib_for_studies(patch):
     patch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
-    render.panels(1, 1, (4.0, 3.0))
+    render.panels((1, 1), (4.0, 3.0), "")
 
 
 def no_scheduler(patch):

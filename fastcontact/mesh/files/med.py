@@ -396,9 +396,8 @@ def checked_name(kind: str, name: str, size: int) -> bytes:
     if not encoded or len(encoded) > size:
         raise FileError(f"{kind} name '{name}' has {len(encoded)} bytes, but MED allows 1 to {size}: rename it")
     if name.endswith(" ") or "\0" in name:
-        raise FileError(
-            f"{kind} name '{name}' ends with a blank or has a zero byte, which MED does not keep: rename it"
-        )
+        fault = "ends with a blank or has a zero byte, which MED does not keep"
+        raise FileError(f"{kind} name '{name}' {fault}: rename it")
     return encoded
 
 
@@ -443,10 +442,8 @@ def family_members(numbers: AnyArray, families: Families) -> dict[str, Indices]:
     for rows in np.split(order, starts) if len(numbers) else []:
         number = int(numbers[rows[0]])
         if number and number not in families:
-            warn(
-                f"{len(rows)} cells or points belong to family {number}, which the MED file does not "
-                "describe: they are in no group"
-            )
+            remark = f"family {number}, which the MED file does not describe: they are in no group"
+            warn(f"{len(rows)} cells or points belong to {remark}")
         for name in families.get(number, ()):
             members_by_group.setdefault(name, []).append(rows)
     return {name: np.unique(np.concatenate(parts)) for name, parts in members_by_group.items()}

@@ -102,11 +102,8 @@ def _tagged(tags: AnyArray, dim: int, field_data: Mapping[str, Any]) -> dict[str
     if tags.ndim != 1 or tags.dtype.kind not in "iu":
         return {}
     names = {(int(entry[0]), int(entry[1])): name for name, entry in field_data.items() if np.size(entry) == 2}
-    return {
-        names.get((tag, dim), f"{SHAPES[dim]}_{tag}"): np.flatnonzero(tags == tag)
-        for tag in np.unique(tags).tolist()
-        if tag
-    }
+    groups = {tag: names.get((tag, dim), f"{SHAPES[dim]}_{tag}") for tag in np.unique(tags).tolist() if tag}
+    return {name: np.flatnonzero(tags == tag) for tag, name in groups.items()}
 
 
 def _point_groups(content: Mapping[str, Any]) -> dict[str, AnyArray]:
@@ -162,9 +159,8 @@ def check_kinds(foreign: Mapping[str, int], known: Iterable[str]) -> None:
     if foreign:
         listed = [f"{count} cells of kind {kind[:MOST_SHOWN]}" for kind, count in list(foreign.items())[:MOST_SHOWN]]
         more = [f"{len(foreign) - MOST_SHOWN} kinds more"] if len(foreign) > MOST_SHOWN else []
-        raise MeshError(
-            f"it has {', '.join([*listed, *more])}, which fastcontact does not know: use only {', '.join(sorted(known))}"
-        )
+        kinds = ", ".join([*listed, *more])
+        raise MeshError(f"it has {kinds}, which fastcontact does not know: use only {', '.join(sorted(known))}")
 
 
 def merged(blocks: Iterable[Block]) -> list[Block]:

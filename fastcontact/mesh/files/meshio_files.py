@@ -265,10 +265,8 @@ def _with_tags(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
             dim, tag = int(dims[members].max()), len(field_data) + 1
             tags[members[dims[members] == dim]] = tag
             field_data[name] = np.array([tag, dim])
-    n_kept = {name: int((tags[mesh.cell_groups[name]] == tag).sum()) for name, (tag, _) in field_data.items()}
-    lost = {
-        name: len(rows) - n_kept[name] for name, rows in mesh.cell_groups.items() if len(rows) > n_kept.get(name, 0)
-    }
+    kept = {name: int((tags[mesh.cell_groups[name]] == tag).sum()) for name, (tag, _) in field_data.items()}
+    lost = {name: len(rows) - kept[name] for name, rows in mesh.cell_groups.items() if len(rows) > kept.get(name, 0)}
     if lost:
         warn(
             f"Gmsh files of version 2.2 store one group per cell: {sum(lost.values())} memberships of the groups "
@@ -304,9 +302,8 @@ def _check_complete(path: Path, temporary: Path, file_format: str, mesh: Mesh) -
     """Read the written file and raise FileError if it differs, because some writers of meshio drop or change cells."""
     with _contained("read back", path):
         content = library().read(temporary, file_format=file_format)
-    different = [
-        kind for kind, block in _meshio_cells(mesh, {}) if not np.array_equal(content.get_cells_type(kind), block)
-    ]
+    stored = content.get_cells_type
+    different = [kind for kind, block in _meshio_cells(mesh, {}) if not np.array_equal(stored(kind), block)]
     if different or len(content.points) != mesh.n_points:
         listed = f"the {', '.join(different)} cells" if different else "the points"
         raise FileError(f"'{path}': meshio's {file_format} format does not keep {listed}; {OTHER_FORMATS}")

@@ -33,9 +33,7 @@ _GENERATORS = (
     half_spheres, quarter_disc, block, block_on_block, cylinder_on_block, box, graded_block, sphere_on_block, sphere_octant,
     punched_block, crowned_blocks, rings,
 )  # fmt: skip
-GENERATORS: dict[str, Callable[..., Mesh]] = {
-    generator.__name__.replace("_", "-"): generator for generator in _GENERATORS
-}
+GENERATORS: dict[str, Callable[..., Mesh]] = {make.__name__.replace("_", "-"): make for make in _GENERATORS}
 
 __all__ = [
     "GENERATORS", "Circle", "Forest", "block", "block_on_block", "box", "circles", "crowned_blocks",

@@ -139,9 +139,8 @@ def _new_points(mesh: Mesh) -> _NewPoints:
         for point in range(block.shape[1], len(pattern.shape)):
             edge = pattern.on_edge[point]
             if edge >= 0:
-                point_keys.append(
-                    _keys(ends[:, edge, 0], ends[:, edge, 1], int(pattern.quarters[point]), mesh.n_points)
-                )
+                start, end = ends[:, edge].T
+                point_keys.append(_keys(start, end, int(pattern.quarters[point]), mesh.n_points))
             else:  # a separate point for each cell
                 point_keys.append(next_key + np.arange(len(block)))
                 next_key += len(block)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -80,16 +81,13 @@ def sphere_on_block(
     one_of("element", element, SOLIDS)
     R = positive("R", R)
     width, height = each(positive, "block_size", (R, R) if block_size is None else block_size)
-    sphere = sphere_octant(
-        element, R=R, size=size, contact_size=contact_size, contact_radius=contact_radius, growth=growth
-    )
-    spacing = _spacing(R, size, contact_size, contact_radius, growth)
+    sizes: Any = {"size": size, "contact_size": contact_size, "contact_radius": contact_radius, "growth": growth}
+    sphere, spacing = sphere_octant(element, R=R, **sizes), _spacing(R, **sizes)
     horizontal, vertical = graded(width, spacing), graded(height, _shallow(spacing))
     names = {"BLOCK": "BLOCK", "XMIN": "SYMMETRY_X", "YMIN": "SYMMETRY_Z", "ZMIN": "CONT_BLOCK", "ZMAX": "BLOCK_BOTTOM"}
     names |= {"XMAX": "BLOCK_SIDE", "YMAX": "BLOCK_SIDE"}
-    block = _mapped(
-        element, (horizontal, horizontal, vertical), lambda x, z, depth: np.column_stack([x, -depth, z]), "BLOCK", names
-    )
+    grid = horizontal, horizontal, vertical
+    block = _mapped(element, grid, lambda x, z, depth: np.column_stack([x, -depth, z]), "BLOCK", names)
     return union(sphere, with_points_at(block, {"POLE_BLOCK": (0.0, 0.0, 0.0)}))
 
 

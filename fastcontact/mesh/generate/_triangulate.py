@@ -206,9 +206,7 @@ def delaunay(points: Array) -> Indices:
     first, second, third = (points[triangles[:, i]] for i in range(3))
     u, v = second - first, third - first
     twice_area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    flat = np.abs(twice_area) <= 1e-9 * ((u * u).sum(axis=1) + (v * v).sum(axis=1))
-    clockwise = twice_area < 0
-    triangles[clockwise] = triangles[clockwise][:, [0, 2, 1]]
+    flat = twice_area <= 1e-9 * ((u * u).sum(axis=1) + (v * v).sum(axis=1))
     return triangles[~flat]
 
 

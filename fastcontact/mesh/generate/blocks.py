@@ -139,23 +139,17 @@ def block_on_block(
     width_lower, height = each(positive, "size_lower", size_lower)
     width_upper, _ = each(positive, "size_upper", size_upper)
     if not -width_upper < number("shift", shift) < width_lower:
-        raise MeshError(
-            f"shift = {shift:g} is out of range: the blocks face each other between {-width_upper:g} and "
-            f"{width_lower:g}"
-        )
+        limits = f"{-width_upper:g} and {width_lower:g}"
+        raise MeshError(f"shift = {shift:g} is out of range: the blocks face each other between {limits}")
     lower = block(size_lower, divisions_lower, element, (0.0, -height), name="LOWER", distortion=distortion)
     upper = block(size_upper, divisions_upper, element, (shift, 0.0), name="UPPER", distortion=distortion)
-    return union(
-        renamed(lower, lambda name: _side_name(name, "LOWER", "TOP")),
-        renamed(upper, lambda name: _side_name(name, "UPPER", "BOTTOM")),
-    )
+    return union(_one_of_two(lower, "LOWER", "TOP"), _one_of_two(upper, "UPPER", "BOTTOM"))
 
 
-def _side_name(name: str, body: str, contact: str) -> str:
-    """Return the name that group `name` of a single block has if the block is one of two."""
-    if name == contact:
-        return f"CONT_{body}"
-    return name if name == body else f"{body}_{name}"
+def _one_of_two(mesh: Mesh, body: str, contact: str) -> Mesh:
+    """Return a block with the names of groups that it has if it is one of two."""
+    names = {name: f"{body}_{name}" for name in mesh.group_names}
+    return renamed(mesh, {**names, body: body, contact: f"CONT_{body}"})
 
 
 @typed(MeshError)

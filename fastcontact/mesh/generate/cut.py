@@ -70,9 +70,8 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
         name: np.concatenate([members, new_node[members[new_node[members] >= 0]]])
         for name, members in mesh.point_groups.items()
     }
-    opened = mesh.replace(
-        points=np.concatenate([mesh.points, mesh.points[points]]), cells=cells, point_groups=point_groups
-    )
+    positions = np.concatenate([mesh.points, mesh.points[points]])
+    opened = mesh.replace(points=positions, cells=cells, point_groups=point_groups)
     return opened.with_facets({group + OPPOSITE: {name: new_node[block] for name, block in facets.items()}})
 
 

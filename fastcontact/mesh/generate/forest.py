@@ -181,11 +181,8 @@ class Forest:
 
     def _halve_lines(self) -> None:
         """Divide lines until no line has a divided edge."""
-        if "line2" not in self._leaves:
-            return
-        while True:
-            corners = self._leaves["line2"].corners
-            mask = (self._midpoints(edges_of("line2", corners)) >= 0).ravel()
+        while "line2" in self._leaves:
+            mask = (self._midpoints(edges_of("line2", self._leaves["line2"].corners)) >= 0).ravel()
             if not mask.any():
                 return
             self._quarter("line2", mask)

@@ -259,12 +259,9 @@ def with_cells_inside(mesh: Mesh, name: str, group: str, inside: Callable[[Array
 
     The function `inside` (n,) of positions (n, dim) [length] returns whether they are in the region.
     """
-    in_region = inside(mesh.points)
-    rows_of = mesh.split(mesh.cell_groups[group])
-    members = [
-        mesh.offsets[name] + rows[in_region[mesh.cells[name][rows]].all(axis=1)] for name, rows in rows_of.items()
-    ]
-    return mesh.with_groups(cells={name: np.concatenate(members)})
+    in_region, rows_of = inside(mesh.points), mesh.split(mesh.cell_groups[group])
+    rows_inside = {kind: rows[in_region[mesh.cells[kind][rows]].all(axis=1)] for kind, rows in rows_of.items()}
+    return mesh.with_groups(cells={name: np.concatenate([mesh.offsets[k] + rows_inside[k] for k in rows_inside])})
 
 
 @typed(MeshError)

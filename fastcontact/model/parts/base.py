@@ -129,11 +129,8 @@ class ModelBase(Suggesting):
                     "an axisymmetric model lies at x >= 0, with y along the axis"
                 )
         check_number("the reference_temperature", reference_temperature)
-        self.mesh = mesh
-        self.kinematics = kinematics
-        self.strain = strain
+        self.mesh, self.kinematics, self.strain, self.case_text = mesh, kinematics, strain, case_text
         self.reference_temperature = reference_temperature
-        self.case_text = case_text
         self.units = named_units(units) if units else {}
         self.materials: list[tuple[Material, tuple[str, ...] | None]] = []
         self.supports: list[Support] = []
@@ -280,14 +277,10 @@ class ModelBase(Suggesting):
             raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
         numbers = {name: np.full(len(block), -1, np.int32) for name, block in self.mesh.solids.items()}
         for index, (_, groups) in enumerate(self.materials):
-            for name in numbers if groups is None else ():
-                self._check_material(index, None, numbers[name])
-                numbers[name][:] = index
-            for group in groups or ():
-                for name, rows in self.mesh.split(self.mesh.cell_groups[group]).items():
-                    if name in numbers:
-                        self._check_material(index, group, numbers[name][rows])
-                        numbers[name][rows] = index
+            for group in groups or (None,):
+                for name, rows in solid_rows(self.mesh, None if group is None else (group,)).items():
+                    self._check_material(index, group, numbers[name][rows])
+                    numbers[name][rows] = index
         self._check_all_have_material(numbers)
         return numbers
 
@@ -347,17 +340,15 @@ class ModelBase(Suggesting):
         >>> round(float(forces[mesh.points_of("RIGHT"), 0].sum()), 12)
         1.0
         """
-        field = self.material_field()
+        field, shape = self.material_field(), self.mesh.points.shape
         if np.size(displacement) != self.n_dofs:
-            raise ModelError(
-                f"the displacement has shape {np.shape(displacement)}, but the mesh {self.mesh.points.shape}"
-            )
+            raise ModelError(f"the displacement has shape {np.shape(displacement)}, but the mesh {shape}")
         bodies = self.nonlinear_bodies(field)
         if bodies is not None:
             if self.strain == "small":
                 raise ModelError("forces of plastic bodies depend on their history, not on the displacement alone")
             if self.temperatures or self.heat_loads:
                 raise ModelError("forces of bodies that heat expands depend on their temperature: see step.reaction")
-            return bodies.at(np.reshape(displacement, self.mesh.points.shape), bodies.beginning).force
+            return bodies.at(np.reshape(displacement, shape), bodies.beginning).force
         K = stiffness(self.mesh, self.kinematics, field.moduli, field.loops, None, field.treatment)
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)

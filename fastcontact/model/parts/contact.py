@@ -373,10 +373,8 @@ class ModelContact(ModelConnections):
                     f"obstacle '{name}' is both moved and pushed along {'xyz'[axis]}: name this component either in its "
                     "motion or in its force"
                 )
-            if axis == 0 and self.kinematics == "axisymmetric":
-                raise ModelError(
-                    f"a force cannot move obstacle '{name}' along the radius x: in axisymmetry give y only"
-                )
+        if 0 in forces and self.kinematics == "axisymmetric":
+            raise ModelError(f"a force cannot move obstacle '{name}' along the radius x: in axisymmetry give y only")
         return tuple(float(forces[k]) if k in forces else None for k in range(self.mesh.dim))  # type: ignore[arg-type]
 
     @property

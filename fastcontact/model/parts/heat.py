@@ -194,9 +194,8 @@ class ModelHeat(ModelBase):
             repeated = np.flatnonzero(fixed[nodes])
             for row in repeated[(values[nodes[repeated]] != rise[repeated])][:1]:
                 other = supports[owner[nodes[row]]]
-                raise ModelError(
-                    f"'{support.group}' and '{other.group}' prescribe different temperatures at point {nodes[row]}"
-                )
+                groups = f"'{support.group}' and '{other.group}'"
+                raise ModelError(f"{groups} prescribe different temperatures at point {nodes[row]}")
             new, (ramp, initial_ramp) = nodes[~fixed[nodes]], support.history()
             by_ramp.setdefault(ramp, np.zeros(self.mesh.n_points))[new] = rise[~fixed[nodes]]
             if support.reached is not None and initial_ramp:

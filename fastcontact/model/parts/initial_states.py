@@ -305,9 +305,10 @@ class ModelInitialStates(ModelLoads):
     def initial_forces_by_ramp(self) -> dict[Table | None, Array]:
         """Return the nodal forces (n_points, dim) [force] of initial stresses and strains at multiplier 1, by history."""
         by_ramp: dict[Table | None, Array] = {}
-        field = self.material_field() if self.initial_states else None
+        if not self.initial_states:
+            return by_ramp
+        field = self.material_field()
         for state in self.initial_states:
-            assert field is not None
             forces = self._forces_of(field, field.offset(None, [(1.0, state)], self.mesh.n_points))
             by_ramp[state.ramp] = by_ramp.get(state.ramp, 0.0) + forces
         return by_ramp

@@ -254,9 +254,8 @@ class ModelLoads(ModelHeat):
             )
         if at is not None:
             if distribute is False:
-                raise ModelError(
-                    f"the force on '{group}' acts through a point or on every node: leave out 'at' or 'distribute'"
-                )
+                remedy = "leave out 'at' or 'distribute'"
+                raise ModelError(f"the force on '{group}' acts through a point or on every node: {remedy}")
             self._add(SpreadForce(group, axes, Spread(tuple(float(v) for v in at), weighting, radius), table))
             return
         if distribute is None and group in self.mesh.cell_groups and self.mesh.cells_of(group, dim=self.mesh.dim):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import body_of
 
 import fastcontact as fc
 from fastcontact.analysis.result_warnings import largest_rotation
@@ -15,9 +16,8 @@ WOOD = fc.Orthotropic(E=(10.0, 1.0, 2.0), nu=(0.1, 0.2, 0.3), G=(1.0, 1.0, 1.0))
 @pytest.mark.parametrize("material", [STEEL, WOOD], ids=["isotropic", "orthotropic"])
 @pytest.mark.parametrize("element", ["tri3", "quad4", "quad8", "tet4", "hex8", "wedge6"])
 def test_the_first_cell_that_is_inside_out_is_told(element, material):
-    flat = element in ("tri3", "quad4", "quad8")
-    mesh = fc.generate.block(divisions=(2, 2), element=element) if flat else fc.generate.box(element=element)
-    kinematics = "plane_strain" if flat else "3d"
+    mesh = body_of(element)
+    kinematics = "plane_strain" if mesh.dim == 2 else "3d"
     count = len(mesh.cells[element])
     turned = mesh.points * np.array([-1.0, *[1.0] * (mesh.dim - 1)])
     bad = mesh.replace(points=turned)
@@ -58,13 +58,11 @@ def test_points_without_cells_have_no_stiffness():
     assert not K[:, n:].any()
 
 
-MESHES = {
-    **{name: lambda name=name: fc.generate.block((2.0, 1.0), (3, 2), name) for name in ("tri3", "quad4", "quad8")},
-    **{name: lambda name=name: fc.generate.box((2.0, 1.0, 1.0), (3, 2, 2), name) for name in ("tet4", "hex8", "hex20")},
-}
+NAMES = ("tri3", "quad4", "quad8", "tet4", "hex8", "hex20")
 
 
-def moved(mesh):
+def moved(name):
+    mesh = body_of(name, (2.0, 1.0, 1.0), (3, 2, 2))
     return mesh.replace(points=mesh.points + 0.05 * np.sin(4.0 * np.roll(mesh.points, 1, axis=1)))
 
 
@@ -79,9 +77,9 @@ def curls(mesh, u, name):
     return np.array(found)
 
 
-@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("name", NAMES)
 def test_the_largest_rotation_is_half_the_largest_curl(name):
-    mesh = moved(MESHES[name]())
+    mesh = moved(name)
     u = np.random.default_rng(0).normal(size=mesh.points.shape)
     expected = curls(mesh, u, name)
     angle, place = largest_rotation(mesh, u)
@@ -89,9 +87,9 @@ def test_the_largest_rotation_is_half_the_largest_curl(name):
     assert np.array_equal(place, mesh.points[mesh.cells[name][expected.argmax()]].mean(axis=0))
 
 
-@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_rigid_rotation_is_found_and_nothing_at_rest(name):
-    mesh = moved(MESHES[name]())
+    mesh = moved(name)
     spin = np.array([[0.0, -0.3, 0.2], [0.3, 0.0, -0.1], [-0.2, 0.1, 0.0]])[: mesh.dim, : mesh.dim]
     angle, _ = largest_rotation(mesh, mesh.points @ spin.T)
     assert abs(angle - np.linalg.norm(spin) / np.sqrt(2.0)) < 1e-12

@@ -5,19 +5,17 @@ import sys
 import meshio
 import numpy as np
 import pytest
+from models import assert_same_mesh, body_of
 
 import fastcontact as fc
 from fastcontact.mesh import elements
 from fastcontact.mesh.topology import bodies, outer_facets
 
-SOLIDS = ("tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "wedge15", "pyramid5", "pyramid13")
-FLAT = ("tri3", "tri6", "quad4", "quad8", "quad9")
+FLAT, SOLIDS = ([name for name, element in elements.ELEMENTS.items() if element.dim == dim] for dim in (2, 3))
 
 
 def bar(element):
-    if element in FLAT:
-        return fc.generate.block((1.0, 2.0), (2, 4), element)
-    return fc.generate.box((1.0, 2.0, 1.0), (2, 4, 2), element)
+    return body_of(element, (1.0, 2.0, 1.0), (2, 4, 2))
 
 
 def at(height):
@@ -99,37 +97,16 @@ def test_what_is_refused(call, said):
         call(bar("quad4"))
 
 
-SOLIDS_OF_LIBRARIES = [name for name, element in elements.ELEMENTS.items() if element.dim == 3]
-
-
 def a_body(element):
     """Return a mesh with groups of solids, facets and points."""
-    generate = fc.generate.block if elements.get(element).dim == 2 else fc.generate.box
-    size = (2.0, 1.0, 1.5)[: elements.get(element).dim]
-    mesh = generate(size, (2,) * len(size), element)
-    return mesh.with_groups(points={"CORNER": [0], "A name, with signs/": [1, 2]})
+    return body_of(element).with_groups(points={"CORNER": [0], "A name, with signs/": [1, 2]})
 
 
-def assert_same(found, mesh):
-    """The same cells, in any order of elements, and the same members in every group."""
-    np.testing.assert_allclose(found.points, mesh.points, atol=1e-15)
-    assert sorted(found.group_names) == sorted(mesh.group_names)
-    for name, block in mesh.cells.items():
-        np.testing.assert_array_equal(found.cells[name], block)
-    for group in mesh.cell_groups:
-        members, expected = found.cells_of(group), mesh.cells_of(group)
-        assert sorted(members) == sorted(expected)
-        for name, block in expected.items():
-            np.testing.assert_array_equal(members[name], block)
-    for group, members in mesh.point_groups.items():
-        np.testing.assert_array_equal(found.point_groups[group], members)
-
-
-@pytest.mark.parametrize("element", ["tri3", "quad8", "quad9", *SOLIDS_OF_LIBRARIES])
+@pytest.mark.parametrize("element", ["tri3", "quad8", "quad9", *SOLIDS])
 def test_meshio_hands_over_what_it_read(element, tmp_path):
     mesh = a_body(element)
     fc.write_mesh(tmp_path / "a.vtu", mesh)
-    assert_same(fc.from_meshio(meshio.read(tmp_path / "a.vtu")), mesh)
+    assert_same_mesh(fc.from_meshio(meshio.read(tmp_path / "a.vtu")), mesh)
 
 
 def test_meshio_hands_over_sets_and_tags_made_in_memory():
@@ -148,12 +125,12 @@ def test_meshio_hands_over_sets_and_tags_made_in_memory():
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("element", ["tri6", "quad4", *SOLIDS_OF_LIBRARIES])
+@pytest.mark.parametrize("element", ["tri6", "quad4", *SOLIDS])
 def test_pyvista_hands_over_a_file_of_ours(element, tmp_path):
     pyvista = pytest.importorskip("pyvista")
     mesh = a_body(element)
     fc.write_mesh(tmp_path / "a.vtu", mesh)
-    assert_same(fc.from_pyvista(pyvista.read(tmp_path / "a.vtu")), mesh)
+    assert_same_mesh(fc.from_pyvista(pyvista.read(tmp_path / "a.vtu")), mesh)
 
 
 def test_masks_and_groups_of_results_become_groups():
@@ -263,7 +240,7 @@ def test_gmsh_without_a_model(gmsh):
         fc.from_gmsh()
 
 
-@pytest.mark.parametrize("element", ["tri3", "quad8", *SOLIDS_OF_LIBRARIES])
+@pytest.mark.parametrize("element", ["tri3", "quad8", *SOLIDS])
 def test_facets_by_their_place_are_those_of_the_generator(element):
     mesh = a_body(element)
     bare = mesh.replace(cells=mesh.solids, cell_groups={}, point_groups={})

@@ -18,8 +18,8 @@ from fastcontact.mesh.quality import check_cells, quality
 from fastcontact.mesh.quality_kernels import extremes
 
 
-def on_line(i):
-    return (1 - (-1) ** (i + 1)) / (i + 1)
+def on_box(*powers):
+    return math.prod((1 - (-1) ** (i + 1)) / (i + 1) for i in powers)
 
 
 def on_triangle(i, j):
@@ -32,32 +32,24 @@ def on_tetrahedron(i, j, k):
 
 def on_pyramid(i, j, k):
     # x = a (1 - z), y = b (1 - z): a Beta function in z is left.
-    return on_line(i) * on_line(j) * factorial(i + j + 2) * factorial(k) / factorial(i + j + k + 3)
-
-
-def on_square(i, j):
-    return on_line(i) * on_line(j)
-
-
-def on_cube(i, j, k):
-    return on_line(i) * on_line(j) * on_line(k)
+    return on_box(i, j) * factorial(i + j + 2) * factorial(k) / factorial(i + j + k + 3)
 
 
 def on_prism(i, j, k):
-    return on_triangle(i, j) * on_line(k)
+    return on_triangle(i, j) * on_box(k)
 
 
 RULES = {
-    "gauss_line": (rules.gauss_line(3), on_line, 5),
-    "simpson": (rules.simpson_line(), on_line, 3),
-    "subdivided simpson": (rules.subdivided(rules.simpson_line(), 3), on_line, 3),
-    "gauss_square": (rules.gauss_square(2), on_square, 3),
+    "gauss_line": (rules.gauss_line(3), on_box, 5),
+    "simpson": (rules.simpson_line(), on_box, 3),
+    "subdivided simpson": (rules.subdivided(rules.simpson_line(), 3), on_box, 3),
+    "gauss_square": (rules.gauss_square(2), on_box, 3),
     "triangle_1": (rules.triangle_1(), on_triangle, 1),
     "triangle_3": (rules.triangle_3(), on_triangle, 2),
     "triangle_3_sides": (rules.triangle_3_sides(), on_triangle, 2),
     "triangle_6": (rules.triangle_6(), on_triangle, 4),
     "triangle_7": (rules.triangle_7(), on_triangle, 5),
-    "gauss_cube": (rules.gauss_cube(3), on_cube, 5),
+    "gauss_cube": (rules.gauss_cube(3), on_box, 5),
     "tetrahedron_1": (rules.tetrahedron_1(), on_tetrahedron, 1),
     "tetrahedron_5": (rules.tetrahedron_5(), on_tetrahedron, 3),
     "prism": (rules.prism(rules.triangle_7(), rules.gauss_line(3)), on_prism, 5),

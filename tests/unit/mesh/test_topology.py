@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from models import elastic_model, united
+from models import body_of, elastic_model, united
 
 import fastcontact as fc
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, topology
-from fastcontact.mesh.generate import block, box
 from fastcontact.mesh.quality import check_cells
 from fastcontact.mesh.topology import bodies, cells_joined_by_facets, rigid_parts
 from fastcontact.model.rigid_motions import free_motions
@@ -21,12 +20,10 @@ NAMES = ["tri3", "tri6", "quad4", "quad8", "quad9", "tet4", "tet10", "hex8", "he
 
 
 def made(name):
-    if elements.get(name).dim == 2:
-        return block((1.0, 1.0), (3, 3), name)
-    return box((1.0, 1.0, 1.0), (3, 3, 3), name)
+    return body_of(name, (1.0, 1.0, 1.0), (3, 3, 3))
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name in elements.ELEMENTS])
+@pytest.mark.parametrize("name", NAMES)
 @given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 1.0))
 @settings(max_examples=10, deadline=None)
 def test_any_cells_turned_are_turned_back(name, seed, share):
@@ -78,15 +75,13 @@ def test_half_a_million_facets_round_one_node():
     assert np.array_equal(np.sort(np.concatenate([first, second])), np.arange(n))
 
 
-PLANE = {"tri3": fc.generate.block, "quad4": fc.generate.block, "tri6": fc.generate.block, "quad8": fc.generate.block}
-SPACE = {"tet4": fc.generate.box, "hex8": fc.generate.box, "wedge6": fc.generate.box, "hex20": fc.generate.box}
+PLANE = ("tri3", "quad4", "tri6", "quad8")
+SPACE = ("tet4", "hex8", "wedge6", "hex20")
 
 
 def joined(element, *origins, merged=True):
     """Bodies of unit size at origins, merged where nodes coincide."""
-    make = {**PLANE, **SPACE}[element]
-    dim = len(origins[0])
-    mesh = united(**{f"B{k}_": make((1.0,) * dim, (1,) * dim, element, o) for k, o in enumerate(origins)})
+    mesh = united(**{f"B{k}_": body_of(element, (1.0,) * 3, (1,) * 3, o) for k, o in enumerate(origins)})
     return fc.generate.merge_points(mesh, 1e-9) if merged else mesh
 
 

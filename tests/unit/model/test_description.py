@@ -289,12 +289,6 @@ def test_functions_that_fail_are_told_apart_by_their_names():
     assert different(parts(pressure=wrong), parts(pressure=other)) == ["the loads"]
 
 
-def test_the_default_ramp_has_equal_steps_to_one():
-    ramp = fc.linear_ramp(4)
-    assert ramp.instants == (0.25, 0.5, 0.75, 1.0)
-    assert [ramp.value(t) for t in ramp.instants] == [0.25, 0.5, 0.75, 1.0]
-
-
 def test_a_piecewise_linear_table_is_interpolated():
     ramp = fc.Ramp((0.5, 1.0, 1.5), ((0, 0), (1, 2), (2, 0)))
     assert [ramp.value(t) for t in ramp.instants] == [1.0, 2.0, 1.0]

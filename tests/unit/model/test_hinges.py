@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import body_of, elastic_model, united
 
 import fastcontact as fc
 from fastcontact.model import rigid_motions
@@ -13,22 +13,17 @@ def pair_of(first, second):
 
 
 def squares(element="quad4", n=2):
-    block = fc.generate.block
-    return pair_of(block((1.0, 1.0), (n, n), element), block((1.0, 1.0), (n, n), element, (1.0, 1.0)))
+    return pair_of(*(body_of(element, (1.0, 1.0), (n, n), (at, at)) for at in (0.0, 1.0)))
 
 
 def boxes(element="hex8", height=0.0):
-    box = fc.generate.box
-    return pair_of(
-        box((1.0, 1.0, 1.0), (1, 1, 1), element), box((1.0, 1.0, 1.0), (1, 1, 1), element, (1.0, 1.0, height))
-    )
+    return pair_of(*(body_of(element, (1.0,) * 3, (1,) * 3, at) for at in ((0.0, 0.0, 0.0), (1.0, 1.0, height))))
 
 
 @pytest.mark.parametrize("element", ["tri3", "quad4", "tri6", "quad8", "quad9"])
 def test_a_square_on_the_corner_of_another_is_refused(element):
     mesh = squares(element)
-    model = elastic_model(mesh)
-    model.fix("A_BOTTOM", "xy")
+    model = elastic_model(mesh, A_BOTTOM="xy")
     node = int(np.flatnonzero((mesh.points == 1.0).all(axis=1))[0])
     part = rf"the part 'B_BLOCK' that is connected at point {node} at \(1, 1\)"
     pattern = rf"1 rigid-body motion is .*{part}.*only at nodes \(number: 1, .*merge"
@@ -41,8 +36,7 @@ def test_a_square_on_the_corner_of_another_is_refused(element):
 @pytest.mark.parametrize("element", ["tet4", "hex8", "wedge6", "tet10", "hex20"])
 @pytest.mark.parametrize(("height", "motions"), [(0.0, "1 rigid-body motion is"), (1.0, "3 rigid-body motions are")])
 def test_a_box_on_the_edge_or_corner_of_another_is_refused(element, height, motions):
-    model = elastic_model(boxes(element, height))
-    model.fix("A_YMIN", "xyz")
+    model = elastic_model(boxes(element, height), A_YMIN="xyz")
     with pytest.raises(
         fc.ModelError, match=rf"{motions} not supported: .*part 'B_BOX' that is connected at \w+ \d+ at \(1, 1, "
     ):
@@ -53,17 +47,14 @@ def test_a_box_on_the_edge_or_corner_of_another_is_refused(element, height, moti
 
 def test_both_parts_held_share_the_force_at_the_hinge():
     """A hinge passes forces on: what pulls one part is held by both supports."""
-    model = elastic_model(squares(n=4))
-    model.fix("A_BOTTOM", "xy")
-    model.fix("B_TOP", "x")
+    model = elastic_model(squares(n=4), A_BOTTOM="xy", B_TOP="x")
     model.add_body_force("B_BLOCK", y=-1.0)
     (step,) = fc.solve(model, fc.linear_ramp(1))
     assert step.reaction[model.mesh.points_of("A_BOTTOM"), 1].sum() == pytest.approx(1.0, rel=1e-9)
 
 
 def test_rings_in_axisymmetry_turn_about_no_node():
-    model = elastic_model(squares(), "axisymmetric")
-    model.fix("A_BOTTOM", "y")
+    model = elastic_model(squares(), "axisymmetric", A_BOTTOM="y")
     model.add_body_force("B_BLOCK", y=-1e-3)
     (step,) = fc.solve(model, fc.linear_ramp(1))
     weight = 1e-3 * np.pi * (2.0**2 - 1.0**2)
@@ -72,8 +63,7 @@ def test_rings_in_axisymmetry_turn_about_no_node():
 
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
 def test_a_floor_holds_what_hangs_at_a_hinge(formulation):
-    model = elastic_model(squares(n=4))
-    model.fix("A_BOTTOM", "xy")
+    model = elastic_model(squares(n=4), A_BOTTOM="xy")
     model.add_body_force("B_BLOCK", y=-1.0)
     floor = fc.obstacles.HalfSpace((0.0, 0.99), (0.0, 1.0))
     model.add_obstacle("floor", secondary="B_BOTTOM", obstacle=floor, formulation=formulation)
@@ -84,8 +74,7 @@ def test_a_floor_holds_what_hangs_at_a_hinge(formulation):
 
 
 def test_a_load_away_from_the_floor_ends_with_the_name_of_the_part():
-    model = elastic_model(squares())
-    model.fix("A_BOTTOM", "xy")
+    model = elastic_model(squares(), A_BOTTOM="xy")
     model.add_body_force("B_BLOCK", y=1.0)
     floor = fc.obstacles.HalfSpace((0.0, 0.99), (0.0, 1.0))
     model.add_obstacle("floor", secondary="B_BOTTOM", obstacle=floor)
@@ -94,12 +83,10 @@ def test_a_load_away_from_the_floor_ends_with_the_name_of_the_part():
 
 
 def test_relations_and_springs_stop_a_hinge():
-    model = elastic_model(squares())
-    model.fix("A_BOTTOM", "xy")
+    model = elastic_model(squares(), A_BOTTOM="xy")
     model.add_spring("B_TOP_RIGHT", x=1.0)
     model.check()
-    model = elastic_model(squares())
-    model.fix("A_BOTTOM", "xy")
+    model = elastic_model(squares(), A_BOTTOM="xy")
     model.relate([("B_TOP_RIGHT", "x", 1.0), ("A_TOP_LEFT", "x", -1.0)])
     model.check()
 
@@ -126,9 +113,7 @@ def test_the_rotation_of_a_round_pin_in_its_hole_is_named():
     )
     bore = mesh.points_of("PIN_BOTTOM")
     beside = bore[np.argmin(np.hypot(*(mesh.points[bore] - [3.0, -0.02]).T))]
-    model = fc.Model(mesh.with_groups(points={"BESIDE": [beside]}), kinematics="plane_stress")
-    model.add_material(fc.LinearElastic(E=210e3, nu=0.3))
-    model.fix("PLATE_TOP", "xy")
+    model = elastic_model(mesh.with_groups(points={"BESIDE": [beside]}), "plane_stress", E=210e3, PLATE_TOP="xy")
     model.fix("BESIDE", "x")
     model.add_body_force("PIN", y=-3.0)
     model.add_contact("pin", secondary="PIN_TOP", primary="PLATE_BOTTOM")
@@ -155,8 +140,6 @@ def test_the_rotation_of_a_ring_of_sectors_is_about_its_centre():
 def test_the_rotation_about_a_hinge_is_about_its_line():
     box = fc.generate.box()
     edge = np.flatnonzero((box.points[:, 0] == 0.0) & (box.points[:, 1] == 1.0))
-    model = fc.Model(box.with_groups(points={"EDGE": edge}), kinematics="3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("EDGE", "xyz")
+    model = elastic_model(box.with_groups(points={"EDGE": edge}), "3d", EDGE="xyz")
     with pytest.raises(fc.ModelError, match=r"rotation about the line through \(0, 1, 0\.5\) along \(0, 0, 1\)\."):
         fc.solve(model, 1)

@@ -351,32 +351,14 @@ def test_facets_that_stand_in_the_mesh_twice_are_the_same(mesh):
         model.add_contact("second", secondary="COPY", primary="CONT_LOWER")
 
 
-def test_one_side_may_meet_two_others(mesh):
-    model = elastic_model(mesh)
-    model.add_contact("left", secondary="CONT_UPPER", primary="CONT_LOWER_LEFT")
-    model.add_contact("right", secondary="CONT_UPPER", primary="CONT_LOWER_RIGHT")
-    assert len(model.contact) == 2
-
-
-def pressed_in_a_corner():
-    model = elastic_model(block((1.0, 1.0), (2, 2)))
-    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
-    model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor)
-    return model
-
-
-def test_one_side_may_meet_two_obstacles():
-    model = pressed_in_a_corner()
-    model.add_obstacle("slope", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, 0.0), (0.5, 1.0)))
-    model.add_obstacle("moving", secondary="BOTTOM", obstacle=model.contact[0].obstacle, motion={"y": 0.1})
-    assert len(model.contact) == 3
-
-
-def test_an_obstacle_and_a_pair_may_share_facets(mesh):
-    model = elastic_model(mesh)
-    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")
-    model.add_obstacle("floor", secondary="CONT_UPPER", obstacle=fc.obstacles.HalfSpace((0.0, -5.0), (0.0, 1.0)))
-    assert len(model.contact) == 2
+def test_one_side_may_meet_two_others_and_several_obstacles(mesh):
+    model, slope = elastic_model(mesh), fc.obstacles.HalfSpace((0.0, -5.0), (0.5, 1.0))
+    for half in ("LEFT", "RIGHT"):
+        model.add_contact(half, secondary="CONT_UPPER", primary=f"CONT_LOWER_{half}")
+    model.add_obstacle("floor", secondary="CONT_UPPER", obstacle=floor(2, -5.0))
+    model.add_obstacle("slope", secondary="CONT_UPPER", obstacle=slope)
+    model.add_obstacle("moving", secondary="CONT_UPPER", obstacle=slope, motion={"y": 0.1})
+    assert len(model.contact) == 5
 
 
 def test_a_facet_that_stands_in_a_group_twice_is_loaded_once(mesh):

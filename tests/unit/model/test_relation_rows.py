@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from case_texts import case_of
-from models import elastic_model, supported
+from models import body_of, elastic_model, supported
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case
@@ -28,9 +28,7 @@ def turn(dim):
 
 
 def block(dim, element=None):
-    if dim == 3:
-        return fc.generate.box((2.0, 3.0, 1.0), (2, 3, 1), element or "hex8")
-    return fc.generate.block((2.0, 3.0), (2, 3), element or "quad4")
+    return body_of(element or ("quad4" if dim == 2 else "hex8"), (2.0, 3.0, 1.0), (2, 3, 1))
 
 
 def model_of(mesh):
@@ -49,15 +47,28 @@ def pair_of(element):
     return dim, Q, held, "ZMAX" if dim == 3 else "TOP", model_of(mesh), model_of(mesh.replace(points=mesh.points @ Q.T))
 
 
-@pytest.mark.parametrize("element", ["tri3", "tri6", "quad4", "quad8", "tet4", "tet10", "hex8", "hex20", "wedge6"])
-def test_supports_along_normals_turn_with_the_body(element):
-    dim, Q, held, moved, axes, turned = pair_of(element)
+@pytest.mark.parametrize(
+    ("along", "element"),
+    [("normal", element) for element in ("tri3", "tri6", "quad4", "quad8", "tet4", "tet10", "hex8", "hex20", "wedge6")]
+    + [("axes", element) for element in ("tri3", "quad8", "tet10", "hex8")],
+)
+def test_supports_along_normals_or_axes_turn_with_the_body(along, element):
+    """With a displacement that varies along the surface and has its own history."""
+    dim, Q, held, moved, straight, turned = pair_of(element)
+    axes = tuple(Q[:, 0].tolist()) if dim == 2 else tuple(tuple(row) for row in Q.T.tolist())
+    options = {"axes": axes} if along == "axes" else {}
     for group, axis in held.items():
-        axes.fix(group, axis)
-        turned.fix(group, "normal")
-    axes.prescribe(moved, **{"xyz"[dim - 1]: -0.1})
-    turned.prescribe(moved, normal=-0.1)
-    one, other = last(axes), last(turned)
+        straight.fix(group, axis)
+        turned.fix(group, axis if along == "axes" else "normal", **options)
+    last_axis, ramp = "xyz"[dim - 1], [(0, 0), (0.5, 1), (1, 0.25)]
+
+    def depth(x):
+        return -0.1 * (1 + x[:, 0])
+
+    straight.prescribe(moved, ramp=ramp, **{last_axis: depth})
+    turned_depth = {last_axis if along == "axes" else "normal": lambda x: depth(x @ Q)}
+    turned.prescribe(moved, ramp=ramp, **turned_depth, **options)
+    one, other = last(straight), last(turned)
     np.testing.assert_allclose(other.displacement, one.displacement @ Q.T, atol=1e-13)
     np.testing.assert_allclose(other.reaction, one.reaction @ Q.T, atol=1e-9 * np.abs(one.reaction).max())
 
@@ -105,21 +116,6 @@ def test_a_smooth_mandrel_holds_a_ring_and_lame_tells_the_pressure():
         errors.append(abs(found + inner) / inner)
     assert errors[1] < 2e-3
     assert errors[1] < 0.4 * errors[0]
-
-
-def test_a_value_may_vary_along_the_surface_and_have_its_own_history():
-    mesh = block(2)
-    axes, along = model_of(mesh), model_of(mesh)
-    for model in (axes, along):
-        supported(model, LEFT="x", BOTTOM="y")
-    ramp = [(0, 0), (0.5, 1), (1, 0.25)]
-
-    def depth(x):
-        return -0.1 * (1 + x[:, 0])
-
-    axes.prescribe("TOP", y=depth, ramp=ramp)
-    along.prescribe("TOP", normal=depth, ramp=ramp)
-    np.testing.assert_allclose(last(along).displacement, last(axes).displacement, atol=1e-14)
 
 
 def test_nodes_coupled_along_normals_move_by_the_same():
@@ -205,23 +201,6 @@ def test_a_cosine_that_is_round_off_contradicts_no_support():
     model.fix("LEFT", "x", axes=(c, s))
     supported(model, BOTTOM="y", TOP={"x": 0.1 * s, "y": -0.1 * c})
     assert last(model).displacement[:, 1] == pytest.approx(0.0, abs=1e-12)
-
-
-@pytest.mark.parametrize("element", ["tri3", "quad8", "tet10", "hex8"])
-def test_supports_along_axes_turn_with_the_body(element):
-    dim, Q, held, moved, straight, turned = pair_of(element)
-    axes = tuple(Q[:, 0].tolist()) if dim == 2 else tuple(tuple(row) for row in Q.T.tolist())
-    for group, axis in held.items():
-        straight.fix(group, axis)
-        turned.fix(group, axis, axes=axes)
-    last_axis = "xyz"[dim - 1]
-    straight.prescribe(moved, ramp=[(0.0, 0.0), (1.0, 1.0)], **{last_axis: lambda x: -0.02 - 0.01 * x[:, 0]})
-    turned.prescribe(
-        moved, axes=axes, ramp=[(0.0, 0.0), (1.0, 1.0)], **{last_axis: lambda x: -0.02 - 0.01 * (x @ Q)[:, 0]}
-    )
-    one, other = last(straight), last(turned)
-    assert other.displacement @ Q == pytest.approx(one.displacement, abs=1e-12)
-    assert other.reaction @ Q == pytest.approx(one.reaction, abs=1e-8)
 
 
 def test_a_ring_held_round_about_is_lames():

@@ -145,6 +145,10 @@ LINKED = {
 }
 
 
+def linked(parameters):
+    return PARSED | {"study": {"parameters": parameters}}
+
+
 @pytest.mark.parametrize(
     ("path", "value", "where"),
     [
@@ -155,7 +159,7 @@ LINKED = {
     ],
 )
 def test_a_path_sets_one_value_and_leaves_the_case_alone(path, value, where):
-    found = substituted(PARSED, path, value, {})
+    found = substituted(PARSED, {path: value})
     assert where(found) == value
     assert PARSED["material"][1]["E"] == 2.0
     assert PARSED["mesh"]["arc_sizes"] == [1.0, 2.0]
@@ -163,7 +167,7 @@ def test_a_path_sets_one_value_and_leaves_the_case_alone(path, value, where):
 
 
 def test_a_name_sets_several_paths_by_their_laws():
-    found = substituted(PARSED, "size", 3.0, LINKED)
+    found = substituted(linked(LINKED), {"size": 3.0})
     assert found["mesh"]["arc_sizes"] == [4.5, 3.0]
     assert found["contact"]["pair"]["friction"] == pytest.approx(-0.3)
 
@@ -184,15 +188,15 @@ def test_a_name_sets_several_paths_by_their_laws():
 )
 def test_a_wrong_path_is_told(path, words):
     with pytest.raises(CaseError, match=words):
-        substituted(PARSED, path, 1.0, LINKED)
+        substituted(linked(LINKED), {path: 1.0})
 
 
 @pytest.mark.parametrize("law", ["2*valve", "value+1", "__import__('os')", 3.0, "value^x"])
 def test_a_law_is_a_power_of_the_value_and_nothing_else(law):
     with pytest.raises(CaseError, match=r"a\*value\^p"):
-        substituted(PARSED, "n", 2.0, {"n": {"contact.pair.friction": law}})
+        substituted(linked({"n": {"contact.pair.friction": law}}), {"n": 2.0})
 
 
 def test_a_power_of_a_negative_number_is_refused():
     with pytest.raises(CaseError, match=r"cannot be evaluated for -2\.0"):
-        substituted(PARSED, "n", -2.0, {"n": {"contact.pair.friction": "value^0.5"}})
+        substituted(linked({"n": {"contact.pair.friction": "value^0.5"}}), {"n": -2.0})

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import body_of, elastic_model
 
 import fastcontact as fc
 from fastcontact.elasticity.stiffness import stiffness
@@ -95,10 +95,7 @@ def test_a_linear_field_has_no_error_and_the_norms_of_its_volume(element, kinema
 @pytest.mark.parametrize("element", QUADRATIC)
 def test_a_quadratic_field_has_no_error_on_quadratic_elements(element):
     """Straight cells that are images of the reference by an affine map, on which the elements hold all of it."""
-    if elements.get(element).dim == 3:
-        mesh = fc.generate.box((2.0, 1.5, 1.0), (2, 2, 2), element)
-    else:
-        mesh = fc.generate.block((2.0, 1.5), (4, 3), element)
+    mesh = body_of(element, (2.0, 1.5, 1.0), (4, 3, 2))
     model = elastic_model(mesh, "plane_strain" if mesh.dim == 2 else "3d", E=E, nu=NU)
     field = quadratic(mesh.dim)
     norms = fc.error_against(field, model, field.displacement(mesh.points))

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from matplotlib_pictures import contact_of
-from models import members
+from models import assert_same_mesh, members, row_of
 
 from fastcontact.errors import FastcontactWarning, FileError, MeshError
 from fastcontact.mesh import elements
@@ -23,34 +23,15 @@ from fastcontact.results.med import write_med_results
 from fastcontact.results.step import StepResult
 
 CASES = Path(__file__).resolve().parents[5] / "shared" / "cases"
-FLAT = {name: element for name, element in elements.ELEMENTS.items() if element.dim <= 2}
-
-
-def assert_same(found, mesh):
-    np.testing.assert_array_equal(found.points, mesh.points)
-    assert set(found.cells) == set(mesh.cells)
-    for name, block in mesh.cells.items():
-        np.testing.assert_array_equal(found.cells[name], block)
-    assert members(found) == members(mesh)
-    assert set(found.point_groups) == set(mesh.point_groups)
-    for name, numbers in mesh.point_groups.items():
-        np.testing.assert_array_equal(found.point_groups[name], numbers)
+FLAT = [name for name, element in elements.ELEMENTS.items() if element.dim <= 2]
 
 
 def all_elements():
     """Two cells of each flat element side by side, in groups that overlap."""
-    points, cells, count = [], {}, 0
-    for column, (name, element) in enumerate(FLAT.items()):
-        nodes = np.pad(element.nodes, [(0, 0), (0, 2 - element.dim)])
-        points += [nodes + np.array([3.0 * column, y]) for y in (0.0, 3.0)]
-        cells[name] = count + np.arange(2 * len(nodes)).reshape(2, -1)
-        count += 2 * len(nodes)
-    n_cells = 2 * len(FLAT)
-    return Mesh(
-        np.concatenate(points),
-        cells,
-        {"everything": np.arange(n_cells), "upper row": np.arange(1, n_cells, 2), "one": [3], "nobody": []},
-        {"P": [0], "Q": [0, 5, 7], "R": [5]},
+    mesh = row_of(FLAT, groups=False)
+    every = np.arange(mesh.n_cells)
+    return mesh.with_groups(
+        {"everything": every, "upper row": every[1::2], "one": [3], "nobody": []}, {"P": [0], "Q": [0, 5, 7], "R": [5]}
     )
 
 
@@ -297,7 +278,7 @@ def meshes(draw):
 @given(mesh=meshes())
 def test_any_mesh_comes_back_the_same(tmp_path, mesh):
     write_med_mesh(tmp_path / "any.med", mesh)
-    assert_same(read_med(tmp_path / "any.med").mesh, mesh)
+    assert_same_mesh(read_med(tmp_path / "any.med").mesh, mesh)
 
 
 def test_fields_come_back_in_code_aster_component_order(tmp_path):
@@ -376,7 +357,7 @@ def test_reads_med_2(tmp_path):
         {"one": [0, 1], "two": [1]},
         {"P": [2]},
     )
-    assert_same(mesh, expected)
+    assert_same_mesh(mesh, expected)
 
 
 def test_med_library_agrees_that_this_is_med_2(tmp_path):
@@ -393,7 +374,7 @@ def test_reads_med_2_as_the_med_library_converts_it(tmp_path):
     assert code == 0, said
     with h5py.File(tmp_path / "new.med") as file:
         assert file["INFOS_GENERALES"].attrs["MAJ"] >= 3
-    assert_same(read_med(tmp_path / "new.med").mesh, read_med(tmp_path / "old.med").mesh)
+    assert_same_mesh(read_med(tmp_path / "new.med").mesh, read_med(tmp_path / "old.med").mesh)
 
 
 def test_first_of_several_time_steps_is_read(tmp_path):
@@ -406,7 +387,7 @@ def test_first_of_several_time_steps_is_read(tmp_path):
         later = mesh[f"{1:020d}{-1:020d}"]
         later.attrs["NDT"] = 1
         later["NOE/COO"][...] += 100.0
-    assert_same(read_med(path).mesh, all_elements())
+    assert_same_mesh(read_med(path).mesh, all_elements())
 
 
 def test_numbers_and_families_may_be_absent(tmp_path):
@@ -464,7 +445,7 @@ def test_no_mesh_and_two_meshes(tmp_path):
         read_med(path)
     with pytest.raises(FileError, match="unknown mesh 'uper': did you mean 'upper'"):
         read_med(path, mesh_name="uper")
-    assert_same(read_med(path, mesh_name="upper").mesh, all_elements())
+    assert_same_mesh(read_med(path, mesh_name="upper").mesh, all_elements())
 
 
 def test_unknown_kinds_are_named_and_counted(tmp_path):

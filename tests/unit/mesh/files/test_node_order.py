@@ -6,33 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, row_of
 
 import fastcontact as fc
 from fastcontact.mesh import elements
 from fastcontact.mesh.files.med import write_med_mesh
 from fastcontact.mesh.files.mesh_files import read_mesh, read_mesh_report, write_mesh
 from fastcontact.mesh.generate.box import box
-from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import corner_measures
 
 pytestmark = pytest.mark.usefixtures("meshio_here")
 
 CASES = Path(__file__).resolve().parents[5] / "shared" / "cases"
 SOLIDS = {name: element for name, element in elements.ELEMENTS.items() if element.dim == 3}
-SHEAR = np.array([[1.0, 0.3, 0.0], [0.0, 1.2, 0.4], [0.2, 0.0, 0.9]])
-
-
-def row_of(names):
-    """Two sheared cells of each element side by side, in groups."""
-    points, cells, count = [], {}, 0
-    for column, name in enumerate(names):
-        nodes = elements.get(name).nodes @ SHEAR
-        points += [nodes + np.array([5.0 * column, y, 0.0]) for y in (0.0, 5.0)]
-        cells[name] = count + np.arange(2 * len(nodes)).reshape(2, -1)
-        count += 2 * len(nodes)
-    every = np.arange(2 * len(cells))
-    return Mesh(np.concatenate(points), cells, {"every": every, "upper": every[1::2]}, {"P": [0, 4]})
 
 
 def volumes(names):
@@ -58,18 +44,6 @@ def parts_of(face):
 
 
 # MED -----------------------------------------------------------------------------------------------------------------
-
-
-def test_every_solid_comes_back_from_med_the_same(tmp_path):
-    mesh = row_of(sorted(SOLIDS, key=lambda name: SOLIDS[name].med))
-    write_mesh(tmp_path / "solids.med", mesh)
-    found, report = read_mesh_report(tmp_path / "solids.med")
-    assert report.n_turned == 0
-    np.testing.assert_array_equal(found.points, mesh.points)
-    assert {name: block.tolist() for name, block in found.cells.items()} == {
-        name: block.tolist() for name, block in mesh.cells.items()
-    }
-    assert found.cell_groups["upper"].tolist() == mesh.cell_groups["upper"].tolist()
 
 
 @pytest.mark.parametrize("name", SOLIDS)

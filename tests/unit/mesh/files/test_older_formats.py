@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import body_of
 
 import fastcontact as fc
 from fastcontact.mesh import elements
@@ -12,11 +13,6 @@ pytestmark = pytest.mark.usefixtures("meshio_here")
 GMSH_KINDS = {"line2": 1, "tri3": 2, "quad4": 3, "tet4": 4, "hex8": 5, "wedge6": 6, "pyramid5": 7}
 MAIL_KINDS = {element: keyword for keyword, element in aster_mail.KINDS.items()}
 SOLIDS = [name for name, element in elements.ELEMENTS.items() if element.dim > 1]
-
-
-def a_body(element):
-    generate = fc.generate.block if elements.get(element).dim == 2 else fc.generate.box
-    return generate((2.0, 1.0, 1.5)[: elements.get(element).dim], (2,) * elements.get(element).dim, element)
 
 
 def version_1(mesh):
@@ -32,7 +28,7 @@ def version_1(mesh):
 
 @pytest.mark.parametrize("element", ["tri3", "quad4", "tet4", "hex8", "wedge6", "pyramid5"])
 def test_gmsh_version_1(element, tmp_path):
-    mesh = a_body(element)
+    mesh = body_of(element)
     (tmp_path / "a.msh").write_text(version_1(mesh))
     found = fc.read_mesh(tmp_path / "a.msh")
     np.testing.assert_array_equal(found.points, mesh.points)
@@ -87,7 +83,7 @@ def test_gmsh_version_4_with_cells_in_several_groups(tmp_path):
     ],
 )
 def test_a_damaged_file_of_version_1(change, text, tmp_path):
-    (tmp_path / "a.msh").write_text(change(version_1(a_body("quad4"))))
+    (tmp_path / "a.msh").write_text(change(version_1(body_of("quad4"))))
     with pytest.raises(fc.FileError, match=text):
         fc.read_mesh(tmp_path / "a.msh")
 
@@ -117,7 +113,7 @@ def mail(mesh):
 
 @pytest.mark.parametrize("element", SOLIDS)
 def test_code_aster_s_text(element, tmp_path):
-    mesh = a_body(element)
+    mesh = body_of(element)
     (tmp_path / "a.mail").write_text(mail(mesh))
     found = fc.read_mesh(tmp_path / "a.mail")
     np.testing.assert_array_equal(found.points, mesh.points)
@@ -161,7 +157,7 @@ def test_middle_nodes_of_code_aster_stand_on_its_edges(element):
     ],
 )
 def test_damaged_text_of_code_aster(old, new, text, tmp_path):
-    whole = mail(a_body("quad4"))
+    whole = mail(body_of("quad4"))
     assert old in whole
     (tmp_path / "a.mail").write_text(whole.replace(old, new))
     with pytest.raises(fc.FileError, match=text):

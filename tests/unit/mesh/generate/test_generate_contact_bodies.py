@@ -93,6 +93,14 @@ def test_rings_have_their_areas_and_their_sides_stand_on_circles(element):
         (lambda: rings(inner_radius=60.0), "must increase, not 60, 50, 100"),
         (lambda: rings(divisions_inner=(0, 3)), r"divisions_inner\[0\] = 0"),
         (lambda: rings("hex8"), "element 'hex8'"),
+        (lambda: sphere_on_block("quad4"), "unknown element 'quad4'"),
+        (lambda: sphere_on_block("pyramid5"), "unknown element 'pyramid5'"),
+        (lambda: sphere_on_block(R=-1.0), "R = -1 is out of range"),
+        (lambda: sphere_on_block(size=60.0), "size = 60 is out of range"),
+        (lambda: sphere_on_block(contact_size=20.0), r"contact_size = 20 .* size = 12.5"),
+        (lambda: sphere_on_block(contact_radius=30.0), "contact_radius = 30 is out of range"),
+        (lambda: sphere_on_block(block_size=(1.0, 2.0, 3.0)), "block_size of sphere_on_block must be two numbers"),
+        (lambda: sphere_on_block(block_size=(1.0, 0.0)), r"block_size\[1\] = 0 is out of range"),
     ],
 )
 def test_wrong_arguments_are_named(make, words):
@@ -168,21 +176,3 @@ def test_equal_arguments_give_equal_meshes():
     one, other = sphere_on_block("tet10", **SIZES), sphere_on_block("tet10", **SIZES)
     assert np.array_equal(one.points, other.points)
     assert all(np.array_equal(one.cells[name], other.cells[name]) for name in one.cells)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"element": "quad4"}, "unknown element 'quad4'"),
-        ({"element": "pyramid5"}, "unknown element 'pyramid5'"),
-        ({"R": -1.0}, "R = -1 is out of range"),
-        ({"size": 60.0}, "size = 60 is out of range"),
-        ({"contact_size": 20.0}, r"contact_size = 20 .* size = 12.5"),
-        ({"contact_radius": 30.0}, "contact_radius = 30 is out of range"),
-        ({"block_size": (1.0, 2.0, 3.0)}, "block_size of sphere_on_block must be two numbers"),
-        ({"block_size": (1.0, 0.0)}, r"block_size\[1\] = 0 is out of range"),
-    ],
-)
-def test_wrong_arguments_of_spheres_are_named(arguments, message):
-    with pytest.raises(fc.MeshError, match=message):
-        sphere_on_block(**arguments)

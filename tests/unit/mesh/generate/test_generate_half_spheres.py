@@ -33,28 +33,16 @@ def coarse(element, k=1):
     return half_spheres(element, arc_sizes=(2.0 / k, 8.0 / k), segments=4 * k)
 
 
-def order_of_area(element):
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_area_converges_with_order_two_and_with_curved_sides_four(element):
     sizes, errors = [], []
     for k in (1, 2, 4):
         mesh = coarse(element, k)
-        arc = topology.ordered_line(mesh, "CONT1")
-        sizes.append(np.diff(arc.abscissa).max())
+        sizes.append(np.diff(topology.ordered_line(mesh, "CONT1").abscissa).max())
         errors.append(abs(fc.quality(mesh).measure / (2 * QUARTER) - 1))
-    return np.polyfit(np.log(sizes), np.log(errors), 1)[0], errors
-
-
-@pytest.mark.parametrize("element", ["tri3", "quad4"])
-def test_area_of_polygons_converges_with_order_two(element):
-    order, errors = order_of_area(element)
-    assert order == pytest.approx(2.0, abs=0.1)
-    assert errors[-1] < 1e-3
-
-
-@pytest.mark.parametrize("element", ["tri6", "quad8", "quad9"])
-def test_area_with_curved_sides_converges_with_order_four(element):
-    order, errors = order_of_area(element)
-    assert order == pytest.approx(4.0, abs=0.2)
-    assert errors[0] < 2e-5
+    order = 2 * elements.get(element).order
+    assert np.polyfit(np.log(sizes), np.log(errors), 1)[0] == pytest.approx(order, abs=0.05 * order)
+    assert errors[-1] < 1e-3 if order == 2 else errors[0] < 2e-5
 
 
 @pytest.mark.parametrize("element", ELEMENTS)
@@ -198,7 +186,7 @@ def test_arc_is_graded_in_geometric_progression_with_the_ratio_asked_for():
     assert 2.0 * 0.98 < angles[-1] <= 2.0
 
 
-def test_arc_distribution_is_carried_to_the_opposite_sides():
+def test_arc_distribution_is_carried_to_the_opposite_sides_of_the_three_blocks():
     mesh = quarter_disc("quad4", arc_sizes=(0.5, 4.0), segments=6)
     arc = topology.ordered_line(mesh, "CONT1", start="C1").points
     theta = np.arctan2(mesh.points[arc, 0], mesh.points[arc, 1] + R) / (math.pi / 4)
@@ -206,10 +194,6 @@ def test_arc_distribution_is_carried_to_the_opposite_sides():
     assert flat[: len(arc)] == pytest.approx(theta, abs=1e-12)
     middle = mesh.points[(mesh.points[:, 1] == -R / 2) & (mesh.points[:, 0] <= R / 2), 0]
     assert np.sort(middle) / (R / 2) == pytest.approx(theta, abs=1e-12)
-
-
-def test_counts_of_the_three_blocks():
-    mesh = quarter_disc("quad4", arc_sizes=(0.5, 4.0), segments=6)
     n = len(mesh.cell_groups["CONT1"])
     assert mesh.cells["quad4"].shape[0] == 6 * n + 6 * n + 6 * 6
     assert len(mesh.cell_groups["A1A2"]) == 12
