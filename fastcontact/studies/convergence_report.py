@@ -443,8 +443,7 @@ class Study(Report):
         """See `Report`."""
         remarks = []
         for series in self.series:
-            warnings = sorted({text for level in series.levels for text in level.warnings})
-            remarks += [f"warning: {text}" for text in warnings]
+            remarks += self.warnings_of((f"level {level.number}", level.warnings) for level in series.levels)
             remarks += [] if series.limits else [f"no limits: {_without_limits(series)}"]
             remarks += [f"level {number} failed: {text}" for number, text in series.failed.items()]
         return remarks + [f"{name} failed: {text}" for name, text in self.failed.items()]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -270,6 +270,22 @@ class Report:
     def structured_known(columns: Mapping[str, Sequence[Any]]) -> AnyArray:
         """Return a structured array (n_rows,) of the columns (n_rows,) that do not contain only NaN."""
         return structured({name: values for name, values in columns.items() if any(v == v for v in values)})
+
+    @staticmethod
+    def warnings_of(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
+        """Return a line for each distinct warning of runs, given as (label, warnings).
+
+        If only some of the runs issued a warning, it begins with the labels of the first three of them.
+        """
+        issued_by, runs = dict[str, list[str]](), list(runs)
+        for label, texts in runs:
+            for text in dict.fromkeys(texts):
+                issued_by.setdefault(text, []).append(label)
+        lines = []
+        for text, labels in sorted(issued_by.items()):
+            listed = labels if len(labels) <= 3 else [*labels[:3], f"{len(labels) - 3} more"]
+            lines.append(f"warning: {text}" if len(labels) == len(runs) else f"warning ({'; '.join(listed)}): {text}")
+        return lines
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return `table` as a ``pandas.DataFrame``.

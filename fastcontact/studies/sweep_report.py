@@ -225,7 +225,7 @@ class Sweep(Report):
 
     def remarks(self) -> list[str]:
         """See `Report`."""
-        remarks = [f"warning: {text}" for text in sorted({text for point in self.points for text in point.warnings})]
+        remarks = self.warnings_of((label_of(point.parameters), point.warnings) for point in self.points)
         remarks += [f"{label_of(choice)} failed: {text}" for choice, text in self.failed]
         theories = [{point.theory.get(name) for point in self.points} - {None} for name in self._main_quantities()]
         values = [{point.values.get(name) for point in self.points} for name in self._main_quantities()]

@@ -9,6 +9,7 @@ import pytest
 import fastcontact as fc
 from fastcontact.cli import main
 from fastcontact.errors import CaseError
+from fastcontact.studies.report import Report
 from fastcontact.studies.runs import convergence_study, parameter_sweep
 from fastcontact.studies.sweep_report import parameter_label
 
@@ -137,6 +138,13 @@ def test_a_quantity_without_theory_has_no_ratio(root):
     low, high = force.get_ylim()
     assert high - low > 0.1 * high  # round-off is no trend
     assert "theory" not in curves(force)
+
+
+def test_warnings_name_the_points_that_issued_them():
+    runs = [(f"E = {k}", ["coarse"] + ["locks"] * (k > 1) + ["yields", "yields"] * (k == 5)) for k in range(6)]
+    assert Report.warnings_of(runs) == [
+        "warning: coarse", "warning (E = 2; E = 3; E = 4; 1 more): locks", "warning (E = 5): yields",
+    ]  # fmt: skip
 
 
 def test_parameters_in_words():
