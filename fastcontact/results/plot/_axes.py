@@ -178,6 +178,7 @@ def labelled_axes(
         half_inch = -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
         below = half_inch if alone else -0.09
         axes.set_aspect("equal")
+        axes.locator_params(axis="x", nbins=6, steps=[1, 2, 5, 10])  # space for labels such as 0.0025
     axes.figure.colorbar(artist, ax=axes, label=caption, shrink=length)
     axes.set_title(heading, fontsize="medium", pad=18 if points is None else None)
     axes.set(**{f"{axis}label": labelled(label, units, "length") for axis, label in zip("xyz", labels)})
