@@ -532,7 +532,7 @@ class StepResult(Suggesting):
         - ``friction_work``: work dissipated by friction.
         - ``friction_while_touching``: part of the frictional work that is dissipated at nodes in the step in which their
           gaps close. It is overestimated in long steps, and zero in steps that are solved in increments.
-        - ``penalty_energy``: energy of penalties and cohesive layers.
+        - ``penalty_energy``: energy of penalties and cohesive layers, and of the small compliance of pressure fields.
         - ``energy_released``: energy dissipated by damage of cohesive layers.
         - ``imbalance``: external work minus the sum of all other energies.
 
