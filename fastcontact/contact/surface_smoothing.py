@@ -179,10 +179,11 @@ def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]
     The results are a matrix (n_facets, n_facets), including the diagonal, positions (n_facets, most) in the points of the
     side, and a mask of the entries of the latter that are filled.
     """
-    i, j = (side.incidence @ side.incidence.T).tocoo().coords
+    incidence = side.incidence.sorted_indices()  # with the order of nodes, round-off would depend on that of each facet
+    i, j = (incidence @ incidence.T).tocoo().coords
     smooth = np.einsum("nd,nd->n", normal[i], normal[j]) > np.cos(np.radians(CORNER))
     near = csr_array((np.ones(smooth.sum()), (i[smooth], j[smooth])), shape=(side.n_facets, side.n_facets))
-    around = csr_array(near @ side.incidence)
+    around = csr_array(near @ incidence)
     valid = np.arange(np.diff(around.indptr).max()) < np.diff(around.indptr)[:, None]
     padded = np.zeros(valid.shape, np.intp)
     padded[valid] = around.indices

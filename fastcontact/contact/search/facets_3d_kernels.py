@@ -20,7 +20,10 @@ def prepare(facets, begin, end, to_terms, weights, low, high):
     m = nodes.shape[1]
     for i in range(begin, end):
         for d in range(3):
-            _fill(nodes, centre, i, d, to_terms, terms, low, high)
+            if m <= 4:
+                _fill_straight(nodes, centre, i, d, terms, low, high)
+            else:
+                _fill_curved(nodes, centre, i, d, to_terms, terms, low, high)
         bend[i], convex[i] = 0.0, np.inf
         if m == 3:
             continue
@@ -36,8 +39,25 @@ def prepare(facets, begin, end, to_terms, weights, low, high):
 
 
 @inlined_kernel
-def _fill(nodes, centre, i, d, to_terms, terms, low, high):
-    """Fill the terms of a facet and the box of its nodes, in one coordinate."""
+def _fill_straight(nodes, centre, i, d, terms, low, high):
+    """Fill the terms and the box of a facet of 3 or 4 nodes, in one coordinate.
+
+    The sums are symmetric, so that round-off does not depend on which node of the facet is the first.
+    """
+    p, q, r = nodes[i, 0, d] - centre[d], nodes[i, 1, d] - centre[d], nodes[i, 2, d] - centre[d]
+    low[i, d], high[i, d] = min(p, q, r), max(p, q, r)
+    if nodes.shape[1] == 3:
+        terms[i, 0, d], terms[i, 1, d], terms[i, 2, d] = p, q - p, r - p
+    else:
+        s = nodes[i, 3, d] - centre[d]
+        terms[i, 0, d], terms[i, 1, d] = 0.25 * ((p + r) + (q + s)), 0.25 * ((q - p) + (r - s))
+        terms[i, 2, d], terms[i, 3, d] = 0.25 * ((r - q) + (s - p)), 0.25 * ((p - q) + (r - s))
+        low[i, d], high[i, d] = min(low[i, d], s), max(high[i, d], s)
+
+
+@inlined_kernel
+def _fill_curved(nodes, centre, i, d, to_terms, terms, low, high):
+    """Fill the terms of a facet with curved sides and the box of its nodes, in one coordinate."""
     low[i, d], high[i, d] = np.inf, -np.inf
     for k in range(to_terms.shape[0]):
         value = 0.0
