@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -120,8 +119,11 @@ class Element:
     def tables(self) -> tuple[Array, Array, Array]:
         """Shape functions (n_q, n_nodes), derivatives (n_q, n_nodes, dim) and weights (n_q,) at quadrature points [-]."""
         points, weights = self.quadrature
-        N, dN = self.shape(points), self.gradient(points)
-        return np.ascontiguousarray(N), np.ascontiguousarray(dN), np.ascontiguousarray(weights)
+        return (
+            np.ascontiguousarray(self.shape(points)),
+            np.ascontiguousarray(self.gradient(points)),
+            np.ascontiguousarray(weights),
+        )
 
     @cached_property
     def extrapolation(self) -> Array:
@@ -159,27 +161,67 @@ def with_middles(linear: Element) -> Array:
     return np.vstack([linear.nodes, linear.nodes[np.array(linear.edges)].sum(axis=1) / 2])
 
 
-def polynomial(nodes: Array, admits: Callable[..., bool]) -> Functions:
-    """Return nodes (n_nodes, dim) [-], shape functions and derivatives of an element whose functions are polynomials.
+def serendipity(box: Element) -> Functions:
+    """Return nodes (n_nodes, dim) [-], shape functions and derivatives of a serendipity square or cube.
 
-    They are spanned by the products of powers, up to squares, of the coordinates for whose exponents `admits` is true: one
-    product for each of the `nodes` (n_nodes, dim) [-]. Their coefficients are multiples of 1/8.
+    The function of a mid-side node with the coordinates X is the product of 1 - x^2 for the coordinate x along its edge,
+    where X is 0, and of (1 + x X) / 2 for the others. The function of a corner is its linear function times the sum of all
+    x X minus dim - 1 (Zienkiewicz and Taylor).
     """
-    axes = range(nodes.shape[1])
-    exponents = np.array([powers for powers in itertools.product(range(3), repeat=len(axes)) if admits(*powers)])
+    nodes, dim = with_middles(box), box.dim
+    corners, middles = np.split(nodes, [box.n_nodes])
 
-    def products(xi: Array, derived: int | None = None) -> Array:
-        """Return the products (n_nodes, m), or their derivatives with respect to the coordinate `derived`."""
-        powers = np.stack([np.ones_like(xi), xi, xi * xi])
-        slopes = np.stack([np.zeros_like(xi), np.ones_like(xi), 2.0 * xi])
-        return np.prod([(slopes if k == derived else powers)[exponents[:, k], :, k] for k in axes], axis=0)
+    def factors(xi: Array) -> Array:
+        x = xi[:, None]
+        return np.where(middles == 0, 1 - x * x, (1 + x * middles) / 2)
 
-    coefficients = np.rint(8.0 * np.linalg.inv(products(nodes))) / 8.0
-
-    def shape(xi: Array, derived: int | None = None) -> Array:
-        return np.einsum("ap,pm->ma", coefficients, products(np.asarray(xi, float), derived), order="C")
+    def shape(xi: Array) -> Array:
+        corner = box.shape(xi) * (xi @ corners.T - (dim - 1))
+        return np.column_stack([corner, factors(xi).prod(axis=2)])
 
     def gradient(xi: Array) -> Array:
-        return np.stack([shape(xi, k) for k in axes], axis=2)
+        excess = (xi @ corners.T - (dim - 1))[:, :, None]
+        corner = box.gradient(xi) * excess + box.shape(xi)[:, :, None] * corners
+        slopes = np.where(middles == 0, -2 * xi[:, None], middles / 2)
+        derivatives = [np.where(np.arange(dim) == k, slopes, factors(xi)).prod(axis=2) for k in range(dim)]
+        return np.concatenate([corner, np.stack(derivatives, axis=2)], axis=1)
 
     return nodes, shape, gradient
+
+
+def product(nodes: Array, first: Element, second: Element) -> Functions:
+    """Return nodes, shape functions (m, n_nodes) [-] and derivatives (m, n_nodes, dim) [-] of the product of two elements.
+
+    The function of each of the `nodes` (n_nodes, dim) [-] is the product of two functions: that of the node of the first
+    element with the first coordinates, and that of the node of the second element with the other coordinates.
+    """
+    split = first.dim
+    I = np.abs(nodes[:, None, :split] - first.nodes).sum(axis=2).argmin(axis=1)  # noqa: E741
+    J = np.abs(nodes[:, None, split:] - second.nodes).sum(axis=2).argmin(axis=1)
+
+    def shape(xi: Array) -> Array:
+        return np.asarray(first.shape(xi[:, :split])[:, I] * second.shape(xi[:, split:])[:, J])
+
+    def gradient(xi: Array) -> Array:
+        x, y = xi[:, :split], xi[:, split:]
+        along_first = first.gradient(x)[:, I] * second.shape(y)[:, J, None]
+        along_second = first.shape(x)[:, I, None] * second.gradient(y)[:, J]
+        return np.concatenate([along_first, along_second], axis=2)
+
+    return nodes, shape, gradient
+
+
+def with_mid_nodes(simplex: Element) -> Functions:
+    """Return the nodes (n_nodes, dim) [-], shape functions and derivatives of the quadratic simplex with mid-side nodes."""
+    first, second = np.array(simplex.edges).T
+
+    def shape(xi: Array) -> Array:
+        L = simplex.shape(xi)
+        return np.column_stack([L * (2 * L - 1), 4 * L[:, first] * L[:, second]])
+
+    def gradient(xi: Array) -> Array:
+        L, dL = simplex.shape(xi)[:, :, None], simplex.gradient(xi)
+        along_edges = 4 * (L[:, first] * dL[:, second] + L[:, second] * dL[:, first])
+        return np.concatenate([(4 * L - 1) * dL, along_edges], axis=1)
+
+    return with_middles(simplex), shape, gradient

@@ -7,13 +7,14 @@ Linear elements have 2 x 2 x 2 quadrature points, quadratic elements 3 x 3 x 3.
 
 import numpy as np
 
-from fastcontact.mesh.elements._element import Element, polynomial, quadratic, with_middles
-from fastcontact.mesh.elements.quadrangles import QUAD4
+from fastcontact.mesh.elements._element import Element, product, quadratic, serendipity
+from fastcontact.mesh.elements.lines import LINE2, LINE3
+from fastcontact.mesh.elements.quadrangles import QUAD4, QUAD9
 from fastcontact.mesh.quadrature import gauss_cube
 
-CORNERS = np.column_stack([np.tile(QUAD4.nodes, (2, 1)), np.repeat([-1.0, 1.0], 4)])
+NODES = np.column_stack([np.tile(QUAD4.nodes, (2, 1)), np.repeat([-1.0, 1.0], 4)])
 CENTRES = np.array([[-1.0, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1], [0, 0, 0]])
-NODES, shape, gradient = polynomial(CORNERS, lambda *powers: max(powers) <= 1)
+_, shape, gradient = product(NODES, QUAD4, LINE2)
 
 HEX8 = Element(
     "hex8", NODES,
@@ -22,11 +23,10 @@ HEX8 = Element(
     gradient=gradient, quadrature=gauss_cube(2), meshio="hexahedron", med="HE8", vtk=12, quadratic="hex20", dilatation=0,
 )  # fmt: skip
 HEX20 = quadratic(
-    "hex20", HEX8, polynomial(with_middles(HEX8), lambda *powers: powers.count(2) <= 1), quadrature=gauss_cube(3),
-    meshio="hexahedron20", med="H20", vtk=25, dilatation=1,
-)  # fmt: skip
+    "hex20", HEX8, serendipity(HEX8), quadrature=gauss_cube(3), meshio="hexahedron20", med="H20", vtk=25, dilatation=1
+)
 HEX27 = quadratic(
-    "hex27", HEX8, polynomial(np.vstack([HEX20.nodes, CENTRES]), lambda *powers: True), quadrature=gauss_cube(3),
+    "hex27", HEX8, product(np.vstack([HEX20.nodes, CENTRES]), QUAD9, LINE3), quadrature=gauss_cube(3),
     meshio="hexahedron27", med="H27", vtk=29, dilatation=1,
 )  # fmt: skip
 ELEMENTS = HEX20, HEX27, HEX8

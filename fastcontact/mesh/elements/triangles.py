@@ -6,18 +6,27 @@ elements six, because three points do not suffice at an axis of symmetry.
 
 import numpy as np
 
-from fastcontact.mesh.elements._element import Element, polynomial, quadratic, with_middles
+from fastcontact.mesh.elements._element import Array, Element, quadratic, with_mid_nodes
 from fastcontact.mesh.quadrature import triangle_1, triangle_6
 
 EDGES = ((0, 1), (1, 2), (2, 0))
-NODES, shape, gradient = polynomial(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), lambda i, j: i + j <= 1)
+
+
+def shape(xi: Array) -> Array:
+    """Return the shape functions (m, 3) [-] at `xi` (m, 2) [-]."""
+    return np.stack([1 - xi[:, 0] - xi[:, 1], xi[:, 0], xi[:, 1]], axis=1)
+
+
+def gradient(xi: Array) -> Array:
+    """Return the derivatives (m, 3, 2) [-] at `xi` (m, 2) [-]."""
+    return np.broadcast_to(np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]), (len(xi), 3, 2)).copy()
+
 
 TRI3 = Element(
-    "tri3", NODES, EDGES, facets=EDGES, shape=shape, gradient=gradient, quadrature=triangle_1(), meshio="triangle",
-    med="TR3", vtk=5, quadratic="tri6",
+    "tri3", np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), EDGES, facets=EDGES, shape=shape, gradient=gradient,
+    quadrature=triangle_1(), meshio="triangle", med="TR3", vtk=5, quadratic="tri6",
 )  # fmt: skip
 TRI6 = quadratic(
-    "tri6", TRI3, polynomial(with_middles(TRI3), lambda i, j: i + j <= 2), quadrature=triangle_6(), meshio="triangle6",
-    med="TR6", vtk=22, dilatation=0,
-)  # fmt: skip
+    "tri6", TRI3, with_mid_nodes(TRI3), quadrature=triangle_6(), meshio="triangle6", med="TR6", vtk=22, dilatation=0
+)
 ELEMENTS = TRI3, TRI6

@@ -8,12 +8,14 @@ in the opposite direction.
 
 import numpy as np
 
-from fastcontact.mesh.elements._element import Element, polynomial, quadratic, with_middles
+from fastcontact.mesh.elements._element import Array, Element, product, quadratic, with_middles
+from fastcontact.mesh.elements.lines import LINE2, LINE3
 from fastcontact.mesh.elements.triangles import TRI3, TRI6
 from fastcontact.mesh.quadrature import gauss_line, prism, triangle_3_sides, triangle_7
 
-CORNERS = np.column_stack([np.tile(TRI3.nodes, (2, 1)), np.repeat([-1.0, 1.0], 3)])
-NODES, shape, gradient = polynomial(CORNERS, lambda i, j, k: i + j <= 1 and k <= 1)
+NODES, shape, gradient = product(np.column_stack([np.tile(TRI3.nodes, (2, 1)), np.repeat([-1.0, 1.0], 3)]), TRI3, LINE2)
+Z = NODES[:, 2]
+TWICE = np.tile(np.arange(3), 2)  # function of the triangle at each of the six corners
 
 WEDGE6 = Element(
     "wedge6", NODES, edges=((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
@@ -21,13 +23,38 @@ WEDGE6 = Element(
     quadrature=prism(triangle_3_sides(), gauss_line(2)), meshio="wedge", med="PE6", vtk=13, quadratic="wedge15",
     dilatation=0,
 )  # fmt: skip
+# Ends of the edges of the two triangles, and the coordinate z = -1 or 1 of each edge.
+A, B = np.array(WEDGE6.edges[:6]).T
+SIDE = Z[A]
+
+
+def shape_15(xi: Array) -> Array:
+    """Return the shape functions (m, 15) [-] at `xi` (m, 3) [-]."""
+    L, z = TRI3.shape(xi[:, :2])[:, TWICE], xi[:, 2:]
+    corner = shape(xi) * (2 * L - 2 + z * Z)
+    horizontal = 2 * L[:, A] * L[:, B] * (1 + z * SIDE)
+    return np.column_stack([corner, horizontal, L[:, :3] * (1 - z * z)])
+
+
+def gradient_15(xi: Array) -> Array:
+    """Return the derivatives (m, 15, 3) [-] at `xi` (m, 3) [-]."""
+    L, z = TRI3.shape(xi[:, :2])[:, TWICE], xi[:, 2:]
+    dL = TRI3.gradient(xi[:, :2])[:, TWICE]
+    slope = np.concatenate([2 * dL, np.broadcast_to(Z[:, None], (*L.shape, 1))], axis=2)
+    corner = gradient(xi) * (2 * L - 2 + z * Z)[:, :, None] + shape(xi)[:, :, None] * slope
+    in_plane = 2 * (dL[:, A] * L[:, B, None] + L[:, A, None] * dL[:, B]) * (1 + z * SIDE)[:, :, None]
+    horizontal = np.concatenate([in_plane, (2 * L[:, A] * L[:, B] * SIDE)[:, :, None]], axis=2)
+    vertical = np.concatenate([dL[:, :3] * (1 - z * z)[:, :, None], (-2 * z * L[:, :3])[:, :, None]], axis=2)
+    return np.concatenate([corner, horizontal, vertical], axis=1)
+
+
 WEDGE15 = quadratic(
-    "wedge15", WEDGE6, polynomial(with_middles(WEDGE6), lambda i, j, k: i + j <= 2 and i + j + k <= 3),
-    quadrature=prism(triangle_7(), gauss_line(3)), meshio="wedge15", med="P15", vtk=26, dilatation=0,
+    "wedge15", WEDGE6, (with_middles(WEDGE6), shape_15, gradient_15), quadrature=prism(triangle_7(), gauss_line(3)),
+    meshio="wedge15", med="P15", vtk=26, dilatation=0,
 )  # fmt: skip
 CENTRES = np.column_stack([TRI6.nodes[3:], np.zeros(3)])
 WEDGE18 = quadratic(
-    "wedge18", WEDGE6, polynomial(np.vstack([WEDGE15.nodes, CENTRES]), lambda i, j, k: i + j <= 2),
-    quadrature=WEDGE15.quadrature, meshio="wedge18", med="P18", vtk=32, dilatation=0,
+    "wedge18", WEDGE6, product(np.vstack([WEDGE15.nodes, CENTRES]), TRI6, LINE3), quadrature=WEDGE15.quadrature,
+    meshio="wedge18", med="P18", vtk=32, dilatation=0,
 )  # fmt: skip
 ELEMENTS = WEDGE15, WEDGE18, WEDGE6
