@@ -45,6 +45,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 # excess of the largest nodal pressure near the edge over means of neighbouring facets where bodies yield.
 # The fraction of a strain that linear kinematics neglect is about as large as the strain.
 NEGLECTED = 0.1
+# Error of the moment of friction above which a warning is given. Where bodies rotate, linear kinematics apply forces at
+# undeformed positions, by which moments are out of balance by about the angle divided by the coefficient of friction.
+OUT_OF_BALANCE = 0.03
 # Largest recommended factor on the number of steps. A larger factor indicates a wrong coefficient of wear.
 MANY_STEPS = 1000
 # Alternation of nodal pressures on quadratic lines above which a warning is given, see `oscillating`; elsewhere ALTERNATING.
@@ -53,6 +56,8 @@ ALTERNATING_ON_LINES = 0.15
 ACROSS = 4
 # Relative residual of the displacement or of the forces above which a warning is given.
 LOOSE = 1e-4
+# Smallest number of nodes for which the median is meaningful.
+MANY = 10
 
 
 def result_warnings(
@@ -308,7 +313,7 @@ def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterato
             f"the largest rotation is {angle:.3f} radian, near {np.array2string(where, precision=4)}: linear kinematics "
             f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
         )
-    elif angle > 0.5 * NOTABLE * min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0):
+    elif angle > 0.5 * OUT_OF_BALANCE * min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0):
         yield from neglected_rotation(problem, last, angle)
 
 
@@ -435,7 +440,7 @@ def oscillating(pair: Formulation, contact: ContactResult, mesh: Mesh) -> Iterat
     others = _alternating(side)
     count = np.asarray(others.sum(axis=1)).ravel()
     inside = contact.active & (side.beside @ ~contact.active == 0) & (count > 0)
-    if inside.sum() < 2 * ACROSS:  # too few for a median
+    if inside.sum() < MANY:
         return
     pressure = contact.pressure[inside]
     deviation = pressure - (others @ contact.pressure)[inside] / count[inside]
@@ -512,7 +517,7 @@ def neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Iter
     # The moment out of balance does twice the neglected work in a rotation. The neglected strain also changes pressures.
     error = ratio + np.divide(2.0 * np.abs(neglected), capacity, out=np.zeros(len(capacity)), where=capacity > 0.0)
     worst = int(np.argmax(np.where(capacity > 0.0, error, 0.0)))
-    if capacity[worst] > 0.0 and error[worst] > NOTABLE:
+    if capacity[worst] > 0.0 and error[worst] > OUT_OF_BALANCE:
         name = body_name(mesh, bodies(mesh)[1], worst)
         yield (
             f"moments of friction on body {name} are wrong by up to {error[worst]:.1%}: it rotates by {angle:.2g} radian, "

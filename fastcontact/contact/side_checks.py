@@ -67,8 +67,7 @@ def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSid
 
 def _check_normals(mesh: Mesh, name: str, side: Surface) -> None:
     """Raise ContactError for a side of contact `name` that has no normal at one of its nodes."""
-    with np.errstate(invalid="ignore"):
-        undefined = np.flatnonzero(~np.isfinite(nodal_normals(side, mesh.points)).all(axis=1))
+    undefined = np.flatnonzero(~nodal_normals(side, mesh.points).any(axis=1))
     if len(undefined):
         point = side.points[undefined[0]]
         raise ContactError(

@@ -50,24 +50,28 @@ def gradients_at(corners: Array, dN: Array) -> tuple[Array, Array]:
     return np.einsum("qak,cqkd->cqad", dN, np.linalg.inv(J), optimize=True), np.linalg.det(J)
 
 
-def slopes_at(values: Array, corners: Array, dN: Array) -> tuple[Array, Array]:
-    """Return the gradients (n_cells, n_q, dim, dim) of a vector field [1 / length], and det J (n_cells, n_q).
+def slopes_at(displacement: Array, corners: Array, dN: Array) -> tuple[Array, Array]:
+    """Return the gradients (n_cells, n_q, dim, dim) of a displacement field [-], and det J (n_cells, n_q).
 
-    `values` (n_cells, n_nodes, dim) are the vectors at the nodes, and the other arguments are those of `gradients_at`. The
-    last index of the gradients is that of the direction of differentiation.
+    The arguments are the nodal displacements `displacement` (n_cells, n_nodes, dim) [length], and those of `gradients_at`,
+    `corners` (n_cells, n_nodes, dim) [length] and `dN` (n_q, n_nodes, dim) [-]. The last index of the gradients is the
+    direction of differentiation.
     """
     J = derivatives_at(corners, dN)
     if J.shape[-1] == 2:
-        return derivatives_at(values, dN) @ np.linalg.inv(J), np.linalg.det(J)
+        return derivatives_at(displacement, dN) @ np.linalg.inv(J), np.linalg.det(J)
     # Cramer's rule takes a quarter of the time of `inv` and `det`.
     a, b, c = np.moveaxis(J, 2, 0)
     cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=3)
     determinant = np.einsum("cqk,cqk->cq", a, cofactors[..., 0])
-    return derivatives_at(values, dN) @ (cofactors / determinant[..., None, None]), determinant
+    return derivatives_at(displacement, dN) @ (cofactors / determinant[..., None, None]), determinant
 
 
 def derivatives_at(values: Array, dN: Array) -> Array:
-    """Return the derivatives (n_cells, n_q, dim, dim) of nodal vectors (n_cells, n_nodes, dim) in the reference cell."""
+    """Return the derivatives (n_cells, n_q, dim, dim) of a vector field with respect to reference coordinates [length].
+
+    The arguments are the vectors at the nodes, `values` (n_cells, n_nodes, dim) [length], and `dN` (n_q, n_nodes, dim) [-].
+    """
     return np.einsum("qak,cad->cqdk", dN, values, optimize=True)
 
 

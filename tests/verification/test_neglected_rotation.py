@@ -107,11 +107,11 @@ def torque(dim, turned, angle, strain="small", **options):
 )  # fmt: skip
 def test_the_torque_of_a_press_fit_that_turns(dim, turned, angle, options, error):
     """The torque of Coulomb's law does not depend on the angle. Small strains deviate by about angle / friction and a warning
-    says so from 1 % on."""
+    says so from about 3 % on."""
     exact = torque(dim, turned, angle, "finite", **options)[0]
     small, warned = torque(dim, turned, angle, **options)
     assert abs(small / exact - 1.0) == pytest.approx(error, abs=0.01)
-    assert len(warned) == (error > 0.01)
+    assert len(warned) == (error > 0.03)
     if warned:
         stated = float(warned[0].split("up to ")[1].split("%")[0]) / 100.0
         assert 0.75 * error < stated < 1.5 * error
