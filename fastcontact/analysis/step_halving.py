@@ -60,10 +60,10 @@ def _substeps(
     if halved >= state.halved or not begin < middle < end:
         try:
             after, result = load_step(problem, state, index, end)
-            unique = last or not (
-                _slides_while_touching(problem, state, after) or _has_two_equilibria(problem, state, after, index)
-            )
-            if unique:
+            ambiguous = not last and _has_two_equilibria(problem, state, after, index)
+            if ambiguous:
+                log.info("step %d from %.6g to %.6g has two equilibria with friction, cut in halves", index, begin, end)
+            if last or not (ambiguous or _slides_while_touching(problem, state, after)):
                 if problem.bodies is not None:  # how many times the next step is halved before its first attempt
                     few = len(result.iterations["history"]) <= FEW
                     after = replace(after, halved=max(halved - few, 0))
@@ -109,12 +109,16 @@ def _has_two_equilibria(problem: Problem, state: State, after: State, index: int
     and so are those with heat conduction or a fixed number of geometry updates.
     """
     pairs = {name: pair for name, pair in problem.pairs.items() if pair.friction and not pair.options.tied}
-    closed = [any(mask.any() for mask in ends.active.values()) for ends in (state, after)]
+    closed = [any(ends.active[name].any() for name in pairs if name in ends.active) for ends in (state, after)]
     if not pairs or closed != [False, True] or problem.heat is not None or not problem.until_settled:
         return False
     zero = np.zeros(problem.model.mesh.dim)
     poses = [np.stack([ends.obstacles.get(name, zero) for name in pairs]) for ends in (state, after)]
-    motion = max(largest((after.u - state.u)[problem.contact_dofs]), largest(poses[1] - poses[0]))
+    turned = [
+        abs(angle - state.angles.get(name, 0.0)) * np.linalg.norm(np.ptp(pairs[name].points, axis=0))
+        for name, angle in after.angles.items() if name in pairs
+    ]  # fmt: skip
+    motion = max(largest((after.u - state.u)[problem.contact_dofs]), largest(poses[1] - poses[0]), *turned)
     if motion < min(float(facet_lengths(pair).min()) for pair in pairs.values()):
         return False
     load = problem.load_at(after.instant)

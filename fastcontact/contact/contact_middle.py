@@ -30,6 +30,10 @@ from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
+# Largest distance of nodes from a plane of symmetry, relative to the size of the surface, and smallest cosine of the angle
+# between directions that are regarded as one. Coordinates in files may have six digits.
+PLANE, PARALLEL = 2e-5, 1.0 - SINGLE_PRECISION
+
 
 @dataclass(frozen=True, eq=False)
 class UnrolledLine:
@@ -229,39 +233,40 @@ def symmetry_planes(pair: Formulation) -> list[tuple[Array, Indices]]:
     points, opposite = coordinates[surface.points], coordinates[pair.primary.points]
     held, driven = motions.at(surface.points), motions.driven[surface.points]
     partly_held = np.trace(held, axis1=1, axis2=2) < points.shape[1] - 0.5
-    tolerance, planes = SINGLE_PRECISION * float(np.ptp(points, axis=0).max()), []
+    tolerance, planes = PLANE * float(np.ptp(points, axis=0).max()), []
     normals = nodal_normals(surface, coordinates)
     for axis in _held_directions(held[partly_held]):
-        x = points @ axis
-        if np.ptp(x) <= 10 * tolerance:
-            continue
-        on_plane = partly_held & (np.einsum("d,nde,e->n", axis, held, axis) >= SAME_DIRECTION**2)
-        on_plane &= ~driven[:, np.abs(axis) > SINGLE_PRECISION].any(axis=1)
-        on_plane &= np.abs(normals @ axis) < LEANING  # otherwise the plane does not cut the surface
+        x, x_opposite = points @ axis, opposite @ axis
+        components = np.abs(axis) > PLANE
         for end, outward in ((x.min(), -1.0), (x.max(), 1.0)):
-            if (outward * (opposite @ axis - end) > 10 * tolerance).any():
+            if np.ptp(x) <= tolerance or (outward * (x_opposite - end) > tolerance).any():
                 continue
-            on_end = partly_held & (np.abs(x - end) <= tolerance)
-            if on_end.any() and on_plane[on_end].all():
-                planes.append((axis, np.flatnonzero(on_end)))
+            nodes = np.flatnonzero(partly_held & (np.abs(x - end) <= tolerance))
+            on_plane = np.einsum("d,nde,e->n", axis, held[nodes], axis) >= SAME_DIRECTION**2
+            on_plane &= ~driven[nodes][:, components].any(axis=1)
+            on_plane &= np.abs(normals[nodes] @ axis) < LEANING  # otherwise the plane does not cut the surface
+            if len(nodes) and on_plane.all():
+                planes.append((axis, nodes))
     return planes
 
 
-def _held_directions(projectors: Array) -> list[Array]:
-    """Return the distinct unit vectors (dim,) along which nodes are held, given their `projectors` (n, dim, dim).
+def _held_directions(projectors: Array) -> Array:
+    """Return distinct unit vectors (k, dim) along which nodes are held, given their `projectors` (n, dim, dim).
 
     If a node is held in several directions, those of other nodes are chosen first, then coordinate axes.
     """
-    dim, directions = projectors.shape[1], list[Array]()
+    dim = projectors.shape[1]
+    directions = np.empty((0, dim))
     distinct = np.unique(np.round(projectors, 9).reshape(-1, dim * dim), axis=0).reshape(-1, dim, dim)
     for P in distinct[np.argsort(np.trace(distinct, axis1=1, axis2=2), kind="stable")]:
-        inside = [n for n in [*directions, *np.eye(dim)] if np.linalg.norm(P @ n) > 1.0 - SINGLE_PRECISION]
+        preferred = np.concatenate([directions, np.eye(dim)])
+        inside = preferred[np.linalg.norm(preferred @ P, axis=1) > PARALLEL]
         for n in [*inside, *np.linalg.eigh(P)[1].T[::-1]]:
             if (length := np.linalg.norm(P @ n)) > 0.5:
                 along = P @ n / length * (1.0 if n[np.argmax(np.abs(n))] > 0.0 else -1.0)
                 P = P - np.outer(along, along)
-                if not any(np.abs(along - known).max() <= SINGLE_PRECISION for known in directions):
-                    directions.append(along)
+                if not (np.abs(directions @ along) > PARALLEL).any():
+                    directions = np.vstack([directions, along])
     return directions
 
 

@@ -126,7 +126,7 @@ def _nodal_means(side: Surface, node: Indices, normal: Array, angle: Array) -> A
     total: Array = np.column_stack([np.bincount(node, component, len(side.points)) for component in weighted])
     side.add_across_ends(total)
     length = np.linalg.norm(total, axis=1, keepdims=True)
-    return np.divide(total, length, out=np.zeros_like(total), where=length > 0.0)  # facets may degenerate to points
+    return np.divide(total, length, out=np.zeros_like(total), where=length != 0.0)
 
 
 def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
@@ -174,7 +174,8 @@ def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
         parallel_map(lambda span: projection_kernels.normals(nodes, slopes, *span, out), portions(*block.facets.shape))
         return out
     normal = area_vectors(nodes, slopes)
-    return normal / np.linalg.norm(normal, axis=2, keepdims=True)
+    length = np.linalg.norm(normal, axis=2, keepdims=True)
+    return np.divide(normal, length, out=np.zeros_like(normal), where=length != 0.0)  # facets may degenerate to points
 
 
 def facet_angles(element: elements.Element, nodes: Array) -> Array:

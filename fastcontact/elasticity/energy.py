@@ -46,8 +46,8 @@ def gradients_at(corners: Array, dN: Array) -> tuple[Array, Array]:
     The arguments are the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], and the derivatives of the shape
     functions `dN` (n_q, n_nodes, dim) [-].
     """
-    J = derivatives_at(corners, dN)
-    return np.einsum("qak,cqkd->cqad", dN, np.linalg.inv(J), optimize=True), np.linalg.det(J)
+    inverse, determinant = _inverted(derivatives_at(corners, dN))
+    return np.einsum("qak,cqkd->cqad", dN, inverse, optimize=True), determinant
 
 
 def slopes_at(displacement: Array, corners: Array, dN: Array) -> tuple[Array, Array]:
@@ -57,14 +57,19 @@ def slopes_at(displacement: Array, corners: Array, dN: Array) -> tuple[Array, Ar
     `corners` (n_cells, n_nodes, dim) [length] and `dN` (n_q, n_nodes, dim) [-]. The last index of the gradients is the
     direction of differentiation.
     """
-    J = derivatives_at(corners, dN)
+    inverse, determinant = _inverted(derivatives_at(corners, dN))
+    return derivatives_at(displacement, dN) @ inverse, determinant
+
+
+def _inverted(J: Array) -> tuple[Array, Array]:
+    """Return the inverses (n_cells, n_q, dim, dim) and determinants (n_cells, n_q) of Jacobians (n_cells, n_q, dim, dim)."""
     if J.shape[-1] == 2:
-        return derivatives_at(displacement, dN) @ np.linalg.inv(J), np.linalg.det(J)
+        return np.linalg.inv(J), np.linalg.det(J)
     # Cramer's rule takes a quarter of the time of `inv` and `det`.
     a, b, c = np.moveaxis(J, 2, 0)
     cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=3)
     determinant = np.einsum("cqk,cqk->cq", a, cofactors[..., 0])
-    return derivatives_at(displacement, dN) @ (cofactors / determinant[..., None, None]), determinant
+    return cofactors / determinant[..., None, None], determinant
 
 
 def derivatives_at(values: Array, dN: Array) -> Array:

@@ -10,7 +10,7 @@ from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.elasticity import dilatation, dilatation_kernels, incompatible_modes, incompatible_modes_kernels
-from fastcontact.elasticity.energy import cell_volumes, gradients_at
+from fastcontact.elasticity.energy import gradients_at
 from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.material_sides import MaterialSides
@@ -333,13 +333,16 @@ def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> 
         N, dN, weights = elements.get(name).tables
         for first in range(0, len(stress), AT_ONCE):
             cells = mesh.cells[name][first : first + AT_ONCE]
-            corners, (gradient, _) = mesh.points[cells], gradients_at(mesh.points[cells], dN)
-            volume = cell_volumes(corners, N, dN, axisymmetric) * weights
-            weighted = volume[..., None] * stress[first : first + AT_ONCE]
+            corners, (gradient, volume) = mesh.points[cells], gradients_at(mesh.points[cells], dN)
+            weighted = (volume * weights)[..., None] * stress[first : first + AT_ONCE]
+            if axisymmetric:
+                radius = np.einsum("qa,ca->cq", N, corners[..., 0])
+                weighted *= 2.0 * np.pi * radius[..., None]
             nodal = np.einsum("cqaj,cqij->cai", gradient, weighted[..., PAIRS[mesh.dim]], optimize=True)
             if axisymmetric:
-                nodal[..., 0] += weighted[..., 2] / np.einsum("qa,ca->cq", N, corners[..., 0]) @ N
-            np.add.at(force, cells, nodal)
+                nodal[..., 0] += weighted[..., 2] / radius @ N
+            for i in range(mesh.dim):
+                force[:, i] += np.bincount(cells.ravel(), nodal[..., i].ravel(), mesh.n_points)
     return force
 
 
