@@ -46,9 +46,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 # body, because a contact is not stiffer than the softer one of its bodies (for a layer that is softer by a
 # factor of 2e5, 100 positions did not suffice with the stiffness of the other body).
 SOFT = 1e-3
-# Singular value of `stretched`, about 1 for motions that contact restrains, up to which a motion is restrained only because
-# the friction force turns with the slip direction (without this, the iteration fails for a box that rides on a driven one in
-# 3D).
+# Singular value of `stretched`, about 1 for motions that contact restrains, up to which it hardly restrains a motion, for
+# example only because the friction force turns with the slip direction (without this, the iteration fails for a box that
+# rides on a driven one in 3D).
 WEAK = 1e-2
 
 
@@ -108,24 +108,20 @@ class Freed:
     def slackened(self, elongation: Array, solution: Solution) -> tuple[Array, float]:
         """Return the change (k,) of the positions that makes springs with an `elongation` (k,) slack [length].
 
-        In motions that contact does not restrain, no change of the positions reduces the elongations. Bodies then slide
-        until friction balances the springs, if that is farther than the elongations; otherwise they move by the elongations,
-        and further until the first gap of the `solution` closes. The largest elongation that the linear response leaves is
-        returned as well; it is infinite if bodies slide, which the linear response does not describe.
+        In motions that contact hardly restrains, bodies slide until friction balances the springs, if that is farther than
+        the elongations. In motions that it does not restrain at all, they otherwise move by the elongations, and further
+        until the first gap of the `solution` closes. The largest elongation that the linear response leaves is returned as
+        well; it is infinite if bodies slide, which the linear response does not describe.
         """
         relaxed, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
         remaining = largest(elongation - self.stretched @ relaxed)
-        unrestrained = remaining > SINGLE_PRECISION * largest(elongation)
-        moved, slip = (np.hypot.reduce(s) for s in (self.relative[1:, sliding] @ relaxed, solution.slip[sliding].T))
-        # The linear response is not valid for motions that reverse slips.
-        if unrestrained or largest(moved) > largest(slip):
-            U, s, V = np.linalg.svd(self.stretched)
-            firm = s > WEAK
-            slide = self._slide(V[~firm].T, elongation, solution, sliding)
-            if largest(slide) > largest(elongation):
-                return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), np.inf
+        U, s, V = np.linalg.svd(self.stretched)
+        firm = s > WEAK
+        slide = self._slide(V[~firm].T, elongation, solution, sliding)
+        if largest(slide) > largest(elongation):
+            return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), np.inf
         change = -relaxed
-        if unrestrained:
+        if remaining > SINGLE_PRECISION * largest(elongation):
             motion = elongation - self._inverse @ (self.stretched @ elongation)
             approach, threshold = -self.relative[0] @ motion, LENGTH_ROUND_OFF * remaining
             closing = (solution.gap > 0.0) & (approach > threshold)
@@ -138,24 +134,17 @@ class Freed:
         """Return the change (k,) of positions until friction at the `sliding` constraints (m,) balances the springs [length].
 
         The change, a combination of `motions` (k, z) of rigid bodies, minimises the work of friction under constant normal
-        forces, less that of the loads, by iteratively reweighted least squares. It is zero if friction cannot balance the
-        springs.
+        forces, less that of the loads. It is zero if friction cannot balance the springs.
         """
-        rates, slip = self.relative[1:, sliding] @ motions, solution.slip[sliding].T
-        limit, length = np.linalg.norm(solution.tangential[sliding], axis=1), np.hypot.reduce(slip)
-        least, spring_force = SINGLE_PRECISION * largest(length), self.stiffness * elongation
-        moving = largest(rates) > LENGTH_ROUND_OFF
-        if not (moving and least and largest(limit) > ROUND_OFF * largest(spring_force)):
+        along, slip, friction = self.relative[1:, sliding], solution.slip[sliding].T, solution.tangential[sliding].T
+        rates, limit, spring_force = along @ motions, np.hypot.reduce(friction), self.stiffness * elongation
+        size, force = largest(np.hypot.reduce(slip)), limit.sum()
+        if largest(rates) <= LENGTH_ROUND_OFF or not size or largest(limit) <= ROUND_OFF * largest(spring_force):
             return np.zeros_like(elongation)
-        load = motions.T @ spring_force
-        load += np.einsum("dmz,m,dm", rates, limit / np.maximum(length, least), slip)
-        left = slip
-        for _ in range(MAX_NEWTON_ITERATIONS):
-            weights = limit / np.maximum(np.hypot.reduce(left), least)
-            matrix = np.einsum("dmz,m,dmy", rates, weights, rates)
-            amplitudes = np.linalg.pinv(matrix, hermitian=True) @ (load - np.einsum("dmz,m,dm", rates, weights, slip))
-            left = slip + rates @ amplitudes
-        return motions @ amplitudes if largest(np.hypot.reduce(left)) <= largest(length) else np.zeros_like(elongation)
+        load = motions.T @ spring_force - np.einsum("dmz,dm", rates, friction)
+        tangent = -self.stiffness * size / force * (motions.T @ self.stretched @ motions)
+        amplitudes, unbalanced = _least_work(rates, slip / size, limit / force, load / force, tangent)
+        return motions @ amplitudes * (size * (unbalanced <= SINGLE_PRECISION))
 
     def respond(self, force: Array, gaps: Array) -> Array:
         """Return the `Response` with springs that stay slack."""
@@ -167,6 +156,60 @@ class Freed:
         """Pseudoinverse (k, k) of `stretched`, whose singular values are about 1, or 0 in motions without restraint."""
         U, s, V = np.linalg.svd(self.stretched)
         return np.asarray((V.T * np.divide(1.0, s, out=np.zeros_like(s), where=s > LENGTH_ROUND_OFF)) @ U.T)
+
+
+def _least_work(rates: Array, slip: Array, limit: Array, load: Array, tangent: Array) -> tuple[Array, float]:
+    """Return amplitudes a (z,) that minimise the sum of ``limit |slip + rates a|``, minus ``load a``, plus elastic energy.
+
+    The lengths of the slips are smoothed, ever less, and Newton's method with a trust region minimises the sum. All data are
+    dimensionless, with magnitudes of about 1. The largest component of the gradient is returned as well; it is not small if
+    there is no minimum.
+
+    Parameters
+    ----------
+    rates : ndarray (d, m, z)
+        Changes of the slips of m constraints along d tangents, for each amplitude.
+    slip : ndarray (d, m)
+    limit : ndarray (m,)
+        Largest friction forces.
+    load : ndarray (z,)
+    tangent : ndarray (z, z)
+        Stiffness, of which the part that is not due to the turning of friction forces stores elastic energy.
+    """
+    from scipy.optimize import OptimizeResult, minimize
+
+    def lengths(amplitudes: Array) -> tuple[Array, Array]:
+        left = slip + rates @ amplitudes
+        length = np.sqrt((left**2).sum(axis=0) + smoothing**2)
+        return length, np.einsum("dm,dmz->mz", left / length, rates)
+
+    def work(amplitudes: Array) -> float:
+        return float(limit @ lengths(amplitudes)[0] + (0.5 * elastic @ amplitudes - load) @ amplitudes)
+
+    def gradient(amplitudes: Array) -> Array:
+        return np.asarray(limit @ lengths(amplitudes)[1] + elastic @ amplitudes - load)
+
+    def hessian(amplitudes: Array) -> Array:
+        length, along = lengths(amplitudes)
+        weights = limit / length
+        turning = np.einsum("dmz,m,dmy", rates, weights, rates) - np.einsum("mz,m,my", along, weights, along)
+        return np.asarray(turning + elastic)
+
+    minimum, smoothing, options = (
+        OptimizeResult(x=np.zeros(len(load))),
+        SINGLE_PRECISION,
+        {"maxiter": MAX_NEWTON_ITERATIONS},
+    )
+    elastic = np.zeros_like(tangent)
+    values, vectors = np.linalg.eigh(0.5 * (tangent + tangent.T) - hessian(minimum.x))
+    elastic = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    smoothing = 1.0
+    while smoothing > SINGLE_PRECISION:
+        smoothing *= 0.1
+        minimum = minimize(
+            work, minimum.x, jac=gradient, hess=hessian, method="trust-exact", tol=SINGLE_PRECISION, options=options
+        )
+    return minimum.x, largest(minimum.jac)
 
 
 class FloatingBodies:
