@@ -176,40 +176,33 @@ def _least_work(rates: Array, slip: Array, limit: Array, load: Array, tangent: A
     tangent : ndarray (z, z)
         Stiffness, of which the part that is not due to the turning of friction forces stores elastic energy.
     """
-    from scipy.optimize import OptimizeResult, minimize
+    from scipy.optimize import minimize
 
-    def lengths(amplitudes: Array) -> tuple[Array, Array]:
-        left = slip + rates @ amplitudes
+    def lengths(a: Array) -> tuple[Array, Array]:
+        left = slip + rates @ a
         length = np.sqrt((left**2).sum(axis=0) + smoothing**2)
         return length, np.einsum("dm,dmz->mz", left / length, rates)
 
-    def work(amplitudes: Array) -> float:
-        return float(limit @ lengths(amplitudes)[0] + (0.5 * elastic @ amplitudes - load) @ amplitudes)
+    def work(a: Array) -> float:
+        return float(limit @ lengths(a)[0] + (0.5 * elastic @ a - load) @ a)
 
-    def gradient(amplitudes: Array) -> Array:
-        return np.asarray(limit @ lengths(amplitudes)[1] + elastic @ amplitudes - load)
+    def gradient(a: Array) -> Array:
+        return np.asarray(limit @ lengths(a)[1] + elastic @ a - load)
 
-    def hessian(amplitudes: Array) -> Array:
-        length, along = lengths(amplitudes)
+    def hessian(a: Array) -> Array:
+        length, along = lengths(a)
         weights = limit / length
         turning = np.einsum("dmz,m,dmy", rates, weights, rates) - np.einsum("mz,m,my", along, weights, along)
         return np.asarray(turning + elastic)
 
-    minimum, smoothing, options = (
-        OptimizeResult(x=np.zeros(len(load))),
-        SINGLE_PRECISION,
-        {"maxiter": MAX_NEWTON_ITERATIONS},
-    )
-    elastic = np.zeros_like(tangent)
-    values, vectors = np.linalg.eigh(0.5 * (tangent + tangent.T) - hessian(minimum.x))
+    a, smoothing, elastic = np.zeros(len(load)), SINGLE_PRECISION, np.zeros_like(tangent)
+    values, vectors = np.linalg.eigh(0.5 * (tangent + tangent.T) - hessian(a))
     elastic = (vectors * np.maximum(values, 0.0)) @ vectors.T
-    smoothing = 1.0
+    smoothing, options = 1.0, {"maxiter": MAX_NEWTON_ITERATIONS}
     while smoothing > SINGLE_PRECISION:
         smoothing *= 0.1
-        minimum = minimize(
-            work, minimum.x, jac=gradient, hess=hessian, method="trust-exact", tol=SINGLE_PRECISION, options=options
-        )
-    return minimum.x, largest(minimum.jac)
+        a = minimize(work, a, jac=gradient, hess=hessian, method="trust-exact", tol=SINGLE_PRECISION, options=options).x
+    return a, largest(gradient(a))
 
 
 class FloatingBodies:
