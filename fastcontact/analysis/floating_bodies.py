@@ -17,7 +17,7 @@ to that of the contact.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -35,6 +35,7 @@ from fastcontact.analysis.solution import Response, Solution
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
+from fastcontact.elasticity.springs import Springs
 from fastcontact.model.rigid_motions import FreeMotions
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
@@ -215,6 +216,8 @@ class FloatingBodies:
     system : System
     soft : bool
         Whether the springs have SOFT times the stiffness of the softest body; otherwise they are as stiff as it.
+    held_by : sequence of Springs
+        The springs of the model. Those of floating bodies are no stiffer than these.
 
     Attributes
     ----------
@@ -228,7 +231,7 @@ class FloatingBodies:
         Stiffness of each spring [force / length].
     """
 
-    def __init__(self, motions: FreeMotions, system: System, soft: bool) -> None:
+    def __init__(self, motions: FreeMotions, system: System, soft: bool, held_by: Sequence[Springs]) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
         # The smallest median of the diagonal over the unknowns that each mode moves, and over those that no mode moves.
         solid, moving = system.free & ~weightless, motions.displacement != 0.0
@@ -245,7 +248,12 @@ class FloatingBodies:
         self._places = [f"{'xyz'[k % self._dim]} of {self._owner(motions, k, weightless)}" for k in self.dofs.tolist()]
         self._at_springs = motions.displacement[self.dofs]
         self.motions = motions.combined(np.asarray(np.linalg.inv(self._at_springs), np.float64))
-        self.stiffness = SOFT * typical if soft else typical
+        # Stiffer springs would jam a body that slides on an incline, since springs of the model yield in other directions.
+        moving_points = moving.any(axis=1).reshape(-1, self._dim).any(axis=1)
+        beside = [s.stiffness.sum() for s in held_by if moving_points[s.rows.indices // self._dim].any()]
+        self.stiffness = min(
+            SOFT * typical if soft else typical, max(SINGLE_PRECISION * typical, min(beside, default=np.inf))
+        )
 
     def with_springs(self, matrix: bsr_array) -> bsr_array:
         """Return the sum of `matrix` (n_dofs, n_dofs) and the stiffness of the springs [force / length]."""

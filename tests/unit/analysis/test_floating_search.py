@@ -278,6 +278,31 @@ def test_a_driven_stack_slides_where_friction_is_least(dim, weakest, angle, opti
             np.testing.assert_allclose(force, [np.sign(drive) * 0.5 * weights[-1], weights[i + 1 :].sum()], rtol=1e-3)
 
 
+@pytest.mark.parametrize(("angle", "stiffness"), first_of(2, [(-12.0, 5e3), (-3.0, 5e5), (12.0, 5e3), (-12.0, 5e5)]))
+def test_a_crate_slides_on_a_driven_incline_until_a_spring_holds_it(angle, stiffness):
+    """Base driven along an incline of `angle` (positive: downwards); the spring acts along x, and only contact along y."""
+    base = fc.generate.block((0.6, 0.08), (24, 3), "quad4", (-0.3, -0.08))
+    crate = fc.generate.block((0.2, 0.12), (10, 6), "quad4", (-0.1, 0.0))
+    boxes = [
+        fc.generate.renamed(box, {name: f"{body}_{name}" for name in ("BOTTOM", "TOP")})
+        for body, box in (("A", base), ("B", crate))
+    ]
+    mesh, slope = fc.generate.transformed(fc.generate.union(*boxes), rotate=-angle), np.radians(angle)
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E=1e8, nu=0.3, density=600.0))
+    model.add_gravity(y=-9.81, ramp=[(0, 0), (1, 1), (2, 1)])
+    top = mesh.points_of("B_TOP")
+    model.add_spring("B_TOP", x=stiffness / len(top))
+    model.prescribe("A_BOTTOM", x=0.05 * np.cos(slope), y=-0.05 * np.sin(slope), ramp=[(0, 0), (1, 0), (2, 1)])
+    model.add_contact("AB", secondary="B_BOTTOM", primary="A_TOP", friction=0.4)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fc.FastcontactWarning)
+        step = fc.solve(model, [1.0, 2.0])[-1]
+    force = stiffness * step.displacement[top, 0].mean()
+    weight = 600.0 * 9.81 * 0.2 * 0.12  # a pressure of 1e-5 times Young's modulus, which turns the normals
+    np.testing.assert_allclose(force, weight * np.tan(slope + np.arctan(0.4)), rtol=1e-5)
+
+
 @pytest.mark.parametrize("penalty", [100.0, 0.01])
 def test_a_soft_penalty_holds_a_stiff_block(penalty):
     model = elastic_model(fc.generate.block((2.0, 1.0), (6, 3), "quad4"), "plane_strain", E=2e5, LEFT="x")
