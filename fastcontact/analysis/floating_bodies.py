@@ -17,7 +17,7 @@ to that of the contact.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -35,6 +35,7 @@ from fastcontact.analysis.solution import Response, Solution
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
+from fastcontact.elasticity.springs import Springs
 from fastcontact.model.rigid_motions import FreeMotions
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
@@ -104,27 +105,23 @@ class Freed:
     def slackened(self, elongation: Array, solution: Solution) -> tuple[Array, float]:
         """Return the change (k,) of the positions that makes springs with an `elongation` (k,) slack [length].
 
-        In motions that contact does not restrain, no change of the positions reduces the elongations. Bodies then slide
-        until friction balances the springs, if that is farther than the elongations; otherwise they move by the elongations,
-        and further until the first gap of the `solution` closes. The largest elongation that the linear response leaves is
-        returned as well; it is infinite if bodies slide, which the linear response does not describe.
+        In motions that contact hardly restrains, bodies slide until friction balances the springs, if that is farther than
+        the elongations. In motions that it does not restrain at all, they otherwise move by the elongations, and further
+        until the first gap of the `solution` closes. The largest elongation that the linear response leaves is returned as
+        well; it is infinite if bodies slide, which the linear response does not describe.
         """
         relaxed, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
         remaining = largest(elongation - self.stretched @ relaxed)
-        unrestrained = remaining > SINGLE_PRECISION * largest(elongation)
-        moved, slip = (np.hypot.reduce(s) for s in (self.relative[1:, sliding] @ relaxed, solution.slip[sliding].T))
-        # The linear response is not valid for motions that reverse slips.
-        if unrestrained or largest(moved) > largest(slip):
-            U, s, V = np.linalg.svd(self.stretched)
-            # A motion with a small singular value, which is about 1 if contact restrains it, is restrained only because the
-            # friction force turns with the slip direction. Otherwise the iteration fails for a box that rides on a driven
-            # one in 3D.
-            firm = s > NOTABLE
-            slide = self._slide(V[~firm].T, elongation, solution, sliding)
-            if largest(slide) > largest(elongation):
-                return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), np.inf
+        U, s, V = np.linalg.svd(self.stretched)
+        # A motion with a small singular value, which is about 1 if contact restrains it, is hardly restrained, for example only
+        # because the friction force turns with the slip direction. Otherwise the iteration fails for a box that rides on a
+        # driven one in 3D.
+        firm = s > NOTABLE
+        slide = self._slide(V[~firm].T, elongation, solution, sliding)
+        if largest(slide) > largest(elongation):
+            return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), np.inf
         change = -relaxed
-        if unrestrained:
+        if remaining > SINGLE_PRECISION * largest(elongation):
             motion = elongation - self._inverse @ (self.stretched @ elongation)
             approach, threshold = -self.relative[0] @ motion, LENGTH_ROUND_OFF * remaining
             closing = (solution.gap > 0.0) & (approach > threshold)
@@ -137,24 +134,17 @@ class Freed:
         """Return the change (k,) of positions until friction at the `sliding` constraints (m,) balances the springs [length].
 
         The change, a combination of `motions` (k, z) of rigid bodies, minimises the work of friction under constant normal
-        forces, less that of the loads, by iteratively reweighted least squares. It is zero if friction cannot balance the
-        springs.
+        forces, less that of the loads. It is zero if friction cannot balance the springs.
         """
-        rates, slip = self.relative[1:, sliding] @ motions, solution.slip[sliding].T
-        limit, length = np.linalg.norm(solution.tangential[sliding], axis=1), np.hypot.reduce(slip)
-        least, spring_force = SINGLE_PRECISION * largest(length), self.stiffness * elongation
-        moving = largest(rates) > LENGTH_ROUND_OFF
-        if not (moving and least and largest(limit) > ROUND_OFF * largest(spring_force)):
+        along, slip, friction = self.relative[1:, sliding], solution.slip[sliding].T, solution.tangential[sliding].T
+        rates, limit, spring_force = along @ motions, np.hypot.reduce(friction), self.stiffness * elongation
+        size, force = largest(np.hypot.reduce(slip)), limit.sum()
+        if largest(rates) <= LENGTH_ROUND_OFF or not size or largest(limit) <= ROUND_OFF * largest(spring_force):
             return np.zeros_like(elongation)
-        load = motions.T @ spring_force
-        load += np.einsum("dmz,m,dm", rates, limit / np.maximum(length, least), slip)
-        left = slip
-        for _ in range(MAX_NEWTON_ITERATIONS):
-            weights = limit / np.maximum(np.hypot.reduce(left), least)
-            matrix = np.einsum("dmz,m,dmy", rates, weights, rates)
-            amplitudes = np.linalg.pinv(matrix, hermitian=True) @ (load - np.einsum("dmz,m,dm", rates, weights, slip))
-            left = slip + rates @ amplitudes
-        return motions @ amplitudes if largest(np.hypot.reduce(left)) <= largest(length) else np.zeros_like(elongation)
+        load = motions.T @ spring_force - np.einsum("dmz,dm", rates, friction)
+        tangent = -self.stiffness * size / force * (motions.T @ self.stretched @ motions)
+        amplitudes, unbalanced = _least_work(rates, slip / size, limit / force, load / force, tangent)
+        return motions @ amplitudes * (size * (unbalanced <= SINGLE_PRECISION))
 
     def respond(self, force: Array, gaps: Array) -> Array:
         """Return the `Response` with springs that stay slack."""
@@ -168,6 +158,53 @@ class Freed:
         return np.asarray((V.T * np.divide(1.0, s, out=np.zeros_like(s), where=s > LENGTH_ROUND_OFF)) @ U.T)
 
 
+def _least_work(rates: Array, slip: Array, limit: Array, load: Array, tangent: Array) -> tuple[Array, float]:
+    """Return amplitudes a (z,) that minimise the sum of ``limit |slip + rates a|``, minus ``load a``, plus elastic energy.
+
+    The lengths of the slips are smoothed, ever less, and Newton's method with a trust region minimises the sum. All data are
+    dimensionless, with magnitudes of about 1. The largest component of the gradient is returned as well; it is not small if
+    there is no minimum.
+
+    Parameters
+    ----------
+    rates : ndarray (d, m, z)
+        Changes of the slips of m constraints along d tangents, for each amplitude.
+    slip : ndarray (d, m)
+    limit : ndarray (m,)
+        Largest friction forces.
+    load : ndarray (z,)
+    tangent : ndarray (z, z)
+        Stiffness, of which the part that is not due to the turning of friction forces stores elastic energy.
+    """
+    from scipy.optimize import minimize
+
+    def lengths(a: Array) -> tuple[Array, Array]:
+        left = slip + rates @ a
+        length = np.sqrt((left**2).sum(axis=0) + smoothing**2)
+        return length, np.einsum("dm,dmz->mz", left / length, rates)
+
+    def work(a: Array) -> float:
+        return float(limit @ lengths(a)[0] + (0.5 * elastic @ a - load) @ a)
+
+    def gradient(a: Array) -> Array:
+        return np.asarray(limit @ lengths(a)[1] + elastic @ a - load)
+
+    def hessian(a: Array) -> Array:
+        length, along = lengths(a)
+        weights = limit / length
+        turning = np.einsum("dmz,m,dmy", rates, weights, rates) - np.einsum("mz,m,my", along, weights, along)
+        return np.asarray(turning + elastic)
+
+    a, smoothing, elastic = np.zeros(len(load)), SINGLE_PRECISION, np.zeros_like(tangent)
+    values, vectors = np.linalg.eigh(0.5 * (tangent + tangent.T) - hessian(a))
+    elastic = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    smoothing, options = 1.0, {"maxiter": MAX_NEWTON_ITERATIONS}
+    while smoothing > SINGLE_PRECISION:
+        smoothing *= 0.1
+        a = minimize(work, a, jac=gradient, hess=hessian, method="trust-exact", tol=SINGLE_PRECISION, options=options).x
+    return a, largest(gradient(a))
+
+
 class FloatingBodies:
     """Springs of the floating bodies of a system, one for each of k free rigid-body modes.
 
@@ -178,6 +215,8 @@ class FloatingBodies:
     system : System
     soft : bool
         Whether the springs have SOFT times the stiffness of the softest body; otherwise they are as stiff as it.
+    held_by : sequence of Springs
+        The springs of the model. Those of floating bodies are no stiffer than these.
 
     Attributes
     ----------
@@ -191,7 +230,7 @@ class FloatingBodies:
         Stiffness of each spring [force / length].
     """
 
-    def __init__(self, motions: FreeMotions, system: System, soft: bool) -> None:
+    def __init__(self, motions: FreeMotions, system: System, soft: bool, held_by: Sequence[Springs]) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
         # The smallest median of the diagonal over the unknowns that each mode moves, and over those that no mode moves.
         solid, moving = system.free & ~weightless, motions.displacement != 0.0
@@ -208,7 +247,12 @@ class FloatingBodies:
         self._places = [f"{'xyz'[k % self._dim]} of {self._owner(motions, k, weightless)}" for k in self.dofs.tolist()]
         self._at_springs = motions.displacement[self.dofs]
         self.motions = motions.combined(np.asarray(np.linalg.inv(self._at_springs), np.float64))
-        self.stiffness = SOFT * typical if soft else typical
+        # Stiffer springs would jam a body that slides on an incline, since springs of the model yield in other directions.
+        moving_points = moving.any(axis=1).reshape(-1, self._dim).any(axis=1)
+        beside = [s.stiffness.sum() for s in held_by if moving_points[s.rows.indices // self._dim].any()]
+        self.stiffness = min(
+            SOFT * typical if soft else typical, max(SINGLE_PRECISION * typical, min(beside, default=np.inf))
+        )
 
     def with_springs(self, matrix: bsr_array) -> bsr_array:
         """Return the sum of `matrix` (n_dofs, n_dofs) and the stiffness of the springs [force / length]."""

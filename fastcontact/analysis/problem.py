@@ -323,7 +323,7 @@ def prepare(
     points = np.unique(np.concatenate([driven_points, *side_points])).astype(np.intp)
     contact_dofs = (points[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
     motions = _floating_motions(model, supported)
-    bodies = FloatingBodies(motions, system, solver.iterative) if len(motions) else None
+    bodies = FloatingBodies(motions, system, solver.iterative, model.springs) if len(motions) else None
     dofs = _prepared_dofs(model, solver, system, bodies, contact_dofs)
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies, dofs, contact_dofs, driven,
@@ -364,7 +364,7 @@ def linearised(
         if model.kinematics != "axisymmetric":
             rotated = _floating_motions(model, model.prescribed_by_ramp()[0], displacement)
             motions = rotated if len(rotated) == len(motions) else motions
-        floating = FloatingBodies(motions, system, problem.solver.iterative and not stiff)
+        floating = FloatingBodies(motions, system, problem.solver.iterative and not stiff, model.springs)
     if replaces and floating is not None and contact is not None:
         modes = floating.motions.displacement
         values = np.linalg.eigvalsh(modes.T @ (contact @ modes))

@@ -212,6 +212,84 @@ def test_a_box_rides_on_a_driven_one(dim, options, angle):
     assert np.abs(force[:-1]).max() < 1e-8 * force[-1]
 
 
+WIDTHS = np.array([120.0, 100.0, 80.0, 60.0])
+
+
+def stack(dim, weakest, angle, options):
+    """Boxes A to D under gravity, A driven sideways and back, D held, and the matrix that turns all; see `WIDTHS`."""
+    make, rest, element = (fc.generate.block, (20.0,), "quad4") if dim == 2 else (fc.generate.box, (40.0, 20.0), "hex8")
+    boxes, turn = [], np.eye(dim)
+    for i, (body, width) in enumerate(zip("ABCD", WIDTHS, strict=True)):
+        corner = (-width / 2, *(0.0,) * (dim - 2), 20.0 * i)
+        box = make((width, *rest), (8 - i, *(2,) * (dim - 1)), element, corner)
+        boxes.append(fc.generate.renamed(box, {name: f"{body}_{name}" for name in box.group_names}))
+    turn[:: dim - 1, :: dim - 1] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    mesh = fc.generate.union(*boxes)
+    mesh = mesh.replace(points=mesh.points @ turn.T)
+    low, high, side = ("BOTTOM", "TOP", "RIGHT") if dim == 2 else ("ZMIN", "ZMAX", "XMAX")
+    model = fc.Model(mesh, "plane_strain" if dim == 2 else "3d")
+    model.add_material(fc.LinearElastic(E=50.0, nu=0.3, density=1e-9))
+    model.add_gravity(**dict(zip("xyz", -1e4 * turn[:, -1], strict=False)), ramp=[(0, 0), (1, 1), (4, 1)])
+    drive = dict(zip("xyz", 5.0 * turn[:, 0], strict=False))
+    model.prescribe(f"A_{low}", **drive, ramp=[(0, 0), (1, 0), (2, 1), (4, -1)])
+    model.fix(f"D_{side}", "normal")
+    for i, (below, above) in enumerate(("AB", "BC", "CD")):
+        friction = (30.0 if i == weakest else 36.0) / WIDTHS[i + 1 :].sum()
+        model.add_contact(
+            below + above, secondary=f"{above}_{low}", primary=f"{below}_{high}", friction=friction, **options
+        )
+    return model, turn
+
+
+@pytest.mark.parametrize(
+    ("dim", "weakest", "angle", "options"),
+    [
+        (2, 0, 0.0, {}),
+        (2, 1, 0.5, {}),
+        (2, 2, 0.0, {"formulation": "continuous"}),
+        (2, 2, 0.0, {"formulation": "node_to_segment"}),
+        (3, 1, 0.5, {}),
+    ],
+)
+def test_a_driven_stack_slides_where_friction_is_least(dim, weakest, angle, options):
+    model, turn = stack(dim, weakest, angle, options)
+    weights = 2e-4 * WIDTHS * (1.0 if dim == 2 else 40.0)
+    for step in fc.solve(model, [1.0, 2.0, 4.0])[1:]:
+        drive = 5.0 if step.load_factor == 2.0 else -5.0
+        for i, body in enumerate("ABCD"):
+            top = model.mesh.points_of(f"{body}_{'TOP' if dim == 2 else 'ZMAX'}")
+            moved = (step.displacement[top] @ turn[:, 0]).mean()
+            assert abs(moved - drive * (i <= weakest)) < 2e-3
+        for i, contact in enumerate(step.contact.values()):
+            force = (contact.force @ turn)[[0, -1]]
+            np.testing.assert_allclose(force, [np.sign(drive) * 0.5 * weights[-1], weights[i + 1 :].sum()], rtol=1e-3)
+
+
+@pytest.mark.parametrize(("angle", "stiffness"), first_of(2, [(-12.0, 5e3), (-3.0, 5e5), (12.0, 5e3), (-12.0, 5e5)]))
+def test_a_crate_slides_on_a_driven_incline_until_a_spring_holds_it(angle, stiffness):
+    """Base driven along an incline of `angle` (positive: downwards); the spring acts along x, and only contact along y."""
+    base = fc.generate.block((0.6, 0.08), (24, 3), "quad4", (-0.3, -0.08))
+    crate = fc.generate.block((0.2, 0.12), (10, 6), "quad4", (-0.1, 0.0))
+    boxes = [
+        fc.generate.renamed(box, {name: f"{body}_{name}" for name in ("BOTTOM", "TOP")})
+        for body, box in (("A", base), ("B", crate))
+    ]
+    mesh, slope = fc.generate.transformed(fc.generate.union(*boxes), rotate=-angle), np.radians(angle)
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E=1e8, nu=0.3, density=600.0))
+    model.add_gravity(y=-9.81, ramp=[(0, 0), (1, 1), (2, 1)])
+    top = mesh.points_of("B_TOP")
+    model.add_spring("B_TOP", x=stiffness / len(top))
+    model.prescribe("A_BOTTOM", x=0.05 * np.cos(slope), y=-0.05 * np.sin(slope), ramp=[(0, 0), (1, 0), (2, 1)])
+    model.add_contact("AB", secondary="B_BOTTOM", primary="A_TOP", friction=0.4)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fc.FastcontactWarning)
+        step = fc.solve(model, [1.0, 2.0])[-1]
+    force = stiffness * step.displacement[top, 0].mean()
+    weight = 600.0 * 9.81 * 0.2 * 0.12  # a pressure of 1e-5 times Young's modulus, which turns the normals
+    np.testing.assert_allclose(force, weight * np.tan(slope + np.arctan(0.4)), rtol=1e-5)
+
+
 @pytest.mark.parametrize("penalty", [100.0, 0.01])
 def test_a_soft_penalty_holds_a_stiff_block(penalty):
     model = elastic_model(fc.generate.block((2.0, 1.0), (6, 3), "quad4"), "plane_strain", E=2e5, LEFT="x")
