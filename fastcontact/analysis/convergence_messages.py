@@ -105,8 +105,9 @@ def friction_exceeded(factor: float, bodies: list[str], coefficients: Array) -> 
 def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, friction: bool, gaps: Array) -> str:
     """Return the message for floating bodies whose springs still carry force under a generalised `load` [force].
 
-    `friction` is whether contact has friction. `gaps` (m, k) are the changes of the gaps in each free motion, from which a
-    motion that contact hardly resists is identified.
+    The load is zero if only obstacles, prescribed displacements or fluid pressures in contacts act. `friction` is whether
+    contact has friction. `gaps` (m, k) are the changes of the gaps in each free motion, from which a motion that contact
+    hardly resists is identified.
     """
     if len(bodies.names) > 1:
         (weakest,), ratio = least_held(bodies.motions, gaps)
@@ -118,8 +119,8 @@ def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, fric
     remedy = "Add a support or more friction, for which the loads may be too large" if friction else "Add a support"
     return (
         f"contact does not hold {grouped(bodies.moving(rigid))}: after {rigid.positions} positions "
-        f"tried, a force of {np.abs(rigid.spring_force).max():.3g} is still missing for equilibrium under a load of "
-        f"{load:.3g}. {remedy}"
+        f"tried, a force of {np.abs(rigid.spring_force).max():.3g} is still missing for equilibrium"
+        f"{f' under a load of {load:.3g}' if load else ''}. {remedy}"
     )
 
 

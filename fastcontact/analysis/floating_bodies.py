@@ -113,9 +113,8 @@ class Freed:
         relaxed, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
         remaining = largest(elongation - self.stretched @ relaxed)
         U, s, V = np.linalg.svd(self.stretched)
-        # A motion with a small singular value, which is about 1 if contact restrains it, is hardly restrained, for example only
-        # because the friction force turns with the slip direction. Otherwise the iteration fails for a box that rides on a
-        # driven one in 3D.
+        # Singular values are about 1 for motions that contact restrains. Smaller ones hardly restrain a motion, for example
+        # only because the friction force turns with the slip direction (a box that rides on a driven one in 3D).
         firm = s > NOTABLE
         slide = self._slide(V[~firm].T, elongation, solution, sliding)
         if largest(slide) > largest(elongation):

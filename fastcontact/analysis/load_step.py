@@ -97,11 +97,12 @@ def _end_of_step(
     )  # fmt: skip
     end = solution.terms.commit(u, end)
     bodies = None if solution.terms.bodies is None else solution.terms.bodies.at(u)
-    if problem.bodies is not None and bodies is not None and problem.bodies.flows_freely and load.rise is None:
-        middle, before = start.extrapolation.midway(start.u, u), start.history or problem.bodies.beginning
-        displacements = problem.displacement(middle), problem.displacement(u)
-        flow = problem.bodies.change_if_halved(*displacements, before, bodies)
-        end = replace(end, flow=max(start.flow, flow))
+    # In the first step, which begins without a history, the path is unknown.
+    flows = problem.bodies is not None and problem.bodies.flows_freely and load.rise is None
+    if problem.bodies is not None and bodies is not None and flows and start.history:
+        displacements = problem.displacement(start.extrapolation.midway(start.u, u)), problem.displacement(u)
+        size, change = problem.bodies.change_if_halved(*displacements, start.history, bodies)
+        end = replace(end, flow=(start.flow[0] + size, start.flow[1] + change))
     contact: dict[str, ContactResult] = {}
     if settled is not None:
         end = save_contact_history(problem, start, load, settled, end)

@@ -85,8 +85,8 @@ class State:
     history : dict of str to ndarray (n_cells, n_q, 9)
         History variables of nonlinear bodies, by element type, see `constitutive_kernels`; empty before the first step.
     flow : (float, float)
-        Norm of the stresses of all points that yielded in a step, and its change if the step were halved, in that of the
-        steps so far in which the norm was largest [pressure].
+        Norm of the stresses of all points that yield in a step, and its change if the step were halved, summed over all steps
+        but the first [pressure].
     rise : ndarray (n_points,), optional
         Temperature rise above the reference temperature, in models with conduction of heat [temperature].
     instant : float

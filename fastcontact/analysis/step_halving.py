@@ -115,7 +115,7 @@ def _has_two_equilibria(problem: Problem, state: State, after: State, index: int
     zero = np.zeros(problem.model.mesh.dim)
     poses = [np.stack([ends.obstacles.get(name, zero) for name in pairs]) for ends in (state, after)]
     turned = [
-        abs(angle - state.angles.get(name, 0.0)) * np.linalg.norm(np.ptp(pairs[name].points, axis=0))
+        abs(angle - state.angles.get(name, 0.0)) * float(np.linalg.norm(np.ptp(pairs[name].points, axis=0)))
         for name, angle in after.angles.items() if name in pairs
     ]  # fmt: skip
     motion = max(largest((after.u - state.u)[problem.contact_dofs]), largest(poses[1] - poses[0]), *turned)

@@ -26,7 +26,7 @@ ARGUMENTS = {
     },
     "--field NAME": (
         "von_mises",
-        "field that colours the mesh: von_mises (default), stress.xx, stress.principal_min, displacement.y, contact_slip ...",
+        "field that colours the mesh: von_mises (default), stress.xx, stress.principal_min, contact_damage ...",
     ),
     "--phases N": (int, "with --animate: one period of vibration with the shape of --step, in N pictures"),
     "--zoom LENGTH": (float, "half width of the part around the largest value to draw"),

@@ -58,7 +58,7 @@ def slopes_at(displacement: Array, corners: Array, dN: Array) -> tuple[Array, Ar
     direction of differentiation.
     """
     inverse, determinant = _inverted(derivatives_at(corners, dN))
-    return derivatives_at(displacement, dN) @ inverse, determinant
+    return np.asarray(derivatives_at(displacement, dN) @ inverse), determinant
 
 
 def _inverted(J: Array) -> tuple[Array, Array]:

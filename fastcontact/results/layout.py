@@ -21,7 +21,8 @@ The second group contains the data that VTKHDF does not support:
 
 A new nodal array needs an attribute of `step.StepResult`, its value in `analysis.load_step`, its name in POINT_FIELDS, a
 check in `check_step`, and code in `reader`. A new array of contact pairs needs an attribute of `step.ContactResult`, its
-value in `analysis.contact_result`, and a column in `contact_row` or `contact_step`.
+value in `analysis.contact_result`, and a column in `contact_row` or `contact_step`. To be shown on the mesh, it also needs
+its names in POINT_FIELDS and CONTACT_FIELDS.
 """
 
 from __future__ import annotations
@@ -80,17 +81,21 @@ RESUMABLE = 2
 # Number of components of point data in files, by name: 3 for vectors and 6 for symmetric tensors, as viewers expect. 2D
 # models have 2 and 4 of these components, and the others are zero.
 POINT_FIELDS = {
-    "displacement": 3,
-    "stress": 6,
-    "von_mises": 1,
-    "von_mises_signed": 1,
-    "reaction": 3,
-    "contact_pressure": 1,
-    "contact_slip": 3,
-    "contact_slip_total": 3,
+    "displacement": 3, "stress": 6, "von_mises": 1, "von_mises_signed": 1, "reaction": 3,
+    "contact_pressure": 1, "contact_slip": 3, "contact_slip_total": 3,
+    "temperature": 1, "heat_reaction": 1, "contact_wear": 1, "contact_damage": 1, "contact_fluid_pressure": 1,
+}  # fmt: skip
+# Captions of the point data of contact pairs, and the quantities that determine their units.
+CONTACT_FIELDS = {
+    "contact_pressure": ("contact pressure", "pressure"),
+    "contact_slip": ("slip of the step", "length"),
+    "contact_slip_total": ("total slip", "length"),
+    "contact_wear": ("depth of wear", "length"),
+    "contact_damage": ("damage", ""),
+    "contact_fluid_pressure": ("fluid pressure", "pressure"),
 }
-# Additional point data of models with heat conduction.
-HEAT_FIELDS = {"temperature": 1, "heat_reaction": 1}
+# Point data that only some models have: heat conduction, wear, cohesive layers or adhesion, and fluid pressures.
+OPTIONAL_FIELDS = ("temperature", "heat_reaction", "contact_wear", "contact_damage", "contact_fluid_pressure")
 # Optional columns of contact tables.
 OPTIONAL_COLUMNS = ("wear", "heat_flux", "damage", "fluid_pressure", "sliding_load")
 
@@ -215,44 +220,46 @@ def padded(values: Array, width: int) -> Array:
     return np.concatenate([values, np.zeros((len(values), width - values.shape[1]))], axis=1)
 
 
-def contact_pressure(mesh: Mesh, step: StepResult) -> Array:
-    """Return the contact pressure (n_points,) [pressure].
+def contact_fields(mesh: Mesh, step: StepResult, names: Iterable[str] = tuple(CONTACT_FIELDS)) -> dict[str, Array]:
+    """Return those of the contact fields `names` that a step has: scalars (n_points,) and vectors (n_points, dim).
 
-    It is zero outside the contact, and the largest pressure at a point that belongs to several pairs.
+    They are zero outside the contact. At a point that belongs to several pairs, they are the largest of the scalars that is
+    not negative, or the vector with the largest component.
     """
-    pressure = np.zeros(mesh.n_points)
-    for contact in step.contact.values():
-        np.maximum.at(pressure, contact.points, contact.pressure)
-    return pressure
+    fields = {}
+    for name in names:
+        columns = {pair: getattr(contact, name.removeprefix("contact_")) for pair, contact in step.contact.items()}
+        if name in OPTIONAL_FIELDS and all(values is None for values in columns.values()):
+            continue
+        fields[name] = field = np.zeros(_shape(mesh, POINT_FIELDS[name]))
+        for pair, values in columns.items():
+            if values is not None:
+                points = step.contact[pair].points
+                larger = ~(_size(values) < _size(field[points]))
+                field[points[larger]] = values[larger]
+    return fields
 
 
-def contact_slip(mesh: Mesh, step: StepResult, name: str) -> Array:
-    """Return the field `name`, ``"slip"`` or ``"slip_total"`` (n_points, dim) [length].
+def _size(values: Array) -> Array:
+    """Return scalars (n,) unchanged, and for vectors (n, dim) the magnitude of their largest component."""
+    return values if values.ndim == 1 else np.abs(values).max(axis=1)
 
-    At a point that belongs to several pairs it is the slip with the largest component. Outside the contact it is zero.
-    """
-    slip = np.zeros((mesh.n_points, mesh.dim))
-    for contact in step.contact.values():
-        values = getattr(contact, name)
-        larger = ~(np.abs(values).max(axis=1) < np.abs(slip[contact.points]).max(axis=1))
-        slip[contact.points[larger]] = values[larger]
-    return slip
+
+def _shape(mesh: Mesh, width: int) -> tuple[int, ...]:
+    """Return the shape of a nodal array whose point data have `width` components."""
+    return mesh.n_points, *{1: (), 3: (mesh.dim,), 6: (4 if mesh.dim == 2 else 6,)}[width]
 
 
 def step_shapes(mesh: Mesh) -> dict[str, tuple[int, ...]]:
     """Return the shape of each nodal array of a `StepResult`, by name."""
-    tails = {1: (), 3: (mesh.dim,), 6: (4 if mesh.dim == 2 else 6,)}  # type: dict[int, tuple[int, ...]]
-    widths = {**POINT_FIELDS, **HEAT_FIELDS}.items()
-    return {name: (mesh.n_points, *tails[width]) for name, width in widths if not name.startswith("contact_")}
+    return {name: _shape(mesh, width) for name, width in POINT_FIELDS.items() if name not in CONTACT_FIELDS}
 
 
 def point_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
     """Return the point data of a step by name, padded to the components of `POINT_FIELDS`."""
     values = {name: getattr(step, name) for name in step_shapes(mesh) if getattr(step, name) is not None}
-    values["contact_pressure"] = contact_pressure(mesh, step)
-    values |= {f"contact_{name}": contact_slip(mesh, step, name) for name in ("slip", "slip_total")}
-    widths = {**POINT_FIELDS, **HEAT_FIELDS}.items()
-    return {name: padded(values[name], width) for name, width in widths if name in values}
+    values |= contact_fields(mesh, step)
+    return {name: padded(values[name], width) for name, width in POINT_FIELDS.items() if name in values}
 
 
 def point_flags(mesh: Mesh) -> dict[str, Flags]:
@@ -299,7 +306,7 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
     """Raise FileError if an array of a step does not match the mesh, or a declared cell field is missing."""
     for name, shape in step_shapes(mesh).items():
         field = getattr(step, name)
-        if field is None and name in HEAT_FIELDS:
+        if field is None and name in OPTIONAL_FIELDS:
             continue
         if np.ma.isMaskedArray(field):
             raise FileError(f"step {step.index}: {name} is a masked array, which files cannot store: fill it first")

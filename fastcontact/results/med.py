@@ -12,11 +12,18 @@ from fastcontact.arrays import Array
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh.files.med import AXES, add_field, add_mesh, new_file
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.layout import contact_pressure, step_shapes
+from fastcontact.results.layout import contact_fields, step_shapes
 from fastcontact.results.step import StepResult
 
 # Index of each MED component in the order xx, yy, zz, xy, yz, xz of this package; in MED files xz precedes yz.
 STRESSES = {"SIXX": 0, "SIYY": 1, "SIZZ": 2, "SIXY": 3, "SIXZ": 5, "SIYZ": 4}
+# Names of MED fields with contact fields, and of their components.
+CONTACT = {
+    "contact_pressure": ("PRES_CONT", "PRES"),
+    "contact_wear": ("USUR_CONT", "USUR"),
+    "contact_damage": ("ENDO_CONT", "ENDO"),
+    "contact_fluid_pressure": ("PRES_FLUI", "PRES"),
+}
 
 
 @typed(FileError)
@@ -32,6 +39,8 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
     - REAC_NODA (DX, DY [, DZ]): reactions [force]. In axisymmetry they are integrated over the full circle, in code_aster
       over one radian.
     - PRES_CONT (PRES): contact pressure, zero at nodes outside the contact surfaces [pressure].
+    - USUR_CONT (USUR), ENDO_CONT (ENDO), PRES_FLUI (PRES), in models with wear, cohesive layers or adhesion, and fluid
+      pressures: depth of wear [length], damage [-] and fluid pressure [pressure], zero at the other nodes.
     - TEMP (TEMP), with heat conduction: temperature [temperature].
 
     Parameters
@@ -93,7 +102,7 @@ def _fields(mesh: Mesh, step: StepResult) -> dict[str, tuple[tuple[str, ...], Ar
         "SIEF_NOEU": (stresses, stress[:, [STRESSES[name] for name in stresses]]),
         "SIEQ_NOEU": (("VMIS", "VMIS_SG"), np.column_stack(equivalent)),
         "REAC_NODA": (directions, _checked(mesh, step, "reaction")),
-        "PRES_CONT": (("PRES",), contact_pressure(mesh, step)[:, None]),
+        **{CONTACT[k][0]: (CONTACT[k][1:], v[:, None]) for k, v in contact_fields(mesh, step, CONTACT).items()},
         **({"TEMP": (("TEMP",), _checked(mesh, step, "temperature")[:, None])} if heated else {}),
     }
 

@@ -310,10 +310,12 @@ class Results(StepSequence):
         """Return the fields of all steps as an ``xarray.Dataset``, which is held in memory.
 
         The dimensions are ``step``, ``point``, ``axis``, ``stress_component`` and ``contact``. The variables at the points
-        are ``displacement`` [length], ``stress``, ``von_mises``, ``von_mises_signed``, ``contact_pressure`` [pressure] and
-        ``reaction`` [force]; the variables of the pairs are ``contact_force`` [force] and ``contact_pressure_max``
-        [pressure]. The coordinates ``x``, ``y`` and, in 3D, ``z`` are the reference positions [length]. The attribute
-        ``units`` of a variable is the name of its unit, if known.
+        are ``displacement`` [length], ``stress``, ``von_mises``, ``von_mises_signed`` [pressure], ``reaction`` [force],
+        ``contact_pressure`` [pressure], ``contact_slip``, ``contact_slip_total`` [length] and, in models with wear, cohesive
+        layers or fluid pressures, ``contact_wear`` [length], ``contact_damage`` [-] or ``contact_fluid_pressure`` [pressure].
+        The variables of the pairs are ``contact_force`` [force] and ``contact_pressure_max`` [pressure]. The coordinates
+        ``x``, ``y`` and, in 3D, ``z`` are the reference positions [length]. The attribute ``units`` of a variable is the name
+        of its unit, if known.
 
         Raises
         ------
@@ -387,7 +389,7 @@ class Results(StepSequence):
     @property
     def point_field_names(self) -> list[str]:
         """Names of the point fields that the file contains for each step; earlier versions wrote fewer fields."""
-        return [name for name in (*layout.POINT_FIELDS, *layout.HEAT_FIELDS) if name in self._file["VTKHDF/PointData"]]
+        return [name for name in layout.POINT_FIELDS if name in self._file["VTKHDF/PointData"]]
 
     @property
     def cell_field_names(self) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import importlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -49,7 +49,8 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
         - ``radius``: distance from the middle of the contact, the magnitude of ``place`` [length];
         - ``pressure`` and ``multiplier`` [pressure];
         - ``force_x`` etc. [force], ``shear_x`` etc. [pressure], ``slip_x`` and ``slip_total_x`` etc. [length];
-        - ``heat_flux``, only with the option ``conductance`` [power / area];
+        - those of ``wear``, ``heat_flux``, ``damage``, ``fluid_pressure`` and ``sliding_load`` that the pair has, described
+          for `ContactResult`;
         - ``active`` and ``sticking``: booleans.
 
         With `step` there are also ``displacement_x`` etc. [length] and ``stress_xx`` etc., ``normal_stress``,
@@ -81,7 +82,7 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
         **_by_axis("shear_", contact.shear),
         **_by_axis("slip_", contact.slip),
         **_by_axis("slip_total_", contact.slip_total),
-        **({} if contact.heat_flux is None else {"heat_flux": contact.heat_flux}),
+        **{name: getattr(contact, name) for name in layout.optional_columns(contact)},
         "active": contact.active,
         "sticking": contact.sticking,
     }
@@ -359,23 +360,31 @@ def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> A
     pairs = list(dict.fromkeys(name for step in all_steps for name in step.contact))
     components = list(STRESS_COMPONENTS[: 4 if dim == 2 else 6])
 
-    def of_pairs(step: StepResult, name: str, missing: Any) -> list[Any]:
-        return [getattr(step.contact[pair], name) if pair in step.contact else missing for pair in pairs]
+    def of_pairs(name: str, missing: Any) -> list[Any]:
+        return [
+            [getattr(c[pair], name) if pair in c else missing for pair in pairs] for c in (s.contact for s in all_steps)
+        ]
 
-    fields: dict[str, tuple[tuple[str, ...], str, Callable[[StepResult], Any]]] = {
-        "displacement": (("point", "axis"), "length", lambda step: step.displacement),
-        "stress": (("point", "stress_component"), "pressure", lambda step: step.stress),
-        "von_mises": (("point",), "pressure", lambda step: step.von_mises),
-        "von_mises_signed": (("point",), "pressure", lambda step: step.von_mises_signed),
-        "reaction": (("point", "axis"), "force", lambda step: step.reaction),
-        "contact_pressure": (("point",), "pressure", lambda step: layout.contact_pressure(mesh, step)),
-        "contact_force": (("contact", "axis"), "force", lambda step: of_pairs(step, "force", np.full(dim, np.nan))),
-        "contact_pressure_max": (("contact",), "pressure", lambda step: of_pairs(step, "pressure_max", np.nan)),
+    fields: dict[str, tuple[tuple[str, ...], str]] = {
+        "displacement": (("point", "axis"), "length"),
+        "stress": (("point", "stress_component"), "pressure"),
+        "von_mises": (("point",), "pressure"),
+        "von_mises_signed": (("point",), "pressure"),
+        "reaction": (("point", "axis"), "force"),
     }
+    columns: dict[str, tuple[tuple[str, ...], str, list[Any]]]
+    columns = {name: (*kind, [getattr(step, name) for step in all_steps]) for name, kind in fields.items()}
+    of_contact = [layout.contact_fields(mesh, step) for step in all_steps]
+    for name, (_, quantity) in layout.CONTACT_FIELDS.items():
+        if all(name in contact for contact in of_contact):
+            dims: tuple[str, ...] = ("point",) if layout.POINT_FIELDS[name] == 1 else ("point", "axis")
+            columns[name] = dims, quantity, [contact[name] for contact in of_contact]
+    columns["contact_force"] = ("contact", "axis"), "force", of_pairs("force", np.full(dim, np.nan))
+    columns["contact_pressure_max"] = ("contact",), "pressure", of_pairs("pressure_max", np.nan)
     sizes = {"point": mesh.n_points, "axis": dim, "stress_component": len(components), "contact": len(pairs)}
     data = {}
-    for name, (dims, quantity, of_step) in fields.items():
-        values = np.array([of_step(step) for step in all_steps], np.float64)
+    for name, (dims, quantity, of_steps) in columns.items():
+        values = np.array(of_steps, np.float64)
         values = values.reshape(len(all_steps), *(sizes[name_of_dim] for name_of_dim in dims))
         data[name] = (("step", *dims), values, _unit(units, quantity))
     coordinates = {

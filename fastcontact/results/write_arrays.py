@@ -25,11 +25,11 @@ SHARED = 4096
 
 
 def write_geometry(
-    file: Any, mesh: Mesh, growing: Sequence[str] = (), material: AnyArray | None = None, heat: bool = False
+    file: Any, mesh: Mesh, growing: Sequence[str] = (), material: AnyArray | None = None, optional: Sequence[str] = ()
 ) -> None:
     """Write the group /VTKHDF with the solid cells, the constant arrays and empty tables for the steps.
 
-    `growing` are the names of the cell fields of steps. With `heat`, steps have the `layout.HEAT_FIELDS`. `material`
+    `growing` are the names of the cell fields of steps, and `optional` those of their `layout.OPTIONAL_FIELDS`. `material`
     (n_solids,) contains the material number of each cell of a model with material interfaces, whose steps also have the
     `layout.MATERIAL_FIELDS`.
     """
@@ -45,10 +45,9 @@ def write_geometry(
     _packed(root, "Offsets", cells.offsets)
     _packed(root, "Types", cells.types)
     point_data, cell_data = root.create_group("PointData"), root.create_group("CellData")
-    widths = layout.POINT_FIELDS | (layout.HEAT_FIELDS if heat else {})
-    names = tuple(widths)
-    for name, width in widths.items():
-        _growing_field(point_data, name, mesh.n_points, width)
+    names = [name for name in layout.POINT_FIELDS if name in optional or name not in layout.OPTIONAL_FIELDS]
+    for name in names:
+        _growing_field(point_data, name, mesh.n_points, layout.POINT_FIELDS[name])
     point_flags, cell_fields = layout.point_flags(mesh), layout.cell_fields(mesh)
     for name, values in point_flags.items():
         _packed(point_data, name, values)

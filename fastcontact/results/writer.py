@@ -118,7 +118,7 @@ class ResultWriter:
         background: bool = False,
     ) -> None:
         self._material: Any = None
-        self._heat, self._units = bool(getattr(mesh, "conducts", False)), dict(getattr(mesh, "units", {}))
+        self._point_fields, self._units = getattr(mesh, "point_fields", ()), dict(getattr(mesh, "units", {}))
         cell_fields = dict.fromkeys((*getattr(mesh, "cell_fields", ()), *cell_fields))
         if not isinstance(mesh, Mesh):
             if not isinstance(getattr(mesh, "mesh", None), Mesh) or not hasattr(mesh, "kinematics"):
@@ -387,7 +387,7 @@ class ResultWriter:
                 size = write_arrays.header_size(self._mesh) + len(case_text) + MARGIN
                 reserve(probe.fileno(), temporary.parent, 0, size)
             with new_hdf5(temporary) as file:
-                write_arrays.write_geometry(file, self._mesh, self._cell_fields, self._material, self._heat)
+                write_arrays.write_geometry(file, self._mesh, self._cell_fields, self._material, self._point_fields)
                 write_arrays.write_case(file, self._mesh, kinematics, case_text, self._units)
         # The file was closed, because Windows does not rename open files. `_open` sets no lock, so that viewers can read it.
         self._open()

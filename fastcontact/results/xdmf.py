@@ -94,7 +94,7 @@ def _constant(reference: str, center: str, group: str, arrays: Mapping[str, AnyA
 def _field(address: str, n_points: int, number: int, n_steps: int) -> Iterator[str]:
     """Yield the attributes of a point field in one step, which occupies a part of the data set for all steps."""
     name = address.rpartition("/")[2]
-    width = {**layout.POINT_FIELDS, **layout.HEAT_FIELDS}[name]
+    width = layout.POINT_FIELDS[name]
     columns = [(name, 0, width)]  # label, first column and number of columns of each attribute
     if name == "stress":  # XDMF orders tensor components differently from VTK
         columns = [(f"stress_{component}", column, 1) for column, component in enumerate(STRESS_COMPONENTS)]

@@ -158,6 +158,18 @@ class ModelHeat(ModelBase):
         return (*super().cell_fields, *(HEAT_FLUX[: self.mesh.dim] if self.conducts else ()))
 
     @property
+    def point_fields(self) -> list[str]:
+        """Names of the point data of result files that only some models have."""
+        options = {option for pair in self.contact for option in pair.options}
+        present = {
+            **dict.fromkeys(("temperature", "heat_reaction"), self.conducts),
+            "contact_wear": "wear" in options,
+            "contact_damage": bool({"cohesion", "adhesion"} & options),
+            "contact_fluid_pressure": any(pair.fluid is not None for pair in self.contact),
+        }
+        return [name for name, has in present.items() if has]
+
+    @property
     def expands(self) -> bool:
         """Whether a material has a coefficient of thermal expansion."""
         return any(material.expansion is not None for material, _ in self.materials)

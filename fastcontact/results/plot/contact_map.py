@@ -1,4 +1,4 @@
-"""Maps of pressure, shear traction and slip on a contact surface in 3D."""
+"""Maps of pressure, shear traction, slip and other quantities on a contact surface in 3D."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
+from fastcontact.results.layout import CONTACT_FIELDS
 from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, new_panels, units_of
 from fastcontact.results.plot.patches import fill
 from fastcontact.results.plot.solid import seen_along
@@ -28,8 +29,7 @@ LEAST_MEAN = 0.3
 # Captions and quantities, which determine units, of the fields that can be plotted next to the pressure.
 BESIDE = {
     "shear": ("shear traction", "pressure"),
-    "slip": ("slip of the step", "length"),
-    "slip_total": ("total slip", "length"),
+    **{name.removeprefix("contact_"): texts for name, texts in CONTACT_FIELDS.items() if name != "contact_pressure"},
 }
 
 
@@ -44,7 +44,7 @@ def contact_map(
     units: Units = UNKNOWN,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
-    """Plot the pressure on the secondary surface of a contact pair in 3D and, with friction, the shear traction or the slip.
+    """Plot the pressure on the secondary surface of a contact pair in 3D and another quantity, by default shear.
 
     The surface is plotted in the reference configuration, projected along its mean normal. Dots mark closed nodes. In the
     map of shear traction or slip, the dots of sliding nodes are orange and arrows show the direction.
@@ -57,7 +57,7 @@ def contact_map(
         Result of a contact pair.
     everything : bool
         Whether to plot the entire surface instead of the closed part and its surroundings.
-    beside : {"shear", "slip", "slip_total"}
+    beside : {"shear", "slip", "slip_total", "wear", "damage", "fluid_pressure"}
         Quantity that is plotted next to the pressure; see `ContactResult`.
     title, units
         Described for `pressure_profile`.
@@ -95,9 +95,10 @@ def contact_map(
     if labels is None:
         flat -= contact.middle @ basis.T
         labels = ("across the contact", "up the contact")
-    check_known("field beside the pressure", beside, BESIDE, FastcontactError)
-    caption, quantity, vectors = *BESIDE[beside], getattr(contact, beside)
-    size = np.linalg.norm(vectors, axis=1)
+    known = [name for name in BESIDE if getattr(contact, name) is not None]
+    check_known("field beside the pressure", beside, known, FastcontactError)
+    caption, quantity, beside_values = *BESIDE[beside], getattr(contact, beside)
+    size = np.linalg.norm(beside_values.reshape(len(flat), -1), axis=1)
     two_maps = bool(size.max(initial=0.0) > (1e-9 * contact.pressure_max if beside == "shear" else 0.0) >= 0.0)
     panels = _panels(axes, two_maps)
     fields = [(contact.pressure, "contact pressure", "pressure"), (size, caption, quantity)]
@@ -110,9 +111,9 @@ def contact_map(
         _mark_nodes(ax, flat, contact, two_maps)
         ax.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"), aspect="equal")
         ax.set_title(f"{caption}\nlargest {valued(float(values.max(initial=0.0)), units, quantity)}", fontsize="medium")
-    if two_maps:
+    if two_maps and beside_values.ndim == 2:
         large = size > 0.1 * size.max()  # the direction of small vectors is not shown
-        panels[1].quiver(*flat[large].T, *(vectors @ basis.T)[large].T, color="white", width=0.004, pivot="tail")
+        panels[1].quiver(*flat[large].T, *(beside_values @ basis.T)[large].T, color="white", width=0.004, pivot="tail")
     if axes is None:
         panels[0].figure.set_figheight(1.6 + 3.0 * high)
     panels[0].figure.suptitle(title or f"Contact '{contact.name}'", fontsize="large")

@@ -12,7 +12,7 @@ from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity.recovery import principal_stress, tresca, von_mises, von_mises_signed
 from fastcontact.errors import FastcontactError, check_known
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.layout import cells_by_element, contact_slip, separated
+from fastcontact.results.layout import CONTACT_FIELDS, cells_by_element, contact_fields, separated
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import AXES, STRESS_COMPONENTS
 from fastcontact.results.units import valued
@@ -76,7 +76,8 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     """Return a field of a step by its name. Raises FastcontactError if there is no field with this name."""
     fluxes = [flux for key, flux in step.cell_fields.items() if key.startswith("heat_flux_")]
     heat = [*["temperature"] * (step.temperature is not None), *["heat_flux"] * bool(fluxes)]
-    check_known("field", name, [*names(mesh), *step.cell_fields, *heat], FastcontactError)
+    contact = contact_fields(mesh, step)
+    check_known("field", name, [*names(mesh), *contact, *step.cell_fields, *heat], FastcontactError)
     if name in OF_STRESS and name not in step.cell_fields:
         separate_mesh, node, stress = separated(mesh, step)
         caption, of_stress = OF_STRESS[name]
@@ -87,9 +88,9 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
         caption, quantity = name.replace(".", " along "), "" if "parameter" in step.iterations else "length"
         axis = AXES.index(name[-1]) if "." in name else None
         values = np.linalg.norm(step.displacement, axis=1) if axis is None else step.displacement[:, axis]
-    elif name in SLIPS:
-        caption, quantity = SLIPS[name], "length"
-        values = np.linalg.norm(contact_slip(mesh, step, name.removeprefix("contact_")), axis=1)
+    elif name in contact:
+        caption, quantity = CONTACT_FIELDS[name]
+        values = np.linalg.norm(contact[name].reshape(mesh.n_points, -1), axis=1)
     elif name == "temperature" and step.temperature is not None:
         values = step.temperature
     elif name == "heat_flux":
@@ -100,9 +101,9 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
 
 
 def names(mesh: Mesh) -> list[str]:
-    """Return the names of the fields that each step on a mesh has."""
+    """Return the names of the fields of bodies that each step on a mesh has."""
     missing = ("stress.yz", "stress.xz", "displacement.z") if mesh.dim == 2 else ()
-    return [name for name in (*OF_STRESS, *DISPLACEMENTS, *SLIPS) if name not in missing]
+    return [name for name in (*OF_STRESS, *DISPLACEMENTS) if name not in missing]
 
 
 def _nodal_mean(mesh: Mesh, values: Array) -> Array:
@@ -134,5 +135,4 @@ CELLS = {
     "J": "volume over reference volume",
     "logarithmic_strain": "principal logarithmic strain",
 }
-SLIPS = {"contact_slip": "slip of the step", "contact_slip_total": "total slip"}
 DISPLACEMENTS = ("displacement", "displacement.x", "displacement.y", "displacement.z")

@@ -1,5 +1,6 @@
 """Results for PyVista, pandas and xarray, units in all outputs, and stress at material interfaces."""
 
+import importlib.util
 import json
 import sys
 
@@ -89,6 +90,69 @@ def test_xarray_gets_the_fields_of_all_steps(results):
     np.testing.assert_array_equal(data["x"], results.mesh.points[:, 0])
     assert data["displacement"].attrs["units"] == "mm"
     assert data["stress"].attrs["units"] == "MPa"
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    ("name", "med", "caption"),
+    [
+        ("damage", "ENDO_CONT", "damage"),
+        ("fluid_pressure", "PRES_FLUI", "fluid pressure [MPa]"),
+        ("wear", "USUR_CONT", "depth of wear [mm]"),
+    ],
+)
+def test_fields_of_special_contacts_are_in_every_export(name, med, caption, tmp_path):
+    model = fc.Model(fc.generate.block_on_block(), "plane_strain", units="mm, N, MPa")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    model.fix("LOWER_BOTTOM", "xy")
+    sides = {"secondary": "CONT_UPPER", "primary": "CONT_LOWER"}
+    if name == "damage":
+        model.prescribe("UPPER_TOP", x=0.0, y=0.1)
+        model.add_contact("joint", **sides, cohesion={"strength": 10.0, "energy": 0.2})
+    elif name == "wear":
+        model.prescribe("UPPER_TOP", x=0.1, y=-0.01)
+        model.add_contact("joint", **sides, friction=0.1, wear=1e-4)
+    else:
+        model.prescribe("UPPER_TOP", x=0.0, y=-0.01)
+        model.add_contact("joint", **sides)
+        model.add_fluid_pressure("joint", 50.0, source="UPPER_BOTTOM_LEFT", ramp=[(0, 0), (1, 0), (3, 2)])
+    path, field = tmp_path / "joint.vtkhdf", f"contact_{name}"
+    with fc.ResultWriter(path, model) as out:
+        fc.solve(model, [1.0, 2.0], on_step=out.write)
+    with fc.open_results(path) as results:
+        steps = list(results)
+        contact = steps[-1].contact["joint"]
+        expected = np.zeros(model.mesh.n_points)
+        expected[contact.points] = getattr(contact, name)
+        assert expected.any()
+        table = fc.contact_table(contact)
+        assert dict(zip(table["point"], table[name])) == dict(zip(contact.points, getattr(contact, name)))
+        np.testing.assert_array_equal(layout.contact_fields(model.mesh, steps[-1])[field], expected)
+        if importlib.util.find_spec("pandas"):
+            frame = results.to_pandas()
+            np.testing.assert_array_equal(frame[frame["step"] == 2][name], table[name])
+        if importlib.util.find_spec("pyvista"):
+            np.testing.assert_array_equal(results.to_pyvista(-1).point_data[field], expected)
+        if importlib.util.find_spec("xarray"):
+            np.testing.assert_array_equal(results.to_xarray()[field][-1], expected)
+    with h5py.File(path) as file:
+        stored = file[f"VTKHDF/PointData/{field}"][()].reshape(2, -1)
+        assert file[f"VTKHDF/Steps/PointDataOffsets/{field}"][()].tolist() == [0, model.mesh.n_points]
+    np.testing.assert_array_equal(stored[-1], expected)
+    assert main(["export", str(path), "--med", str(tmp_path / "j.med"), "--xdmf", str(tmp_path / "j.xdmf"), "-q"]) == 0
+    np.testing.assert_array_equal(fc.read_med_field(tmp_path / "j.med", med)[1][:, :, 0], stored)
+    assert f'Name="{field}"' in (tmp_path / "j.xdmf").read_text()
+    assert main(["plot", str(path), "--png", str(tmp_path / "j.png"), "--field", field, "-q"]) == 0
+    axes = fc.plot.deformed_shape(model.mesh, steps[-1], field=field, units=model.units)
+    assert caption in [other.get_ylabel() for other in axes.figure.axes]
+    with h5py.File(path, "r+") as file:  # as earlier versions wrote it
+        del file[f"VTKHDF/PointData/{field}"], file[f"VTKHDF/Steps/PointDataOffsets/{field}"]
+    with fc.ResultWriter(path, model, resume=True) as out:
+        fc.solve(model, [1.0, 2.0, 3.0], on_step=out.write, resume=out.done)
+    with fc.open_results(path) as results:
+        assert field not in results.point_field_names
+        np.testing.assert_array_equal(getattr(results[1].contact["joint"], name), getattr(contact, name))
+        assert getattr(results[2].contact["joint"], name).any()
 
 
 @pytest.mark.parametrize(
