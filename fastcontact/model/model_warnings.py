@@ -82,11 +82,11 @@ def _split_sides(model: Model, pairs: Pairs) -> Iterator[str]:
 def _different_ends(model: Model) -> Iterator[str]:
     """Yield a warning for each contact with nodes at one end of a sector that coincide with no node of the other end."""
     for (name, nodes), pair in itertools.product(model.interpolated.items(), model.contact):
-        count = len(np.intersect1d(nodes, model.mesh.points_of(pair.secondary)))
-        if count:
+        n = len(np.intersect1d(nodes, model.mesh.points_of(pair.secondary)))
+        if n:
             yield (
-                f"{count} nodes of contact '{pair.name}' at the ends of {name} coincide with no node of the other end: "
-                "pressures near them may be wrong by as much as their mean. Use equal meshes where contact meets the ends"
+                f"at the ends of {name}, {n} node{'s' * (n > 1)} of contact '{pair.name}' have no counterpart at the other "
+                "end: pressures near them may be wrong by as much as their mean. Use equal meshes where contact ends"
             )
 
 

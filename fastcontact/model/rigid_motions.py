@@ -377,12 +377,13 @@ def needed_friction(
         stop = _farthest(rows @ motions.displacement, gap0 + rows @ u, work, size)
         return np.where(np.abs(stop) > 0.99 * FAR, stop, 0.0)
 
-    if not slide(low).any() or slide(high).any():
+    sliding = slide(low)
+    if not sliding.any() or slide(high).any():
         return None
     while high > 1.001 * low:
         middle = float(np.sqrt(low * high))
         low, high = (middle, high) if slide(middle).any() else (low, middle)
-    return high / inscribed, list(motions.combined(slide(low)[:, None]).by_body())
+    return high / inscribed, list(motions.combined(sliding[:, None]).by_body())
 
 
 def _extreme(along: Array, gaps: Array, gap: Array, held: Array, bound: float) -> Array:

@@ -175,7 +175,8 @@ def combinations(
         return tuple(_checked_combination(element, settings.case_combination.formulation) for element in selected)
     if settings.pair is None:
         raise CaseError("this case has no contact pair, so there are no formulations to compare")
-    compared = list(FORMULATIONS) if list(formulations) == ["all"] else formulations
+    formulations = list(formulations)
+    compared = list(FORMULATIONS) if formulations == ["all"] else formulations
     return tuple(_checked_combination(element, formulation) for element in selected for formulation in compared)
 
 
@@ -318,8 +319,7 @@ def _refined_arguments(settings: Settings, element: str, level_0: Mapping[str, A
             "halve = [...] or double = [...]"
         )
     arguments = {**rule.defaults, **level_0, **({"element": element} if "element" in signature else {})}
-    for key in (*halve, *double):
-        factor = 0.5**level if key in halve else 2**level
+    for key, factor in [(key, 0.5**level) for key in halve] + [(key, 2**level) for key in double]:
         value = arguments.get(key, signature[key].default if key in signature else None)
         if value is not None:
             is_sequence = isinstance(value, (list, tuple))

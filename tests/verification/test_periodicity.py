@@ -385,8 +385,9 @@ def two_bodies(dim, elements, ends, wind, seed=None):
 @pytest.mark.filterwarnings("ignore:.*across its radius", "ignore:.*facets", "ignore:.*stiff", "ignore:.*oscillate")
 @pytest.mark.parametrize(
     ("dim", "elements", "wind", "seed", "ends", "swapped", "options"),
-    first_of(3, [
+    first_of(4, [
         (2, ("quad4", "quad4"), 0.0, None, 0.5, False, {}),
+        (2, ("quad8", "quad8"), 0.0, None, 0.0, False, {}),
         (3, ("hex8", "tet4"), 0.0, 2, 0.0, True, {"friction": 0.1}),
         (3, ("hex8", "hex8"), 0.0, 2, 0.5, False, {}),
         (2, ("quad4", "tri6"), 0.3, 1, 0.0, True, {"friction": 0.1}),
@@ -424,9 +425,7 @@ def test_contact_nodes_at_one_end_alone_are_told():
     for group, axis in (("IN_I", "y"), ("OUT_O", "y"), ("IN_ZMIN", "z"), ("OUT_ZMIN", "z")):
         model.fix(group, axis, **({"axes": fc.CylindricalAxes()} if axis == "y" else {}))
     model.add_contact("fit", secondary="IN_O", primary="OUT_I", clearance=-0.05)
-    with pytest.warns(
-        fc.FastcontactWarning, match="2 nodes of contact 'fit' at the ends of the cyclic symmetry of 'F' and"
-    ):
+    with pytest.warns(fc.FastcontactWarning, match="cyclic symmetry of 'F' and 'S', 2 nodes of contact 'fit' have no"):
         fc.solve(model, 1)
 
 

@@ -99,3 +99,25 @@ def test_a_pair_that_shares_no_nodes_keeps_its_pressures(formulation):
     assert 0.2 < side.pressure_max < 20.0
     assert side.force_vectors.sum(axis=0) == pytest.approx(side.force, rel=1e-12)
     assert -side.force[1] == pytest.approx(0.26, rel=0.2)
+
+
+@pytest.mark.each_value
+@pytest.mark.parametrize("element", ["hex8", "tet4"])
+@pytest.mark.parametrize("penalty", [None, 1e5])
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+def test_two_pairs_are_what_one_of_both_is(solver, penalty, element, caplog):
+    options = {"element": element} | ({} if penalty is None else {"penalty": penalty})
+    one = solved(pressed(1, **options), solver)
+    with caplog.at_level(logging.INFO, "fastcontact"):
+        two = solved(pressed(2, **options), solver)
+    assert not any("are linearly dependent" in record.message for record in caplog.records)  # columns of the inverse
+    size = np.abs(together(one)).max()
+    assert together(two) == pytest.approx(together(one), abs=1e-7 * size)
+    left, right = two.contact["LEFT"], two.contact["RIGHT"]
+    common, mine, theirs = np.intersect1d(left.points, right.points, return_indices=True)
+    assert len(common) == 5
+    for name in ("pressure", "gap"):
+        values = getattr(left, name)
+        assert getattr(right, name)[theirs] == pytest.approx(values[mine], abs=1e-7 * max(np.abs(values).max(), 1e-3))
+    assert (left.active[mine] == right.active[theirs]).all()
+    assert left.active[mine].any()

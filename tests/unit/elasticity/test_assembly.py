@@ -6,10 +6,10 @@ from models import elastic_model
 
 import fastcontact as fc
 from fastcontact import recovery
-from fastcontact.elasticity.stiffness import sparsity, stiffness
+from fastcontact.elasticity.stiffness import rigid_modes, sparsity, stiffness
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate.box import box
-from fastcontact.mesh.topology import corner_measures, outer_facets
+from fastcontact.mesh.topology import corner_measures, oriented, outer_facets
 
 pytestmark = pytest.mark.pairwise
 
@@ -318,3 +318,54 @@ def test_six_rigid_motions_are_counted_and_named():
         model.check()
     model.fix("XMIN", "z")
     model.check()
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_cells_turned_inside_out_are_turned_back(name):
+    mesh = MESHES[name]()
+    K, cells, random, n_turned = assembled(mesh), {}, np.random.default_rng(5), 0
+    for kind, block in mesh.solids.items():
+        turned = random.random(len(block)) < 0.5
+        turned[0] = True
+        cells[kind] = np.where(turned[:, None], block[:, elements.get(kind).reversed], block)
+        n_turned += turned.sum()
+    inside_out = mesh.replace(cells={**mesh.cells, **cells})
+    assert sum((corner_measures(inside_out, kind) < 0).sum() for kind in cells) == n_turned
+    with pytest.raises(fc.MeshError, match=r"inverted"):
+        fc.Model(inside_out, "3d")
+    with pytest.raises(fc.MeshError, match=r"cell 0 of"):
+        assembled(inside_out)
+    back, count = oriented(inside_out)
+    assert count == n_turned
+    assert np.array_equal(assembled(back).toarray(), K.toarray())
+    assert oriented(back) == (back, 0)
+
+
+def test_rigid_body_motion_needs_no_force_and_gives_no_stress(body):
+    kinematics, mesh = body
+    K, modes = assembled(mesh, kinematics), rigid_modes(mesh.points, kinematics)
+    assert np.linalg.matrix_rank(modes) == {"3d": 6, "axisymmetric": 1}.get(kinematics, 3)
+    for mode in modes.T:
+        assert np.abs(K @ mode).max() < 1e-10 * np.abs(K.data).max()
+        at_points = stress_at_points(kinematics, mesh, mode.reshape(-1, mesh.dim))
+        assert np.abs(recovery.nodal_average(mesh, at_points)).max() < 1e-10 * E
+
+
+@pytest.mark.parametrize("element", QUADRATIC)
+def test_cantilever_against_timoshenko(element):
+    length, tip = 10.0, 0.01
+    model = elastic_model(box((length, 1.0, 1.0), (10, 2, 2), element), "3d", E=E, nu=0.0, XMIN="xyz", XMAX={"z": tip})
+    (step,) = fc.solve(model, fc.linear_ramp(1))
+    # Bending and shear; shear coefficient of a rectangle 10 (1 + nu) / (12 + 11 nu) (Cowper, 1966).
+    compliance = length**3 / (3 * E / 12) + length / (5 / 6 * E / 2)
+    force = step.reaction[model.mesh.points_of("XMAX")].sum(axis=0)
+    assert force[2] == pytest.approx(tip / compliance, rel=4e-3)
+    assert force[:2] == pytest.approx([0.0, 0.0], abs=1e-9)
+    middle = np.isclose(model.mesh.points[:, 0], 5.0)
+    bending = -6 * 2 * (model.mesh.points[middle, 2] - 0.5) * force[2] * (length - 5.0)
+    assert np.abs(step.stress[middle, 0] - bending).max() < 0.03 * np.abs(bending).max()
+
+
+def test_assembly_gives_the_same_bits_each_time():
+    mesh = patch("hex20")
+    assert np.array_equal(assembled(mesh).data, assembled(mesh).data)

@@ -7,6 +7,7 @@ from scipy.sparse import block_diag, bsr_array, csc_array, csr_array, diags_arra
 
 from fastcontact.errors import ModelError
 from fastcontact.linear.cholesky import elimination_tree_kernels, factorisation, triangular_kernels
+from fastcontact.linear.cholesky import factorisation_kernels as kernels
 
 pytestmark = pytest.mark.pairwise
 
@@ -162,3 +163,18 @@ def test_factors_have_the_same_bits_again():
 def test_what_is_not_positive_definite_is_refused(matrix, message):
     with pytest.raises(ModelError, match=message):
         factors(bsr_array(np.array(matrix), blocksize=(1, 1)), np.array([1]))
+
+
+@pytest.mark.parametrize("size", [1, 2, 47, 48, 49, 130])
+@pytest.mark.parametrize("share", [0.3, 1.0])
+def test_fronts_are_eliminated_as_by_hand(size, share):
+    A = positive(size, 1.0, size).toarray()
+    width = max(1, int(share * size))
+    F, expected = np.triu(A), A.copy()
+    for j in range(width):
+        row = expected[j, j + 1 :] / expected[j, j]
+        expected[j + 1 :, j + 1 :] -= np.outer(row, expected[j, j + 1 :])
+        expected[j, j + 1 :] = row
+    room = (np.empty(count * size) for count in (kernels.PANEL, kernels.PANEL, 2 * kernels.PANEL))
+    assert kernels._eliminated(F, width, *room) == -1
+    np.testing.assert_allclose(np.triu(F), np.triu(expected), atol=1e-13 * np.abs(A).max())

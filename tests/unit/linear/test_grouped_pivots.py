@@ -345,3 +345,10 @@ def test_a_full_compliance_that_would_take_hours_is_refused_with_the_alternative
     expected = r"full compliance of \d+ constraints, .*GB .*formulation=\"mortar\" with multipliers=\"dual\""
     with pytest.raises(fc.ContactError, match=expected):
         solved(model, solver)
+
+
+def test_one_layer_is_a_diagonal():
+    B = np.array([[2.0, 0.0, 1.0], [0.0, -4.0, 1.0]])
+    pivots, inverse = chosen(csr_array(B))
+    assert pivots.tolist() == [0, 1]
+    assert inverse.matrix.toarray().tolist() == [[0.5, 0.0], [0.0, -0.25]]

@@ -17,6 +17,7 @@ from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.errors import ModelError
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.krylov import krylov_kernels
+from fastcontact.linear.krylov.iterations import ConjugateGradients
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid import matrix as matrices
 from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierarchy
@@ -480,3 +481,44 @@ def test_a_bound_that_is_too_low_is_noticed_and_raised(caplog):
         u = solver.load(f).full_solution(np.zeros(len(f)))
     K = problem((12, 11, 10))[0]
     assert np.abs(K @ u - f).max() < 1e-8 * np.abs(f).max()
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+def test_eliminated_equations_hold_for_any_unknowns(coupled):
+    rng = np.random.default_rng(7)
+    B = rng.normal(size=(5, 20)) * (rng.random((5, 20)) < 0.6)
+    if not coupled:
+        B[:, :5] = np.diag([2.0, -3.0, 4.0, 5.0, -6.0])
+    c, kept = rng.normal(size=5), csr_array(B)
+    elimination = eliminate(kept, c)
+    assert np.array_equal(kept.toarray(), B)  # untouched
+    u = rng.normal(size=20)
+    elimination.complete(u, elimination.offset)
+    assert B @ u == pytest.approx(c, abs=1e-12)
+    multiplier = rng.normal(size=5)
+    assert elimination.multiplier((B.T @ multiplier)[elimination.pivots]) == pytest.approx(multiplier)
+    # Forces at the pivots are moved so that they do the same work.
+    force, motion = rng.normal(size=20), rng.normal(size=20)
+    elimination.complete(motion)
+    work = force @ motion
+    elimination.move_forces(force)
+    assert force @ motion == pytest.approx(work)
+    assert not force[elimination.pivots].any()
+    assert not np.isin(elimination.pivots, elimination.weights.indices).any()
+    if not coupled:
+        assert elimination.pivots.tolist() == [0, 1, 2, 3, 4]
+
+
+def test_conjugate_gradients_finish_on_a_small_matrix():
+    rng = np.random.default_rng(9)
+    half = rng.normal(size=(8, 8))
+    A = half @ half.T + np.eye(8)
+    b = rng.normal(size=8)
+    cg = ConjugateGradients(8)
+    cg.r[:] = b
+    cg.start()
+    diagonal = np.diag(A)
+    for _ in range(8):
+        assert cg.step(lambda p, q: np.matmul(A, p, out=q), lambda r, norm, z: np.divide(r, diagonal, out=z))
+    assert A @ cg.x == pytest.approx(b, abs=1e-8)
+    assert cg.norm < 1e-8

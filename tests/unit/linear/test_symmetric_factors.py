@@ -13,9 +13,10 @@ from fastcontact.elasticity.constrained_system import supports_apart
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.linear import choice as linear
 from fastcontact.linear.cholesky import symmetric_factors, triangular_kernels
-from fastcontact.linear.cholesky.factorisation import fill_reducing
+from fastcontact.linear.cholesky.factorisation import fill_reducing, reordered
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.factor_solver import KnownLoads
+from fastcontact.linear.multigrid.hierarchy import by_columns, transposed
 from fastcontact.linear.multigrid.local_change import SymmetricChange
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.sparse_rows import scaled, taken
@@ -327,3 +328,20 @@ def test_rows_scaled_and_taken():
     assert np.array_equal(R.toarray(), kept)
     assert taken(R, np.arange(9)) is R
     assert np.array_equal(taken(R, np.array([1, 4])).toarray(), kept[[1, 4]])
+
+
+@pytest.mark.parametrize(("size", "width"), [(3, 6), (2, 3), (6, 6)])
+def test_products_with_the_transpose_of_a_prolongator(size, width):
+    rng = np.random.default_rng(width)
+    P, dense = prolongator(size, width, rng)
+    x, y = rng.normal(size=N_NODES * size).astype(np.float32), np.full(N_COARSE * width, np.nan, np.float32)
+    transposed(P, by_columns(P, N_COARSE)).multiply(x, y)
+    bound = np.finfo(np.float32).eps * N_NODES * (np.abs(dense.T) @ np.abs(x))
+    assert (np.abs(y - dense.T @ x) <= bound).all()
+
+
+def test_a_symmetric_matrix_is_reordered_by_rows_and_columns():
+    K, top = supported()
+    order = fill_reducing(K, top)
+    found = reordered(K, order)
+    np.testing.assert_array_equal(found.toarray(), K.toarray()[np.ix_(order, order)])
