@@ -83,13 +83,13 @@ class ContactResultants:
         Moment of the contact forces about the middle of the contact, see `contact_moment`; zero in axisymmetry
         [force times length].
     area : float
-        Contact area: sum of the tributary areas of the closed nodes, in finite strain on the deformed facets; in the
-        plane a length times unit thickness, in axisymmetry over the full circle [length^2]. Accurate to a row of
-        facets at the edge, mostly too large: by 6 to 18 % in 3D with 9 to 4 facets across the radius. Mortar contact between
-        bodies leaves out the parts of facets without an opposite side.
+        Contact area: sum of the tributary areas of the closed nodes, in finite strain on the deformed facets; in 2D
+        a length times unit thickness, in axisymmetry over the full circle [length^2]. Its error is up to one row of facets
+        along the edge, and it is usually too large: in 3D by 6 % with 9 facets across the radius, and by 18 % with 4.
+        Mortar contact between bodies leaves out the parts of facets without an opposite side.
     centre : ndarray (dim,)
-        Centre of pressure of the normal forces; NaN without contact [length]. In axisymmetry it lies on the axis, and its
-        radial component is NaN.
+        Centre of pressure of the normal forces; NaN without contact [length]. In axisymmetry its radial component is NaN,
+        since the resultant acts along the axis.
     mean_gap : float
         Mean gap over the area that faces the other side [length]; NaN if there is none.
     pressure_mean, pressure_max : float
@@ -348,7 +348,9 @@ def _result_of_pair(pair: Formulation, step: StepResult, name: str) -> ContactRe
     """Return the result of a contact pair in a step; ContactError if the step belongs to another model."""
     contact, sizes = step.contact.get(name), (len(pair.points), len(pair.secondary.points))
     if contact is None or (len(step.displacement), len(contact.points)) != sizes:
-        raise ContactError(f"load step {step.index} is of another model: it has no contact pair '{name}' on this mesh")
+        raise ContactError(
+            f"load step {step.index} belongs to another model: it has no contact pair '{name}' on this mesh"
+        )
     return contact
 
 
@@ -382,7 +384,7 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     Raises
     ------
     ModelError
-        If the step is of another model.
+        If the step belongs to another model.
 
     Examples
     --------
@@ -448,7 +450,7 @@ def spring_forces(model: Model, step: StepResult) -> dict[str, Array]:
     Raises
     ------
     ModelError
-        If the step is of another model.
+        If the step belongs to another model.
 
     Examples
     --------

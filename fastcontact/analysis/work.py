@@ -1,11 +1,13 @@
-"""Energy balance of a load step: strain energy, external work, frictional work, energy of penalties, and imbalance.
+"""Energy balance of a load step: strain energy, external work, frictional work, penalty energy, and imbalance.
 
 The work of a force in a step is integrated by the trapezoidal rule: it is the mean of the forces at the beginning and at
-the end, multiplied by the displacement. There are two exceptions. A normal force does no work on a gap that is open at one
-of the ends. Sliding friction has its limit traction during the complete step, whatever it was at the beginning.
+the end, multiplied by the displacement. There are two exceptions. A normal force does no work on a gap that is open at the
+beginning or the end of the step. Sliding friction has its limit traction during the complete step, whatever it was at the
+beginning.
 
-The external work is the sum of the strain energy, these works, and the imbalance. The imbalance is the work of contact
-forces at constraints that stay closed or stick. It is an error of long steps, in which normals rotate.
+The external work is the sum of the strain energy, the plastic and frictional work, the energies of penalties and cohesive
+layers, and the imbalance. The imbalance is the work of contact forces at constraints that stay closed or stick. It is an
+error of long steps, in which normals rotate.
 """
 
 from __future__ import annotations
@@ -197,7 +199,7 @@ def contact_work(
     if solution.work is not None:  # the work of all increments, in which constraints carry no force before they close
         work, closing = solution.work[rows], np.zeros_like(closing)
     elif work_at_end[closing].any():
-        # The nearest of the secondary nodes that faced the other side at the beginning of the step were open.
+        # A constraint was open at the beginning of the step if the nearest secondary node that then faced the other side was.
         gap = pair.nodal_gap(replace(configuration, displacement=configuration.start, pose=configuration.pose_start))[0]
         faced = np.isfinite(gap)
         if faced.any():

@@ -62,11 +62,11 @@ STUDY: dict[str, Any] = {
 }
 # Types of the entries of lists and tables in ``[study]``, and their description in messages.
 STUDY_ENTRIES: dict[str, tuple[Any, str]] = {
-    **dict.fromkeys(("halve", "double"), (str, 'the name of an argument, "size"')),
-    "quantities": (str, 'the name of a quantity, "PROBE.stress.yy"'),
-    "combinations": ((str, list), 'an element and a formulation, "quad8 mortar"'),
+    **dict.fromkeys(("halve", "double"), (str, 'the name of an argument, such as "size"')),
+    "quantities": (str, 'the name of a quantity, such as "PROBE.stress.yy"'),
+    "combinations": ((str, list), 'an element and a formulation, such as "quad8 mortar"'),
     "options": (dict, "a table of options of a formulation"),
-    "parameters": (dict, 'a table of laws by path, { "material[0].E" = "value" }'),
+    "parameters": (dict, 'a table of expressions by path, { "material[0].E" = "value" }'),
 }
 MODES: dict[str, Any] = {"n": int, "stress_stiffening": bool, "hold_sliding": bool, "nodal_diameters": (int, str, list)}
 TOP: dict[str, Any] = {
@@ -82,7 +82,7 @@ TOP: dict[str, Any] = {
 
 
 def check_keys(where: str, data: Any, known: Mapping[str, Any], required: Iterable[str] = ()) -> None:
-    """Raise CaseError unless `data` is a table with the `required` keys, and with keys and types of values in `known`.
+    """Raise CaseError unless `data` is a table with all `required` keys and only keys and types of values listed in `known`.
 
     The type None admits any value.
     """
@@ -135,7 +135,7 @@ def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) 
         return function(**arguments)
     except (TypeError, ValueError) as error:
         values = ", ".join(f"{key} = {repr(value)}" for key, value in arguments.items())
-        raise CaseError(f"'{where}': {values} have invalid types ({error})") from error
+        raise CaseError(f"'{where}': {values} are invalid ({error})") from error
     except FastcontactError as error:
         raise CaseError(_of_key(where, str(error)) or f"'{where}': {error}") from error
 

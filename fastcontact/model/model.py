@@ -56,10 +56,10 @@ class Model(ModelSupports):
     case_text : str
         Text that result files store, usually the case file.
     strain : {"small", "finite"}
-        With ``"finite"`` strains and rotations are finite (total Lagrangian formulation). Materials are then hyperelastic,
-        such as `NeoHookean`, or `ElasticPlastic`, or `LinearElastic`, which is interpreted as the Saint Venant-Kirchhoff
-        law for small strains and large rotations. Pressures follow the deformed surface; other loads keep their directions
-        and reference areas. Stresses are Cauchy stresses.
+        If ``"finite"``, strains and rotations may be large (total Lagrangian formulation). The materials are then
+        hyperelastic ones such as `NeoHookean`, `ElasticPlastic`, and `LinearElastic`, which is interpreted as the Saint
+        Venant-Kirchhoff law for small strains and large rotations. Pressures follow the deformed surface; other loads keep
+        their directions and reference areas. Stresses are Cauchy stresses.
     reference_temperature : float
         Initial temperature of the bodies, at which the thermal strain is zero, unless `add_temperature` is given another
         one [temperature].
@@ -168,7 +168,7 @@ class Model(ModelSupports):
         self._check_changes(lambda acting: acting._check_motions(fixed, driving))
 
     def _check_changes(self, check: Callable[[Model], None]) -> None:
-        """Call `check` once for every set of temporary items that act together, with the model without the others."""
+        """For every set of temporary items that act together, call `check` with a model that contains only these."""
         temporary = [item for item in (*self.relations, *self.heat_loads) if isinstance(item, TEMPORARY)]
         changes = {0.0, *(t for item in temporary for t in (item.begins, item.ends) if 0.0 < t < np.inf)}
         for begin in sorted(changes):
@@ -180,7 +180,9 @@ class Model(ModelSupports):
     def _check_heat_of(self, acting: Model) -> None:
         acting.check_heat()
         if self.conducts and not acting.conducts:
-            raise ModelError("no heat load acts, so that temperatures are undetermined: add a film")
+            raise ModelError(
+                "no heat load acts, so the temperatures are undetermined: add a film condition (convection)"
+            )
 
     def _acting(self, begin: float) -> Model:
         """Return the model with only those items that act in the load step that begins at the load factor `begin`."""
@@ -201,16 +203,16 @@ class Model(ModelSupports):
     def _check_motions(self, fixed: Mask, forces: Sequence[Array]) -> None:
         """Raise ModelError if a rigid-body motion is possible.
 
-        Supports, constraints and springs prevent rigid-body motions. Contact prevents motions that close a gap, and also the
-        opposite motions if a load does work on them, since this load may press the body against the contact.
+        Supports, constraints and springs prevent rigid-body motions. Contact prevents motions that close a gap. A motion
+        that opens a gap is accepted, too, if a load does work in it, since this load may press the body against the contact.
         """
         motions = self.force_driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))
         if not len(motions):
             return
-        works = [generalised(motions, force.ravel()) for force in forces]
+        generalised_forces = [generalised(motions, force.ravel()) for force in forces]
         # The load steps check whether friction suffices, and their errors state the coefficient that would.
         gaps = gaps_at_rest(self, motions, MOST_FRICTION)
-        check_motions(self.mesh, motions.combined(unstopped(gaps, np.reshape(works, (-1, len(motions))))))
+        check_motions(self.mesh, motions.combined(unstopped(gaps, np.reshape(generalised_forces, (-1, len(motions))))))
 
 
 def gaps_at_rest(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:

@@ -23,17 +23,17 @@ from fastcontact.model.ramp import Table
 from fastcontact.model.relation_rows import coincident, less_first, matched, to_facets
 from fastcontact.round_off import ROUND_OFF
 
-# Largest distance of the rotated nodes of one end from the facets of the other end, and beyond their edges, in facet sizes.
-# Facets of curved ends with different meshes deviate from each other by less.
+# Largest distance, relative to facet size, by which a rotated node of one end may lie off the facets of the other end or
+# outside their edges. Facets of curved ends with different meshes deviate from each other by less.
 LARGEST_DISTANCE = 0.02
 
 
 class PeriodicInterface(NamedTuple):
-    """Coincident nodes of the two ends of a periodic part, `first` (m,) and `second` (m,).
+    """Matching nodes of the two ends of a periodic part, `first` (m,) and `second` (m,).
 
     In a ring of several `sectors`, vectors at a second node are those at the first node times `turn` (dim, dim), the matrix
-    of `rotation`; the constraint `relation` enforces this for displacements. These three are None without a rotation, and
-    `relation` is None, too, if other nodes of the ends do not coincide and are tied to facets.
+    of `rotation`; the constraint `relation` enforces this for displacements. `turn`, `rotation` and `relation` are None
+    without a rotation; `relation` is also None if other nodes of the ends do not match and are tied to facets.
     """
 
     first: Indices
@@ -45,7 +45,7 @@ class PeriodicInterface(NamedTuple):
 
 
 def same_place(interfaces: Sequence[PeriodicInterface], n_points: int) -> Indices | None:
-    """Return the smallest number of the nodes that coincide with each node (n_points,); None without interfaces."""
+    """Return, for each node (n_points,), the lowest number of the nodes that coincide with it; None without interfaces."""
     if not interfaces:
         return None
     ends = tuple(np.concatenate(side) for side in zip(*(interface[:2] for interface in interfaces), strict=True))
@@ -111,12 +111,12 @@ def cyclic(
     sectors : int
         Number of sectors in the ring.
     origin, direction : sequence of float
-        A point of the axis (dim,) [length] and its direction (3,) [-].
+        A point on the axis (dim,) [length] and its direction (3,) [-].
 
     Raises
     ------
     ModelError
-        If the ends do not coincide after the rotation, as nodes or as surfaces.
+        If, after the rotation, neither the nodes nor the surfaces of the ends coincide.
     """
     name = f"the cyclic symmetry of '{ends[0]}' and '{ends[1]}'"
     first, second = (mesh.points_of(end).astype(np.intp) for end in ends)
@@ -183,7 +183,8 @@ def _motion(rotation: Rotation, sign: float) -> tuple[Array, Array]:
 def _projected(positions: Array, inward: Array, other: Surface, corners: list[Array]) -> Closest:
     """Project positions (n, dim) [length] on the closest facets of a surface, whose nodes are at `corners`.
 
-    Where bodies are in contact, a position lies on facets of both. It belongs to that toward which `inward` (n, dim) points.
+    Where two bodies are in contact, a position lies on facets of both. It is assigned to the body into which `inward`
+    (n, dim) points.
     """
     near, inside = (closest_of_kinds(positions + shift, corners) for shift in (0.0, LARGEST_DISTANCE * inward))
     nodes, nodes_inside = (places(other, closest.facet, closest.xi).nodes for closest in (near, inside))
@@ -198,7 +199,7 @@ def _projected(positions: Array, inward: Array, other: Surface, corners: list[Ar
 
 
 def _without_zeros(rows: csr_array) -> csr_array:
-    """Return rows without entries below round-off, and without the rows that then are empty."""
+    """Return rows without entries below round-off, and without the rows that are then empty."""
     rows.sum_duplicates()
     rows.data[np.abs(rows.data) < ROUND_OFF] = 0.0
     rows.eliminate_zeros()

@@ -262,7 +262,7 @@ def test_steps_of_another_model_or_order_are_refused():
     steps = fc.solve(model, 2)
     for answer in (lambda m: fc.wear(m, steps, "floor", 1e-3), lambda m: fc.contact_history(m, steps, "floor")):
         assert len(answer(model)) == 2
-        with pytest.raises(fc.errors.ContactError, match="load step 1 is of another model"):
+        with pytest.raises(fc.errors.ContactError, match="load step 1 belongs to another model"):
             answer(sliding(6))
     for wrong in (steps[::-1], steps[1:]):
         with pytest.raises(fc.errors.ContactError, match="step 1 was expected, but got step 2"):

@@ -64,16 +64,16 @@ class ElementType:
 
 @cache
 def element_type(name: str) -> ElementType | None:
-    """Return the translation of an element type in upper case; None unless it is a supported solid or heat conductor."""
+    """Return the translation of an element type in upper case; None if it is neither a supported solid nor for heat transfer."""
     conducts = name[:4] in CONDUCTING
     base = CONDUCTING[name[:4]] + name[4:] if conducts else name.removesuffix("T")
     note, modes = "", False
     for suffix, difference in (
-        ("MH", "an ordinary quadratic one here"),
+        ("MH", "replaced by the standard quadratic element"),
         ("RH", "integrated fully, without hybrid pressure"), ("IH", "without hybrid pressure"),
         ("R", "integrated fully here"), ("I", ""),
-        ("H", "without hybrid pressure: nearly incompressible materials have a mean dilatation"),
-        ("M", "an ordinary quadratic one here"),
+        ("H", "without hybrid pressure: in nearly incompressible materials it has a mean dilatation"),
+        ("M", "replaced by the standard quadratic element"),
     ):  # fmt: skip
         if base.endswith(suffix) and not conducts:
             base, note, modes = base.removesuffix(suffix), difference, suffix[0] == "I"
@@ -83,7 +83,7 @@ def element_type(name: str) -> ElementType | None:
     if modes and kinematics == "axisymmetric":
         modes, note = False, "without incompatible modes, which makes thin parts stiffer in bending"
     elif modes and element not in BENDING:  # C3D10I, whose stresses at the surface are improved
-        modes, note = False, "an ordinary quadratic one here"
+        modes, note = False, "replaced by the standard quadratic element"
     return ElementType(name, element, kinematics, note, modes, conducts) if element and kinematics else None
 
 

@@ -1,4 +1,4 @@
-"""Histories of supports and loads over the steps of a deck, of which step k runs from load factor k - 1 to k."""
+"""Histories of supports and loads over the steps of a deck; step k runs from load factor k - 1 to k."""
 
 from __future__ import annotations
 
@@ -150,8 +150,8 @@ class Histories(Generic[Name]):
             earlier, earlier_amplitude, earlier_location = self.changing.get(name)
             if (earlier, earlier_amplitude) != (value, amplitude):
                 raise location.refuse(
-                    f"{value:g} is the second value in this step, after {earlier:g} in line {earlier_location.line}, which "
-                    "programs interpret differently: give one value"
+                    f"{value:g} is the second value in this step, after {earlier:g} in line {earlier_location.line}: "
+                    "programs interpret this differently, so give one value"
                 )
         self.changing.put(name, value, amplitude, location)
         self.dying.pop(name, None)
@@ -259,11 +259,11 @@ def _equal_rows(*columns: AnyArray) -> Iterator[Indices]:
 
 
 class ByShape(Generic[Name]):
-    """Histories of points along axes, grouped by axis and shape, so that many nodal values become a few loads.
+    """Histories of nodes, facets or cells, grouped by a key, such as an axis, and by shape: many values become a few loads.
 
-    The points may be facets or cells, and the axis any key. Iteration yields the axis, the points, the value and the history
-    of each group. The value is 1 if all points have the same history; otherwise it is a function that returns the values of
-    the points, which are in ascending order.
+    Iteration yields the axis, the points, the value and the history
+    of each group. The value is 1 if all points have the same history; otherwise it is a function that returns one value for
+    each point, with the points in ascending order.
     """
 
     def __init__(self) -> None:
@@ -271,10 +271,10 @@ class ByShape(Generic[Name]):
 
     def add(self, axis: Name, table: Table, points: Sequence[int]) -> None:
         """Add the history of some points along an axis."""
-        size = max((value for _, value in table), key=abs)
-        shape = tuple((time, round(value / size, DECIMALS)) for time, value in table) if size else table
-        _, sizes, members = self._members.setdefault((axis, shape), (table, array("d"), array("q")))
-        sizes.extend([size] * len(points))
+        peak = max((value for _, value in table), key=abs)
+        shape = tuple((factor, round(value / peak, DECIMALS)) for factor, value in table) if peak else table
+        _, peaks, members = self._members.setdefault((axis, shape), (table, array("d"), array("q")))
+        peaks.extend([peak] * len(points))
         members.extend(points)
 
     @staticmethod
@@ -286,25 +286,25 @@ class ByShape(Generic[Name]):
         return by_shape
 
     def __iter__(self) -> Iterator[tuple[Name, Indices, Any, Table]]:
-        for (axis, shape), (table, sizes, members) in self._members.items():
+        for (axis, shape), (table, peaks, members) in self._members.items():
             points, inverse = np.unique(members, return_inverse=True)
-            if len(points) == len(members) and min(sizes) == max(sizes):
+            if len(points) == len(members) and min(peaks) == max(peaks):
                 yield axis, np.asarray(members), 1.0, table
             else:  # several values at a point are added
-                yield axis, points, partial(repeated_values, np.bincount(inverse, sizes).astype(float)), shape
+                yield axis, points, partial(repeated_values, np.bincount(inverse, peaks).astype(float)), shape
 
 
 def repeated_values(values: Array, positions: Array) -> Array:
-    """Return `values` (n,), each repeated k times for k n positions; the positions (k n, dim) [length] are not used."""
+    """Return `values` (n,), each repeated k times; only the number of `positions` (k n, dim) [length] is used."""
     return np.repeat(values, len(positions) // len(values))
 
 
 def _amplitude_points(
     value: float, shape: Amplitude, begin: float, start: float, period: float
 ) -> list[tuple[float, float]]:
-    """Return the pairs of load factor and value of an amplitude, times `value`, in a step.
+    """Return pairs of load factor and `value` times amplitude for a step.
 
-    The step begins at the load factor `begin` and at the total time `start`, and lasts the time `period`.
+    The step begins at the load factor `begin` and the total time `start`, and has the duration `period`.
     """
     first = start if shape.total else 0.0
     low, high = bisect_right(shape.times, first), bisect_left(shape.times, first + period)

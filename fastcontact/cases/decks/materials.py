@@ -103,7 +103,7 @@ def plastic(content: Content, current: Material, block: Block) -> None:
     if table[0][0] != 0.0:
         raise block.rows[0].refuse(f"{current.about}the first plastic strain {table[0][0]:g} must be zero")
     if len({row.text(2) for row in block.rows}) > 1:
-        raise block.refuse(f"{current.about}one temperature is supported")
+        raise block.refuse(f"{current.about}only one temperature is supported")
     modulus = 0.0  # of kinematic hardening
     if hardening == "KINEMATIC":
         if len(table) > 2:
@@ -175,7 +175,7 @@ def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
 
 
 def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
-    """Return the material of the model for material `axes`; `modes` is true if its elements have incompatible modes."""
+    """Return the model's material with the given `axes`; `modes` is true if its elements have incompatible modes."""
     if content.heat == "alone":
         return _with_constants(material, ARBITRARY_LAW, axes, conductivity=_conductivity(content, material))
     assert material.law is not None
@@ -199,14 +199,14 @@ def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
 
 
 def _conductivity(content: Content, material: Material) -> float | tuple[float, ...] | None:
-    """Return the conductivity of a material; CaseError unless it is positive if temperatures are computed."""
+    """Return the conductivity of a material; CaseError if temperatures are computed and it is missing or not positive."""
     block = material.conductivity
     if block is None:
         if content.heat:
             raise material.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
         return None
     if not content.heat:
-        content.note(block, f"{material.about}no effect, temperatures are given, not computed")
+        content.note(block, f"{material.about}*CONDUCTIVITY has no effect, because temperatures are prescribed")
         return None
     values = along_axes(material, block)
     if not np.min(values) > 0.0:
@@ -219,7 +219,7 @@ def _with_constants(material: Material, law: Any, axes: Any, **constants: Any) -
     if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
         if isinstance(law, nonlinear.NonlinearElastic):
             raise material.refuse(
-                f"{material.about}expansion and conductivity along axes are supported in elastic materials only"
+                f"{material.about}expansion and conductivity along axes are supported in linear elastic materials only"
             )
         G = law.E / (2.0 * (1.0 + law.nu))
         others = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}

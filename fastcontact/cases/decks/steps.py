@@ -24,7 +24,7 @@ def new_step(content: Content, step: Step | None, block: Block) -> Step:
 
 
 def static(content: Content, step: Step, block: Block) -> None:
-    """Read *STATIC: the initial increment and the duration of the step, whose ratio is the number of increments."""
+    """Read *STATIC: the duration of the step divided by its initial increment is the number of increments."""
     if step.has_procedure:
         raise block.refuse("the step has this keyword twice")
     if step.n_modes:
@@ -72,7 +72,9 @@ def end_step(content: Content, step: Step | None, block: Block) -> None:
             raise step.refuse("the step has no *STATIC or other procedure")
         return
     if step.conditions:
-        raise step.conditions[0].block.refuse("cannot be in a step with *FREQUENCY: modes have the earlier supports")
+        raise step.conditions[0].block.refuse(
+            "cannot be in a step with *FREQUENCY: the modes use the supports of the preceding steps"
+        )
     content.steps.pop()
     if not content.steps:
         raise step.refuse("*FREQUENCY needs a step with *STATIC before it: modes are vibrations about its last state")
@@ -83,7 +85,7 @@ def end_step(content: Content, step: Step | None, block: Block) -> None:
     content.note(
         step,
         f"{step.n_modes} modes at the last step, {'with' if stiffening else 'without'} the initial-stress stiffness "
-        "(PERTURBATION, or NLGEOM before)",
+        "(included with PERTURBATION, or after a step with NLGEOM)",
     )
 
 
@@ -109,5 +111,5 @@ def amplitude(content: Content, block: Block) -> None:
     numbers = block.numbers()
     times, values = numbers[::2], numbers[1::2]
     if not times or len(times) != len(values) or any(b <= a for a, b in pairwise(times)):
-        raise block.refuse(f"amplitude '{name}' needs pairs of ascending times and multipliers")
+        raise block.refuse(f"amplitude '{name}' needs pairs of time and multiplier, with ascending times")
     content.amplitudes[folded(name)] = Amplitude(block.location, name, tuple(times), tuple(values), total)

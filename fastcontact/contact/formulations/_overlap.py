@@ -42,11 +42,11 @@ class OverlapPoints(NamedTuple):
     Attributes
     ----------
     facet : ndarray of int (n,)
-        Number of the facet of each point.
+        Index of the facet that contains each point.
     shape : ndarray (n, k)
         Shape functions of the k nodes of the facet at the point [-].
     area : ndarray (n,)
-        Undeformed area of the point, zero outside of the overlap [area].
+        Integration weight of the point in the reference configuration, zero outside the overlap [area].
     """
 
     facet: Indices
@@ -67,9 +67,9 @@ class Overlap:
     closer : list of ndarray (n_facets, n_nodes, dim)
         For each block, integrals of its shape functions times the distance by which the smooth surfaces are closer to each
         other than the facets, see `surface_smoothing`, along the normals of the primary side [volume]. Against an obstacle,
-        which has no points in the mesh, the integrals are those of the shape functions times the opposite positions.
+        which has no points in the mesh, these are integrals of the shape functions times the opposite positions.
     points : list of OverlapPoints
-        For each block, the integration points; empty for faces, whose segments are divided into triangles.
+        For each block, the integration points; empty in 3D, where the mortar segments are divided into triangles.
     """
 
     mass: list[Array]
@@ -81,7 +81,7 @@ class Overlap:
 def obstacle_overlap(
     secondary: Surface, obstacle: RigidSide, points: tuple[Array, Array], axisymmetric: bool, pose: Pose
 ) -> Overlap:
-    """Integrate over the parts of the secondary facets that face a rigid obstacle; areas are those of the reference.
+    """Integrate over the parts of the secondary facets that face a rigid obstacle; areas are undeformed.
 
     Parameters
     ----------

@@ -179,7 +179,7 @@ def test_what_is_wrong_is_told_before_anything_runs(case, parameters, words):
     ("entry", "words"),
     [
         ("quantities = [3]", r"'study.quantities\[0\]' must be the name of a quantity"),
-        ('parameters = { soft = ["material[0].E"] }', "'study.parameters.soft' must be a table of laws by path"),
+        ('parameters = { soft = ["material[0].E"] }', "'study.parameters.soft' must be a table of expressions by path"),
         ("combinations = [3]", r"'study.combinations\[0\]' must be an element and a formulation"),
         ("options = { mortar = 1 }", "'study.options.mortar' must be a table of options"),
     ],

@@ -238,7 +238,7 @@ LOADS = {
     ),
     "amplitude without values": (
         before("*Step", "*Amplitude, name=a\n0., 1., 0., 2.\n"),
-        "needs pairs of ascending times",
+        "needs pairs of time and multiplier, with ascending times",
     ),
 }
 CASES = {**MODEL, **PARTS, **MATERIALS, **CONTACTS, **RELATIONS, **LOADS}

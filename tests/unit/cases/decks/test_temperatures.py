@@ -106,7 +106,7 @@ def test_expansion_without_temperatures_is_noted(tmp_path):
     text = WHOLE.replace("200000., 0.\n", "200000., 0.\n" + EXPANSION + "*Conductivity\n50.\n*Specific Heat\n4e8\n")
     notes = "\n".join(deck_of(tmp_path, text).notes)
     assert "without temperatures the expansion has no effect" in notes
-    assert notes.count("no effect, temperatures are given, not computed") == 1
+    assert notes.count("*CONDUCTIVITY has no effect, because temperatures are prescribed") == 1
     assert notes.count("no effect, because heat conduction is steady or temperatures are given") == 1
 
 
