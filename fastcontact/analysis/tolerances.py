@@ -27,8 +27,8 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 # to the last relative residual if that is smaller. More accurate solutions are of no use, because contact detection has an
 # error of the size of this change. The relative residual of the first solution of a step is NOTABLE.
 RESIDUAL = 0.03
-# The tolerance decreases at least by this factor, because changes and the residual of the friction law may not decrease if
-# linear solutions are inaccurate.
+# If the residual of the friction law determines the tolerance, the tolerance decreases at least by this factor, because
+# the residual of the law may not decrease if linear solutions are inaccurate.
 LEAST_FALL = 0.2
 # Number of updates, or of Newton iterations, within which changes must decline.
 WINDOW = 8
@@ -67,13 +67,11 @@ class Tolerances:
         """Reduce the tolerance of linear solutions according to the last relative change of the displacements.
 
         `law_residual` is the residual of the friction law, relative to the largest force. It determines the tolerance if it
-        exceeds the smaller of the change and the last tolerance, because the next Newton step is not more accurate. So does
-        the change that an error of the fraction RESIDUAL leaves: pairings would not use a more accurate solution.
+        exceeds the smaller of the change and the last tolerance, because the next Newton step is not more accurate.
         """
         residual = RESIDUAL * min(self._residual, relative_change)
-        next_error = max(RESIDUAL * relative_change, law_residual)
-        if RESIDUAL * next_error > residual:
-            residual = min(RESIDUAL * next_error, LEAST_FALL * self._residual)
+        if RESIDUAL * law_residual > residual:
+            residual = min(RESIDUAL * law_residual, LEAST_FALL * self._residual)
         self._residual = max(self._solver.tolerance, residual)
 
     def accuracy(self, scale: float) -> Accuracy:
