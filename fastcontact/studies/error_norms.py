@@ -339,7 +339,7 @@ def _cells_of_facets(name: str, cells: Numbers, facets: Numbers) -> tuple[Indice
     adjacent = np.flatnonzero(np.isin(cells, facets).sum(axis=1) >= facets.shape[1])
     sides = [list(side) for side in elements.get(name).facets if len(side) == facets.shape[1]]
     rows = np.array([same_facets(facets, cells[adjacent][:, side]) for side in sides], np.intp)
-    rows = rows.reshape(-1, len(adjacent))
+    rows = rows.reshape(len(sides), len(adjacent))
     cell, side = np.nonzero(rows.T >= 0)
     nodes, row = cells[adjacent[cell]], rows[side, cell]
     return row, adjacent[cell], np.argmax(nodes[:, None] == facets[row][:, :, None], axis=2)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, supported, united
 
 import fastcontact as fc
 from fastcontact.mesh import elements
@@ -94,3 +94,14 @@ def test_a_block_in_space_pressed_on_a_plane_has_no_error_and_a_wrong_pressure_h
     # h / E times the square of a pressure of 1 over the face, h the diagonal of a facet's box.
     assert found.contact.max() > 0.0
     assert np.sum(found.contact**2) == pytest.approx(np.sqrt(0.5) / 1000.0, rel=1e-6)
+
+
+def test_bodies_of_different_elements_in_contact():
+    """Elements without a cell at a side raised a ValueError; a uniform pressure has no error."""
+    mesh = united(
+        L_=fc.generate.block((2.0, 1.0), (4, 2)), U_=fc.generate.block((2.0, 1.0), (4, 2), "tri3", (0.0, 1.0))
+    )
+    model = elastic_model(mesh, nu=0.0, L_BOTTOM="xy", U_LEFT="x")
+    model.add_pressure("U_TOP", 1.0)
+    model.add_contact("c", secondary="U_BOTTOM", primary="L_TOP")
+    assert fc.estimate_error(model, fc.solve(model, 1)[-1]).relative < 1e-9
