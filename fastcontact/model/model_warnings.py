@@ -86,7 +86,8 @@ def _different_ends(model: Model) -> Iterator[str]:
         if n:
             yield (
                 f"at the ends of {name}, {n} node{'s' * (n > 1)} of contact '{pair.name}' have no counterpart at the other "
-                "end: pressures near them may be wrong by as much as their mean. Use equal meshes where contact ends"
+                "end: pressures near them may be wrong by as much as their mean. Use equal meshes where contact meets the "
+                "ends"
             )
 
 
