@@ -124,7 +124,7 @@ class Freed:
             motion = elongation - self._inverse @ (self.stretched @ elongation)
             approach, threshold = -self.relative[0] @ motion, LENGTH_ROUND_OFF * remaining
             closing = (solution.gap > 0.0) & (approach > threshold)
-            if closing.any() and largest(self.relative[1:, sliding] @ motion) <= threshold:
+            if closing.any():
                 change += motion * np.min(solution.gap[closing] / approach[closing])
             change += motion
         return change, remaining

@@ -9,32 +9,55 @@ from numpy.typing import NDArray
 
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.problem import Problem
-from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh.topology import bodies, outer_facets
 from fastcontact.model.body_overlap import depths
 from fastcontact.model.rigid_motions import body_name
-from fastcontact.results.step import StepResult
+from fastcontact.results.step import ContactResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 Indices = NDArray[np.signedinteger]
 # Numbers of two bodies, outer nodes of the first (n,), and the depths of these nodes in the second (n,) [length].
 Inside = tuple[int, int, Indices, Array]
+Contacts = Mapping[str, ContactResult]
+# Number, displacements (n_points, dim) and contact results of a step.
+Peak = tuple[int, Array, Contacts]
 # Depth beside the facets of a contact above which a warning is given, relative to the largest depth of nodes in contact.
 HELD = 2.0
 
 
-def interpenetration(problem: Problem, state: State, last: StepResult) -> list[str]:
-    """Return warnings about bodies inside each other or inside rigid obstacles, at the end of the `last` step."""
-    mesh, u = problem.model.mesh, problem.displacement(state.u)
-    between = _pairs_between(problem)
-    overlaps = list(depths(mesh, problem.model.kinematics, mesh.points + u))
-    return [
-        *_without_contact(problem, between, overlaps), *_beside_contact(problem, last, between, overlaps),
-        *_through_obstacles(problem, state, last),
-    ]  # fmt: skip
+def interpenetration(problem: Problem, displacement: Array, contact: Contacts, peaks: Sequence[Peak] = ()) -> list[str]:
+    """Return warnings about bodies inside each other or inside rigid obstacles.
+
+    Parameters
+    ----------
+    problem : Problem
+    displacement : ndarray (n_points, dim)
+        Displacements at the end of the last step [length].
+    contact : dict of str to ContactResult
+        Contact results at the end of the last step.
+    peaks : list of (int, ndarray (n_points, dim), dict of str to ContactResult)
+        Numbers, displacements and contact results of earlier steps in which the forces of contact pairs are largest.
+    """
+    mesh, between = problem.model.mesh, _pairs_between(problem)
+
+    def lacking(u: Array, contact: Contacts, overlaps: Sequence[Inside]) -> list[str]:
+        beside = _beside_contact(problem, u, contact, between, overlaps)
+        return [*beside, *_through_obstacles(problem, u, contact)]
+
+    overlaps = list(depths(mesh, problem.model.kinematics, mesh.points + displacement))
+    texts = lacking(displacement, contact, overlaps)
+    if not texts:
+        at_peaks = (
+            (index, lacking(u, there, list(depths(mesh, problem.model.kinematics, mesh.points + u))))
+            for index, u, there in peaks
+        )
+        texts = [
+            f"in load step {index}, where its force is largest, {text}" for index, found in at_peaks for text in found
+        ]
+    return [*_without_contact(problem, between, overlaps), *texts]
 
 
 def _pairs_between(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
@@ -71,8 +94,9 @@ def _without_contact(
 
 
 def _beside_contact(
-    problem: Problem, last: StepResult, between: Mapping[frozenset[int], Sequence[str]], overlaps: Sequence[Inside]
-) -> list[str]:
+    problem: Problem, displacement: Array, contact: Contacts, between: Mapping[frozenset[int], Sequence[str]],
+    overlaps: Sequence[Inside],
+) -> list[str]:  # fmt: skip
     """Return warnings about bodies that pass through each other where the groups of their contact pairs lack facets."""
     mesh, texts = problem.model.mesh, []
     _, body = bodies(mesh)
@@ -81,8 +105,8 @@ def _beside_contact(
         if not entries or any(problem.pairs[name].options.wear for name in names):  # worn material is still in the mesh
             continue
         points, depth = np.concatenate([entry[2] for entry in entries]), np.concatenate([entry[3] for entry in entries])
-        secondary, primary = (mask[points] for mask in _points_of_sides(problem, last, names))
-        deformed = max(float(np.ptp(last.displacement[body == number], axis=0).max()) for number in body_pair)
+        secondary, primary = (mask[points] for mask in _points_of_sides(problem, contact, names))
+        deformed = max(float(np.ptp(displacement[body == number], axis=0).max()) for number in body_pair)
         limit = max(NOTABLE * deformed, HELD * float(depth[secondary].max(initial=0.0)))
         depth[secondary | primary] = 0.0
         row = int(np.argmax(depth))
@@ -93,12 +117,12 @@ def _beside_contact(
     return texts
 
 
-def _points_of_sides(problem: Problem, last: StepResult, names: Sequence[str]) -> tuple[Mask, Mask]:
+def _points_of_sides(problem: Problem, contact: Contacts, names: Sequence[str]) -> tuple[Mask, Mask]:
     """Return masks (n_points,) of secondary points that face the other side or are excluded, and of all primary points."""
     secondary, primary = np.zeros((2, problem.model.mesh.n_points), bool)
     for name in names:
         pair = problem.pairs[name]
-        facing = np.isfinite(last.contact[name].gap) | pair.options.excluded_nodes(pair.secondary)
+        facing = np.isfinite(contact[name].gap) | pair.options.excluded_nodes(pair.secondary)
         secondary[pair.secondary.points[facing]] = True
         primary[pair.primary.points] = True
     return secondary, primary
@@ -113,9 +137,9 @@ def _at_rest(problem: Problem, overlaps: Sequence[Inside], point: int) -> float:
     return 0.0
 
 
-def _through_obstacles(problem: Problem, state: State, last: StepResult) -> list[str]:
+def _through_obstacles(problem: Problem, displacement: Array, contact: Contacts) -> list[str]:
     """Return warnings about nodes beside a contact surface that pass through its rigid obstacle."""
-    mesh, u, texts = problem.model.mesh, problem.displacement(state.u), []
+    mesh, u, texts = problem.model.mesh, displacement, []
     for name, pair in problem.pairs.items():
         if not isinstance(pair.primary, RigidSide) or pair.options.wear:  # worn material is still in the mesh
             continue
@@ -125,9 +149,11 @@ def _through_obstacles(problem: Problem, state: State, last: StepResult) -> list
         if not len(points):
             continue
         at_rest = pair.primary.facing(mesh.points[points], Pose(np.zeros(mesh.dim)))[0]
-        pose = Pose(state.obstacles[name], state.angles.get(name, 0.0))
+        motion = contact[name].obstacle_displacement
+        assert motion is not None
+        pose = Pose(motion, contact[name].obstacle_angle or 0.0)
         gap = pair.primary.facing(mesh.points[points] + u[points], pose)[0]
-        contact_gap = last.contact[name].gap
+        contact_gap = contact[name].gap
         contact_depth = -float(np.min(contact_gap, initial=0.0, where=np.isfinite(contact_gap)))
         limit = max(NOTABLE * float(np.ptp(u, axis=0).max()), HELD * contact_depth)
         row = int(np.argmin(np.where(at_rest >= 0.0, gap, np.inf)))

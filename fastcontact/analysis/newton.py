@@ -279,9 +279,8 @@ class _Newton:
         if self._regularisation in with_springs:
             unmodified = []  # the unmodified tangent failed before
         geometric = self._regularisation.geometric
-        tried = [] if geometric < WHOLE else with_springs  # otherwise springs failed as well
         parts = range(min(geometric + 1, WHOLE))[::-1]
-        return [*unmodified, *tried, *(Regularisation(part, stiff=floats) for part in parts)]
+        return [*unmodified, *with_springs, *(Regularisation(part, stiff=floats) for part in parts)]
 
     def _linearised_contact(
         self, u: Array, changes: list[float], regularisation: Regularisation

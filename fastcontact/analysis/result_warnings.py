@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.analysis.criteria import NOTABLE, Criteria
 from fastcontact.analysis.facet_sag import sag_warnings
-from fastcontact.analysis.interpenetration import interpenetration
+from fastcontact.analysis.interpenetration import Peak, interpenetration
 from fastcontact.analysis.locking import ALTERNATING, locking_warning, nonlinear_scatter_warnings, scatter_warnings
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
@@ -62,14 +62,16 @@ MANY = 10
 
 def result_warnings(
     problem: Problem, state: State, last: StepResult, free: tuple[int, dict[str, list[str]]] | None = None,
-    peaks: Mapping[str, tuple[int, ContactResult]] | None = None,
+    peaks: Mapping[str, Peak] | None = None,
 ) -> list[str]:  # fmt: skip
     """Return the warnings about an analysis whose `last` step ended in a state.
 
     `free` is the number of the first step in which nothing determines the position of bodies, and their free motions;
-    `peaks` are, for each pair, the number and the contact result of the step with its largest normal force.
+    `peaks` are, for each pair, the number, displacements and contact results of the step with its largest normal force.
     """
-    warnings = [*interpenetration(problem, state, last), *_carrying_springs(problem, state), *_undetermined(last, free)]
+    earlier = {peak[0]: peak for peak in (peaks or {}).values() if peak[0] != last.index}
+    inside = interpenetration(problem, last.displacement, last.contact, list(earlier.values()))
+    warnings = [*inside, *_carrying_springs(problem, state), *_undetermined(last, free)]
     if problem.model.strain == "small":
         warnings += [*_large_strain(problem, last), *_large_rotation(problem, state, last)]
     if problem.bodies is None:
@@ -91,9 +93,9 @@ def result_warnings(
         warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
         unresolved, mesh = [sag[name]] if name in sag else _unresolved(pair, contact, state), problem.model.mesh
         pressures = [*unresolved, *oscillating(pair, contact, mesh)]
-        index, largest_contact = (peaks or {}).get(name, (last.index, contact))
+        index, _, at_peak = (peaks or {}).get(name, (last.index, last.displacement, last.contact))
         if not pressures and index != last.index:
-            texts = [*_unresolved(pair, largest_contact, state), *oscillating(pair, largest_contact, mesh)]
+            texts = [*_unresolved(pair, at_peak[name], state), *oscillating(pair, at_peak[name], mesh)]
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
         warnings += [*pressures, *_peak_at_edge(pair, last, contact), *_too_fast(name, pair, state)]
     warnings += [*_unsettled(state), *_loose(problem, last), *_unbalanced(state)]

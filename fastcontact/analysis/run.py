@@ -11,6 +11,7 @@ from fastcontact._jit import ahead
 from fastcontact._tools.argument_types import typed
 from fastcontact.analysis import restart, step_halving
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.interpenetration import Peak
 from fastcontact.analysis.problem import Problem, prepare, quadratic_and_linear
 from fastcontact.analysis.progress import Progress
 from fastcontact.analysis.result_warnings import result_warnings
@@ -21,7 +22,7 @@ from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
 from fastcontact.model.ramp import Ramp, RampLike, ramp_of
-from fastcontact.results.step import ContactResult, StepResult, Steps
+from fastcontact.results.step import StepResult, Steps
 
 
 @typed(ModelError)
@@ -176,21 +177,19 @@ def _touched(steps: Sequence[StepResult]) -> frozenset[str]:
     return frozenset(touched)
 
 
-def _peaks(
-    steps: Iterable[StepResult], earlier: Mapping[str, tuple[int, ContactResult]] | None = None
-) -> dict[str, tuple[int, ContactResult]]:
-    """Return, for each contact pair, the number and the result of the step with its largest normal force."""
+def _peaks(steps: Iterable[StepResult], earlier: Mapping[str, Peak] | None = None) -> dict[str, Peak]:
+    """Return, for each contact pair, the data of the step with its largest normal force."""
     peaks = dict(earlier or {})
     for step in steps:
         for name, contact in step.contact.items():
-            if name not in peaks or contact.normal_force > peaks[name][1].normal_force:
-                peaks[name] = step.index, contact
+            if name not in peaks or contact.normal_force > peaks[name][2][name].normal_force:
+                peaks[name] = step.index, step.displacement, step.contact
     return peaks
 
 
 def _solved_steps(
     model: Model, ramp: Ramp, prepare_model: Callable[[Model], Problem], instants: list[float], case: dict[str, Any],
-    last: StepResult | None, earlier: tuple[frozenset[str], dict[str, tuple[int, ContactResult]]],
+    last: StepResult | None, earlier: tuple[frozenset[str], dict[str, Peak]],
 ) -> Iterator[StepResult]:  # fmt: skip
     """Yield the steps at `instants`, which follow the step `last`; `earlier` are `_touched` and `_peaks` of earlier steps."""
     doubtful = model_warnings(model, ramp)

@@ -237,6 +237,20 @@ DOUBTS = [
         ),
     ),
     Doubt(
+        "a contact group against an obstacle lacks facets while it is pressed",
+        lambda: block((1.0, 1.0), (8, 8)).with_facet_group("HALF", lambda x: (x[:, 1] > 0.999) & (x[:, 0] < 0.51)),
+        of(
+            STEEL,
+            supports(BOTTOM="xy"),
+            '[obstacle.pair]\nsecondary = "HALF"\nmotion = { y = -0.02 }\nramp = [[0.0, 0.0], [0.5, 1.0], [1.0, 0.0]]\n',
+            'shape = { kind = "half_space", point = [0.0, 1.0], normal = [0.0, -1.0] }\n',
+            steps=2,
+        ),
+        (
+            r"in load step 1, where its force is largest, contact 'pair' lacks facets: the body passes through the obstacle by 0\.01\d+ at point \d+ \[0\.625 1\. +\], beside 'HALF'; its force is too small, add the facets there",
+        ),
+    ),
+    Doubt(
         "nodes nearly coincide",
         lambda: generate.union(
             block((0.5, 1.0), (2, 2), name="A"), block((0.5, 1.0), (2, 2), origin=(0.5 + 1e-7, 0.0), name="B")

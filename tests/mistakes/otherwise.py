@@ -171,6 +171,7 @@ OTHERWISE = {
     "the program stops with a damaged file": ("the disk is full",),
     "no message: the force is a third too small, which only pictures show": (
         "a contact group lacks facets", "a contact group against an obstacle lacks facets",
+        "a contact group against an obstacle lacks facets while it is pressed",
     ),
     "no message: the result of another problem than the intended one": (
         "friction in percent", "the initial penetration exceeds the prescribed approach",

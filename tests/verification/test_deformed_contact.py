@@ -152,15 +152,20 @@ def test_a_ring_held_by_contact_alone_is_that_of_symmetry() -> None:
     assert volume(ring(False).mesh, moved) == pytest.approx(volume(ring(False).mesh, points), rel=1e-3)
 
 
-def groove(friction: float, ramp: list[tuple[float, float]] | None = None) -> fc.Model:
-    """Return an O-ring that the four walls of a groove hold: the inner one stretches it, the lid squeezes it by a quarter."""
-    part = fc.generate.quarter_disc("tri6", R=2.5, size=0.7, contact_size=0.7)
+def cord(r: float, centre: float, size: float, contact_size: float) -> fc.Mesh:
+    """Return the section of an O-ring of a radius, at a distance from the axis, whose halves are 'UPPER' and 'LOWER'."""
+    part = fc.generate.quarter_disc("tri6", R=r, size=size, contact_size=contact_size)
     part = fc.generate.renamed(part, {"CONT1": "UPPER", "D1B1": "UPPER"})
-    part = fc.generate.transformed(part, translate=(0.0, 2.5))
+    part = fc.generate.transformed(part, translate=(0.0, r))
     upper = fc.generate.union(part, fc.generate.mirrored(part, "x"))
     lower = fc.generate.renamed(fc.generate.mirrored(upper, "y"), {"UPPER": "LOWER"})
-    mesh = fc.generate.merge_points(fc.generate.union(upper, lower), 1e-6)
-    mesh = fc.generate.transformed(mesh, translate=(25.0, 0.0))
+    mesh = fc.generate.merge_points(fc.generate.union(upper, lower), 1e-6 * r)
+    return fc.generate.transformed(mesh, translate=(centre, 0.0))
+
+
+def groove(friction: float, ramp: list[tuple[float, float]] | None = None) -> fc.Model:
+    """Return an O-ring that the four walls of a groove hold: the inner one stretches it, the lid squeezes it by a quarter."""
+    mesh = cord(2.5, 25.0, 0.7, 0.7)
     mesh = mesh.with_facet_group("CORD", lambda x: np.hypot(x[:, 0] - 25.0, x[:, 1]) > 2.4)
     mesh = mesh.with_facet_group("INSIDE", lambda x: np.hypot(x[:, 0] - 22.5, x[:, 1]) < 0.9)
     model = fc.Model(mesh, "axisymmetric", strain="finite")
@@ -229,6 +234,38 @@ def test_fluid_pushes_a_ring_with_friction_across_its_groove() -> None:
     shear = np.linalg.norm(contact["lid"].shear, axis=1)
     assert (shear[dry] <= 0.1 * contact["lid"].pressure[dry] + 1e-6).all()
     assert abs(steps[-1].work["imbalance"]) < 0.01 * steps[-1].work["external_work"]
+
+
+@pytest.mark.filterwarnings("ignore:contact .* elements across its radius")
+def test_fluid_pushes_a_ring_along_its_groove_until_the_wall_stops_it() -> None:
+    """Squeezed radially, the ring slides when the fluid below it pushes more than friction carries, up to the wall above.
+
+    The wall then carries the pressure on the area of the groove less the friction of its sides.
+    """
+    r, centre, pressure = 0.0695, 0.5615, 50.0
+    ramp, fluid = [(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)], [(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)]
+    mesh = cord(r, centre, 0.04, 0.02)
+    for name, sign in (("INNER", -1.0), ("OUTER", 1.0)):
+        mesh = mesh.with_facet_group(
+            name,
+            lambda x, sign=sign: (sign * (x[:, 0] - centre) > -1e-9) & (np.hypot(x[:, 0] - centre, x[:, 1]) > 0.98 * r),
+        )
+    mesh = mesh.with_facet_group("BELOW", lambda x: np.hypot(x[:, 0] - centre, x[:, 1] + r) < 0.35 * r)
+    model = fc.Model(mesh, "axisymmetric", strain="finite")
+    model.add_material(fc.MooneyRivlin(C10=110.0, C01=22.0, bulk=2e5))
+    for name, side, point, normal, motion in (
+        ("inner", "INNER", (0.492, 0.0), (1.0, 0.0), {"x": 0.008}),
+        ("outer", "OUTER", (0.632, 0.0), (-1.0, 0.0), {"x": -0.021}),
+        ("wall", "UPPER", (0.0, 0.0935), (0.0, -1.0), None),
+    ):
+        plane = fc.obstacles.HalfSpace(point=point, normal=normal)
+        model.add_obstacle(name, secondary=side, obstacle=plane, motion=motion, ramp=ramp, friction=0.1)
+    for name in ("inner", "outer"):
+        model.add_fluid_pressure(name, 20.0 * pressure, source="BELOW", ramp=fluid)
+    contact = fc.solve(model, [0.5, 1.0, 1.05])[-1].contact
+    push = pressure * np.pi * (0.611**2 - 0.5**2)
+    rubs = 0.1 * sum(contact[name].normal_force for name in ("inner", "outer"))  # with the fluid, which does not rub
+    assert push - rubs < contact["wall"].normal_force < push
 
 
 def volume(mesh: fc.Mesh, points: np.ndarray) -> float:
