@@ -78,14 +78,14 @@ DOUBTS = [
         ),
     ),
     Doubt(
-        "contact is lost",
+        "contact opens again",
         block_on_block,
         of(STEEL, BLOCKS, PAIR, steps=4).replace(
             "ramp.steps = 4", "ramp = { steps = 4, table = [[0.0, 0.0], [0.5, 1.0], [1.0, -1.0]] }"
         ),
         (r"contact 'pair' has opened again at the end: the smallest gap is 0\.01",),
     ),
-    Doubt("contact is never reached", lambda: raised(1.0), of(STEEL, BLOCKS, PAIR),
+    Doubt("contact never closes", lambda: raised(1.0), of(STEEL, BLOCKS, PAIR),
           (r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and the direction of the loads",)),
     Doubt(
         "bodies interpenetrate where no contact is defined",
