@@ -204,7 +204,7 @@ class Mesh(Suggesting):
             similar = difflib.get_close_matches(group, self.cell_groups, n=2, cutoff=0.3) or [*self.cell_groups][:6]
             names = " or ".join(map(repr, similar))
             remedy = f": name one such as {names}" if names else ", and the mesh has none of cells"
-            needed = "here one of cells is needed (lines, faces, solids)"
+            needed = "a group of cells (lines, faces or solids) is required here"
             raise MeshError(f"'{group}' is a group of points, but {needed}{remedy}")
         if group not in self.cell_groups:
             raise MeshError(self._no_group("group of cells", group, self.cell_groups))
@@ -243,7 +243,7 @@ class Mesh(Suggesting):
         """
         numbers = self.points_of(group)
         if len(numbers) != 1:
-            raise MeshError(f"group '{group}' contains {len(numbers)} points where exactly one is needed")
+            raise MeshError(f"group '{group}' contains {len(numbers)} points, but exactly one is required")
         return int(numbers[0])
 
     def replace(self, **changes: Any) -> Mesh:

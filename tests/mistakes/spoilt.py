@@ -88,6 +88,6 @@ MESHES = [
     ("the file contains only lines", rewritten(lines_only), r"the mesh has no solid cells, only line2"),
     ("a duplicate cell in the file", rewritten(with_a_copy),
      r"cell \d+ \(tri3 at \(.*\)\) occurs in the mesh 2 times \(number of such cells: 1\): remove the copies"),
-    ("the file contains a 3D mesh", in_space, r"kinematics 'axisymmetric' do not fit a mesh in 3 dimensions: use '3d'"),
+    ("the file contains a 3D mesh", in_space, r"kinematics 'axisymmetric' cannot be used with a 3D mesh: use '3d'"),
 ]
 # fmt: on
