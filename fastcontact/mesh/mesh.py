@@ -204,7 +204,7 @@ class Mesh(Suggesting):
             similar = difflib.get_close_matches(group, self.cell_groups, n=2, cutoff=0.3) or [*self.cell_groups][:6]
             names = " or ".join(map(repr, similar))
             remedy = f": name one such as {names}" if names else ", and the mesh has none of cells"
-            needed = "a group of cells (lines, faces or solids) is required here"
+            needed = "here one of cells is needed (lines, faces, solids)"
             raise MeshError(f"'{group}' is a group of points, but {needed}{remedy}")
         if group not in self.cell_groups:
             raise MeshError(self._no_group("group of cells", group, self.cell_groups))

@@ -192,10 +192,10 @@ def _coincident(model: Model) -> str:
     first = pairs[np.lexsort(mesh.points[pairs[:, 0]].T)[0]]
     point = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
     largest = float(distance.max())
-    where = "coincide with another" if largest <= LENGTH_ROUND_OFF * size else f"lie within {largest:.3g} of another"
+    where = "where another one is" if largest <= LENGTH_ROUND_OFF * size else f"within {largest:.3g} of another one"
     return (
-        f"{count} nodes {where} node, and no contact connects them (first: points {first[0]} and {first[1]} at ({point})): "
-        "merge them in the mesher or with generate.transform.merge_points, or define the contact"
+        f"{count} nodes lie {where}, and no contact joins them (first: points {first[0]} and {first[1]} at ({point})): merge "
+        "them in the mesher or with generate.transform.merge_points, or define the contact"
     )
 
 
@@ -262,8 +262,8 @@ def _unramped(model: Model, ramp: Ramp) -> Iterator[str]:
     if 0 < len(without) < len(ramps):
         yield (
             f"{', '.join(without)} {'has' if len(without) == 1 else 'have'} no ramp, as others have: at load factor {top:g} "
-            f"{'it is' if len(without) == 1 else 'they are'} {top:g} times the given value; to keep it constant from 1 on, "
-            f"use ramp=[(0, 0), (1, 1), ({top:g}, 1)]"
+            f"{'it is' if len(without) == 1 else 'they are'} {top:g} times what was given; to hold it from 1 on give "
+            f"ramp=[(0, 0), (1, 1), ({top:g}, 1)]"
         )
 
 

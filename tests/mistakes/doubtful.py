@@ -167,7 +167,7 @@ DOUBTS = [
         ),
         of(STEEL, supports(BOTTOM="xy")),
         (
-            r"3 nodes coincide with another node, and no contact connects them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact",
+            r"3 nodes lie where another one is, and no contact joins them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact",
         ),
     ),
     Doubt(
@@ -243,7 +243,7 @@ DOUBTS = [
         ),
         of(STEEL, supports(BOTTOM="xy")),
         (
-            r"3 nodes lie within 1e-07 of another node, and no contact connects them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact",
+            r"3 nodes lie within 1e-07 of another one, and no contact joins them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact",
         ),
     ),
     Doubt(
@@ -272,7 +272,7 @@ DOUBTS = [
             "ramp = [[0.0, 0.0], [1.0, 0.0], [2.0, 1.0]]\n",
         ).replace("ramp.steps = 1", "ramp = { instants = [1.0, 2.0], table = [[0.0, 0.0], [2.0, 2.0]] }"),
         (
-            r"the pressure on 'TOP' has no ramp, as others have: at load factor 2 it is 2 times the given value; to keep it constant from 1 on, use ramp=\[\(0, 0\), \(1, 1\), \(2, 1\)\]",
+            r"the pressure on 'TOP' has no ramp, as others have: at load factor 2 it is 2 times what was given; to hold it from 1 on give ramp=\[\(0, 0\), \(1, 1\), \(2, 1\)\]",
         ),
     ),
 ]

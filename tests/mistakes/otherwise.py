@@ -36,7 +36,7 @@ OTHERWISE = {
     ),
     "a singular matrix, reported as a small pivot in an equation that is given by its number": (
         "a spring as a rigid link",        "E is zero", "E of zero in Python", "no support at all", "one body free to slide", "a plate supported at one point",
-        "nodes that were not merged, one part without supports",
+        "nodes not merged, one part not held",
     ),
     "a solution of NaN values, or the value is read as zero": (
         "E is NaN", "support value is not finite", "a pressure that is NaN", "a table with NaN",
@@ -85,8 +85,8 @@ OTHERWISE = {
     ),
     "the number is used: the solution does not converge or is wrong": (
         "friction is negative", "friction that is negative", "tolerance is negative", "a penalty of zero",
-        "theory with nu above 0.5", "size of a mesh is negative", "a solver tolerance that is too large", "a convergence criterion of zero",
-        "a convergence criterion that is too large",
+        "theory with nu above 0.5", "size of a mesh is negative", "a solver tolerance that is too large", "a criterion of zero",
+        "a criterion that accepts everything",
         "a negative limit of updates", "a negative number of halvings", "a negative number of updates",
         "tied contact with a penalty",
     ),
@@ -139,7 +139,7 @@ OTHERWISE = {
         "a penetration larger than an element", "an obstacle deep in the body",
     ),
     "no message: the job ends successfully, although contact is open": (
-        "a contact that never closes", "contact never closes", "contact opens again",
+        "a contact that is never reached", "contact never closes", "contact opens again",
     ),
     "no message: the bodies interpenetrate": (
         "a contact pair is missing", "bodies interpenetrate where no contact is defined",
