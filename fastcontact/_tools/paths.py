@@ -33,7 +33,7 @@ def existing_file(path: PathLike) -> Path:
     if file.is_dir():
         raise FileError(f"'{path}' is a folder: name a file in it")
     if not file.exists():
-        raise FileError(f"there is no file '{path}': check its name and the folder you are in")
+        raise FileError(f"file '{path}' does not exist: check its name and the current folder")
     if not file.is_file():
         raise FileError(f"'{path}' is a device or a pipe: name a regular file")
     return file

@@ -55,6 +55,6 @@ def misfit(units: Mapping[str, str]) -> str:
     if metre is None or newton is None or pascal is None or 0.99 < (ratio := newton / metre**2 / pascal) < 1.01:
         return ""
     return (
-        f"the units do not fit each other: 1 {units['force']}/{units['length']}^2 is {ratio:.6g} {units['pressure']}; "
+        f"the units are inconsistent: 1 {units['force']}/{units['length']}^2 is {ratio:.6g} {units['pressure']}; "
         "change one of the three"
     )

@@ -138,9 +138,9 @@ def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
     depth, size = float(state.worn[name].depth.max()), float(np.ptp(pair.points, axis=0).max())
     if factor > MANY_STEPS or depth > NEGLECTED * size:
         yield (
-            f"contact '{name}' wears off {depth:.3g}, {depth / size:.2g} times the size of the model, in steps "
-            f"{factor:.2g} times as long as pressures can follow: is its wear Archard's coefficient divided by the hardness, "
-            "in the unit of one over pressure?"
+            f"contact '{name}' has a depth of wear of {depth:.3g}, {depth / size:.2g} times the size of the model, and load "
+            f"steps that are {factor:.2g} times too large for this wear: is the option 'wear' Archard's coefficient divided "
+            "by the hardness, in units of 1/pressure?"
         )
     else:
         yield (

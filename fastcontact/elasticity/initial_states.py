@@ -113,7 +113,7 @@ def initial_state(
             check_number(f"the component {component} of {label}", value)
         components[number] = value
     if not components:
-        raise ModelError(f"{label} has no component: give for example xx=...")
+        raise ModelError(f"{label} has no component: specify, for example, xx=...")
     state = InitialState(kind, groups, cells, components, checked_axes(axes), kinematics, ramp or ALWAYS)
     state.check()
     return state

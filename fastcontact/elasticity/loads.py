@@ -355,7 +355,7 @@ def axes_of(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, 
     """
     specified = {name: value for name, value in components.items() if value is not None}
     if not specified:
-        raise ModelError(f"{caption} has no component: give for example y=-1.0")
+        raise ModelError(f"{caption} has no component: specify, for example, y=-1.0")
     for name in specified:
         check_known("component", name, "xyz"[:dim], ModelError, f"{caption}: ")
     return {"xyz".index(name): value for name, value in specified.items()}

@@ -411,7 +411,7 @@ class LinearElastic(Material):
             check_positive("Young's modulus E", self.E)
         if not isinstance(self.nu, Varying) and not -1.0 < _real(self.nu) < 0.5:
             raise ModelError(
-                f"Poisson's ratio nu = {self.nu} must lie between -1 and 0.5, both excluded "
+                f"Poisson's ratio nu = {self.nu} must be greater than -1 and less than 0.5 "
                 "(for an incompressible material use nu = 0.4999 with quadrangles or hexahedra, whose mean dilatation avoids "
                 "locking)"
             )

@@ -243,7 +243,7 @@ class Mesh(Suggesting):
         """
         numbers = self.points_of(group)
         if len(numbers) != 1:
-            raise MeshError(f"group '{group}' contains {len(numbers)} points where exactly one is needed")
+            raise MeshError(f"group '{group}' contains {len(numbers)} points, but exactly one is required")
         return int(numbers[0])
 
     def replace(self, **changes: Any) -> Mesh:

@@ -27,17 +27,17 @@ def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
         _check_obstacles(mesh, pair, other)
     elif {pair.secondary, pair.primary} == {other.secondary, other.primary}:
         raise ContactError(
-            f"contact '{pair.name}' pairs '{pair.secondary}' and '{pair.primary}', which contact '{other.name}' pairs "
-            "already: leave out one of the two"
+            f"contact '{pair.name}' has the sides '{pair.secondary}' and '{pair.primary}', as contact '{other.name}' has: "
+            "remove one of the two"
         )
     else:
         for facing, opposite in ((other.secondary, other.primary), (other.primary, other.secondary)):
             nodes = shared_facets(mesh, pair.secondary, facing)
             if len(nodes) and len(shared_facets(mesh, pair.primary, opposite)):
                 raise ContactError(
-                    f"contact '{pair.name}' pairs facets of '{pair.secondary}' and '{pair.primary}' that contact "
-                    f"'{other.name}' pairs already: '{pair.secondary}' and '{facing}' share facets with {len(nodes)} nodes "
-                    f"(first: point {nodes[0]}), '{pair.primary}' and '{opposite}' share facets, too. Leave out one of the "
+                    f"contact '{pair.name}' pairs facets of '{pair.secondary}' and '{pair.primary}' that are also paired by "
+                    f"contact '{other.name}': '{pair.secondary}' and '{facing}' share facets with {len(nodes)} nodes "
+                    f"(first: point {nodes[0]}), and '{pair.primary}' and '{opposite}' share facets, too. Remove one of the "
                     "two contacts, or separate their groups"
                 )
 

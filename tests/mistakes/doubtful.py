@@ -78,14 +78,14 @@ DOUBTS = [
         ),
     ),
     Doubt(
-        "contact is lost",
+        "contact opens again",
         block_on_block,
         of(STEEL, BLOCKS, PAIR, steps=4).replace(
             "ramp.steps = 4", "ramp = { steps = 4, table = [[0.0, 0.0], [0.5, 1.0], [1.0, -1.0]] }"
         ),
         (r"contact 'pair' has opened again at the end: the smallest gap is 0\.01",),
     ),
-    Doubt("contact is never reached", lambda: raised(1.0), of(STEEL, BLOCKS, PAIR),
+    Doubt("contact never closes", lambda: raised(1.0), of(STEEL, BLOCKS, PAIR),
           (r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and the direction of the loads",)),
     Doubt(
         "bodies interpenetrate where no contact is defined",
@@ -212,7 +212,7 @@ DOUBTS = [
             "motion = { y = -0.2 }\nrotation = { angle = 0.1, centre = [0.0, 5.0] }\nwear = 1.0\n",
         ),
         (
-            r"contact 'drum' wears off \S+, \S+ times the size of the model, in steps \S+ times as long as pressures can follow: is its wear Archard's coefficient divided by the hardness, in the unit of one over pressure\?",
+            r"contact 'drum' has a depth of wear of \S+, \S+ times the size of the model, and load steps that are \S+ times too large for this wear: is the option 'wear' Archard's coefficient divided by the hardness, in units of 1/pressure\?",
         ),
     ),
     Doubt(

@@ -16,19 +16,22 @@ from spoilt import MESHES
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "mistakes.md"
 HEAD = """# Mistakes and their messages
 
-The messages below are single lines that state the cause and the remedy. An error in the input is reported before any
-computation. The command line then ends with exit code 1; the library raises one of its [errors](errors.md) with the
-same text. A doubtful but solvable model is solved, with a warning that states the size of the effect. The warning is
-shown on screen and stored in the log, in `--json` and in the result file (`open_results(path).warnings`); in Python it
-is a `FastcontactWarning`.
+This page lists common mistakes and the messages that report them. Each message is a single line that states the cause
+and the remedy.
 
-The tables show messages or parts of them; `...` stands for text that varies. They are generated from tests, which make
-each mistake and compare the message. The last column describes a common response of finite-element programs to the same
-mistake; programs differ.
+- **Errors in the input** are reported before the analysis starts. The command line ends with exit code 1. The library
+  raises one of its [exceptions](errors.md) with the same text.
+- **Doubtful input** that can be solved causes a warning, which states the size of the effect. In Python, the warning is
+  a `FastcontactWarning`. The command line shows it on the terminal. It is also stored in the log, in the summary
+  written by `--json` and in the result file (`open_results(path).warnings`).
+
+The tables show messages or parts of them. Three dots stand for text that varies. The tables are generated from tests
+that make each mistake and compare the message. The last column describes a common response of other finite-element
+programs to the same mistake. The responses of individual programs differ.
 """
 SECTIONS = (
-    ("In a case file", "`fastcontact run` with the ready-made case FORMA04 A and one change:", CASES),
-    ("In a mesh file", "`fastcontact run` with the same case and a damaged copy of its mesh:", MESHES),
+    ("In a case file", "`fastcontact run` solves the ready-made case FORMA04 A with one change:", CASES),
+    ("In a mesh file", "`fastcontact run` solves the same case with a damaged copy of its mesh:", MESHES),
     ("On the command line", "", COMMANDS),
     ("Where results are written", "", ACCIDENTS),
     ("In calls: meshes", "", library.MESH),
@@ -37,7 +40,7 @@ SECTIONS = (
     ("In calls: contact", "", library.CONTACT),
     ("In calls: loads", "", library.LOADS),
     ("In calls: ramp and options", "", [*library.RAMP, *library.OPTIONS]),
-    ("Warnings", "The case is solved, but its result is doubtful:", DOUBTS),
+    ("Warnings", "In these cases the analysis runs, but its result is doubtful:", DOUBTS),
 )
 CONSEQUENCE = {name: text for text, names in OTHERWISE.items() for name in names}
 

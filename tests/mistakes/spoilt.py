@@ -85,9 +85,9 @@ MESHES = [
      r"cells \d+ and \d+ lie on the same side of the facet between them, near \(.*\), one of 3 such pairs: the mesh is folded there; move its nodes or remesh"),
     ("the file has no groups", rewritten(without_groups),
      r"the mesh has no groups, and thus no 'SPHHAU': add groups in the mesher, or with Mesh\.with_groups"),
-    ("the file has lines only", rewritten(lines_only), r"the mesh has no solid cells, only line2"),
+    ("the file contains only lines", rewritten(lines_only), r"the mesh has no solid cells, only line2"),
     ("a duplicate cell in the file", rewritten(with_a_copy),
      r"cell \d+ \(tri3 at \(.*\)\) occurs in the mesh 2 times \(number of such cells: 1\): remove the copies"),
-    ("the file has a 3D mesh", in_space, r"kinematics 'axisymmetric' do not fit a mesh in 3 dimensions: use '3d'"),
+    ("the file contains a 3D mesh", in_space, r"kinematics 'axisymmetric' cannot be used with a 3D mesh: use '3d'"),
 ]
 # fmt: on

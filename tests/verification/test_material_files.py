@@ -153,7 +153,7 @@ def test_a_graded_bar_of_a_case_file(folder, E, scale, within):
         ("{file = 'gauss.med', field = 'E'}", "has 4 values per cell, at integration points"),
         ("{file = 'block.med', field = 'E'}", "unknown field 'E'"),
         ("{file = 'coarse.vtu', field = 'E'}", r"has no cell where \d+ cells of the mesh are"),
-        ("{file = 'no.vtu', field = 'E'}", "there is no file"),
+        ("{file = 'no.vtu', field = 'E'}", "does not exist"),
     ],
 )
 def test_mistakes_are_told(folder, E, message):

@@ -116,7 +116,7 @@ class ModelBase(Suggesting):
         check_known("strain", strain, STRAINS, ModelError)
         if (kinematics == "3d") != (mesh.dim == 3):
             fitting = ", ".join(f"'{name}'" for name in KINEMATICS if (name == "3d") == (mesh.dim == 3))
-            raise ModelError(f"kinematics '{kinematics}' do not fit a mesh in {mesh.dim} dimensions: use {fitting}")
+            raise ModelError(f"kinematics '{kinematics}' cannot be used with a {mesh.dim}D mesh: use {fitting}")
         if not mesh.solids:
             raise ModelError(f"the mesh has no solid cells, only {', '.join(mesh.cells) or 'points'}")
         ahead.expect([f"{mesh.dim}d"])
@@ -305,9 +305,9 @@ class ModelBase(Suggesting):
         offsets = self.mesh.offsets
         cells = np.concatenate([rows + offsets[name] for name, rows in without.items()])
         groups = [g for g, members in self.mesh.cell_groups.items() if np.isin(members, cells).any()]
-        of_groups = f", in {', '.join(repr(g) for g in groups)}" if groups else ""
+        of_groups = f" in {', '.join(repr(g) for g in groups)}" if groups else ""
         raise ModelError(
-            f"{total} solid cells have no material{of_groups}: assign one to their groups by add_material or [[material]]"
+            f"{total} solid cells{of_groups} have no material: assign one to their groups by add_material or [[material]]"
         )
 
     def internal_forces(self, displacement: Array) -> Array:

@@ -60,7 +60,7 @@ class ModelSupports(ModelContact):
         >>> model.fix("RIM", "x", axes=fc.CylindricalAxes())  # the radial component
         """
         if not components:
-            raise ModelError(f"fix('{group}', ...) has no component: give for example 'x' or 'xy'")
+            raise ModelError(f"fix('{group}', ...) has no component: specify, for example, 'x' or 'xy'")
         if axes is not None:
             self._along_axes(group, dict.fromkeys(components, 0.0), axes, None)
         elif components == NORMAL:

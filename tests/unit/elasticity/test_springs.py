@@ -223,8 +223,8 @@ def test_springs_that_cost_digits_are_told_and_those_that_leave_none_refused(how
     assert len(step.warnings) == 1  # the result file keeps it
     with pytest.warns(fc.FastcontactWarning, match="times as stiff"), contextlib.suppress(fc.ConvergenceError):
         last(model(1e9 * E))  # told before round-off keeps forces out of balance
-    for stiffness, left in ((1e13 * E, r"\d of 16 digits"), (1e30 * E, "no digit")):
-        with pytest.raises(fc.ModelError, match=f"the spring .* times as stiff .*: results would keep {left}; use"):
+    for stiffness, left in ((1e13 * E, r"only \d of 16 correct digits"), (1e30 * E, "no correct digit")):
+        with pytest.raises(fc.ModelError, match=f"the spring .* times as stiff .*: results would have {left}; use"):
             last(model(stiffness))
 
 

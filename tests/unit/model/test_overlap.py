@@ -333,7 +333,7 @@ def mesh():
 def test_facets_of_an_earlier_pair_are_refused(mesh, first, second, formulation):
     model = elastic_model(mesh)
     model.add_contact("first", secondary=first[0], primary=first[1], formulation=formulation)
-    with pytest.raises(fc.ContactError, match=r"contact 'second' pairs .* that contact 'first' pairs already: .*point"):
+    with pytest.raises(fc.ContactError, match=r"contact 'second' pairs .* also paired by contact 'first': .*point"):
         model.add_contact("second", secondary=second[0], primary=second[1], formulation=formulation)
     assert len(model.contact) == 1
 
