@@ -64,8 +64,8 @@ class ContactOptions(FormulationOptions, SharedOptions, total=False):
 
 
 SHARED_OPTIONS = tuple(sorted(SharedOptions.__annotations__))
-# Names of the required and of the optional constants of a cohesive layer and of adhesion. Those in CHOICES have names as
-# values, all others positive numbers.
+# Names of the required and of the optional constants of a cohesive layer and of adhesion. The values of the constants in
+# CHOICES are strings, those of all others are positive numbers.
 LAWS = {
     "cohesion": (
         ("strength", "energy"),
@@ -111,15 +111,15 @@ def pair_options(
 
 def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
     """Return the cohesive law of a pair, None without one."""
-    chosen = [option for option in LAWS if option in options]
-    if not chosen:
+    laws = [option for option in LAWS if option in options]
+    if not laws:
         return None
     exclusive = ("adhesion", "friction", "penalty", "tangential_penalty", "wear")
-    excess = [option for option in exclusive if option in options and option != chosen[0]]
+    excess = [option for option in exclusive if option in options and option != laws[0]]
     if excess or options.get("kind", "unilateral") != "unilateral":
         other = (excess or ["kind"])[0]
-        raise ContactError(f"contact '{name}' has {chosen[0]}, which excludes {other}: leave out one of the two")
-    option, constants = chosen[0], options[chosen[0]]
+        raise ContactError(f"contact '{name}' has {laws[0]}, which excludes {other}: leave out one of the two")
+    option, constants = laws[0], options[laws[0]]
     required, optional = LAWS[option]
     if not isinstance(constants, Mapping) or not set(required) <= set(constants):
         raise ContactError(f"the {option} of contact '{name}' needs {' and '.join(required)}, each given by name")
@@ -168,14 +168,14 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
     return str(kind)
 
 
-def _positive(name: str, option: str, options: Mapping[str, Any], without: str) -> float | None:
-    """Return the positive number of an option, None if not given; `without` is the effect of omitting the option."""
+def _positive(name: str, option: str, options: Mapping[str, Any], default: str) -> float | None:
+    """Return the positive number of an option, None if not given; `default` describes the effect of omitting the option."""
     value = options.get(option)
     if value is None:
         return None
     check_number(f"the {option} of contact '{name}'", value)
     if not value > 0:
-        raise ContactError(f"{option} = {value} of contact '{name}' must be positive; leave it out for {without}")
+        raise ContactError(f"{option} = {value} of contact '{name}' must be positive; leave it out for {default}")
     return float(value)
 
 
@@ -237,10 +237,11 @@ def _penalty(name: str, options: Mapping[str, Any]) -> float | OverclosureLaw | 
 def _tangential_penalty(name: str, value: Any) -> Field | None:
     """Return a number or a function of position as a function; pass None through."""
     penalty = _function(f"the tangential_penalty of contact '{name}'", value)
-    return None if penalty is None else partial(_all_positive, penalty, name)
+    return None if penalty is None else partial(_positive_values, penalty, name)
 
 
-def _all_positive(penalty: Field, name: str, positions: Array) -> Array:
+def _positive_values(penalty: Field, name: str, positions: Array) -> Array:
+    """Return the tangential penalties (n,) at `positions` (n, dim). Raises ContactError if one is not positive."""
     values = penalty(positions)
     if not (values > 0).all():
         remedy = "leave it out for stick without elastic slip"

@@ -66,7 +66,7 @@ def periodic(
     ends : (str, str)
         Groups.
     jump : mapping of int to float
-        Displacement of the second end relative to the first at multiplier 1, by component [length].
+        Displacement of the second end relative to the first one at multiplier 1, by component [length].
     free : sequence of int
         Components in which the jump is equal for all nodes, but unknown.
     translation : sequence of float (dim,), optional
@@ -128,7 +128,7 @@ def cyclic(
         key=lambda motion: float(nearest(mesh.points[second], mesh.points[first] @ motion[0].T + motion[1])[0].max()),
     )
     match, distance, tolerance = coincident(mesh, (ends[0], first), (ends[1], second), turn, shift)
-    far = int(np.argmax(distance))
+    worst = int(np.argmax(distance))
     same = distance <= tolerance
     interface = PeriodicInterface(first[same], second[match[same]], turn, rotation, sectors)
     if len(first) == len(second) == len(np.unique(match)) and same.all():
@@ -140,7 +140,7 @@ def cyclic(
             if (rows := _rows_to_facets(mesh, dependent, facets, rotation, sign)) is not None:
                 return [MultiPointConstraint(name, _without_zeros(rows))], interface
     raise ModelError(
-        f"{name}: point {first[far]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[far]:.3g} from the "
+        f"{name}: point {first[worst]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[worst]:.3g} from the "
         f"nearest node of '{ends[1]}', and the groups do not consist of facets that coincide: check axis and sectors"
     )
 
@@ -164,7 +164,7 @@ def _rows_to_facets(mesh: Mesh, dependent: str, facets: str, rotation: Rotation,
     other, nodes = surface(mesh, facets), mesh.points_of(dependent).astype(np.intp)
     turn, shift = _motion(rotation, sign)
     corners = other.corners(mesh.points)
-    near = _projected(mesh.points[nodes] @ turn.T + shift, to_facets(mesh, nodes) @ turn.T, other, corners)
+    near = _closest(mesh.points[nodes] @ turn.T + shift, to_facets(mesh, nodes) @ turn.T, other, corners)
     sizes = np.concatenate([np.ptp(block, axis=1).max(axis=1) for block in corners])
     if (near.distance > LARGEST_DISTANCE * sizes[near.facet]).any() or (near.overhang > LARGEST_DISTANCE).any():
         return None
@@ -180,8 +180,8 @@ def _motion(rotation: Rotation, sign: float) -> tuple[Array, Array]:
     return turn, centre - turn @ centre
 
 
-def _projected(positions: Array, inward: Array, other: Surface, corners: list[Array]) -> Closest:
-    """Project positions (n, dim) [length] on the closest facets of a surface, whose nodes are at `corners`.
+def _closest(positions: Array, inward: Array, other: Surface, corners: list[Array]) -> Closest:
+    """Return the projections of positions (n, dim) [length] on the closest facets of a surface with nodes at `corners`.
 
     Where two bodies are in contact, a position lies on facets of both. It is assigned to the body into which `inward`
     (n, dim) points.

@@ -164,9 +164,9 @@ def pretension(
     for name_of_value, value in (("force", force), ("shortening", shortening), ("locked_from", locked_from)):
         if value is not None:
             check_number(f"the {name_of_value} of {name}", value)
-    nodes, facing = _sides(mesh, name, section, opposite)
+    nodes, opposite_nodes = _sides(mesh, name, section, opposite)
     direction = _outward(mesh, name, section, _normal(mesh, name, nodes, normal))
-    return Pretension(label, nodes, facing, direction, force or 0.0, shortening, locked_from, ramp)
+    return Pretension(label, nodes, opposite_nodes, direction, force or 0.0, shortening, locked_from, ramp)
 
 
 def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[Indices, Indices]:
@@ -178,12 +178,12 @@ def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[I
             f"{name}: the mesh is not cut along '{section}', there is no group '{other}': build the model on "
             f"fc.generate.cut(mesh, '{section}'), or name the opposite side"
         )
-    facing = mesh.points_of(other).astype(np.intp)
-    shared = np.intersect1d(nodes, facing)
+    opposite_nodes = mesh.points_of(other).astype(np.intp)
+    shared = np.intersect1d(nodes, opposite_nodes)
     if len(shared):
         raise ModelError(f"{name}: '{section}' and '{other}' share point {shared[0]}: both sides need separate nodes")
-    match = matched(mesh, (section, nodes), (other, facing), [0.0] * mesh.dim)
-    return nodes, facing[match]
+    match = matched(mesh, (section, nodes), (other, opposite_nodes), [0.0] * mesh.dim)
+    return nodes, opposite_nodes[match]
 
 
 def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | None) -> Array:
@@ -231,8 +231,8 @@ def locked_lengths(
 ) -> dict[str, float]:
     """Return by name the shortenings of the sections that are locked in the load step from the instant `begin` [length].
 
-    The shortening of a newly locked section follows from displacements (n_points, dim) [length]. Later steps use the value
-    `stored` at that time, because their displacements reproduce it only up to round-off.
+    The shortening of a section that is locked in this step is computed from displacements (n_points, dim) [length]. Later
+    steps use the `stored` value, because their displacements reproduce it only up to round-off.
     """
     locked = [bolt for bolt in sections if bolt.locked_from is not None and begin >= bolt.locked_from]
     return {bolt.label: stored[bolt.label] if bolt.label in stored else bolt.shortened(displacement) for bolt in locked}

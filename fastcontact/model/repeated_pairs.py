@@ -19,7 +19,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
 def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
-    """Raise ContactError if two pairs share facets on both sides, in either role, or press shared facets on one obstacle.
+    """Raise ContactError if two pairs share facets on both sides, in either role, or press the same facets on one obstacle.
 
     A surface may face several other surfaces, because the opposite side of each pair then differs.
     """
@@ -88,8 +88,8 @@ def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Ite
             continue
         roles = ((other_sides.secondary, other_sides.primary), (other_sides.primary, other_sides.secondary))
         for secondary, primary in roles:
-            nodes = _common(sides.points, sides.secondary, secondary)
-            if len(nodes) and len(_common(sides.points, sides.primary, primary)):
+            nodes = _common_smooth_nodes(sides.points, sides.secondary, secondary)
+            if len(nodes) and len(_common_smooth_nodes(sides.points, sides.primary, primary)):
                 yield (
                     f"contacts '{pair.name}' and '{other.name}' continue each other at common nodes of their sides "
                     f"(number: {len(nodes)}, first: point {nodes[0]}): the pressure near them is not unique; make one "
@@ -97,7 +97,7 @@ def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Ite
                 )
 
 
-def _common(points: Array, side: Surface, other: Surface) -> Numbers:
+def _common_smooth_nodes(points: Array, side: Surface, other: Surface) -> Numbers:
     """Return the common nodes of two surfaces at which their normals differ by less than CORNER."""
     nodes, of_side, of_other = np.intersect1d(side.points, other.points, return_indices=True)
     if not len(nodes):

@@ -272,7 +272,7 @@ DOUBTS = [
             "ramp = [[0.0, 0.0], [1.0, 0.0], [2.0, 1.0]]\n",
         ).replace("ramp.steps = 1", "ramp = { instants = [1.0, 2.0], table = [[0.0, 0.0], [2.0, 2.0]] }"),
         (
-            r"the pressure on 'TOP' has no ramp, as others have: at load factor 2 it is 2 times what was given; to hold it from 1 on give ramp=\[\(0, 0\), \(1, 1\), \(2, 1\)\]",
+            r"the pressure on 'TOP' has no ramp, unlike others: at load factor 2 it is 2 times the given value; to hold it from 1 on, give ramp=\[\(0, 0\), \(1, 1\), \(2, 1\)\]",
         ),
     ),
 ]

@@ -248,9 +248,9 @@ class ModelContact(ModelConnections):
         check_known("contact", contact, names, ModelError)
         fluid = FluidPressure(float(pressure), source, table_of(ramp, f"the ramp of the fluid in contact '{contact}'"))
         index = names.index(contact)
-        wetted = dataclasses.replace(self.contact[index], fluid=fluid)
-        self.bind(wetted)
-        self.contact[index] = wetted
+        pair_with_fluid = dataclasses.replace(self.contact[index], fluid=fluid)
+        self.bind(pair_with_fluid)
+        self.contact[index] = pair_with_fluid
 
     def add_obstacle(
         self,
@@ -329,12 +329,12 @@ class ModelContact(ModelConnections):
             log.info("contact '%s': %s, since %s", name, method(formulation, chosen), reason)
         if formulation == "mortar":
             chosen.setdefault("multipliers", "dual")
-        driving = self._driving(name, components, force)
-        turned = rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
-        moved = displacement, history, driving, *turned
-        self._add_pair(ContactPair(name, secondary, "", formulation, chosen, obstacle, *moved))
+        driving = self._driving_force(name, components, force)
+        rotation_and_ramp = rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
+        motion_of_obstacle = displacement, history, driving, *rotation_and_ramp
+        self._add_pair(ContactPair(name, secondary, "", formulation, chosen, obstacle, *motion_of_obstacle))
 
-    def _source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
+    def _fluid_source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
         """Return the mask (n_points,) of the points at which fluid enters a contact pair; None without a fluid."""
         if pair.fluid is None:
             return None
@@ -361,7 +361,7 @@ class ModelContact(ModelConnections):
         of_simplices = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
         return list(facets), of_simplices
 
-    def _driving(self, name: str, motion: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
+    def _driving_force(self, name: str, motion: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
         """Return the force on obstacle `name` by component, None where its motion is prescribed; empty without forces."""
         if not force:
             return ()
@@ -401,8 +401,8 @@ class ModelContact(ModelConnections):
         """
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
-        given = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
-        available = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given)]
+        common = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
+        available = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in common)]
         available += ["motion", "rotation", "force"] * (pair.obstacle is not None)  # arguments of `add_obstacle`
         for option in pair.options:
             check_known(f"option of {pair.formulation}", option, available, ContactError)
@@ -413,8 +413,8 @@ class ModelContact(ModelConnections):
             for interface in self.periodic_interfaces
         ]
         secondary = surface(self.mesh, pair.secondary).with_periodic_ends(ends)
-        against = pair.obstacle is not None
-        options = pair_options(pair.name, pair.options, self.mesh, secondary, against_obstacle=against)
+        has_obstacle = pair.obstacle is not None
+        options = pair_options(pair.name, pair.options, self.mesh, secondary, against_obstacle=has_obstacle)
         primary: Surface | RigidSide
         if pair.obstacle is not None:
             if not kind.against_obstacles:
@@ -431,6 +431,6 @@ class ModelContact(ModelConnections):
         turning = next((e.rotation for e in interfaces if e.rotation and np.isin(e.second, points).any()), None)
         options = dataclasses.replace(
             options, same_place=same_place(interfaces, self.mesh.n_points), turning=turning,
-            source=self._source(pair, secondary, options),
+            source=self._fluid_source(pair, secondary, options),
         )  # fmt: skip
         return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **specific)

@@ -159,7 +159,7 @@ class ModelHeat(ModelBase):
 
     @property
     def point_fields(self) -> list[str]:
-        """Names of the point data of result files that only some models have."""
+        """Names of those point data of result files that only some models have."""
         options = {option for pair in self.contact for option in pair.options}
         present = {
             **dict.fromkeys(("temperature", "heat_reaction"), self.conducts),
@@ -167,7 +167,7 @@ class ModelHeat(ModelBase):
             "contact_damage": bool({"cohesion", "adhesion"} & options),
             "contact_fluid_pressure": any(pair.fluid is not None for pair in self.contact),
         }
-        return [name for name, has in present.items() if has]
+        return [name for name, is_present in present.items() if is_present]
 
     @property
     def expands(self) -> bool:
