@@ -189,18 +189,18 @@ def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> No
 def new_file(path: PathLike, mesh: Mesh) -> Iterator[Any]:
     """Open a new MED file, which appears at `path` when it is complete; `mesh` determines the version."""
     version = 4 if "wedge18" in mesh.cells else 3
-    with replacing(path) as temporary, _order_tracked(version >= 4), new_hdf5(temporary) as file:
+    with replacing(path) as temporary, _tracking_order(version >= 4), new_hdf5(temporary) as file:
         _set(file.create_group("INFOS_GENERALES"), MAJ=version, MIN=0, REL=0)
         yield file
 
 
 @contextmanager
-def _order_tracked(wanted: bool) -> Iterator[None]:
-    """Make new HDF5 groups track the order of their members if `wanted`; the MED library requires it in version 4."""
+def _tracking_order(enabled: bool) -> Iterator[None]:
+    """Make new HDF5 groups track the order of their members if `enabled`; the MED library requires it in version 4."""
     import h5py
 
     settings = h5py.get_config()
-    before, settings.track_order = settings.track_order, wanted
+    before, settings.track_order = settings.track_order, enabled
     try:
         yield
     finally:
@@ -215,7 +215,7 @@ def _set(group: Any, **attributes: Any) -> None:
         group.attrs[name] = np.bytes_(value) if isinstance(value, (str, bytes)) else value
 
 
-def _padded(names: Iterable[str]) -> str:
+def _fixed_width(names: Iterable[str]) -> str:
     return "".join(f"{name:<{COMPONENT_SIZE}}" for name in names)
 
 
@@ -227,7 +227,7 @@ def add_mesh(file: Any, mesh: Mesh, mesh_name: str) -> None:
     group = file.create_group(f"ENS_MAA/{mesh_name}")
     _set(group, DIM=max((elements.get(name).dim for name in mesh.cells), default=mesh.dim), ESP=mesh.dim)
     _set(group, REP=0, SRT=0, TYP=0, NXT=NO_STEP, NXI=NO_STEP, UNT="", DES="fastcontact")
-    _set(group, NOM=_padded(AXES[: mesh.dim]), UNI=_padded([""] * mesh.dim))
+    _set(group, NOM=_fixed_width(AXES[: mesh.dim]), UNI=_fixed_width([""] * mesh.dim))
     step = group.create_group(_step_key(NO_STEP, NO_STEP))
     _set(step, CGT=1, NDT=NO_STEP, NOR=NO_STEP, PDT=-1.0, NXT=NO_STEP, NXI=NO_STEP, PVT=NO_STEP, PVI=NO_STEP)
     folder = file.create_group(f"FAS/{mesh_name}")
@@ -279,7 +279,7 @@ def add_field(
     path = f"CHA/{name}"
     if path not in file:
         _set(file.create_group(path), MAI=mesh_name, TYP=FLOAT64, NCO=len(components), UNT="")
-        _set(file[path], NOM=_padded(components), UNI=_padded([""] * len(components)))
+        _set(file[path], NOM=_fixed_width(components), UNI=_fixed_width([""] * len(components)))
     group = file[path].create_group(_step_key(number, NO_STEP))
     _set(group, NDT=number, NOR=NO_STEP, PDT=float(time), RDT=NO_STEP, ROR=NO_STEP)
     support = group.create_group("NOE")
@@ -415,13 +415,13 @@ def read_families(folder: Any, level: int = 0) -> Families:
     families: Families = {}
     for entry in folder.values():
         if "NUM" in entry.attrs:
-            families[int(attribute(entry, "NUM"))] = _names_in(entry)
+            families[int(attribute(entry, "NUM"))] = _group_names_of(entry)
         elif hasattr(entry, "values") and level < LEVELS:
             families.update(read_families(entry, level + 1))
     return families
 
 
-def _names_in(family: Any) -> tuple[str, ...]:
+def _group_names_of(family: Any) -> tuple[str, ...]:
     if "GRO" not in family:
         return ()
     groups = family["GRO"]

@@ -250,15 +250,15 @@ def circles(mesh: Mesh) -> list[Circle]:
     >>> {round(circle.radius, 9) for circle in generate.circles(generate.half_spheres(size=10.0))}
     {50.0}
     """
-    fitted = []
+    curves = []
     for group in mesh.cell_groups:
         blocks = mesh.cells_of(group, dim=1)
         has_solids = any(elements.get(name).dim == 2 for name in mesh.split(mesh.cell_groups[group]))
         if blocks and not has_solids:
             circle = _circle(mesh, group, list(blocks.values()))
             if circle is not None:
-                fitted.append(circle)
-    return fitted
+                curves.append(circle)
+    return curves
 
 
 def _circle(mesh: Mesh, group: str, blocks: list[AnyArray]) -> Circle | None:
