@@ -206,8 +206,8 @@ class Mesh(Suggesting):
             similar = difflib.get_close_matches(group, self.cell_groups, n=2, cutoff=0.3) or [*self.cell_groups][:6]
             names = " or ".join(map(repr, similar))
             remedy = f": name one such as {names}" if names else ", and the mesh has no such group"
-            needed = "here a group of cells is needed (lines, faces, solids)"
-            raise MeshError(f"'{group}' is a group of points, but {needed}{remedy}")
+            requirement = "here a group of cells is needed (lines, faces, solids)"
+            raise MeshError(f"'{group}' is a group of points, but {requirement}{remedy}")
         if group not in self.cell_groups:
             raise MeshError(self._no_group("group of cells", group, self.cell_groups))
         rows = self.split(self.cell_groups[group])
@@ -313,10 +313,10 @@ class Mesh(Suggesting):
             considered = np.isin(np.arange(self.n_cells), self.cell_groups[of])
         facets = _facets_with_nodes(self, selected, between, considered)
         if not facets:
-            of_group = f" of '{of}'" if of else ""
+            group_text = f" of '{of}'" if of else ""
             raise MeshError(
                 f"facet group '{name}' would be empty: its function selects {int(selected.sum())} points, but no "
-                f"facet{of_group} {'between two cells' if between else 'on the outside'} has all its nodes among them; "
+                f"facet{group_text} {'between two cells' if between else 'on the outside'} has all its nodes among them; "
                 "compare coordinates with a tolerance, or define a group of points with with_groups"
             )
         return self.with_facets({name: facets})

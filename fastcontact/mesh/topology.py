@@ -101,10 +101,10 @@ def remembered(function: OfMesh[Arguments, Result]) -> OfMesh[Arguments, Result]
 
     @wraps(function)
     def remembered(mesh: Mesh, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
-        of_mesh, key = results.setdefault(mesh, {}), (*args, *kwargs.items())
-        if key not in of_mesh:
-            of_mesh[key] = function(mesh, *args, **kwargs)
-        return of_mesh[key]
+        results_of_mesh, key = results.setdefault(mesh, {}), (*args, *kwargs.items())
+        if key not in results_of_mesh:
+            results_of_mesh[key] = function(mesh, *args, **kwargs)
+        return results_of_mesh[key]
 
     return remembered
 

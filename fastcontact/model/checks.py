@@ -99,8 +99,8 @@ def check_penetration(name: str, pair: Formulation) -> None:
         point = pair.secondary.points[row]
         raise ContactError(
             f"contact '{name}' begins with a penetration of {-gap[row]:.4g} at point {point} {pair.points[point]}, more than "
-            f"the length of the element there ({size[row]:.4g}): move a body apart, reverse the orientation of a surface, or "
-            "give an interference that is meant as clearance"
+            f"the length of the element there ({size[row]:.4g}): separate the bodies, reverse the orientation of a surface, "
+            "or specify an intended interference as a clearance"
         )
 
 

@@ -191,7 +191,7 @@ class ReferencePoint:
 
 
 def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
-    """Return a reference point by the name of its group; ModelError if there is no such point."""
+    """Return a reference point by the name of its group. Raises ModelError if there is no such point."""
     if name + ROTATION not in mesh.point_groups:
         raise ModelError(
             f"'{name}' is not a reference point: build the model on "

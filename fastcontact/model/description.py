@@ -79,20 +79,20 @@ def _theory(model: Any) -> str:
 
 
 def _supports(model: Any) -> Iterator[str]:
-    by_place: dict[tuple[str, Any], list[str]] = {}
+    by_group: dict[tuple[str, Any], list[str]] = {}
     for support in model.supports:
-        texts = by_place.setdefault((support.group, support.ramp), [])
+        texts = by_group.setdefault((support.group, support.ramp), [])
         texts.append(f"{'xyz'[support.component]} = {_value(support.value)}")
         if support.rotation is not None and support.component == model.mesh.dim - 1:
             turn = support.rotation
             texts.append(f"rotated by {turn.angle:g} radian about {turn.centre}{_history(support.rotation_ramp)}")
-    for (group, ramp), components in by_place.items():
+    for (group, ramp), components in by_group.items():
         count = len(model.mesh.points_of(group))
         yield f"Support: {', '.join(components)} on '{group}' ({count} points){_history(ramp)}."
     on_axis = len(model.axis_nodes)
     if on_axis:
         yield f"Support: x = 0 at the {on_axis} points on the axis, by symmetry."
-    if not (by_place or model.relations or model.springs or on_axis):
+    if not (by_group or model.relations or model.springs or on_axis):
         yield "Support: none."
 
 

@@ -142,8 +142,8 @@ class ForceDrivenObstacles:
         """
         number = self.number(name)
         if number is None:
-            padded = tuple(self._with_empty_columns(tangent) for tangent in constraints.tangents)
-            return dataclasses.replace(constraints, B=self._with_empty_columns(constraints.B), tangents=padded)
+            with_zeros = tuple(self._with_empty_columns(tangent) for tangent in constraints.tangents)
+            return dataclasses.replace(constraints, B=self._with_empty_columns(constraints.B), tangents=with_zeros)
         B, normal = self._with_motion(constraints.B, number)
         tangents = tuple(self._with_motion(tangent, number)[0] for tangent in constraints.tangents)
         slip0 = np.zeros_like(constraints.slip0)
@@ -156,6 +156,6 @@ class ForceDrivenObstacles:
         """Return rows (m, n_dofs) that include the motion of an obstacle, and their directions (m, dim)."""
         n, dim = self.shape
         direction = rows @ np.tile(np.eye(dim), (n, 1))
-        of_obstacles = np.zeros((rows.shape[0], len(self) * dim))
-        of_obstacles[:, number * dim : (number + 1) * dim] = -direction
-        return csr_array(hstack([rows, csr_array(of_obstacles)], format="csr")), direction
+        obstacle_columns = np.zeros((rows.shape[0], len(self) * dim))
+        obstacle_columns[:, number * dim : (number + 1) * dim] = -direction
+        return csr_array(hstack([rows, csr_array(obstacle_columns)], format="csr")), direction

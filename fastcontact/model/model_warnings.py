@@ -75,8 +75,8 @@ def _split_sides(model: Model, pairs: Pairs) -> Iterator[str]:
         if pair.primary
     }
     points, count = np.unique(np.concatenate([*nodes.values(), np.empty(0, np.int32)]), return_counts=True)
-    adjoining = [name for name in nodes if np.isin(nodes[name], points[count > 1]).any()]
-    return split_side_warnings([(pair, bound) for pair, bound in pairs if pair.name in adjoining])
+    adjacent = [name for name in nodes if np.isin(nodes[name], points[count > 1]).any()]
+    return split_side_warnings([(pair, bound) for pair, bound in pairs if pair.name in adjacent])
 
 
 def _sector_ends(model: Model) -> Iterator[str]:
@@ -148,7 +148,7 @@ def _proportions(model: Model, motion: float) -> Iterator[str]:
     if strain > PLAUSIBLE_STRAIN[1] or 0.0 < strain < PLAUSIBLE_STRAIN[0]:
         yield (
             f"the loads strain the model by about {strain:.2g} (total force over E times the cross-section of the "
-            "model): are loads, lengths and E in one set of units?"
+            "model): are loads, lengths and E in consistent units?"
         )
 
 
@@ -192,20 +192,20 @@ def _close_nodes(model: Model) -> str:
     first = pairs[np.lexsort(mesh.points[pairs[:, 0]].T)[0]]
     point = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
     largest = float(distance.max())
-    where = "where another one is" if largest <= LENGTH_ROUND_OFF * size else f"within {largest:.3g} of another one"
+    relation = "coincide with" if largest <= LENGTH_ROUND_OFF * size else f"lie within {largest:.3g} of"
     return (
-        f"{count} nodes lie {where}, and no contact joins them (first: points {first[0]} and {first[1]} at ({point})): merge "
-        "them in the mesher or with generate.transform.merge_points, or define the contact"
+        f"{count} nodes {relation} another node, and no contact joins them (first: points {first[0]} and {first[1]} at "
+        f"({point})): merge them in the mesher or with generate.transform.merge_points, or define the contact"
     )
 
 
 def _shared_fluids(model: Model) -> list[str]:
     """Return the warnings about contacts with fluids that share secondary facets with each other."""
-    groups, wetted = model.mesh.cell_groups, [pair for pair in model.contact if pair.fluid is not None]
+    groups, fluid_pairs = model.mesh.cell_groups, [pair for pair in model.contact if pair.fluid is not None]
     return [
         f"the fluids of contacts '{first.name}' and '{second.name}' both act on {len(shared)} secondary facets, and each "
         "bypasses the seal of the other contact: give each pair separate facets"
-        for first, second in itertools.combinations(wetted, 2)
+        for first, second in itertools.combinations(fluid_pairs, 2)
         if len(shared := np.intersect1d(groups.get(first.secondary, []), groups.get(second.secondary, [])))
     ]
 
@@ -258,11 +258,11 @@ def _missing_ramps(model: Model, ramp: Ramp) -> Iterator[str]:
     rotations = {s.group: s.rotation_ramp or s.ramp for s in model.supports if s.rotation is not None}
     ramps += [(f"the rotation of '{group}'", history) for group, history in rotations.items()]
     ramps += [(f"the force on obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.force)]
-    without = [name for name, history in ramps if history is None]
-    if 0 < len(without) < len(ramps):
+    missing = [name for name, history in ramps if history is None]
+    if 0 < len(missing) < len(ramps):
         yield (
-            f"{', '.join(without)} {'has' if len(without) == 1 else 'have'} no ramp, unlike others: at load factor {peak:g} "
-            f"{'it is' if len(without) == 1 else 'they are'} {peak:g} times the given value; to hold it from 1 on, give "
+            f"{', '.join(missing)} {'has' if len(missing) == 1 else 'have'} no ramp, unlike others: at load factor {peak:g} "
+            f"{'it is' if len(missing) == 1 else 'they are'} {peak:g} times the given value; to hold it from 1 on, give "
             f"ramp=[(0, 0), (1, 1), ({peak:g}, 1)]"
         )
 

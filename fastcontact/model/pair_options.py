@@ -85,7 +85,7 @@ def pair_options(
     the pair.
     """
     if against_obstacle and "clearance_primary" in options:
-        raise ContactError(f"a rigid obstacle has no nodes to measure from: give contact '{name}' a 'clearance'")
+        raise ContactError(f"a rigid obstacle has no 'clearance_primary': give contact '{name}' a 'clearance'")
     _check_obstacle_temperature(name, options, against_obstacle)
     if "clearance_ramp" in options and not {"clearance", "clearance_primary"} & set(options):
         raise ContactError(f"contact '{name}' has a clearance_ramp, but no clearance that it could multiply")
@@ -185,7 +185,7 @@ def _check_obstacle_temperature(name: str, options: Mapping[str, Any], against_o
     if temperature is None:
         if against_obstacle and {"conductance", "friction_heat"} & set(options):
             raise ContactError(
-                f"heat that crosses contact '{name}' needs the temperature of its obstacle: give it obstacle_temperature=..."
+                f"heat flow through contact '{name}' needs the temperature of its obstacle: give it obstacle_temperature=..."
             )
         return
     check_number(f"the obstacle_temperature of contact '{name}'", temperature)

@@ -103,8 +103,8 @@ def _overlaps(pairs: Pairs, supports: Supports) -> Iterator[tuple[ContactPair, F
         # Nodes without supports are included in the total, whether they face the other side or not.
         unsupported = len(usable) - len(nodes)
         candidates = Candidates(nodes[:, None], np.ones((len(nodes), 1)))
-        at_rest = Configuration.undeformed(formulation.points)
-        gap0, _, _ = _gaps(formulation, candidates, at_rest, with_clearance=False)
+        undeformed = Configuration.undeformed(formulation.points)
+        gap0, _, _ = _gaps(formulation, candidates, undeformed, with_clearance=False)
         overlaps = [_overlap_at(contact, formulation, candidates, gap0, supports, t) for t in supports.instants()]
         worst = max(overlaps, key=lambda overlap: overlap.depth)
         if worst.count:

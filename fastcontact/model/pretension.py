@@ -160,7 +160,7 @@ def pretension(
     if (force is None) == (shortening is None):
         raise ModelError(f"{name} needs either a force or a shortening")
     if shortening is not None and locked_from is not None:
-        raise ModelError(f"{name} has a shortening, which is known at all times: locked_from belongs to a force")
+        raise ModelError(f"{name} has a prescribed shortening: locked_from applies to a force only")
     for name_of_value, value in (("force", force), ("shortening", shortening), ("locked_from", locked_from)):
         if value is not None:
             check_number(f"the {name_of_value} of {name}", value)
@@ -196,7 +196,7 @@ def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | Non
     arms = mesh.points[nodes] - mesh.points[nodes].mean(axis=0)
     extent, axes = np.linalg.svd(arms, full_matrices=True)[1:]
     if len(nodes) < mesh.dim or (len(extent) >= mesh.dim and extent[-1] > SINGLE_PRECISION * extent[0]):
-        raise ModelError(f"the nodes of {name} determine no plane: give its normal, along the bolt")
+        raise ModelError(f"the nodes of {name} do not determine a plane: give its normal, along the bolt")
     vector = axes[-1] * np.sign(axes[-1][np.argmax(np.abs(axes[-1]))])
     return np.asarray(np.where(np.abs(vector) < ROUND_OFF, 0.0, vector))
 
@@ -247,7 +247,7 @@ def loose_bolts(sections: Sequence[Pretension], modes: Array, force: Array) -> s
     loose = " and ".join(bolt.name for bolt in free if not force[bolt.nodes].any())
     if not loose:
         return ""
-    return f". The force of {loose} is 0: give a loose bolt a small one from the beginning, such as 0.001 of the full force"
+    return f". The force of {loose} is 0: give a loose bolt a small force from the beginning, 0.001 of the full one"
 
 
 def check_locks(sections: Sequence[Pretension], instants: Sequence[float]) -> None:

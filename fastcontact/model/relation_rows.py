@@ -129,10 +129,10 @@ def coincident(mesh: Mesh, first: NodeGroup, second: NodeGroup, turn: Array, shi
         rows[row[best]] = candidate[best]
         ambiguous = np.flatnonzero(~best[1:] & best[:-1] & (np.diff(mismatch) <= tolerance))
         if len(ambiguous):
-            node, two = nodes[row[ambiguous[0]]], opposite[candidate[ambiguous[0] : ambiguous[0] + 2]]
+            node, pair = nodes[row[ambiguous[0]]], opposite[candidate[ambiguous[0] : ambiguous[0] + 2]]
             raise ModelError(
-                f"points {two[0]} and {two[1]} of '{other}' lie at one place, and neither the facets nor the bodies of the "
-                f"groups tell which of them point {node} of '{name}' meets: join groups of one body at a time"
+                f"points {pair[0]} and {pair[1]} of '{other}' coincide, and neither the facets nor the bodies of the groups "
+                f"determine which of them belongs to point {node} of '{name}': join groups of one body at a time"
             )
     return Coincident(rows, distance, tolerance)
 

@@ -68,7 +68,7 @@ def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
     same_gap = np.allclose(gap, other_gap, rtol=0.0, atol=LENGTH_ROUND_OFF * size)
     if same_gap and np.allclose(normal, other_normal, atol=SINGLE_PRECISION):
         raise ContactError(
-            f"contact '{pair.name}' presses facets of '{pair.secondary}' on the same rigid obstacle as contact "
+            f"contact '{pair.name}' presses facets of '{pair.secondary}' against the same rigid obstacle as contact "
             f"'{other.name}', with {len(nodes)} nodes (first: point {nodes[0]}): leave out one of the two"
         )
 
@@ -92,15 +92,15 @@ def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Ite
             if len(nodes) and len(_common_smooth_nodes(sides.points, sides.primary, primary)):
                 yield (
                     f"contacts '{pair.name}' and '{other.name}' continue each other at common nodes of their sides "
-                    f"(number: {len(nodes)}, first: point {nodes[0]}): the pressure near them is not unique; make one "
-                    "contact of both, with one group for each side"
+                    f"(number: {len(nodes)}, first: point {nodes[0]}): the pressure near them is not unique; combine "
+                    "the two contacts into one, with one group for each side"
                 )
 
 
 def _common_smooth_nodes(points: Array, side: Surface, other: Surface) -> Numbers:
     """Return the common nodes of two surfaces at which their normals differ by less than CORNER."""
-    nodes, of_side, of_other = np.intersect1d(side.points, other.points, return_indices=True)
+    nodes, side_index, other_index = np.intersect1d(side.points, other.points, return_indices=True)
     if not len(nodes):
         return nodes
-    normals = [nodal_normals(surface, points)[index] for surface, index in ((side, of_side), (other, of_other))]
+    normals = [nodal_normals(surface, points)[index] for surface, index in ((side, side_index), (other, other_index))]
     return np.asarray(nodes[np.einsum("nd,nd->n", *normals) > np.cos(np.radians(CORNER))])

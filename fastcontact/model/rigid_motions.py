@@ -202,9 +202,9 @@ def _body_motions(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
     joint = _joint_motions(mesh, rigid, moving)
     coefficients = np.split(joint, np.cumsum([motion.shape[2] for _, motion in moving]))
     displacement = np.zeros((mesh.n_points, mesh.dim, joint.shape[1]))
-    for number, ((members, motion), of_part) in enumerate(zip(moving, coefficients[:-1], strict=True)):
+    for number, ((members, motion), weights) in enumerate(zip(moving, coefficients[:-1], strict=True)):
         in_part = rigid.part[members] == number  # a node at a hinge belongs to several parts
-        displacement[members[in_part]] = motion[in_part] @ of_part
+        displacement[members[in_part]] = motion[in_part] @ weights
     return FreeMotions(
         displacement.reshape(mesh.points.size, joint.shape[1]), np.asarray(block_diag(*matrices), float) @ joint, labels,
         np.unique(rigid.hinge_node),
@@ -285,7 +285,7 @@ def _edges(constraints: Constraints, factor: float) -> tuple[csr_array, Array]:
         angle = 2.0 * np.pi * np.arange(EDGES) / EDGES
         weights = np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / EDGES)
     shear = [T.multiply(factor * constraints.friction[:, None]) for T in constraints.tangents]
-    edges = [constraints.B + sum(weight * T for T, weight in zip(shear, of_edge)) for of_edge in weights]
+    edges = [constraints.B + sum(weight * T for T, weight in zip(shear, edge_weights)) for edge_weights in weights]
     return csr_array(vstack(edges, format="csr")), np.tile(constraints.gap0, len(edges))
 
 

@@ -38,8 +38,8 @@ def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> 
     lines = np.column_stack([starts, np.roll(starts, -1)])
     ends = np.cumsum([len(nodes) - 1 for _, nodes in sides])
     mesh = Mesh(points, {"tri3": triangles}, {solid: np.arange(len(triangles))})
-    of_sides = zip(sides, np.split(lines, ends[:-1]), strict=True)
-    return mesh.with_facets({name: {"line2": block} for (name, _), block in of_sides})
+    named_lines = zip(sides, np.split(lines, ends[:-1]), strict=True)
+    return mesh.with_facets({name: {"line2": block} for (name, _), block in named_lines})
 
 
 def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:

@@ -152,9 +152,9 @@ def _heights(mesh: Mesh, marked: Mask, direction: Array) -> Array:
     """
     heights = np.zeros((2, mesh.n_cells))
     for name, block in mesh.solids.items():
-        along, near = mesh.points[block] @ direction, marked[block]
+        positions, near = mesh.points[block] @ direction, marked[block]
         cells = slice(mesh.offsets[name], mesh.offsets[name] + len(block))
-        heights[0, cells] = along.mean(axis=1)
-        of_touched = (along * near).sum(axis=1) / np.maximum(near.sum(axis=1), 1)
-        heights[1, cells] = np.where(near.any(axis=1), heights[0, cells] - of_touched, 0.0)
+        heights[0, cells] = positions.mean(axis=1)
+        marked_mean = (positions * near).sum(axis=1) / np.maximum(near.sum(axis=1), 1)
+        heights[1, cells] = np.where(near.any(axis=1), heights[0, cells] - marked_mean, 0.0)
     return heights

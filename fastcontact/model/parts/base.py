@@ -298,16 +298,16 @@ class ModelBase(Suggesting):
 
     def _check_all_have_material(self, numbers: dict[str, Numbers]) -> None:
         """Raise ModelError if a solid cell has no material, which the number -1 denotes."""
-        without = {name: np.flatnonzero(values < 0) for name, values in numbers.items()}
-        total = sum(map(len, without.values()))
+        missing = {name: np.flatnonzero(values < 0) for name, values in numbers.items()}
+        total = sum(map(len, missing.values()))
         if not total:
             return
         offsets = self.mesh.offsets
-        cells = np.concatenate([rows + offsets[name] for name, rows in without.items()])
+        cells = np.concatenate([rows + offsets[name] for name, rows in missing.items()])
         groups = [g for g, members in self.mesh.cell_groups.items() if np.isin(members, cells).any()]
-        of_groups = f", in {', '.join(repr(g) for g in groups)}" if groups else ""
+        groups_text = f", in {', '.join(repr(g) for g in groups)}" if groups else ""
         raise ModelError(
-            f"{total} solid cells have no material{of_groups}: assign one to their groups by add_material or [[material]]"
+            f"{total} solid cells have no material{groups_text}: assign one to their groups by add_material or [[material]]"
         )
 
     def internal_forces(self, displacement: Array) -> Array:
@@ -348,7 +348,7 @@ class ModelBase(Suggesting):
             if self.strain == "small":
                 raise ModelError("forces of plastic bodies depend on their history, not on the displacement alone")
             if self.temperatures or self.heat_loads:
-                raise ModelError("forces of bodies that heat expands depend on their temperature: see step.reaction")
+                raise ModelError("forces of bodies with thermal expansion depend on the temperature: see step.reaction")
             return bodies.at(np.reshape(displacement, shape), bodies.beginning).force
         K = stiffness(self.mesh, self.kinematics, field.moduli, field.loops, None, field.treatment)
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)

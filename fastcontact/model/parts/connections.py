@@ -286,7 +286,7 @@ class ModelConnections(ModelInitialStates):
         """
         name = f"the cyclic symmetry of '{first}' and '{second}'"
         if self.kinematics == "axisymmetric":
-            raise ModelError(f"{name}: an axisymmetric model is the whole ring already")
+            raise ModelError(f"{name}: an axisymmetric model already represents the entire ring")
         point = (0.0,) * self.mesh.dim if origin is None else tuple(origin)
         axis = (0.0, 0.0, 1.0) if self.mesh.dim == 2 else tuple(direction)
         valid_axis = len(point) == self.mesh.dim and len(axis) == 3 and any(axis)

@@ -329,9 +329,9 @@ class ModelContact(ModelConnections):
             log.info("contact '%s': %s, since %s", name, method(formulation, chosen), reason)
         if formulation == "mortar":
             chosen.setdefault("multipliers", "dual")
-        driving = self._driving_force(name, components, force)
+        obstacle_force = self._driving_force(name, components, force)
         rotation_and_ramp = rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
-        motion_of_obstacle = displacement, history, driving, *rotation_and_ramp
+        motion_of_obstacle = displacement, history, obstacle_force, *rotation_and_ramp
         self._add_pair(ContactPair(name, secondary, "", formulation, chosen, obstacle, *motion_of_obstacle))
 
     def _fluid_source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
@@ -358,8 +358,8 @@ class ModelContact(ModelConnections):
         if not facets:  # `bind` raises the error
             return [], False
         simplices = [block for name, block in self.mesh.solids.items() if name in ("tri3", "tet4")]
-        of_simplices = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
-        return list(facets), of_simplices
+        only_simplices = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
+        return list(facets), only_simplices
 
     def _driving_force(self, name: str, motion: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
         """Return the force on obstacle `name` by component, None where its motion is prescribed; empty without forces."""
