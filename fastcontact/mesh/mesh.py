@@ -230,6 +230,7 @@ class Mesh(Suggesting):
 
     @cached_property
     def _nodes_of_groups(self) -> dict[str, AnyArray]:
+        """Point numbers of the cell groups for which `points_of` has computed them."""
         return {}
 
     def _no_group(self, kind: str, group: str, known: Iterable[str]) -> str:

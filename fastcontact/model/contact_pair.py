@@ -115,6 +115,7 @@ def rotation_of(caption: str, spec: Mapping[str, Any] | None, kinematics: str) -
 
 
 def _vector(name: str, values: Sequence[float], size: int) -> tuple[float, ...]:
+    """Return `size` numbers as a tuple. Raises ModelError, with the `name` of the vector, if they are not finite numbers."""
     vector = finite_vector(values, size)
     if vector is None:
         raise ModelError(f"{name} must be {size} finite numbers, not {values!r}")

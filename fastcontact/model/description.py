@@ -72,6 +72,7 @@ def sentences(model: Any) -> Iterator[str]:
 
 
 def _theory(model: Any) -> str:
+    """Return the kinematic assumption and the kind of the materials."""
     nonlinear = any(isinstance(law, NonlinearElastic) for law, _ in model.materials)
     if model.strain == "finite":
         return "finite strains and pressures that follow the surface"
@@ -79,6 +80,7 @@ def _theory(model: Any) -> str:
 
 
 def _supports(model: Any) -> Iterator[str]:
+    """Yield a line for the supports of each group that share a history, and a line for the axis of symmetry."""
     by_group: dict[tuple[str, Any], list[str]] = {}
     for support in model.supports:
         texts = by_group.setdefault((support.group, support.ramp), [])
@@ -97,6 +99,7 @@ def _supports(model: Any) -> Iterator[str]:
 
 
 def _load(load: Any) -> str:
+    """Return the components or values of a load."""
     components: Mapping[int, Any] | None = getattr(load, "components", None)
     if isinstance(load, Centrifugal):
         return f"speed {load.speed:g} about the axis through {load.origin} along {load.direction}"
@@ -106,14 +109,17 @@ def _load(load: Any) -> str:
 
 
 def _value(value: Any) -> str:
+    """Return a number, or a note that the value is a function of position."""
     return "a function of position" if callable(value) else f"{value:g}"
 
 
 def _history(ramp: Any) -> str:
+    """Return a note that an item has a separate history, or an empty string."""
     return "" if ramp is None else ", with a separate history"
 
 
 def _contact(model: Any, pair: ContactPair) -> str:
+    """Return the sides, the formulation, the law and the options of a contact pair."""
     nodes = len(model.mesh.points_of(pair.secondary))
     friction = pair.options.get("friction")
     law = f"with friction {friction:g}" if friction else "without friction"

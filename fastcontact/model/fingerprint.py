@@ -99,6 +99,7 @@ def digest_of_mesh(mesh: Mesh) -> str:
 
 
 def _digest(value: Any, mesh: Mesh) -> str:
+    """Return the first LENGTH hexadecimal digits of the SHA-256 hash of a value."""
     digest = hashlib.sha256()
     _update(value, digest.update, mesh, mesh.points)
     return digest.hexdigest()[:LENGTH]

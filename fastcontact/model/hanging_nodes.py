@@ -173,6 +173,7 @@ def _closed_at_corners(outer: OuterFacets, facet: Indices) -> Mask:
 
 
 def _outer_facets(mesh: Mesh) -> OuterFacets:
+    """Return the outer facets of all bodies."""
     facets, n_corners = outer_facets(mesh), 2 if mesh.dim == 2 else 4
     width = max(block.shape[1] for block in facets.values())
     nodes, corners, centres, rises = [], [], [], []

@@ -32,7 +32,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
 
-# Largest plausible ratio of Young's moduli: that of steel to soft rubber is 200 000, that of MPa to Pa a million.
+# Largest plausible ratio of Young's moduli. For steel and soft rubber it is 200 000; a confusion of MPa and Pa gives 1e6.
 LARGEST_MODULUS_RATIO = 3e5
 # Prescribed displacements above this multiple of the size of the model are probably mistakes [-].
 LARGEST_DISPLACEMENT = 1.0
@@ -50,7 +50,7 @@ NEAR = 1e-2
 # Largest penetration, relative to the facet length, that is regarded as an effect of straight facets: the midpoints of the
 # sides of a regular octagon lie 0.0995 times their length inside the circle.
 SAG = 0.1
-# Largest plausible coefficient of friction; that of rubber on rough ground is 1 to 2.
+# Largest plausible coefficient of friction. For rubber on rough ground it is 1 to 2.
 LARGEST_FRICTION = 3.0
 
 
@@ -170,7 +170,7 @@ def _peak(ramp: Table | None) -> float:
 def _close_nodes(model: Model) -> str:
     """Return a warning if nodes of solid cells nearly coincide without a contact or constraint between them."""
     mesh, size = model.mesh, float(np.ptp(model.mesh.points, axis=0).max())
-    # The shortest edge at each node on the surface of a body; infinite at other nodes, which cannot lie on cracks.
+    # Length of the shortest edge at each node on the surface of a body, and infinity at other nodes, which are not on cracks.
     edge = np.full(mesh.n_points, np.inf)
     for name, facets in outer_facets(mesh).items():
         corners = mesh.points[facets[:, : elements.get(name).n_corners]]

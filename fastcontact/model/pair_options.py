@@ -110,7 +110,7 @@ def pair_options(
 
 
 def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
-    """Return the cohesive law of a pair, None without one."""
+    """Return the cohesive law of a pair, or None if it has no such law."""
     laws = [option for option in LAWS if option in options]
     if not laws:
         return None
@@ -235,7 +235,7 @@ def _penalty(name: str, options: Mapping[str, Any]) -> float | OverclosureLaw | 
 
 
 def _tangential_penalty(name: str, value: Any) -> Field | None:
-    """Return a number or a function of position as a function; pass None through."""
+    """Return a number or a function of position as a function, and None unchanged."""
     penalty = _function(f"the tangential_penalty of contact '{name}'", value)
     return None if penalty is None else partial(_positive_values, penalty, name)
 
@@ -281,7 +281,7 @@ def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side:
 
 
 def _function(name: str, value: Any) -> Field | None:
-    """Return a number or a function of position as a function that checks its result; pass None through."""
+    """Return a number or a function of position as a function that checks its result, and None unchanged."""
     if value is None:
         return None
     check_value(name, value)

@@ -83,6 +83,7 @@ def prescribed_overlap_warnings(pairs: Pairs, supports: Supports) -> list[str]:
 
 
 def _summary(contact: ContactPair, formulation: Formulation, overlap: Overlap) -> str:
+    """Return the first part of a message: the number of nodes, the sides and the largest depth."""
     position = ", ".join(f"{x:.6g}" for x in formulation.points[overlap.point])
     preposition = "off" if formulation.options.always_closed else "into"
     other = f"'{contact.primary}'" if contact.primary else "the rigid obstacle"

@@ -138,6 +138,7 @@ def _column_echelon_form(A: Array) -> Array:
 
 
 def _vector_text(values: Array) -> str:
+    """Return the components of a vector in parentheses, with four digits."""
     return f"({', '.join(f'{value:.4g}' for value in values)})"
 
 

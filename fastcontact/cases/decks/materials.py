@@ -18,11 +18,11 @@ from fastcontact.elasticity.materials import LinearElastic
 CONSTANTS = {"ISOTROPIC": 2, "ENGINEERING CONSTANTS": 9, "ORTHOTROPIC": 9, "ANISOTROPIC": 21}
 # Poisson's ratio at small strains of a hyperelastic material whose compressibility constant D1 is zero, as in CalculiX.
 DEFAULT_POISSON_RATIO = 0.475
-# Number of deviatoric constants and of compressibility constants of each hyperelastic law; for Ogden, of each term.
+# Number of deviatoric constants and of compressibility constants of each hyperelastic law, and for Ogden of each term.
 HYPERELASTIC = {"NEO HOOKE": (1, 1), "MOONEY-RIVLIN": (2, 1), "YEOH": (3, 3), "OGDEN": (2, 1)}
 # Number of coefficients of expansion and conductivity by type.
 COEFFICIENTS = {"ISO": 1, "ORTHO": 3}
-# Elastic constants in decks of heat transfer alone; they have no effect, since all displacements are fixed.
+# Elastic constants for decks with heat transfer only. They have no effect, since all displacements are fixed.
 ARBITRARY_LAW = LinearElastic(E=1.0, nu=0.0)
 
 

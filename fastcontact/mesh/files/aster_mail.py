@@ -19,7 +19,7 @@ KINDS = {
     "QUAD9": "quad9", "TETRA4": "tet4", "TETRA10": "tet10", "PENTA6": "wedge6", "PENTA15": "wedge15", "PENTA18": "wedge18",
     "PYRAM5": "pyramid5", "PYRAM13": "pyramid13", "HEXA8": "hex8", "HEXA20": "hex20", "HEXA27": "hex27",
 }  # fmt: skip
-# Elements with another node order in code_aster: node k here is node NODE_ORDER[keyword][k] of code_aster. code_aster orders
+# Elements whose node order differs in code_aster: node k here is node NODE_ORDER[keyword][k] of code_aster. code_aster orders
 # the edges as bottom, vertical, top; fastcontact as bottom, top, vertical.
 _BRICK_EDGES = (*range(12), *range(16, 20), *range(12, 16))
 NODE_ORDER = {
@@ -140,12 +140,14 @@ class _Content:
         yield from (words[i : i + width] for i in range(0, len(words), width))
 
     def _number(self, word: Word) -> float:
+        """Return a word as a number. Raises FileError if it is not a number."""
         try:
             return float(word[0].upper().replace("D", "E"))
         except ValueError:
             raise self._error(word[1], f"'{word[0][:40]}' is not a number") from None
 
     def _point(self, word: Word) -> str:
+        """Return the name of a node. Raises FileError if the node is not defined."""
         if word[0] not in self._points:
             raise self._error(word[1], f"there is no node '{word[0][:40]}' before this line")
         return word[0]
@@ -157,4 +159,5 @@ class _Content:
                 raise self._error(line, f"there is no {kind} '{word[:40]}'")
 
     def _error(self, line: int, text: str) -> FileError:
+        """Return a FileError with the file, the line and a text."""
         return FileError(f"'{self._path}', line {line}: {text}")

@@ -17,7 +17,7 @@ from fastcontact.mesh.mesh import Mesh
 
 # Gmsh's names for entities of dimension 0 to 3. A tag without a name becomes a group such as "curve_7".
 SHAPES = ("point", "curve", "surface", "volume")
-# Cells with another node order in meshio: node k here is node NODE_ORDER[format][element][k] of meshio. meshio mirrors the
+# Cells whose node order differs in meshio: node k here is node NODE_ORDER[format][element][k] of meshio. meshio mirrors the
 # linear wedge of VTK, as in old documentation of VTK but not in VTK 9.7, and does not reorder Gmsh's 18-node wedge.
 Orders = Mapping[str, tuple[int, ...]]
 NODE_ORDER: dict[str, Orders] = {
@@ -67,6 +67,7 @@ def _cell_group_names(content: Mapping[str, Any], file_format: str) -> list[str]
 
 
 def _blocks(content: Mapping[str, Any], order: Orders) -> list[Block]:
+    """Return the cells of each block with their groups. Raises MeshError for cells of an unknown type."""
     unknown: dict[str, int] = {}
     for kind, count, _ in content["cells"]:
         if kind not in elements.BY_MESHIO and kind != VERTEX:
@@ -76,6 +77,7 @@ def _blocks(content: Mapping[str, Any], order: Orders) -> list[Block]:
 
 
 def _block(content: Mapping[str, Any], index: int, kind: str, nodes: AnyArray, order: Orders) -> Block:
+    """Return the cells of block number `index` with their groups, in the node order of this package."""
     kind = VERTEX if kind == VERTEX else elements.BY_MESHIO[kind].name
     dim = 0 if kind == VERTEX else elements.get(kind).dim
     groups: dict[str, AnyArray] = {}
@@ -107,6 +109,7 @@ def _groups_of_tags(tags: AnyArray, dim: int, field_data: Mapping[str, Any]) -> 
 
 
 def _point_groups(content: Mapping[str, Any]) -> dict[str, AnyArray]:
+    """Return the groups of points from arrays and sets of meshio."""
     groups: dict[str, AnyArray] = {}
     for key, data in content["point_data"].items():
         if key in TAGS:

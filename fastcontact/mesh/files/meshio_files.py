@@ -55,6 +55,7 @@ def _error(action: str, path: Path, reason: str) -> FileError:
 
 
 def _log(action: str, path: Path, output: str) -> None:
+    """Log the output of meshio, if there is any."""
     if output:
         logger.info("meshio, to %s %s: %s", action, path, " ".join(output.split()))
 
@@ -234,6 +235,7 @@ def _arguments(mesh: Mesh, file_format: str) -> dict[str, Any]:
 
 
 def _meshio_cells(mesh: Mesh, order: Orders) -> list[tuple[str, AnyArray]]:
+    """Return the name and the connectivity of each cell type in the node order of meshio."""
     return [
         (elements.get(name).meshio, block[:, np.argsort(order[name])] if name in order else np.array(block))
         for name, block in mesh.cells.items()
@@ -251,6 +253,7 @@ def _add_arrays(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
 
 
 def _mask_of(members: AnyArray, count: int) -> Numbers:
+    """Return an array (count,) of integers, 1 for the members of a group and 0 otherwise."""
     return np.bincount(members, minlength=count).astype(np.int32)
 
 

@@ -24,7 +24,7 @@ from fastcontact._tools.packing import packed, unpacked
 from fastcontact.arrays import AnyArray
 
 # Limits of computing time [s] and of memory [bytes] of the child process: a constant, and a term per byte of the file. meshio
-# 5.3.5 takes up to 0.15 s and 9 MB per megabyte (permas, vtu); the process itself takes 130 MB.
+# 5.3.5 takes up to 0.15 s and 9 MB per megabyte (permas, vtu). The process itself takes 130 MB.
 SECONDS, SECONDS_PER_BYTE = 5.0, 5e-6
 MEMORY, MEMORY_PER_BYTE = 1 << 30, 32
 # Limit of the answer of the child process [bytes]. A compressed file of a few kilobytes can contain many equal points.

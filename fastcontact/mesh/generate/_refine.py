@@ -18,7 +18,7 @@ from fastcontact.mesh.generate.quadratic import ON_CURVE, Circle, Curve, all_on,
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 
-# Quadratic elements whose nodes are the corners of the children in `RED`; each child has the orientation of its parent.
+# Quadratic elements whose nodes are the corners of the children in `RED`. Each child has the orientation of its parent.
 _LATTICE = {"line2": "line3", "tri3": "tri6", "quad4": "quad9"}
 # Largest angle that a facet of a circle may subtend [radian]. Nodes at larger distances are regarded as those of a polygon.
 _TURN = np.pi / 5

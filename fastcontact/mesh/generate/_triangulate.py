@@ -187,7 +187,7 @@ Size = Callable[[Array], Array]
 
 _STEPS_PER_TRIANGULATION = 4  # steps of `relax` and sweeps of `polish` with one triangulation
 _STEP = 0.2  # pseudo-time of one step of `relax`
-_STRETCH = 1.2  # rest length of bars over their scaled length, so that the points spread
+_STRETCH = 1.2  # rest length of the bars relative to their scaled length; it exceeds 1 so that the points spread
 _DIRECTIONS = np.linspace(0.0, 2 * np.pi, 13)[:-1]
 _TRIALS = np.column_stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 _TRIALS = np.vstack([_TRIALS, 0.5 * _TRIALS])

@@ -383,6 +383,7 @@ class ModelContact(ModelConnections):
         return ForceDrivenObstacles([pair for pair in self.contact if pair.force], (self.mesh.n_points, self.mesh.dim))
 
     def _add_pair(self, pair: ContactPair) -> None:
+        """Add a contact pair after checking it alone and together with the other pairs."""
         if pair.name in {other.name for other in self.contact}:
             raise ContactError(f"there is already a contact pair '{pair.name}': names must differ")
         bound = self.bind(pair)

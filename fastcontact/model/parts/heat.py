@@ -144,6 +144,7 @@ class ModelHeat(ModelBase):
         self._add_heat(Film(group, coefficient, ambient, table, *_span(begins, ends)))
 
     def _add_heat(self, load: FixedTemperature | Heating | Film) -> None:
+        """Add a heat load after checking it."""
         load.check(self.mesh, self.kinematics)
         self.heat_loads.append(load)
 

@@ -231,6 +231,7 @@ class ModelInitialStates(ModelLoads):
     def _add_initial(
         self, kind: str, groups: Sequence[str] | str | None, components: Mapping[str, Any], axes: Axes, ramp: History
     ) -> None:
+        """Add an initial stress or strain, as `kind` states."""
         names = self._solid_groups(groups, f": it has no initial {kind}")
         table = table_of(ramp, f"the ramp of the initial {kind}")
         cells = self._cells_of(names)

@@ -161,6 +161,7 @@ class ModelSupports(ModelContact):
             self._add_related_support(group, MultiPointConstraint(f"{caption} along axes", rows, values, table))
 
     def _add_related_support(self, group: str, relation: MultiPointConstraint) -> None:
+        """Add a support that is expressed as a multi-point constraint."""
         self.relations.append(relation)
         self.related_supports.append((group, relation))
 
@@ -168,6 +169,7 @@ class ModelSupports(ModelContact):
         self, group: str, components: Mapping[str, Value], ramp: History, rotation: Rotation | None = None,
         rotation_ramp: Table | None = None,
     ) -> None:  # fmt: skip
+        """Add a support for each component of the displacement, after checking it."""
         check_points(self.mesh, group, "no displacement can be prescribed on it")
         for axis, value in axes_of(f"the support of '{group}'", components, self.mesh.dim).items():
             table = table_of(ramp, f"the ramp of the displacement prescribed on '{group}'")
