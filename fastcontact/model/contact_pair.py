@@ -109,7 +109,7 @@ def rotation_of(caption: str, spec: Mapping[str, Any] | None, kinematics: str) -
     check_number(f"the angle of {caption}", spec["angle"])
     axis = _vector(f"the axis of {caption}", spec["axis"], 3) if dim == 3 else (0.0, 0.0, 1.0)
     if not any(axis):
-        raise ModelError(f"the axis of {caption} has length zero")
+        raise ModelError(f"the axis of {caption} has no length")
     rotation = Rotation(_vector(f"the centre of {caption}", spec["centre"], dim), axis, float(spec["angle"]))  # type: ignore[arg-type]
     return rotation, table_of(spec.get("ramp"), f"the ramp of {caption}")
 
