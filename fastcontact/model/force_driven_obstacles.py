@@ -1,7 +1,7 @@
 """Rigid obstacles moved by forces. Each obstacle adds one point without stiffness, which is held by contact only.
 
-The additional points follow those of the mesh, and their displacements are those of the obstacles. Components under a force
-are rigid-body motions like those of a floating body, and are regularised by the same weak springs (see
+The additional points follow those of the mesh, and their displacements are those of the obstacles. Components driven by a
+force are rigid-body motions like those of a floating body, and are regularised by the same weak springs (see
 `analysis.floating_bodies`); the other components are prescribed. A gap to a rigid obstacle changes by ``n . (u - q)``, where
 q is the displacement of the obstacle. In the row of a gap, the entries of q are therefore minus the sum of the entries of all
 points.

@@ -23,7 +23,7 @@ from fastcontact.model.parts.supports import ModelSupports
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
 from fastcontact.model.pretension import check_locks
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
-from fastcontact.model.rigid_motions import MOST_FRICTION, FreeMotions, free_motions, generalised, resisting, unstopped
+from fastcontact.model.rigid_motions import MOST_FRICTION, FreeMotions, free_motions, generalised, mechanisms, resisting
 
 # Types of items that may act in only some of the load steps.
 TEMPORARY = (TemporaryConstraint, TemporaryHeat)
@@ -214,7 +214,7 @@ class Model(ModelSupports):
         generalised_forces = [generalised(motions, force.ravel()) for force in forces]
         # Whether friction suffices is checked in the load steps, whose errors state the coefficient that would suffice.
         gaps = gaps_at_rest(self, motions, MOST_FRICTION)
-        check_motions(self.mesh, motions.combined(unstopped(gaps, np.reshape(generalised_forces, (-1, len(motions))))))
+        check_motions(self.mesh, motions.combined(mechanisms(gaps, np.reshape(generalised_forces, (-1, len(motions))))))
 
 
 def gaps_at_rest(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:

@@ -68,7 +68,7 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
 
 
 def _split_sides(model: Model, pairs: Pairs) -> Iterator[str]:
-    """Return the warnings about pairs of contacts whose sides continue each other; see `split_side_warnings`."""
+    """Return the warnings about two contact pairs with adjoining sides; see `split_side_warnings`."""
     nodes = {
         pair.name: np.union1d(*(model.mesh.points_of(side) for side in (pair.secondary, pair.primary)))
         for pair in model.contact

@@ -20,7 +20,7 @@ from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows, shapes_at
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table
-from fastcontact.model.relation_rows import coincident, less_first, matched, to_facets
+from fastcontact.model.relation_rows import coincident, matched, minus_first, to_facets
 from fastcontact.round_off import ROUND_OFF
 
 # Largest distance, relative to facet size, by which a rotated node of one end may lie off the facets of the other end or
@@ -92,7 +92,7 @@ def periodic(
         unit = np.eye(mesh.dim)[axis]
         rows = _rows(interface, unit, -unit, mesh)
         if axis in free:
-            rows = less_first(rows)
+            rows = minus_first(rows)
         if rows.shape[0]:
             relations.append(MultiPointConstraint(name, rows, float(jump.get(axis, 0.0)), ramp))
     return relations, interface

@@ -15,7 +15,7 @@ from fastcontact.elasticity.loads import Load, Table, check_number
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import OPPOSITE, Mesh
-from fastcontact.model.relation_rows import along, less_first, matched, normals_of
+from fastcontact.model.relation_rows import along, matched, minus_first, normals_of
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
 # Smallest cosine of the angle between the direction of a bolt and the normal of its section [-].
@@ -81,7 +81,7 @@ class Pretension:
         rows = [self._approach(direction, n_dofs) for direction in _tangents(self.normal)]
         approach = self._approach(self.normal, n_dofs)
         if len(self.nodes) > 1:
-            rows.append(less_first(approach))
+            rows.append(minus_first(approach))
         matrix = csr_array(vstack(rows, format="csr"))
         matrix.eliminate_zeros()
         constraints = [MultiPointConstraint(f"the sides of {self.name}", matrix)]

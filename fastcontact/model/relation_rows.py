@@ -55,7 +55,7 @@ def along(nodes: Indices, directions: Array, n_dofs: int) -> csr_array:
     return nodal_rows(nodes[:, None], directions[:, None], n_dofs)
 
 
-def less_first(rows: csr_array) -> csr_array:
+def minus_first(rows: csr_array) -> csr_array:
     """Return the rows (m - 1, n) that follow the first of the `rows` (m, n), minus the first row."""
     return csr_array(rows[1:] - csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr")))
 

@@ -42,8 +42,11 @@ def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
                 )
 
 
-def joined_already(mesh: Mesh, sides: tuple[str, str], other: ContactPair) -> bool:
-    """Return whether the sides of `other` share facets with both groups `sides`, in either role; False for an obstacle."""
+def share_facets(mesh: Mesh, sides: tuple[str, str], other: ContactPair) -> bool:
+    """Return whether the two `sides` share facets with the two sides of the pair `other`, in either role.
+
+    The result is False if `other` has an obstacle.
+    """
     if other.obstacle is not None:
         return False
     roles = (other.secondary, other.primary), (other.primary, other.secondary)
@@ -74,7 +77,7 @@ def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
 
 
 def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Iterator[str]:
-    """Yield a warning for every two pairs whose sides continue each other at common nodes, on both bodies.
+    """Yield a warning for every two contact pairs whose sides adjoin each other at common nodes, on both bodies.
 
     Each pair has a separate pressure at such a node, but the gap determines only the sum of the two pressures. Their ratio,
     and with it the pressure at neighbouring nodes, is arbitrary. Node-to-segment contact divides the force of a node in the
@@ -91,7 +94,7 @@ def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Ite
             nodes = _common_smooth_nodes(sides.points, sides.secondary, secondary)
             if len(nodes) and len(_common_smooth_nodes(sides.points, sides.primary, primary)):
                 yield (
-                    f"contacts '{pair.name}' and '{other.name}' continue each other at common nodes of their sides "
+                    f"contacts '{pair.name}' and '{other.name}' adjoin each other at common nodes of their sides "
                     f"(number: {len(nodes)}, first: point {nodes[0]}): the pressure near them is not unique; combine "
                     "the two contacts into one, with one group for each side"
                 )

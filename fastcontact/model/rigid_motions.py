@@ -302,7 +302,7 @@ def generalised(motions: FreeMotions, force: Array, largest: float = 0.0) -> Arr
     return work
 
 
-def unstopped(gaps: Array, works: Array) -> Array:
+def mechanisms(gaps: Array, works: Array) -> Array:
     """Return the coefficients (k, j) of motions that neither contact nor contact and loads together can stop.
 
     `gaps` (m, k) are the changes of the gaps and `works` (l, k) the generalised forces of the loads for each motion. The
@@ -387,13 +387,13 @@ def needed_friction(
     return high / inscribed, list(motions.combined(sliding[:, None]).by_body())
 
 
-def _extreme(along: Array, gaps: Array, gap: Array, held: Array, bound: float) -> Array:
-    """Return y (k,) that maximises ``along @ y`` for ``gap + gaps @ y >= 0``, ``held @ y = 0`` and ``|y| <= bound``.
+def _extreme(objective: Array, gaps: Array, gap: Array, held: Array, bound: float) -> Array:
+    """Return y (k,) that maximises ``objective @ y`` for ``gap + gaps @ y >= 0``, ``held @ y = 0`` and ``|y| <= bound``.
 
     Returns zeros if the linear programme has no solution.
     """
     from scipy.optimize import linprog
 
     equalities = {"A_eq": held, "b_eq": np.zeros(len(held))} if len(held) else {}
-    optimum = linprog(-along, A_ub=-gaps, b_ub=gap, bounds=(-bound, bound), method="highs", **equalities)
-    return np.zeros(len(along)) if optimum.x is None else np.asarray(optimum.x)
+    optimum = linprog(-objective, A_ub=-gaps, b_ub=gap, bounds=(-bound, bound), method="highs", **equalities)
+    return np.zeros(len(objective)) if optimum.x is None else np.asarray(optimum.x)

@@ -388,7 +388,7 @@ CONTACT = [
     Mistake("two pairs over the same facets", lambda: pairs_overlap(), fc.ContactError,
             r"contact 'some' pairs facets of 'SOME' and 'CONT_LOWER' that contact 'pair' pairs already: 'SOME' and 'CONT_UPPER' share facets with 2 nodes \(first: point \d+\), 'CONT_LOWER' and 'CONT_LOWER' share facets, too\. Leave out one of the two contacts, or separate their groups"),
     Mistake("one surface in two groups with a contact each", lambda: solved(split_in_two()), fc.FastcontactWarning,
-            r"contacts 'left' and 'right' continue each other at common nodes of their sides \(number: 1, first: point \d+\): the pressure near them is not unique; combine the two contacts into one, with one group for each side"),
+            r"contacts 'left' and 'right' adjoin each other at common nodes of their sides \(number: 1, first: point \d+\): the pressure near them is not unique; combine the two contacts into one, with one group for each side"),
     Mistake("the same obstacle twice",
             lambda: with_obstacle(1.0).add_obstacle("again", secondary="TOP", obstacle=fc.obstacles.HalfSpace((2.0, 1.0), (0.0, -2.0)), motion={"y": -0.01} ),
             fc.ContactError,

@@ -1,4 +1,4 @@
-"""Uniform refinement of 2D meshes, with new nodes on exact curves of the boundary, and detection of such circles."""
+"""Uniform refinement of 2D meshes, with new nodes on exact curves of the boundary, and detection of circles on it."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> 
     the end of the previous one. `spacing` defines the longest inner edges.
     """
     outline = np.vstack([nodes[:-1] for _, nodes in sides])
-    points, triangles = triangulated(outline, spacing)
+    points, triangles = triangulate(outline, spacing)
     starts = np.arange(len(outline))
     lines = np.column_stack([starts, np.roll(starts, -1)])
     ends = np.cumsum([len(nodes) - 1 for _, nodes in sides])
@@ -42,7 +42,7 @@ def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> 
     return mesh.with_facets({name: {"line2": block} for (name, _), block in named_lines})
 
 
-def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:
+def triangulate(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:
     """Return points (n_points, 2) [length] and triangles (n_triangles, 3), counter-clockwise, that fill a convex polygon.
 
     The corners of the `outline` (n, 2) [length], counter-clockwise, are the first n points, and no other point lies on it.

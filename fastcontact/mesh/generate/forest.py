@@ -1,8 +1,8 @@
 """Local red-green refinement of 2D meshes of triangles and quadrangles (Bank, Sherman and Weiser, 1983).
 
 A forest contains every cell of an initial mesh and its descendants. Cells without descendants are its leaves. Red refinement
-divides marked leaves into four. Green refinement divides neighbours of smaller leaves in the mesh, but not in the forest, so
-that angles do not deteriorate with repeated refinement.
+divides marked leaves into four. Green refinement divides the neighbours of smaller leaves. It changes only the mesh and not
+the forest, so that angles do not deteriorate with repeated refinement.
 """
 
 from __future__ import annotations

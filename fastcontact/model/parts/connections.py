@@ -18,7 +18,7 @@ from fastcontact.model.parts.initial_states import ModelInitialStates
 from fastcontact.model.periodicity import cyclic, periodic
 from fastcontact.model.pretension import PretensionForce, pretension
 from fastcontact.model.ramp import History, table_of
-from fastcontact.model.relation_rows import NORMAL, along, directions_of, less_first, matched
+from fastcontact.model.relation_rows import NORMAL, along, directions_of, matched, minus_first
 
 
 @typed(ModelError)
@@ -120,7 +120,7 @@ class ModelConnections(ModelInitialStates):
             axes_of(f"couple('{group}')", dict.fromkeys(component, 1.0), self.mesh.dim)
         for name in directions:
             ((nodes, vectors),) = directions_of(self.mesh, group, name)
-            rows = less_first(along(nodes, vectors, self.n_dofs))
+            rows = minus_first(along(nodes, vectors, self.n_dofs))
             self.relations.append(MultiPointConstraint(f"couple('{group}', '{name}')", rows))
 
     def relate_groups(

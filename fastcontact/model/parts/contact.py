@@ -32,7 +32,7 @@ from fastcontact.model.pair_options import SHARED_OPTIONS, ContactOptions, pair_
 from fastcontact.model.parts.connections import ModelConnections
 from fastcontact.model.periodicity import same_place
 from fastcontact.model.ramp import History, table_of
-from fastcontact.model.repeated_pairs import check_repeated, joined_already
+from fastcontact.model.repeated_pairs import check_repeated, share_facets
 
 log = logging.getLogger("fastcontact")
 
@@ -202,7 +202,7 @@ class ModelContact(ModelConnections):
             ends = [self.mesh.points_of(group) for group in (secondary, primary)]
             if any(np.isin(side, [cut.nodes, cut.opposite]).all() for cut in self.pretensions for side in ends):
                 continue
-            if any(joined_already(self.mesh, (secondary, primary), other) for other in self.contact):
+            if any(share_facets(self.mesh, (secondary, primary), other) for other in self.contact):
                 log.info("contact '%s' is left out, since another contact pairs its facets already", pair.name)
                 continue
             self.add_contact(pair.name, secondary=secondary, primary=primary, formulation=formulation, **options)
