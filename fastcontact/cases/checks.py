@@ -30,7 +30,7 @@ REQUIRED_OPTIONS = {
 
 
 def at_point(step: StepResult, point: int) -> tuple[ContactResult, int] | None:
-    """Return the last contact with a point on its secondary side, and the row of the point; None without such a contact."""
+    """Return the last contact with a point on its secondary side, and the row of the point, or None if there is none."""
     for contact in reversed(step.contact.values()):
         rows = np.flatnonzero(contact.points == point)
         if len(rows):

@@ -169,7 +169,10 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
 
 
 def _positive(name: str, option: str, options: Mapping[str, Any], default: str) -> float | None:
-    """Return the positive number of an option, None if not given; `default` describes the effect of omitting the option."""
+    """Return the positive number of an option, or None if it is not given.
+
+    `default` describes the effect of omitting the option, for messages.
+    """
     value = options.get(option)
     if value is None:
         return None
@@ -196,7 +199,7 @@ def _check_obstacle_temperature(name: str, options: Mapping[str, Any], against_o
 
 
 def _friction_heat(name: str, options: Mapping[str, Any]) -> float:
-    """Return the fraction of the frictional work that becomes heat; zero if not given."""
+    """Return the fraction of the frictional work that becomes heat, which is zero by default."""
     fraction = options.get("friction_heat", 0.0)
     check_number(f"the friction_heat of contact '{name}'", fraction)
     if not 0.0 <= fraction <= 1.0:
@@ -207,7 +210,7 @@ def _friction_heat(name: str, options: Mapping[str, Any]) -> float:
 
 
 def _vector(name: str, option: str, options: Mapping[str, Any], dim: int) -> Array | None:
-    """Return the vector (dim,) of an option, None if not given."""
+    """Return the vector (dim,) of an option, or None if it is not given."""
     value = options.get(option)
     if value is None:
         return None
@@ -260,7 +263,7 @@ def _check_friction_ramp(name: str, options: Mapping[str, Any]) -> None:
 
 
 def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side: Surface) -> Mask | None:
-    """Return a mask (n_points,) of the nodes of the groups named by an option; None without groups."""
+    """Return a mask (n_points,) of the nodes of the groups named by an option, or None if it names no group."""
     groups = options.get(option)
     if groups is None:
         return None

@@ -45,7 +45,10 @@ class PeriodicInterface(NamedTuple):
 
 
 def same_place(interfaces: Sequence[PeriodicInterface], n_points: int) -> Indices | None:
-    """Return, for each node (n_points,), the lowest number of the nodes that coincide with it; None without interfaces."""
+    """Return for each node (n_points,) the lowest number of the nodes that coincide with it.
+
+    The result is None if there are no interfaces.
+    """
     if not interfaces:
         return None
     ends = tuple(np.concatenate(side) for side in zip(*(interface[:2] for interface in interfaces), strict=True))

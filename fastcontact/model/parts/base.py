@@ -152,7 +152,7 @@ class ModelBase(Suggesting):
         return self.mesh.n_points * self.mesh.dim
 
     def _solid_groups(self, groups: Sequence[str] | str | None, consequence: str) -> tuple[str, ...] | None:
-        """Return the names of groups of solid cells, None for all cells.
+        """Return the names of groups of solid cells, or None for all cells.
 
         Raises a ModelError that ends with `consequence` if a group contains no solid cell.
         """

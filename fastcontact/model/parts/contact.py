@@ -335,7 +335,7 @@ class ModelContact(ModelConnections):
         self._add_pair(ContactPair(name, secondary, "", formulation, chosen, obstacle, *motion_of_obstacle))
 
     def _fluid_source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
-        """Return the mask (n_points,) of the points at which fluid enters a contact pair; None without a fluid."""
+        """Return the mask (n_points,) of the points at which fluid enters a contact pair, or None if it has no fluid."""
         if pair.fluid is None:
             return None
         mask = np.zeros(self.mesh.n_points, bool)
@@ -362,7 +362,10 @@ class ModelContact(ModelConnections):
         return list(facets), only_simplices
 
     def _driving_force(self, name: str, motion: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
-        """Return the force on obstacle `name` by component, None where its motion is prescribed; empty without forces."""
+        """Return the components of the force on obstacle `name`, None where its motion is prescribed.
+
+        The result is empty if no force is given.
+        """
         if not force:
             return ()
         forces = axes_of(f"the force on obstacle '{name}'", dict(force), self.mesh.dim)
