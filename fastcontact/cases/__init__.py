@@ -1,1 +1,1 @@
-"""Case files: a whole problem as TOML, the shipped cases, checks and summaries."""
+"""Case files in TOML and input decks, the ready-made cases, checks of results, and summaries."""

@@ -47,14 +47,14 @@ def shipped_cases() -> dict[str, Path]:
 
 
 def shipped_case(name: str) -> Path:
-    """Return the path of a ready-made case; CaseError, with the most similar names, if no case has the name."""
+    """Return the path of a ready-made case. Raises CaseError, with the most similar names, if there is no such case."""
     cases = shipped_cases()
     check_known("ready-made case", name, cases, CaseError)
     return cases[name]
 
 
 def case_path(given: str | Path) -> Path:
-    """Return a path unchanged, and the path of the file for the name of a ready-made case.
+    """Return the path of a case file that is given by its path or by the name of a ready-made case.
 
     A file of that name in the working directory takes precedence, and "-" stands for the standard input. Raises CaseError if
     `given` is neither a path nor the name of a ready-made case.
@@ -75,7 +75,7 @@ def case_path(given: str | Path) -> Path:
 
 
 def files_named(data: dict[str, Any], folder: Path) -> Iterator[Path]:
-    """Yield the files that the parsed data of a case file name, relative to `folder`, and the files that these include."""
+    """Yield the files named in the parsed data of a case file, relative to `folder`, and the files that they include."""
     for key, value in data.items():
         entries = value if isinstance(value, list) else [value]
         for entry in entries:
@@ -87,15 +87,15 @@ def files_named(data: dict[str, Any], folder: Path) -> Iterator[Path]:
 
 
 def digest(paths: Iterator[Path]) -> str:
-    """Return the SHA-256 hash of the contents of files; the hash depends on which of them cannot be read."""
-    combined = hashlib.sha256()
+    """Return the SHA-256 hash of the contents of files. A file that cannot be read also changes the hash."""
+    hasher = hashlib.sha256()
     for path in paths:
         try:
             with open(path, "rb") as file:
-                combined.update(hashlib.file_digest(file, "sha256").digest())
+                hasher.update(hashlib.file_digest(file, "sha256").digest())
         except OSError:
-            combined.update(b"missing")
-    return combined.hexdigest()
+            hasher.update(b"missing")
+    return hasher.hexdigest()
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,12 +198,12 @@ def read_case(path: str | Path) -> Case:
     path = case_path(path)
     if path.suffix.lower() == DECK:
         return _case_of_deck(path)
-    text, data = _parsed(path)
+    text, data = _read_toml(path)
     try:
         with in_file(path):
             return build_case(data, name=path.stem, folder=path.parent, text=text)
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
-        # No check covers this value, so the message of Python is the only description of the fault.
+        # No check covers this value. The message of Python is then the only description of the fault.
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise CaseError(f"{path}: a value is of the wrong kind or size ({reason}): see the ready-made cases") from error
 
@@ -238,11 +238,11 @@ def files_of_case(path: str | Path) -> list[Path]:
         from fastcontact.cases.decks.blocks import files_of_deck
 
         return files_of_deck(existing_file(path))
-    return [path, *files_named(_parsed(path)[1], path.parent)]
+    return [path, *files_named(_read_toml(path)[1], path.parent)]
 
 
-def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
-    """Return the text of a case file and the data parsed from it; CaseError if it cannot be read or is not TOML."""
+def _read_toml(path: Path) -> tuple[str, dict[str, Any]]:
+    """Return the text of a case file and the data parsed from it. Raises CaseError if it cannot be read or is not TOML."""
     try:
         if is_stream(path):
             raise CaseError(f"'{path}' is a pipe or a terminal, and a case is read more than once: save it in a file")
@@ -252,14 +252,14 @@ def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
             )
         text = path.read_text(encoding="utf-8-sig")  # Windows editors begin files with a byte order mark
     except (OSError, ValueError) as error:  # ValueError: a null byte in the name, or text that is not UTF-8
-        raise CaseError(f"cannot read the case file '{path}': {_unreadable(path, error)}") from error
+        raise CaseError(f"cannot read the case file '{path}': {_reading_error(path, error)}") from error
     try:
         return text, toml_text.parsed(text)
     except ValueError as error:
         raise CaseError(f"the case file '{path}' is not valid TOML: {error}") from error
 
 
-def _unreadable(path: Path, error: Exception) -> str:
+def _reading_error(path: Path, error: Exception) -> str:
     """Return the reason why a case file cannot be read, with a remedy if there is one."""
     if path.is_dir():
         return "it is a folder; name a file in it"
@@ -330,8 +330,8 @@ def _text(data: dict[str, Any]) -> str:
 def _pairs(data: dict[str, Any], model: Model) -> dict[str, Any]:
     """Return the tables of all contact pairs and obstacles; automatically detected pairs share the table ``[contacts]``."""
     pairs = data.get("contact", {})
-    named = {**(pairs if isinstance(pairs, dict) else {}), **data.get("obstacle", {})}
-    return {pair.name: named.get(pair.name, data.get("contacts", {})) for pair in model.contact}
+    entries = {**(pairs if isinstance(pairs, dict) else {}), **data.get("obstacle", {})}
+    return {pair.name: entries.get(pair.name, data.get("contacts", {})) for pair in model.contact}
 
 
 def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list[Label]]]:
@@ -437,9 +437,9 @@ def _theory(where: str, data: dict[str, Any], kinematics: str) -> Any:
 
 
 def described(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the title, the theories, the approaches and the ramp table from the text of a case in a result file.
+    """Return the title, the theories, the approaches and the ramp table of a case whose text a result file contains.
 
-    `data` is the parsed text, which is empty for results without a case file.
+    `data` is the parsed text. It is empty for results without a case file.
     """
     theories, approach = _theories(data)
     return {

@@ -30,7 +30,7 @@ REQUIRED_OPTIONS = {
 
 
 def at_point(step: StepResult, point: int) -> tuple[ContactResult, int] | None:
-    """Return the last contact whose secondary side has a point, with the row of the point on it; None if none has."""
+    """Return the last contact with a point on its secondary side, and the row of the point, or None if there is none."""
     for contact in reversed(step.contact.values()):
         rows = np.flatnonzero(contact.points == point)
         if len(rows):
@@ -45,7 +45,7 @@ def _bracket_midpoint(bracket: tuple[float, float]) -> float:
 
 
 def _contact_field(field: str) -> Callable[[StepResult, int], float]:
-    """Return a function of step and point: the magnitude of a contact field, or NaN if no secondary side has the point."""
+    """Return a function of step and point: the magnitude of a contact field, or NaN if it is on no secondary side."""
 
     def value(step: StepResult, point: int) -> float:
         contact, row = at_point(step, point) or (None, 0)
@@ -59,7 +59,7 @@ def _component(vector: Callable[..., Any], index: int) -> Callable[..., Any]:
     return lambda *arguments: vector(*arguments)[index]
 
 
-# Quantities of a contact pair: the kind of unit, and the function that returns the quantity, or None if it is undefined.
+# Quantities of a contact pair: the kind of unit, and the function that returns the quantity, or None if undefined.
 OF_PAIRS: dict[str, tuple[str, Callable[[ContactResult], Any]]] = {
     "force": ("force", lambda contact: np.linalg.norm(contact.force)),
     "pressure_max": ("pressure", lambda contact: contact.pressure_max),
@@ -67,7 +67,7 @@ OF_PAIRS: dict[str, tuple[str, Callable[[ContactResult], Any]]] = {
     "stick_radius": ("length", lambda contact: _bracket_midpoint(contact.stick_radius)),
     "torque": ("moment", lambda contact: contact.torque),
     "wear_max": ("length", lambda contact: None if contact.wear is None else contact.wear.max(initial=0.0)),
-    "heat": ("power", lambda contact: None),  # read from the step instead
+    "heat": ("power", lambda contact: None),  # `measured` reads it from the step
     **{f"force.{axis}": ("force", _component(lambda contact: contact.force, i)) for axis, i in _AXES.items()},
     **{f"moment.{axis}": ("moment", _component(contact_moment, i)) for axis, i in {**_AXES, "z": -1}.items()},
 }  # fmt: skip
@@ -149,7 +149,7 @@ CHECK = keys_of(Check)
 def read_check(
     where: str, entry: Table, probes: Mapping[str, int], pairs: Table, theories: Table, kinematics: str = "3d"
 ) -> Check:
-    """Return the check that an entry of a case file describes; CaseError if a key or a value is invalid."""
+    """Return the check that an entry of a case file describes. Raises CaseError if a key or a value is invalid."""
     check_keys(where, entry, CHECK, ("quantity", "tolerance"))
     if ("theory" in entry) == ("value" in entry):
         raise CaseError(f"{where} needs either 'theory', the name of a contact pair with a theory, or 'value'")
@@ -205,7 +205,7 @@ def check_target(where: str, check: Check, theory: Any) -> None:
 
 
 def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float:
-    """Return the quantity of a check in a step, times its factor; NaN if undefined, such as wear before any contact."""
+    """Return the quantity of a check in a step, times its factor; NaN if it is undefined, such as wear without contact."""
     owner, _, field = check.quantity.partition(".")
     if owner in probes:
         value = OF_PROBES[field][1](step, probes[owner])

@@ -26,7 +26,7 @@ _TOML: dict[Any, tuple[type, ...]] = {
 
 
 def toml_types(annotation: Any) -> tuple[type, ...]:
-    """Return the TOML types that the annotation of an argument admits; a case file gives a function as a table."""
+    """Return the TOML types that the annotation of an argument admits. In a case file, a table represents a function."""
     kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
     if kind in (typing.Union, types.UnionType):
         return tuple(dict.fromkeys(type_of_member for member in members for type_of_member in toml_types(member)))
@@ -35,9 +35,9 @@ def toml_types(annotation: Any) -> tuple[type, ...]:
     return _TOML.get(kind, ())
 
 
-def keys_of(described: Callable[..., Any]) -> dict[str, tuple[type, ...]]:
+def keys_of(function: Callable[..., Any]) -> dict[str, tuple[type, ...]]:
     """Return the TOML types of the fields of a class or of the arguments of a function, by name."""
-    return {name: toml_types(annotation) for name, annotation in types_of(described).items()}
+    return {name: toml_types(annotation) for name, annotation in types_of(function).items()}
 
 
 # Message of `fastcontact._tools.argument_types` about an argument of a wrong type.
@@ -137,7 +137,7 @@ def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) 
         values = ", ".join(f"{key} = {repr(value)}" for key, value in arguments.items())
         raise CaseError(f"'{where}': {values} are invalid ({error})") from error
     except FastcontactError as error:
-        raise CaseError(_of_key(where, str(error)) or f"'{where}': {error}") from error
+        raise CaseError(_message_of_key(where, str(error)) or f"'{where}': {error}") from error
 
 
 @contextlib.contextmanager
@@ -150,13 +150,13 @@ def at(where: str) -> Iterator[None]:
     except FastcontactError as error:
         if where.replace(".", " '", 1) + "'" in str(error):  # the message names the table
             raise
-        if message := _of_key(where, str(error)):
+        if message := _message_of_key(where, str(error)):
             raise CaseError(message) from error
         raise type(error)(f"{where}: {error}") from error
 
 
-def _of_key(where: str, text: str) -> str:
-    """Return a message about the argument of a function as one about the key, or an empty string for other messages."""
+def _message_of_key(where: str, text: str) -> str:
+    """Return a message about an argument of a function as a message about a key, or an empty string for other messages."""
     match = _ARGUMENT.fullmatch(text)
     if match is None:
         return ""
@@ -165,7 +165,7 @@ def _of_key(where: str, text: str) -> str:
 
 
 def tables(where: str, entries: Any) -> list[dict[str, Any]]:
-    """Return `entries`; CaseError if they are not a list of tables."""
+    """Return `entries`. Raises CaseError if they are not a list of tables."""
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise CaseError(f"'{where}' must be a list of tables: write [[{where}]] above each")
     return entries

@@ -36,7 +36,7 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
     law = _material_law(constants)
     constants.pop("law", None)
     if law is LinearElastic:
-        # Here a list of numbers always holds components along the axes, although the law also takes one value per cell.
+        # In a case file a list contains components along the axes. The class also accepts a list with one value per cell.
         if isinstance(constants.get("expansion"), list):
             check_expansion(constants["expansion"], 1)
         if isinstance(constants.get("conductivity"), list):
@@ -46,7 +46,7 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
 
 
 def _add_temperature(model: Model, **entry: Any) -> None:
-    """Add a temperature, which an entry gives by a value or by a field in files."""
+    """Add the temperature that an entry specifies by a value or by a field in files."""
     if ("value" in entry) == ("file" in entry):
         raise CaseError("a temperature needs either 'value', or 'file' and 'field'")
     if "value" in entry:
@@ -62,7 +62,7 @@ def _add_temperature(model: Model, **entry: Any) -> None:
 
 @functools.wraps(Model.add_coupling)
 def _add_coupling(model: Model, place: Any = None, **entry: Any) -> None:
-    """Add a coupling; `_with_references` has already added its reference point, at `place`, to the mesh."""
+    """Add a coupling; `_add_references` has already added its reference point, at `place`, to the mesh."""
     model.add_coupling(**entry)
 
 
@@ -137,23 +137,23 @@ _ADD_TO_CONTACT: dict[str, Callable[..., None]] = {"fluid_pressure": Model.add_f
 LISTS = (*_ADD, *_ADD_TO_CONTACT)
 
 
-def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any], list[str]]:
+def _keys(*functions: Callable[..., None], **extra: Any) -> tuple[dict[str, Any], list[str]]:
     """Return the TOML types of the keys of a table and its required keys.
 
-    The keys are the arguments of the functions `adding`, and those in `further` with their types.
+    The keys are the arguments of the `functions`, and the keys of `extra`, which contains their types.
     """
     known: dict[str, Any] = {}
     required = []
-    for add in adding:
-        annotated = types_of(inspect.unwrap(add))
+    for add in functions:
+        annotations = types_of(inspect.unwrap(add))
         for key, parameter in [*inspect.signature(add).parameters.items()][1:]:  # the first parameter is the model
-            kinds = toml_types(annotated[key])
+            kinds = toml_types(annotations[key])
             if parameter.kind is parameter.VAR_KEYWORD:
                 known |= dict.fromkeys(COMPONENTS, kinds) if key == "tensor_components" else AXES
             else:
                 known[key] = kinds if key in (*VALUES, "axes") else tuple(kind for kind in kinds if kind is not dict)
                 required += [key] * (parameter.default is parameter.empty)
-    return {**known, **further}, required
+    return {**known, **extra}, required
 
 
 @functools.cache
@@ -162,15 +162,15 @@ def keys_of_list(kind: str) -> tuple[dict[str, Any], Sequence[str]]:
     if kind == "material":  # its required keys depend on the law
         others = {"groups": (list, str), "law": str, "D": list, "hardening": list}
         return _constants() | others | dict.fromkeys(("mu", "alpha"), (*NUMBER, list)), ()
-    if kind == "temperature":  # a value or a file gives it, and no key is required in both cases
+    if kind == "temperature":  # it needs either a value or a file
         return _keys(Model.add_temperature, Model.add_temperature_file)[0], ()
-    further: dict[str, Any] = {"coupling": {"place": list}, "support": {"rotation": dict}}
-    return _keys({**_ADD, **_ADD_TO_CONTACT}[kind], **further.get(kind, {}))
+    extra: dict[str, Any] = {"coupling": {"place": list}, "support": {"rotation": dict}}
+    return _keys({**_ADD, **_ADD_TO_CONTACT}[kind], **extra.get(kind, {}))
 
 
 def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
     """Return the model of the parsed `data` of a case file; paths in the data are relative to `folder`."""
-    mesh = _with_references(_cut(mesh, data.get("pretension", [])), data.get("coupling", []))
+    mesh = _add_references(_cut_along(mesh, data.get("pretension", [])), data.get("coupling", []))
     model = Model(
         mesh,
         data["kinematics"],
@@ -187,9 +187,9 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
     return model
 
 
-def _add_lists(model: Model, data: dict[str, Any], folder: Path, adding: Mapping[str, Callable[..., None]]) -> None:
-    """Add the entries of the lists of tables to a model by the functions `adding`; CaseError if an entry is invalid."""
-    for kind, add in adding.items():
+def _add_lists(model: Model, data: dict[str, Any], folder: Path, functions: Mapping[str, Callable[..., None]]) -> None:
+    """Add the entries of the lists of tables to a model by the `functions`. Raises CaseError if an entry is invalid."""
+    for kind, add in functions.items():
         for i, entry in enumerate(tables(kind, data.get(kind, []))):
             where, (known, required) = f"{kind}[{i}]", keys_of_list(kind)
             if kind == "material":
@@ -202,8 +202,8 @@ def _add_lists(model: Model, data: dict[str, Any], folder: Path, adding: Mapping
                 required = [key for key, parameter in constants.items() if parameter.default is parameter.empty]
             check_keys(where, entry, known, required)
             with at(where):
-                values = _from_files(where, entry, model.mesh, folder) if kind == "material" else entry
-                add(model, **_arguments(where, _with_paths(folder, _converted(where, values, VALUES, _tabulated))))
+                values = _read_fields(where, entry, model.mesh, folder) if kind == "material" else entry
+                add(model, **_arguments(where, _resolve(folder, _convert(where, values, VALUES, _interpolant))))
 
 
 def _add_contacts(model: Model, data: dict[str, Any]) -> None:
@@ -218,8 +218,8 @@ def _add_contacts(model: Model, data: dict[str, Any]) -> None:
             )
         for key in ("secondary", "primary"):
             if not isinstance(entry.get(key), str):
-                renamed = "".join(f"; rename '{other}' to '{key}'" for other in entry if OTHER_WORDS.get(other) == key)
-                raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets{renamed}")
+                hint = "".join(f"; rename '{other}' to '{key}'" for other in entry if OTHER_WORDS.get(other) == key)
+                raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets{hint}")
         with at(f"contact.{name}"):
             model.add_contact(name, **entry)
     if pairs == "auto" or "contacts" in data:
@@ -227,8 +227,8 @@ def _add_contacts(model: Model, data: dict[str, Any]) -> None:
             model.add_contacts(**data.get("contacts", {}))
 
 
-def _from_files(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> dict[str, Any]:
-    """Return a material entry in which arrays replace constants that are given as fields in files."""
+def _read_fields(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> dict[str, Any]:
+    """Return a material entry in which the constants specified as fields in files are replaced by arrays."""
 
     def read(name: str, value: Any) -> Any:
         if not (isinstance(value, dict) and "file" in value):
@@ -236,12 +236,12 @@ def _from_files(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> 
         check_keys(name, value, FIELD)
         if "field" not in value:
             raise CaseError(f"'{name}' needs 'field', the name of the field in the file")
-        return read_field(mesh, groups=entry.get("groups"), **_with_paths(folder, value))
+        return read_field(mesh, groups=entry.get("groups"), **_resolve(folder, value))
 
-    return _converted(where, entry, CONSTANTS, read)
+    return _convert(where, entry, CONSTANTS, read)
 
 
-def _converted(
+def _convert(
     where: str, entry: dict[str, Any], keys: Sequence[str], convert: Callable[[str, Any], Any]
 ) -> dict[str, Any]:
     """Return an entry with `convert` applied to the values of `keys`, and to each member of a list.
@@ -258,7 +258,7 @@ def _converted(
     return values
 
 
-def _with_paths(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
+def _resolve(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
     """Return an entry with the paths in `file` resolved relative to the folder of the case file."""
     file = entry.get("file")
     if file is None:
@@ -270,12 +270,12 @@ def _with_paths(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
     return {**entry, "file": paths[0] if isinstance(file, str) else paths}
 
 
-def _tabulated(where: str, value: Any) -> Any:
-    """Return the function that interpolates a table of values by position; other values are returned unchanged."""
+def _interpolant(where: str, value: Any) -> Any:
+    """Return the function that interpolates `value`, a table of values by position; return other values unchanged."""
     return called(where, Tabulated, value) if isinstance(value, dict) else value
 
 
-def _cut(mesh: Mesh, sections: Any) -> Mesh:
+def _cut_along(mesh: Mesh, sections: Any) -> Mesh:
     """Return the mesh cut along those pretension sections that have no opposite side yet."""
     for i, entry in enumerate(tables("pretension", sections)):
         name = entry.get("section")
@@ -285,7 +285,7 @@ def _cut(mesh: Mesh, sections: Any) -> Mesh:
     return mesh
 
 
-def _with_references(mesh: Mesh, couplings: Any) -> Mesh:
+def _add_references(mesh: Mesh, couplings: Any) -> Mesh:
     """Return the mesh with the reference points of those couplings that state a `place`."""
     for i, entry in enumerate(tables("coupling", couplings)):
         name, coordinates = entry.get("reference"), entry.get("place")
@@ -318,8 +318,8 @@ def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
     if kind not in (*SHAPES, "mesh"):
         raise CaseError(unknown(f"{where}.kind", str(kind), (*SHAPES, "mesh")))
     if not isinstance(shape, dict):
-        needed = [key for key, p in inspect.signature(SHAPES[kind]).parameters.items() if p.default is p.empty]
-        others = "".join(f", {key} = ..." for key in needed)
+        required = [key for key, p in inspect.signature(SHAPES[kind]).parameters.items() if p.default is p.empty]
+        others = "".join(f", {key} = ..." for key in required)
         raise CaseError(f"'{where}' is a table: write {{ kind = \"{kind}\"{others} }}")
     arguments: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in shape.items() if k != "kind"}
     if kind == "mesh":
@@ -355,7 +355,10 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def ramp_points(table: list[Any], where: str = "ramp.table") -> Table:
-    """Return the pairs of instant and load multiplier [-] of a ramp; CaseError if `table` is not a list of such pairs."""
+    """Return the pairs of instant and load multiplier [-] of a ramp.
+
+    Raises CaseError if `table` is not a list of such pairs.
+    """
     rows = table if isinstance(table, list) else [None]
     if not rows or not all(
         isinstance(row, list) and [isinstance(v, NUMBER) for v in row] == [True] * 2 for row in rows

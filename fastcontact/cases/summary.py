@@ -33,10 +33,10 @@ def summarise(
     warnings: Sequence[str],
     modes: Modes | None = None,
 ) -> dict[str, Any]:
-    """Return the summary of a run, which contains numbers, strings, lists and dictionaries only, as JSON requires.
+    """Return the summary of a run, which contains only numbers, strings, lists and dictionaries, as JSON requires.
 
-    `last` is the last step, `steps` contains the result of `of_step` for each step, and `modes` are the modes at the last
-    step, if they were requested.
+    `last` is the last step. `steps` contains the result of `of_step` for each step. `modes` contains the vibration modes at
+    the last step if the case requests them.
     """
     mesh = case.mesh
     peak = int(np.argmax(last.von_mises))
@@ -57,7 +57,7 @@ def summarise(
         **({"cell_fields": {k: _bounds(values) for k, values in last.cell_fields.items()}} if last.cell_fields else {}),
         **({} if last.temperature is None else {"heat": _heat(last)}),
         "theory": {
-            pair: _against_theory(last.contact[pair], case.approach.get(pair), **theories)
+            pair: _theory_deviations(last.contact[pair], case.approach.get(pair), **theories)
             for pair, theories in case.theories.items()
             if pair in last.contact and all(hasattr(theories["theory"], name) for name in COMPARED)
         },
@@ -87,11 +87,12 @@ def _sensitivity(case: Case, last: StepResult, quantity: Label, by: Sequence[Lab
 def _heat(last: StepResult) -> dict[str, Any]:
     """Return the heat flows of a step [power] and the bounds of its temperature."""
     assert last.heat_reaction is not None
-    entering = float(np.maximum(last.heat_reaction, 0.0).sum())
-    return {**last.heat, "entering": entering, "temperature": _bounds(last.temperature)}
+    inflow = float(np.maximum(last.heat_reaction, 0.0).sum())
+    return {**last.heat, "entering": inflow, "temperature": _bounds(last.temperature)}
 
 
 def _modes(modes: Modes) -> dict[str, Any]:
+    """Return the natural frequencies and effective masses, and for cyclic sectors the nodal diameters and mode pairs."""
     table = {"frequencies": modes.frequencies.tolist(), "effective_mass": modes.effective_mass.tolist()}
     if modes.nodal_diameters is None or modes.twins is None:
         return table
@@ -114,7 +115,7 @@ def of_step(step: StepResult) -> dict[str, Any]:
 
 
 def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
-    """Return the results of a contact pair in the last step that `ContactResult` contains, and its `penalty`."""
+    """Return the summary of a contact pair in the last step from its `ContactResult`, with the `penalty` of the pair."""
     displacement = contact.obstacle_displacement
     return {
         "formulation": contact.formulation,
@@ -154,24 +155,25 @@ def finite(value: float) -> float | None:
 
 
 def _bounds(values: Any) -> list[float]:
+    """Return the smallest and the largest of some values."""
     return [float(values.min()), float(values.max())]
 
 
 def _probe(step: StepResult, point: int) -> dict[str, Any]:
-    """Return the results at a probe; stresses by material are included on interfaces of materials only."""
+    """Return the results at a probe; stresses by material are included only on interfaces between materials."""
     contact, row = at_point(step, point) or (None, 0)
     by_material = step.material_stress.at(point) if step.material_stress is not None else {}
-    of_materials = {str(number): stress.tolist() for number, stress in by_material.items()}
+    material_stresses = {str(number): stress.tolist() for number, stress in by_material.items()}
     return {
         "stress": step.stress[point].tolist(),
         "displacement": step.displacement[point].tolist(),
         "von_mises": float(step.von_mises[point]),
         "pressure": float(contact.pressure[row]) if contact else None,
-        **({"stress_by_material": of_materials} if of_materials else {}),
+        **({"stress_by_material": material_stresses} if material_stresses else {}),
     }
 
 
-def _against_theory(
+def _theory_deviations(
     contact: ContactResult, approach: float | None, theory: Any, mesh_converged: Any = None, share: float = 1.0
 ) -> dict[str, Any]:
     """Return the deviations of a contact from its theory at equal approach and at equal force, and from `mesh_converged`.
@@ -180,12 +182,12 @@ def _against_theory(
     """
     force = float(np.linalg.norm(contact.force)) / share
     computed = {"force": force, "pressure_max": contact.pressure_max, "radius": 0.5 * sum(contact.radius)}
-    compared = {"equal_approach": {"approach": approach, **_deviations(computed, theory)}}
+    deviations = {"equal_approach": {"approach": approach, **_deviations(computed, theory)}}
     if force > 0 and hasattr(theory, "at_force"):
-        compared["equal_force"] = _deviations(computed, theory.at_force(force))
+        deviations["equal_force"] = _deviations(computed, theory.at_force(force))
     if mesh_converged is not None:
-        compared["mesh_converged"] = _deviations(computed, mesh_converged)
-    return compared
+        deviations["mesh_converged"] = _deviations(computed, mesh_converged)
+    return deviations
 
 
 def _deviations(computed: Mapping[str, float], theory: Any) -> dict[str, Any]:
@@ -206,8 +208,8 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         f"{sum(s['geometry_updates'] for s in steps)} geometry updates",
     ]
     if substeps := [len(s["substeps"]) for s in steps if "substeps" in s]:
-        divided = count(len(substeps), "load step")
-        rows.append(f"  {divided} did not converge as a whole, {sum(substeps)} substeps instead")
+        steps_text = count(len(substeps), "load step")
+        rows.append(f"  {steps_text} did not converge as a whole, {sum(substeps)} substeps instead")
     peak = summary["von_mises_max"]
     loaded = peak["value"] > 0.0 or "heat" not in summary  # heat conduction alone has no forces
     for name, contact in summary["contact"].items() if loaded else ():
@@ -227,7 +229,7 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         rows.append(f"  {name.replace('_', ' ')} of cells from {low:.4g} to {high:.4g}")
     if heat := summary.get("heat"):
         powers = ", ".join(f"{name} {heat[name]:.4g}" for name in ("loads", "films", "friction"))
-        supports = f"prescribed temperatures {heat['entering']:.6g} in, {heat['entering'] - heat['supports']:.6g} out"
+        supports = f"prescribed temperatures {heat['inflow']:.6g} in, {heat['inflow'] - heat['supports']:.6g} out"
         contacts = "".join(f"; across '{name}' {power:.6g}" for name, power in heat["contacts"].items())
         temperatures = "temperatures from {:.6g} to {:.6g}".format(*heat["temperature"])
         rows.append(f"  {temperatures}; heat into the bodies by {supports}, {powers}{contacts}")
@@ -291,7 +293,7 @@ def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str
 
 
 def _extent_text(extent: str, lower: float | None, upper: float | None, unit: Mapping[str, str]) -> str:
-    """Return the bounds [length] of the radius or the half-width of a contact as text; `extent` says which of them it is.
+    """Return the bounds [length] of the radius or the half-width of a contact as text; `extent` states which.
 
     The lower bound is None in an open contact, the upper bound if the contact reaches the end of the surface.
     """
@@ -320,6 +322,7 @@ def _theory_lines(pair: str, theory: Mapping[str, Any], extent: str) -> list[str
 
 
 def _sensitivity_line(report: Mapping[str, Any]) -> str:
+    """Return the line of a sensitivity: its quantity and derivatives, or the reason why they are undefined."""
     quantity = " ".join(map(str, report["quantity"]))
     if "refused" in report:
         return f"  no sensitivities of {quantity}: {report['refused']}"

@@ -54,21 +54,21 @@ def weighted_area_vectors(
         Derivatives, with the node and the component of the position as the last two indices [length].
     """
     normal = area_vectors(corners, dN)
-    by_node = np.zeros((*normal.shape[:2], dN.shape[1], corners.shape[2], corners.shape[2]))
+    derivative = np.zeros((*normal.shape[:2], dN.shape[1], corners.shape[2], corners.shape[2]))
     if corners.shape[2] == 2:
-        by_node[..., 0, 1], by_node[..., 1, 0] = dN[:, :, 0], -dN[:, :, 0]
+        derivative[..., 0, 1], derivative[..., 1, 0] = dN[:, :, 0], -dN[:, :, 0]
     else:
         first, second = np.einsum("qkj,nkd->jnqd", dN, corners)
         for j, unit in enumerate(np.eye(3)):
-            by_node[..., j] = np.cross(unit, second)[:, :, None] * dN[:, :, 0, None]
-            by_node[..., j] += np.cross(first, unit)[:, :, None] * dN[:, :, 1, None]
+            derivative[..., j] = np.cross(unit, second)[:, :, None] * dN[:, :, 0, None]
+            derivative[..., j] += np.cross(first, unit)[:, :, None] * dN[:, :, 1, None]
     if axisymmetric:
         circle = 2.0 * np.pi * corners[:, :, 0] @ N.T
-        by_node *= circle[..., None, None, None]
-        by_node[..., 0] += 2.0 * np.pi * np.einsum("qb,fqi->fqbi", N, normal)
+        derivative *= circle[..., None, None, None]
+        derivative[..., 0] += 2.0 * np.pi * np.einsum("qb,fqi->fqbi", N, normal)
         normal = normal * circle[..., None]
     vectors = np.einsum("fq,qa,fqi->fai", weights, test, normal)
-    return vectors, np.einsum("fq,qa,fqbij->faibj", weights, test, by_node)
+    return vectors, np.einsum("fq,qa,fqbij->faibj", weights, test, derivative)
 
 
 def flat_area_vectors(corners: Array) -> Array:

@@ -106,8 +106,8 @@ def from_pyvista(grid: Any) -> Mesh:
     content = {
         "points": np.asarray(grid.points, np.float64),
         "cells": [[names[kind], len(rows), np.asarray(grid.cells_dict[kind])] for kind, rows in kinds.items()],
-        "cell_data": {k: [v[rows] for rows in kinds.values()] for k, v in _flags(grid.cell_data, CELL_PREFIX).items()},
-        "point_data": _flags(grid.point_data, POINT_PREFIX),
+        "cell_data": {k: [v[rows] for rows in kinds.values()] for k, v in _group_arrays(grid.cell_data, CELL_PREFIX).items()},
+        "point_data": _group_arrays(grid.point_data, POINT_PREFIX),
         "cell_sets": {}, "point_sets": {}, "field_data": {},
     }  # fmt: skip
     return _mesh_of(content, "", "PyVista's data set")
@@ -152,8 +152,8 @@ def from_gmsh() -> Mesh:
     dim = gmsh.model.getDimension()
     if dim < 0 or not any(map(len, gmsh.model.mesh.getElements(dim)[1])):
         raise MeshError("the model that is open in gmsh has no mesh: call gmsh.model.mesh.generate(2) or (3)")
-    _warn_of_omissions(gmsh, dim)
-    saved = {name: gmsh.option.getNumber(name) for name in GMSH_OPTIONS}
+    _warn_about_omissions(gmsh, dim)
+    previous = {name: gmsh.option.getNumber(name) for name in GMSH_OPTIONS}
     try:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "model.msh"
@@ -162,11 +162,11 @@ def from_gmsh() -> Mesh:
             gmsh.write(str(path))
             return read_mesh(path)
     finally:
-        for name, value in saved.items():
+        for name, value in previous.items():
             gmsh.option.setNumber(name, value)
 
 
-def _warn_of_omissions(gmsh: Any, dim: int) -> None:
+def _warn_about_omissions(gmsh: Any, dim: int) -> None:
     """Warn of solid cells without a physical group, which gmsh omits if the model has physical groups."""
     if not gmsh.model.getPhysicalGroups():
         return
@@ -181,8 +181,8 @@ def _warn_of_omissions(gmsh: Any, dim: int) -> None:
         )
 
 
-def _flags(data: Any, prefix: str) -> dict[str, Any]:
-    """Return the arrays that define groups, with the names that `mesh_of` expects."""
+def _group_arrays(data: Any, prefix: str) -> dict[str, Any]:
+    """Return the arrays of PyVista that define groups, with the names that `mesh_of` expects."""
     groups = {}
     for name in data.keys():  # noqa: SIM118, the data of PyVista are not a mapping
         values = np.asarray(data[name])

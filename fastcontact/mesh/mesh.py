@@ -25,15 +25,15 @@ ROTATION = " rotation"
 
 
 def _read_only(values: ArrayLike, dtype: Any) -> AnyArray:
-    """Return values as a read-only array, which is copied unless it is one already."""
-    frozen = isinstance(values, np.ndarray) and values.base is None and not values.flags.writeable
-    array = np.array(values, dtype=dtype, order="C", copy=None if frozen else True)
+    """Return `values` as a read-only array. They are copied unless they are already such an array."""
+    read_only = isinstance(values, np.ndarray) and values.base is None and not values.flags.writeable
+    array = np.array(values, dtype=dtype, order="C", copy=None if read_only else True)
     array.setflags(write=False)
     return array
 
 
 def _numbers(name: str, values: ArrayLike) -> AnyArray:
-    """Return `values` as an array of numbers that are integers of 32 bits. Raises MeshError if they are not."""
+    """Return `values` as an array. Raises MeshError if they are not whole numbers that 32-bit integers can represent."""
     array = np.asarray(values)
     if array.size == 0:
         return array.astype(np.int32)
@@ -109,6 +109,7 @@ class Mesh(Suggesting):
 
     @staticmethod
     def _checked_cells(name: str, block: ArrayLike, n_points: int) -> AnyArray:
+        """Return the cells of an element type as a read-only array. Raises MeshError for wrong shapes or point numbers."""
         element = elements.get(name)
         nodes = _read_only(_numbers(f"cells of {name}", block), np.int32)
         if nodes.shape[:1] == (0,):
@@ -122,15 +123,16 @@ class Mesh(Suggesting):
 
     @staticmethod
     def _checked_groups(kind: str, groups: Mapping[str, ArrayLike], count: int) -> Mapping[str, AnyArray]:
-        checked = {}
+        """Return the groups as sorted, read-only arrays of numbers. Raises MeshError if a number is not below `count`."""
+        groups_by_name = {}
         for name, members in groups.items():
             numbers = np.unique(_numbers(f"{kind} group '{name}'", members).astype(np.int32))
             if len(numbers) and (numbers[0] < 0 or numbers[-1] >= count):
                 outside = min(numbers[0], 0) or numbers[-1]
                 raise MeshError(f"{kind} group '{name}' contains {kind} {outside}, but there are {count} (0-based)")
             numbers.setflags(write=False)
-            checked[name] = numbers
-        return MappingProxyType(checked)
+            groups_by_name[name] = numbers
+        return MappingProxyType(groups_by_name)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Mesh, (self.points, dict(self.cells), dict(self.cell_groups), dict(self.point_groups))
@@ -203,9 +205,9 @@ class Mesh(Suggesting):
         if group in self.point_groups and group not in self.cell_groups:
             similar = difflib.get_close_matches(group, self.cell_groups, n=2, cutoff=0.3) or [*self.cell_groups][:6]
             names = " or ".join(map(repr, similar))
-            remedy = f": name one such as {names}" if names else ", and the mesh has none of cells"
-            needed = "here one of cells is needed (lines, faces, solids)"
-            raise MeshError(f"'{group}' is a group of points, but {needed}{remedy}")
+            remedy = f": name one such as {names}" if names else ", and the mesh has no such group"
+            requirement = "here a group of cells is needed (lines, faces, solids)"
+            raise MeshError(f"'{group}' is a group of points, but {requirement}{remedy}")
         if group not in self.cell_groups:
             raise MeshError(self._no_group("group of cells", group, self.cell_groups))
         rows = self.split(self.cell_groups[group])
@@ -228,10 +230,11 @@ class Mesh(Suggesting):
 
     @cached_property
     def _nodes_of_groups(self) -> dict[str, AnyArray]:
+        """Point numbers of the cell groups for which `points_of` has computed them."""
         return {}
 
     def _no_group(self, kind: str, group: str, known: Iterable[str]) -> str:
-        """Return the message for a missing group; `known` are the names of the groups of its kind."""
+        """Return the message for an unknown group; `known` contains the names of all groups of this kind."""
         if not self.group_names:
             return f"the mesh has no groups, and thus no '{group}': add groups in the mesher, or with Mesh.with_groups"
         return unknown(kind, group, known)
@@ -311,10 +314,10 @@ class Mesh(Suggesting):
             considered = np.isin(np.arange(self.n_cells), self.cell_groups[of])
         facets = _facets_with_nodes(self, selected, between, considered)
         if not facets:
-            of_group = f" of '{of}'" if of else ""
+            group_text = f" of '{of}'" if of else ""
             raise MeshError(
                 f"facet group '{name}' would be empty: its function selects {int(selected.sum())} points, but no "
-                f"facet{of_group} {'between two cells' if between else 'on the outside'} has all its nodes among them; "
+                f"facet{group_text} {'between two cells' if between else 'on the outside'} has all its nodes among them; "
                 "compare coordinates with a tolerance, or define a group of points with with_groups"
             )
         return self.with_facets({name: facets})
@@ -331,7 +334,7 @@ class Mesh(Suggesting):
             rows[name] = {}
             for kind, block in facets.items():
                 block = np.asarray(block, np.int32)
-                cells[kind], rows[name][kind] = _added(cells.get(kind, block[:0]), block)
+                cells[kind], rows[name][kind] = _extended_block(cells.get(kind, block[:0]), block)
         starts = starts_of(cells)
 
         def numbers(rows_by_kind: Mapping[str, AnyArray]) -> AnyArray:
@@ -349,9 +352,9 @@ class Mesh(Suggesting):
 
 
 def facets_of_cells(mesh: Mesh) -> Iterator[tuple[str, AnyArray, AnyArray]]:
-    """Yield the element types and the nodes (n_cells, n_nodes) of the facets of solid cells, and the numbers of the cells.
+    """Yield the element type and the nodes (n_cells, n_nodes) of facets of solid cells, and the numbers of the cells.
 
-    The facets are those at the same place in all cells of an element type; their normals point out of the cells.
+    Each item contains the facets with one local number in all cells of an element type. Their normals point out of the cells.
     """
     for name, block in mesh.solids.items():
         element, numbers = elements.get(name), mesh.offsets[name] + np.arange(len(block), dtype=np.int32)
@@ -393,8 +396,8 @@ def _facets_with_nodes(mesh: Mesh, selected: Mask, between: bool, considered: Ma
     return facets_by_kind
 
 
-def _added(block: AnyArray, facets: AnyArray) -> tuple[AnyArray, Indices]:
-    """Return a block of facets extended by those of the `facets` that it lacks, and the row of each of the `facets`."""
+def _extended_block(block: AnyArray, facets: AnyArray) -> tuple[AnyArray, Indices]:
+    """Return a block of facets with the missing ones of `facets` appended, and the row (n,) of each of the `facets`."""
     candidates = np.concatenate([block, facets])
     _, first, facet = np.unique(np.sort(candidates, axis=1), axis=0, return_index=True, return_inverse=True)
     row, rows = first[facet.ravel()], np.arange(len(candidates))  # row of the first facet with the same nodes

@@ -120,7 +120,7 @@ def check_cells(mesh: Mesh) -> None:
         for fault, bad in (("degenerate", degenerate), ("inverted", inverted)):
             if bad.any():
                 row = int(np.flatnonzero(bad)[0])
-                cell = _described(mesh, name, row, measure[row])
+                cell = _cell_text(mesh, name, row, measure[row])
                 raise MeshError(f"{cell} is {fault} (number of such cells: {int(bad.sum())}): {REMEDIES[fault]}")
 
 
@@ -132,7 +132,7 @@ def poorest_cell(mesh: Mesh) -> str:
     """
     for name in mesh.solids:
         measure, low, high, longest = _extremes(mesh, name)
-        # Excesses over the limits, the values and the texts of all criteria.
+        # For each criterion: the excess over its limit, the value, and the text of the message.
         ratio, volume = low / high, measure / longest**3
         text = "its smallest Jacobian is {:.2g} of its largest; move its nodes or remesh"
         criteria = [(LEAST_JACOBIAN_RATIO - ratio, ratio, text)]
@@ -146,7 +146,7 @@ def poorest_cell(mesh: Mesh) -> str:
         for excess, value, text in criteria:
             row = int(np.argmax(excess))
             if excess[row] > 0.0:
-                return f"{_described(mesh, name, row, measure[row])} is poor: {text.format(value[row])}"
+                return f"{_cell_text(mesh, name, row, measure[row])} is poor: {text.format(value[row])}"
     return ""
 
 
@@ -158,7 +158,7 @@ def _check_nodes(mesh: Mesh, name: str) -> None:
     if len(rows):
         node = int(nodes[rows[0], :-1][repeated[rows[0]]][0])
         raise MeshError(
-            f"{_described(mesh, name, int(rows[0]))} has point {node} twice (number of such cells: {len(rows)}): "
+            f"{_cell_text(mesh, name, int(rows[0]))} has point {node} twice (number of such cells: {len(rows)}): "
             "write it as the element that it collapses to, a triangle, wedge, pyramid or tetrahedron"
         )
 
@@ -175,12 +175,12 @@ def _check_duplicates(mesh: Mesh, name: str) -> None:
     if (count > 1).any():
         row = int(rows[first[count > 1].min()])
         raise MeshError(
-            f"{_described(mesh, name, row)} occurs in the mesh {int(count.max())} times (number of such cells: "
+            f"{_cell_text(mesh, name, row)} occurs in the mesh {int(count.max())} times (number of such cells: "
             f"{int((count > 1).sum())}): remove the copies"
         )
 
 
-def _described(mesh: Mesh, name: str, row: int, measure: float | None = None) -> str:
+def _cell_text(mesh: Mesh, name: str, row: int, measure: float | None = None) -> str:
     """Return a text with the number, the element type, the position and, if given, the `measure` of a cell, for messages."""
     centre = ", ".join(f"{x:.6g}" for x in _corners(mesh, name)[row].mean(axis=0))
     size = "" if measure is None else f", {'area' if mesh.dim == 2 else 'volume'} {measure:.3g}"

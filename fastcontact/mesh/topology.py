@@ -70,7 +70,7 @@ def _check_folds(mesh: Mesh) -> None:
     """Raise MeshError if two oriented solid cells have a common facet with the same orientation."""
     folds, owners = [], []
     for kind, nodes, numbers in facets_of_cells(mesh):
-        folds.append(_direction(nodes[:, : elements.get(kind).n_corners].astype(np.int64)))
+        folds.append(_oriented_keys(nodes[:, : elements.get(kind).n_corners].astype(np.int64)))
         owners.append(numbers)
     keys, owner = np.concatenate(folds), np.concatenate(owners)
     rows, others = equal_rows(keys)
@@ -83,11 +83,11 @@ def _check_folds(mesh: Mesh) -> None:
         )
 
 
-def _direction(facets: Indices) -> Indices:
-    """Return three numbers (n, 3) that identify each facet and its orientation.
+def _oriented_keys(facets: Indices) -> Indices:
+    """Return three numbers (n, 3) that identify each of the facets (n, n_corners) and its orientation.
 
-    They are the node with the lowest number, the node after it and the node before it. For a line the third number is the
-    position of the lowest node.
+    They are the lowest of its node numbers, the following node and the preceding node. For a line the third number is the
+    local number of the lowest node.
     """
     first = facets.argmin(axis=1)
     rows, count = np.arange(len(facets)), facets.shape[1]
@@ -101,10 +101,10 @@ def remembered(function: OfMesh[Arguments, Result]) -> OfMesh[Arguments, Result]
 
     @wraps(function)
     def remembered(mesh: Mesh, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
-        of_mesh, key = results.setdefault(mesh, {}), (*args, *kwargs.items())
-        if key not in of_mesh:
-            of_mesh[key] = function(mesh, *args, **kwargs)
-        return of_mesh[key]
+        results_of_mesh, key = results.setdefault(mesh, {}), (*args, *kwargs.items())
+        if key not in results_of_mesh:
+            results_of_mesh[key] = function(mesh, *args, **kwargs)
+        return results_of_mesh[key]
 
     return remembered
 
@@ -327,19 +327,19 @@ def rigid_parts(mesh: Mesh) -> RigidParts:
 
 
 def _shared_nodes(mesh: Mesh, label: Indices) -> tuple[Indices, Indices, Indices]:
-    """Return the lowest part (n_points,) of each point, and the pairs (k,) of a shared node and each of its parts.
+    """Return the lowest part (n_points,) of each point, and the nodes (k,) shared by parts with each of their parts (k,).
 
     `label` (n_solids,) contains the part of each solid cell. The part of points without a solid cell is -1.
     """
     part = np.full(mesh.n_points, -1, np.intp)
     shared = np.zeros(mesh.n_points, bool)
     ends = np.cumsum([len(block) for block in mesh.solids.values()])
-    owned = list(zip(mesh.solids.values(), np.split(label, ends[:-1]), strict=True))
-    for block, owners in owned:
+    cells_and_parts = list(zip(mesh.solids.values(), np.split(label, ends[:-1]), strict=True))
+    for block, owners in cells_and_parts:
         part[block] = owners[:, None]
-    for block, owners in owned:
+    for block, owners in cells_and_parts:
         shared[block[part[block] != owners[:, None]]] = True
-    rows = [(block[shared[block]], np.repeat(owners, shared[block].sum(axis=1))) for block, owners in owned]
+    rows = [(block[shared[block]], np.repeat(owners, shared[block].sum(axis=1))) for block, owners in cells_and_parts]
     node, part_of_node = np.unique(np.concatenate([np.stack(pair) for pair in rows], axis=1), axis=1).astype(np.intp)
     _, lowest = np.unique(node, return_index=True)
     part[node[lowest]] = part_of_node[lowest]
@@ -347,9 +347,9 @@ def _shared_nodes(mesh: Mesh, label: Indices) -> tuple[Indices, Indices, Indices
 
 
 def _common_nodes(node: Indices, part: Indices) -> tuple[Indices, Indices, Indices]:
-    """Return two parts (m,), (m,) and a node (m,) that they share, for all such pairs of parts and nodes.
+    """Return the pairs of parts (m,), (m,) that share a node, and this node (m,), once for each shared node.
 
-    `node` and `part` are the pairs of a node and each of its parts, in ascending order of the nodes.
+    `node` and `part` contain a pair for each part of each node, in ascending order of the nodes.
     """
     pairs = [np.empty((3, 0), np.intp)]
     shift = 1
@@ -361,7 +361,7 @@ def _common_nodes(node: Indices, part: Indices) -> tuple[Indices, Indices, Indic
 
 
 def _rigidly_connected(points: Array, first: Indices, second: Indices, common: Indices) -> Mask:
-    """Return for each pair (m,) of parts with a common node whether all their common nodes connect them rigidly."""
+    """Return the mask (m,) of pairs of parts with a common node that their common nodes connect rigidly."""
     if not len(common):
         return np.empty(0, bool)
     _, pair, count = np.unique(np.stack([first, second]), axis=1, return_inverse=True, return_counts=True)

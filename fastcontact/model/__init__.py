@@ -1,1 +1,1 @@
-"""The description of a problem: materials, supports, loads and contact pairs, checked before any computation."""
+"""Description of a contact problem: materials, supports, loads and contact pairs, with checks before the solution."""

@@ -52,35 +52,35 @@ def check_ramps(ramped: Iterable[tuple[str, Table | None]], instants: Iterable[f
 
 
 def check_forces(mesh: Mesh, forces: Array, related: Mask, name: str) -> None:
-    """Raise ModelError if `forces` (n_points, dim) [force] of load `name` act on points without solid cell.
+    """Raise ModelError if `forces` (n_points, dim) [force] of load `name` act on points that belong to no solid cell.
 
     Points with multi-point constraints, `related` (n_points,) of bool, are exempt.
     """
-    loose = np.flatnonzero(forces.any(axis=1) & ~_carried(mesh, related))
-    if len(loose):
+    isolated = np.flatnonzero(forces.any(axis=1) & ~_connected_points(mesh, related))
+    if len(isolated):
         raise ModelError(
-            f"{name} acts on points that belong to no solid cell (number: {len(loose)}, first: point {loose[0]}): "
+            f"{name} acts on points that belong to no solid cell (number: {len(isolated)}, first: point {isolated[0]}): "
             "name a group of the body, or tie the points to it with couple or relate"
         )
 
 
-def _carried(mesh: Mesh, related: Mask) -> Mask:
-    """Return whether each point (n_points,) has a solid cell or a constraint."""
-    carried = related.copy()
+def _connected_points(mesh: Mesh, related: Mask) -> Mask:
+    """Return the mask (n_points,) of the points that belong to a solid cell or to a constraint."""
+    connected = related.copy()
     for block in mesh.solids.values():
-        carried[block] = True
-    return carried
+        connected[block] = True
+    return connected
 
 
 def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: Mask) -> None:
-    """Raise ModelError if all points of a support (name, group) are without solid cell.
+    """Raise ModelError if no point of one of the supports (name, group) belongs to a solid cell.
 
     Points with multi-point constraints, `related` (n_points,) of bool, are exempt.
     """
-    carried = _carried(mesh, related)
+    connected = _connected_points(mesh, related)
     for name, group in supports:
         points = mesh.points_of(group)
-        if not carried[points].any():
+        if not connected[points].any():
             raise ModelError(
                 f"{name} contains only points that belong to no solid cell (number: {len(points)}, first: point "
                 f"{points[0]}): name a group of the body"
@@ -90,7 +90,7 @@ def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: Mas
 def check_penetration(name: str, pair: Formulation) -> None:
     """Raise ContactError if the initial penetration of contact pair `name` exceeds the facet length at a node.
 
-    An intended interference is smaller, or is given by the option `clearance`.
+    An intended interference is smaller than this, or is specified by the option `clearance`.
     """
     gap, _ = initial_gaps(pair)
     size = facet_lengths(pair)
@@ -99,8 +99,8 @@ def check_penetration(name: str, pair: Formulation) -> None:
         point = pair.secondary.points[row]
         raise ContactError(
             f"contact '{name}' begins with a penetration of {-gap[row]:.4g} at point {point} {pair.points[point]}, more than "
-            f"the length of the element there ({size[row]:.4g}): move a body apart, reverse the orientation of a surface, or "
-            "give an interference that is meant as clearance"
+            f"the length of the element there ({size[row]:.4g}): separate the bodies, reverse the orientation of a surface, "
+            "or specify an intended interference as a clearance"
         )
 
 
@@ -122,20 +122,20 @@ def initial_gaps(pair: Formulation) -> tuple[Array, Array]:
     if pair.options.tied or pair.options.gap_only:
         shape = len(pair.secondary.points), pair.points.shape[1]
         return np.full(shape[0], np.inf), np.zeros(shape)
-    at_rest = Configuration.undeformed(pair.points)
-    gap, normal = pair.nodal_gap(at_rest, with_clearance=False)
+    undeformed = Configuration.undeformed(pair.points)
+    gap, normal = pair.nodal_gap(undeformed, with_clearance=False)
     if pair.options.clearance is not None or pair.options.clearance_primary is not None:
-        gap = np.maximum(gap, pair.nodal_gap(at_rest)[0])
+        gap = np.maximum(gap, pair.nodal_gap(undeformed)[0])
     return np.where(pair.options.excluded_nodes(pair.secondary), np.inf, gap), normal
 
 
-def check_overlap(mesh: Mesh, kinematics: str, paired: Iterable[tuple[str, str]]) -> None:
+def check_overlap(mesh: Mesh, kinematics: str, groups: Iterable[tuple[str, str]]) -> None:
     """Raise ModelError if bodies overlap in the reference configuration without a contact pair between them.
 
-    `paired` are the (secondary, primary) groups of the contact pairs.
+    `groups` contains the names (secondary, primary) of the groups of the contact pairs.
     """
     _, body_of = bodies(mesh)
-    joined = {frozenset((int(body_of[mesh.points_of(a)[0]]), int(body_of[mesh.points_of(b)[0]]))) for a, b in paired}
+    joined = {frozenset((int(body_of[mesh.points_of(a)[0]]), int(body_of[mesh.points_of(b)[0]]))) for a, b in groups}
     size = float(np.ptp(mesh.points, axis=0).max())
     for body, other, depth, position in penetration(mesh, kinematics, mesh.points):
         if depth > SINGLE_PRECISION * size and frozenset((body, other)) not in joined:

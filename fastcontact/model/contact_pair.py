@@ -86,14 +86,14 @@ KEYS = ("angle", "centre", "axis", "ramp")
 LARGEST_TURN = 1.0
 
 
-def rotation_of(caption: str, given: Mapping[str, Any] | None, kinematics: str) -> tuple[Rotation | None, Table | None]:
-    """Return a rotation, called `caption` in messages, and its ramp; each is None if it is not given.
+def rotation_of(caption: str, spec: Mapping[str, Any] | None, kinematics: str) -> tuple[Rotation | None, Table | None]:
+    """Return the rotation that `spec` defines, called `caption` in messages, and its ramp; each is None if not given.
 
     Raises ModelError if the rotation or the ramp is not admissible.
     """
-    if given is None:
+    if spec is None:
         return None, None
-    for key in given:
+    for key in spec:
         check_known(f"key of {caption}", key, KEYS, ModelError)
     if kinematics == "axisymmetric":
         raise ModelError(
@@ -102,19 +102,20 @@ def rotation_of(caption: str, given: Mapping[str, Any] | None, kinematics: str) 
         )
     dim = 3 if kinematics == "3d" else 2
     for key in ("angle", "centre", "axis")[:dim]:
-        if key not in given:
+        if key not in spec:
             raise ModelError(f"{caption} needs '{key}'")
-    if dim == 2 and given.get("axis") is not None:
+    if dim == 2 and spec.get("axis") is not None:
         raise ModelError(f"{caption}: in 2D rotations are about z, counter-clockwise: leave out the axis")
-    check_number(f"the angle of {caption}", given["angle"])
-    axis = _vector(f"the axis of {caption}", given["axis"], 3) if dim == 3 else (0.0, 0.0, 1.0)
+    check_number(f"the angle of {caption}", spec["angle"])
+    axis = _vector(f"the axis of {caption}", spec["axis"], 3) if dim == 3 else (0.0, 0.0, 1.0)
     if not any(axis):
         raise ModelError(f"the axis of {caption} has no length")
-    rotation = Rotation(_vector(f"the centre of {caption}", given["centre"], dim), axis, float(given["angle"]))  # type: ignore[arg-type]
-    return rotation, table_of(given.get("ramp"), f"the ramp of {caption}")
+    rotation = Rotation(_vector(f"the centre of {caption}", spec["centre"], dim), axis, float(spec["angle"]))  # type: ignore[arg-type]
+    return rotation, table_of(spec.get("ramp"), f"the ramp of {caption}")
 
 
 def _vector(name: str, values: Sequence[float], size: int) -> tuple[float, ...]:
+    """Return `size` numbers as a tuple. Raises ModelError, with the `name` of the vector, if they are not finite numbers."""
     vector = finite_vector(values, size)
     if vector is None:
         raise ModelError(f"{name} must be {size} finite numbers, not {values!r}")

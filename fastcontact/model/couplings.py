@@ -35,7 +35,7 @@ WEIGHTINGS: dict[str, Callable[[Array], Array]] = {
 
 @dataclass(frozen=True)
 class Spread:
-    """Weighting of a group by the distance from a point.
+    """Weighting of the nodes of a group by their distance from a point.
 
     Attributes
     ----------
@@ -191,7 +191,7 @@ class ReferencePoint:
 
 
 def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
-    """Return a reference point by the name of its group; ModelError if there is none of that name."""
+    """Return a reference point by the name of its group. Raises ModelError if there is no such point."""
     if name + ROTATION not in mesh.point_groups:
         raise ModelError(
             f"'{name}' is not a reference point: build the model on "
@@ -273,12 +273,12 @@ def distributing_rows(
     rotation = mean_rotation(weight, positions - centroid, caption)
     arms = directions @ by_rotation(np.array(reference.place) - centroid)
     # The coefficients of the translation and of the rotation of the reference point.
-    of_reference = np.zeros((len(rotation) + len(directions), 2, dim))
-    of_reference[: len(rotation), 1] = np.eye(len(rotation), dim)
-    of_reference[len(rotation) :, 0], of_reference[len(rotation) :, 1, : len(rotation)] = directions, -arms
+    reference_rows = np.zeros((len(rotation) + len(directions), 2, dim))
+    reference_rows[: len(rotation), 1] = np.eye(len(rotation), dim)
+    reference_rows[len(rotation) :, 0], reference_rows[len(rotation) :, 1, : len(rotation)] = directions, -arms
     means = np.concatenate([rotation, directions[:, None] * weight[:, None]])
-    nodes = np.tile([reference.point, reference.rotation, *points], (len(of_reference), 1))
-    return nodal_rows(nodes, np.concatenate([of_reference, -means], axis=1), n_dofs)
+    nodes = np.tile([reference.point, reference.rotation, *points], (len(reference_rows), 1))
+    return nodal_rows(nodes, np.concatenate([reference_rows, -means], axis=1), n_dofs)
 
 
 def coupling(

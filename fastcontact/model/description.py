@@ -28,8 +28,8 @@ def sentences(model: Any) -> Iterator[str]:
     cells = " and ".join(f"{len(block)} {name}" for name, block in mesh.solids.items())
     article = "An" if model.kinematics == "axisymmetric" else "A"
     yield f"{article} {KINDS[model.kinematics]} of {mesh.n_points} points, {cells}: {model.n_dofs} degrees of freedom."
-    if named := [f"{kind} in {unit}" for kind, unit in model.units.items() if unit not in ("", "-")]:
-        yield f"Units: {', '.join(named)}."
+    if unit_names := [f"{kind} in {unit}" for kind, unit in model.units.items() if unit not in ("", "-")]:
+        yield f"Units: {', '.join(unit_names)}."
     for (material, groups), modes in zip(model.materials, model.bending(), strict=True):
         locking = ", with a mean dilatation against locking" if material.averaged and not modes else ""
         locking += ", with incompatible modes" if modes else ""
@@ -44,10 +44,10 @@ def sentences(model: Any) -> Iterator[str]:
             continue
         value = "a number for each point" if isinstance(temperature.value, np.ndarray) else _value(temperature.value)
         groups = temperature.name.removeprefix("the temperature of ")
-        when, times = _history(temperature.ramp), temperature.times
+        history, times = _history(temperature.ramp), temperature.times
         if times:
-            when = f", at {len(times)} instants from {times[0]:g} to {times[-1]:g}"
-        yield f"Temperature: {value} over {temperature.reference:g} in {groups}{when}."
+            history = f", at {len(times)} instants from {times[0]:g} to {times[-1]:g}"
+        yield f"Temperature: {value} over {temperature.reference:g} in {groups}{history}."
     for load in model.heat_loads:
         history = _history(load.ramp)
         if isinstance(load, TemporaryHeat) and load.temporary:
@@ -66,37 +66,40 @@ def sentences(model: Any) -> Iterator[str]:
     if not model.contact:
         yield "Contact: none."
     yield (
-        f"Solved are {_solved(model)}, without inertia, step by step along the ramp given to solve "
-        "(20 equal steps without one)" + ("; the contact geometry follows the deformation." if model.contact else ".")
+        f"Analysis: quasi-static, with {_theory(model)}, in the load steps of the ramp given to solve (20 equal steps by "
+        "default)" + ("; the contact geometry follows the deformation." if model.contact else ".")
     )
 
 
-def _solved(model: Any) -> str:
+def _theory(model: Any) -> str:
+    """Return the kinematic assumption and the kind of the materials."""
     nonlinear = any(isinstance(law, NonlinearElastic) for law, _ in model.materials)
     if model.strain == "finite":
-        return "finite strains, pressures following the surface"
+        return "finite strains and pressures that follow the surface"
     return "small strains with plasticity" if nonlinear else "small strains and linear elasticity"
 
 
 def _supports(model: Any) -> Iterator[str]:
-    by_place: dict[tuple[str, Any], list[str]] = {}
+    """Yield a line for the supports of each group that share a history, and a line for the axis of symmetry."""
+    by_group: dict[tuple[str, Any], list[str]] = {}
     for support in model.supports:
-        texts = by_place.setdefault((support.group, support.ramp), [])
+        texts = by_group.setdefault((support.group, support.ramp), [])
         texts.append(f"{'xyz'[support.component]} = {_value(support.value)}")
         if support.rotation is not None and support.component == model.mesh.dim - 1:
             turn = support.rotation
-            texts.append(f"turned by {turn.angle:g} radian about {turn.centre}{_history(support.rotation_ramp)}")
-    for (group, ramp), components in by_place.items():
+            texts.append(f"rotated by {turn.angle:g} radian about {turn.centre}{_history(support.rotation_ramp)}")
+    for (group, ramp), components in by_group.items():
         count = len(model.mesh.points_of(group))
         yield f"Support: {', '.join(components)} on '{group}' ({count} points){_history(ramp)}."
     on_axis = len(model.axis_nodes)
     if on_axis:
         yield f"Support: x = 0 at the {on_axis} points on the axis, by symmetry."
-    if not (by_place or model.relations or model.springs or on_axis):
+    if not (by_group or model.relations or model.springs or on_axis):
         yield "Support: none."
 
 
 def _load(load: Any) -> str:
+    """Return the components or values of a load."""
     components: Mapping[int, Any] | None = getattr(load, "components", None)
     if isinstance(load, Centrifugal):
         return f"speed {load.speed:g} about the axis through {load.origin} along {load.direction}"
@@ -106,19 +109,22 @@ def _load(load: Any) -> str:
 
 
 def _value(value: Any) -> str:
+    """Return a number, or a note that the value is a function of position."""
     return "a function of position" if callable(value) else f"{value:g}"
 
 
 def _history(ramp: Any) -> str:
+    """Return a note that an item has a separate history, or an empty string."""
     return "" if ramp is None else ", with a separate history"
 
 
 def _contact(model: Any, pair: ContactPair) -> str:
+    """Return the sides, the formulation, the law and the options of a contact pair."""
     nodes = len(model.mesh.points_of(pair.secondary))
     friction = pair.options.get("friction")
     law = f"with friction {friction:g}" if friction else "without friction"
     kind = pair.options.get("kind", "unilateral")
-    law = {"tied": "tied", "gap_only": "only watched, without forces"}.get(kind, law if kind == "unilateral" else kind)
+    law = {"tied": "tied", "gap_only": "gap only, without forces"}.get(kind, law if kind == "unilateral" else kind)
     opposite = f"'{pair.primary}'" if pair.obstacle is None else pair.opposite
     others = sorted({*pair.options} - {"friction", "kind", "multipliers"})
     text = f" (further options: {', '.join(others)})" if others else ""

@@ -67,7 +67,7 @@ def different(first: Mapping[str, str], second: Mapping[str, str]) -> list[str]:
 
 
 def formulation_behind(model: Model, name: str, digest: str | None) -> str | None:
-    """Return the formulation, with its options, for which pair `name` has the `digest`; None if there is no such formulation.
+    """Return the formulation and its options with which pair `name` has the given `digest`; None if there are none.
 
     Earlier versions chose other default formulations for pairs whose formulation is not given.
     """
@@ -99,6 +99,7 @@ def digest_of_mesh(mesh: Mesh) -> str:
 
 
 def _digest(value: Any, mesh: Mesh) -> str:
+    """Return the first LENGTH hexadecimal digits of the SHA-256 hash of a value."""
     digest = hashlib.sha256()
     _update(value, digest.update, mesh, mesh.points)
     return digest.hexdigest()[:LENGTH]
@@ -142,7 +143,7 @@ def _update_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points:
         _update(list(value.distance(points)), add, mesh, points)
         fields = [field for field in fields if not callable(getattr(value, field.name))]
     elif not fields and callable(value):
-        _update(_called(value, points), add, mesh, points)
+        _update(_function_values(value, points), add, mesh, points)
     # Some fields with default values are left out, so that digests agree with those in files of earlier versions.
     if is_material:
         fields = [field for field in fields if getattr(value, field.name) is not None]
@@ -155,7 +156,7 @@ def _update_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points:
         fields = [field for field in fields if field.name not in ("times", "instant")]
     if isinstance(value, ContactPair):
         fields = [f for f in fields if f.name != "found_gap" and (f.name != "fluid" or value.fluid is not None)]
-    if isinstance(value, LinearElastic):  # the volumetric option that takes effect
+    if isinstance(value, LinearElastic):  # include only the treatment of dilatation that takes effect
         fields = [field for field in fields if field.name != "volumetric"]
         add(b"mean dilatation" if value.averaged else b"")
     for field in fields:
@@ -163,7 +164,7 @@ def _update_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points:
         _update(getattr(value, field.name), add, mesh, points)
 
 
-def _called(function: Callable[[Array], Any], points: Array) -> Any:
+def _function_values(function: Callable[[Array], Any], points: Array) -> Any:
     """Return the values (n,) of a function of position, or its name if it raises an error at these points."""
     try:
         return np.asarray(function(points), float)

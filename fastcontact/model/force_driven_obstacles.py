@@ -1,7 +1,7 @@
-"""Rigid obstacles moved by forces. Each adds one point without stiffness, which only contact holds.
+"""Rigid obstacles moved by forces. Each obstacle adds one point without stiffness, which is held by contact only.
 
-The additional points follow those of the mesh, and their displacements are those of the obstacles. Components under a force
-are rigid-body motions like those of a floating body, and are regularised by the same weak springs (see
+The additional points follow those of the mesh, and their displacements are those of the obstacles. Components driven by a
+force are rigid-body motions like those of a floating body, and are regularised by the same weak springs (see
 `analysis.floating_bodies`); the other components are prescribed. A gap to a rigid obstacle changes by ``n . (u - q)``, where
 q is the displacement of the obstacle. In the row of a gap, the entries of q are therefore minus the sum of the entries of all
 points.
@@ -51,7 +51,7 @@ class ForceDrivenObstacles:
 
     @property
     def without_stiffness(self) -> Mask:
-        """Mask (n_dofs,) of the displacement components under a force, which are free but have no stiffness."""
+        """Mask (n_dofs,) of the displacement components driven by a force, which are free but have no stiffness."""
         mask = np.zeros(self.n_dofs, bool)
         for number, pair in enumerate(self.pairs):
             mask[self.dofs(number)] = [force is not None for force in pair.force]
@@ -80,9 +80,9 @@ class ForceDrivenObstacles:
         """Return multi-point constraints with additional columns for the obstacles."""
         if not self.pairs:
             return list(relations)
-        return [dataclasses.replace(relation, rows=self._padded(relation.rows)) for relation in relations]
+        return [dataclasses.replace(relation, rows=self._with_empty_columns(relation.rows)) for relation in relations]
 
-    def _padded(self, rows: csr_array) -> csr_array:
+    def _with_empty_columns(self, rows: csr_array) -> csr_array:
         """Return rows with additional empty columns for the obstacles."""
         return csr_array((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], self.n_dofs))
 
@@ -142,20 +142,20 @@ class ForceDrivenObstacles:
         """
         number = self.number(name)
         if number is None:
-            padded = tuple(self._padded(tangent) for tangent in constraints.tangents)
-            return dataclasses.replace(constraints, B=self._padded(constraints.B), tangents=padded)
-        B, normal = self._coupled(constraints.B, number)
-        tangents = tuple(self._coupled(tangent, number)[0] for tangent in constraints.tangents)
+            with_zeros = tuple(self._with_empty_columns(tangent) for tangent in constraints.tangents)
+            return dataclasses.replace(constraints, B=self._with_empty_columns(constraints.B), tangents=with_zeros)
+        B, normal = self._with_motion(constraints.B, number)
+        tangents = tuple(self._with_motion(tangent, number)[0] for tangent in constraints.tangents)
         slip0 = np.zeros_like(constraints.slip0)
         if moved is not None and constraints.tangents:
             slip0 = constraints.slip0 + np.stack([t @ moved for t in constraints.directions])
         gap0 = constraints.gap0 + normal @ position
         return dataclasses.replace(constraints, B=B, gap0=gap0, tangents=tangents, slip0=slip0)
 
-    def _coupled(self, rows: csr_array, number: int) -> tuple[csr_array, Array]:
+    def _with_motion(self, rows: csr_array, number: int) -> tuple[csr_array, Array]:
         """Return rows (m, n_dofs) that include the motion of an obstacle, and their directions (m, dim)."""
         n, dim = self.shape
         direction = rows @ np.tile(np.eye(dim), (n, 1))
-        of_obstacles = np.zeros((rows.shape[0], len(self) * dim))
-        of_obstacles[:, number * dim : (number + 1) * dim] = -direction
-        return csr_array(hstack([rows, csr_array(of_obstacles)], format="csr")), direction
+        obstacle_columns = np.zeros((rows.shape[0], len(self) * dim))
+        obstacle_columns[:, number * dim : (number + 1) * dim] = -direction
+        return csr_array(hstack([rows, csr_array(obstacle_columns)], format="csr")), direction

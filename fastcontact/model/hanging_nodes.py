@@ -1,6 +1,7 @@
 """Hanging nodes, which lie on facets of their own body without belonging to them.
 
-Where a coarse and a fine mesh meet, only their common nodes are connected. Under load, gaps or overlaps arise at the others.
+Where a coarse and a fine mesh meet, only their common nodes are connected. Under load, gaps or overlaps form at the other
+nodes.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ from fastcontact.model.rigid_motions import node_at
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
 
-# Nodes whose distance from a facet is below NEAR, relative to its size, lie on it. Nodes with this distance from a node of
-# the facet coincide with that node. On arcs, the nodes of fine facets may be at a distance of ON_ARC from a coarse facet. A
-# slit is then excluded by the requirement that each corner of the coarse facet has another facet of opposite normal.
+# Distances relative to the size of a facet [-]. A node closer than NEAR lies on the facet, and it coincides with a node of
+# the facet that is closer than NEAR. On arcs, nodes of fine facets may be at a distance up to ON_ARC from a coarse facet.
+# They are distinguished from slits by the condition that each corner of the coarse facet has a facet of opposite normal.
 NEAR, ON_ARC = 0.02, 0.1
 
 
@@ -56,8 +57,8 @@ def hanging_nodes_warning(model: Model) -> str:
     relevant = ~model.related_points()[node]
     for pair in model.contact if len(node) else ():
         if pair.primary:
-            relevant &= ~_joined(mesh, pair.secondary, pair.primary, node, outer.corners[facet])
-            relevant &= ~_joined(mesh, pair.primary, pair.secondary, node, outer.corners[facet])
+            relevant &= ~_paired_by_contact(mesh, pair.secondary, pair.primary, node, outer.corners[facet])
+            relevant &= ~_paired_by_contact(mesh, pair.primary, pair.secondary, node, outer.corners[facet])
     if not relevant.any():
         return ""
     node, facet = node[relevant], facet[relevant]
@@ -69,7 +70,7 @@ def hanging_nodes_warning(model: Model) -> str:
     )
 
 
-def _joined(mesh: Mesh, nodes_of: str, facets_of: str, node: Indices, corners: Numbers) -> Mask:
+def _paired_by_contact(mesh: Mesh, nodes_of: str, facets_of: str, node: Indices, corners: Numbers) -> Mask:
     """Return the mask (m,) of nodes in group `nodes_of` whose facets, with `corners` (m, n_corners), are in `facets_of`."""
     on_side, on_opposite = np.zeros((2, mesh.n_points), bool)
     on_side[mesh.points_of(nodes_of)] = True
@@ -100,14 +101,14 @@ def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     _, body = bodies(mesh)
     same_body = body[node] == body[outer.corners[facet, 0]]
     node, facet = node[same_body], facet[same_body]
-    inside = _within(mesh.points, node, outer, facet)
+    inside = _project_inside(mesh.points, node, outer, facet)
     node, facet = node[inside], facet[inside]
     height = np.abs(_heights(mesh, node, outer, facet)) / outer.size[facet]
     hanging = height <= NEAR
     on_arc = ~hanging & (height <= ON_ARC)
     hanging[on_arc] = _closed_at_corners(outer, facet[on_arc])
     node, facet = node[hanging], facet[hanging]
-    hanging = ~_connected(mesh, node, outer, facet)
+    hanging = ~_share_cells(mesh, node, outer, facet)
     return node[hanging], facet[hanging], outer
 
 
@@ -129,11 +130,11 @@ def _heights(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> A
     return np.asarray(height)
 
 
-def _connected(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
+def _share_cells(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
     """Return whether nodes (m,) belong to the cells behind facets (m,), or to their neighbours.
 
-    This holds on the opposite side of a thin sheet. It does not hold where two meshes meet, because there cells share no
-    facet, or only the corners of the given facet.
+    A node on the opposite side of a thin sheet belongs to such a cell. A node where two meshes meet does not, because the
+    cells of the two meshes share no facet, or only the corners of the given facet.
     """
     corners = outer.corners[facet]
     involved = np.zeros(mesh.n_points, bool)
@@ -154,7 +155,7 @@ def _connected(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) ->
 
 
 def _closed_at_corners(outer: OuterFacets, facet: Indices) -> Mask:
-    """Return whether every corner of facets (m,) has another facet of opposite normal, as at both ends of a closed tear."""
+    """Return whether every corner of facets (m,) also has a facet of opposite normal, as at the ends of a closed tear."""
     if not len(facet):
         return np.empty(0, bool)
     n, width = outer.corners.shape
@@ -172,6 +173,7 @@ def _closed_at_corners(outer: OuterFacets, facet: Indices) -> Mask:
 
 
 def _outer_facets(mesh: Mesh) -> OuterFacets:
+    """Return the outer facets of all bodies."""
     facets, n_corners = outer_facets(mesh), 2 if mesh.dim == 2 else 4
     width = max(block.shape[1] for block in facets.values())
     nodes, corners, centres, rises = [], [], [], []
@@ -200,7 +202,7 @@ def _rise(element: Element, x: Array) -> Array:
     return np.asarray(np.linalg.norm(x - flat, axis=2).max(axis=1))
 
 
-def _within(points: Array, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
+def _project_inside(points: Array, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
     """Return whether nodes (m,) project onto facets (m,) and coincide with none of their nodes."""
     members, size = outer.nodes[facet], outer.size[facet]
     distance = np.linalg.norm(points[members] - points[node][:, None], axis=2)

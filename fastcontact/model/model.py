@@ -23,7 +23,7 @@ from fastcontact.model.parts.supports import ModelSupports
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
 from fastcontact.model.pretension import check_locks
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
-from fastcontact.model.rigid_motions import MOST_FRICTION, FreeMotions, free_motions, generalised, resisting, unstopped
+from fastcontact.model.rigid_motions import MOST_FRICTION, FreeMotions, free_motions, generalised, mechanisms, resisting
 
 # Types of items that may act in only some of the load steps.
 TEMPORARY = (TemporaryConstraint, TemporaryHeat)
@@ -38,8 +38,8 @@ PUBLIC = (
 class Model(ModelSupports):
     """A contact problem of elastic or elastoplastic bodies.
 
-    Each method checks its arguments, and `check` checks the complete model. The MeshError, ModelError or ContactError of a
-    check states the cause and the remedy in one line.
+    Each method checks its arguments, and `check` checks the complete model. A check that fails raises MeshError, ModelError
+    or ContactError, whose message states the cause and the remedy in one line.
 
     Prescribed values are numbers, or functions from reference positions (n, dim) [length] to numbers (n,). They are
     multiplied by a history, a piecewise linear function of the load factor. The parameter `ramp` of many methods gives
@@ -61,8 +61,8 @@ class Model(ModelSupports):
         Venant-Kirchhoff law for small strains and large rotations. Pressures follow the deformed surface; other loads keep
         their directions and reference areas. Stresses are Cauchy stresses.
     reference_temperature : float
-        Initial temperature of the bodies, at which the thermal strain is zero, unless `add_temperature` is given another
-        one [temperature].
+        Initial temperature of the bodies, at which the thermal strain is zero, unless `add_temperature` specifies
+        another one [temperature].
     units : str or mapping of str to str, optional
         Names of the units of length, force and pressure, either in this order as a string such as ``"mm, N, MPa"``, or by
         the keys ``"length"``, ``"force"`` and ``"pressure"``. Tables, reports, plots and result files show them, and a
@@ -142,56 +142,58 @@ class Model(ModelSupports):
         self._log_axis()
         forces = self.forces_by_ramp()
         self.thermal_forces_by_ramp()
-        self._check_changes(self._check_heat_of)
+        self._check_each_set(self._check_heat_of)
         if ramp is not None:
             items: list[Any] = [*self.supports, *self.loads, *self.relations]
             items += [*self.temperatures, *self.initial_states, *self.heat_loads]
-            named = [(item.name, item.ramp) for item in items]
-            named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
-            named += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]
-            named += [(f"the friction of contact '{p.name}'", p.friction_ramp) for p in self.contact]
-            named += [(f"the fluid in contact '{p.name}'", p.fluid.ramp) for p in self.contact if p.fluid is not None]
-            named += [(f"the rotation of '{s.group}'", s.rotation_ramp) for s in self.supports]
-            named += [(f"the rotation of obstacle '{p.name}'", p.rotation_ramp) for p in self.contact]
-            check_ramps(named, ramp.instants)
+            ramps = [(item.name, item.ramp) for item in items]
+            ramps += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
+            ramps += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]
+            ramps += [(f"the friction of contact '{p.name}'", p.friction_ramp) for p in self.contact]
+            ramps += [(f"the fluid in contact '{p.name}'", p.fluid.ramp) for p in self.contact if p.fluid is not None]
+            ramps += [(f"the rotation of '{s.group}'", s.rotation_ramp) for s in self.supports]
+            ramps += [(f"the rotation of obstacle '{p.name}'", p.rotation_ramp) for p in self.contact]
+            check_ramps(ramps, ramp.instants)
             check_turns(self.contact, ramp)
             check_locks(self.pretensions, ramp.instants)
         self._check_relations(fixed, prescribed, ramp or Ramp((1.0,)))
         check_supports(self.mesh, [(s.name, s.group) for s in self.supports], self.related_points())
-        bound = [(pair, self.bind(pair)) for pair in self.contact]
-        for pair, formulation in bound:
+        bound_pairs = [(pair, self.bind(pair)) for pair in self.contact]
+        for pair, formulation in bound_pairs:
             check_penetration(pair.name, formulation)
-        check_prescribed(bound, Supports(fixed, prescribed, ramp or Ramp((1.0,))))
+        check_prescribed(bound_pairs, Supports(fixed, prescribed, ramp or Ramp((1.0,))))
         sides = [(p.secondary, p.primary) for p in self.contact if p.obstacle is None]
         check_overlap(self.mesh, self.kinematics, sides)
-        driving = list(self.force_driven.forces(forces).values())
-        self._check_changes(lambda acting: acting._check_motions(fixed, driving))
+        nodal_forces = list(self.force_driven.forces(forces).values())
+        self._check_each_set(lambda model: model._check_motions(fixed, nodal_forces))
 
-    def _check_changes(self, check: Callable[[Model], None]) -> None:
-        """For every set of temporary items that act together, call `check` with a model that contains only these."""
+    def _check_each_set(self, check: Callable[[Model], None]) -> None:
+        """Call `check` once for every set of temporary items that act together, with a model that has no other such items."""
         temporary = [item for item in (*self.relations, *self.heat_loads) if isinstance(item, TEMPORARY)]
-        changes = {0.0, *(t for item in temporary for t in (item.begins, item.ends) if 0.0 < t < np.inf)}
-        for begin in sorted(changes):
+        starts = {0.0, *(t for item in temporary for t in (item.begins, item.ends) if 0.0 < t < np.inf)}
+        for begin in sorted(starts):
             try:
-                check(self._acting(begin))
+                check(self._model_from(begin))
             except ModelError as error:
                 raise ModelError(f"in the load steps after {begin:g}: {error}" if begin else str(error)) from None
 
-    def _check_heat_of(self, acting: Model) -> None:
-        acting.check_heat()
-        if self.conducts and not acting.conducts:
+    def _check_heat_of(self, model: Model) -> None:
+        """Check the heat conduction problem of `model`, which contains the temporary items of some load steps only."""
+        model.check_heat()
+        if self.conducts and not model.conducts:
             raise ModelError(
                 "no heat load acts, so the temperatures are undetermined: add a film condition (convection)"
             )
 
-    def _acting(self, begin: float) -> Model:
-        """Return the model with only those items that act in the load step that begins at the load factor `begin`."""
-        acting = copy.copy(self)
-        acting.relations = [r for r in self.relations if not isinstance(r, TemporaryConstraint) or r.acts_from(begin)]
-        acting.heat_loads = [r for r in self.heat_loads if not isinstance(r, TemporaryHeat) or r.acts_from(begin)]
-        return acting
+    def _model_from(self, begin: float) -> Model:
+        """Return a copy of the model with only the items that act in the load step that begins at the load factor `begin`."""
+        model = copy.copy(self)
+        model.relations = [r for r in self.relations if not isinstance(r, TemporaryConstraint) or r.acts_from(begin)]
+        model.heat_loads = [r for r in self.heat_loads if not isinstance(r, TemporaryHeat) or r.acts_from(begin)]
+        return model
 
     def _check_relations(self, fixed: Mask, prescribed: Mapping[PartHistory, Array], ramp: Ramp) -> None:
+        """Raise ModelError if multi-point constraints contradict each other or a support at an instant of `ramp`."""
         relations = [relation for relation in self.relations if not isinstance(relation, TemporaryConstraint)]
         if not relations:
             return
@@ -204,15 +206,15 @@ class Model(ModelSupports):
         """Raise ModelError if a rigid-body motion is possible.
 
         Supports, constraints and springs prevent rigid-body motions. Contact prevents motions that close a gap. A motion
-        that opens a gap is accepted, too, if a load does work in it, since this load may press the body against the contact.
+        that opens a gap is also accepted if a load does work on it, since this load may press the body against the contact.
         """
         motions = self.force_driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))
         if not len(motions):
             return
         generalised_forces = [generalised(motions, force.ravel()) for force in forces]
-        # The load steps check whether friction suffices, and their errors state the coefficient that would.
+        # Whether friction suffices is checked in the load steps, whose errors state the coefficient that would suffice.
         gaps = gaps_at_rest(self, motions, MOST_FRICTION)
-        check_motions(self.mesh, motions.combined(unstopped(gaps, np.reshape(generalised_forces, (-1, len(motions))))))
+        check_motions(self.mesh, motions.combined(mechanisms(gaps, np.reshape(generalised_forces, (-1, len(motions))))))
 
 
 def gaps_at_rest(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:
@@ -221,7 +223,7 @@ def gaps_at_rest(model: Model, motions: FreeMotions, factor: float = 1.0) -> Arr
     A constraint with friction is represented by the edges of its friction cone, see `resisting`; `factor` multiplies all
     coefficients of friction.
     """
-    obstacles, at_rest, zero = model.force_driven, Configuration.undeformed(model.mesh.points), np.zeros(model.mesh.dim)
-    contact = [obstacles.constraints(pair.name, model.bind(pair).constraints(at_rest), zero) for pair in model.contact]
+    obstacles, initial, zero = model.force_driven, Configuration.undeformed(model.mesh.points), np.zeros(model.mesh.dim)
+    contact = [obstacles.constraints(pair.name, model.bind(pair).constraints(initial), zero) for pair in model.contact]
     rows = [resisting(constraints, factor)[0] @ motions.displacement for constraints in contact]
     return np.vstack([*rows, np.empty((0, len(motions)))])

@@ -1,6 +1,6 @@
 """Warnings about a model before the solution, such as inconsistent units, poor cells and inexact integrals.
 
-They are printed and stored in the result file. The analysis continues, because the model may still be correct.
+The warnings are printed and stored in the result file. The analysis continues, because the model may still be correct.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
 
-# Largest plausible ratio of Young's moduli: that of steel to soft rubber is 200 000, that of MPa to Pa a million.
+# Largest plausible ratio of Young's moduli. For steel and soft rubber it is 200 000; a confusion of MPa and Pa gives 1e6.
 LARGEST_MODULUS_RATIO = 3e5
 # Prescribed displacements above this multiple of the size of the model are probably mistakes [-].
 LARGEST_DISPLACEMENT = 1.0
@@ -44,13 +44,13 @@ SOLIDS = (1e2, 2e12)
 SAMPLE = 1000
 # Relative quadrature errors above which a warning is given: of a load, and of the stiffness (1.6 % on regular pyramids).
 LARGEST_LOAD_ERROR, LARGEST_STIFFNESS_ERROR = 1e-3, 5e-2
-# Nodes probably should coincide if their distance is below this fraction of the adjacent edges and below SINGLE_PRECISION
-# times the size of the model.
+# Two nodes are assumed to be meant to coincide if their distance is below this fraction of the adjacent edges and below
+# SINGLE_PRECISION times the size of the model.
 NEAR = 1e-2
 # Largest penetration, relative to the facet length, that is regarded as an effect of straight facets: the midpoints of the
 # sides of a regular octagon lie 0.0995 times their length inside the circle.
 SAG = 0.1
-# Largest plausible coefficient of friction; that of rubber on rough ground is 1 to 2.
+# Largest plausible coefficient of friction. For rubber on rough ground it is 1 to 2.
 LARGEST_FRICTION = 3.0
 
 
@@ -59,27 +59,27 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     """Return the warnings about a model accepted by `Model.check`, for an analysis along a ramp."""
     supports = Supports(*model.prescribed_by_ramp(), ramp)
     pairs, motion = [(pair, model.bind(pair)) for pair in model.contact], _largest_motion(supports)
-    texts = [*_moduli(model), *_named_units(model), *_proportions(model, float(motion.max())), poorest_cell(model.mesh)]
-    texts += [hanging_nodes_warning(model), _coincident(model), *_friction(model), *_penetrating(model, pairs, motion)]
-    texts += [*_unramped(model, ramp), *prescribed_overlap_warnings(pairs, supports), *_lost_loads(model)]
-    texts += [*_split_sides(model, pairs), *_different_ends(model), *_wetted_twice(model), _stiffness(model.mesh)]
-    texts += [text for load in model.loads for text in _load_integral(model, load)]
+    texts = [*_moduli(model), *_units(model), *_proportions(model, float(motion.max())), poorest_cell(model.mesh)]
+    texts += [hanging_nodes_warning(model), _close_nodes(model), *_friction(model), *_penetration(model, pairs, motion)]
+    texts += [*_missing_ramps(model, ramp), *prescribed_overlap_warnings(pairs, supports), *_loads_on_supports(model)]
+    texts += [*_split_sides(model, pairs), *_sector_ends(model), *_shared_fluids(model), _stiffness(model.mesh)]
+    texts += [text for load in model.loads for text in _load_quadrature(model, load)]
     return [text for text in texts if text]
 
 
 def _split_sides(model: Model, pairs: Pairs) -> Iterator[str]:
-    """Return the warnings about pairs of contacts whose sides continue each other; see `split_side_warnings`."""
+    """Return the warnings about two contact pairs with adjoining sides; see `split_side_warnings`."""
     nodes = {
         pair.name: np.union1d(*(model.mesh.points_of(side) for side in (pair.secondary, pair.primary)))
         for pair in model.contact
         if pair.primary
     }
     points, count = np.unique(np.concatenate([*nodes.values(), np.empty(0, np.int32)]), return_counts=True)
-    adjoining = [name for name in nodes if np.isin(nodes[name], points[count > 1]).any()]
-    return split_side_warnings([(pair, bound) for pair, bound in pairs if pair.name in adjoining])
+    adjacent = [name for name in nodes if np.isin(nodes[name], points[count > 1]).any()]
+    return split_side_warnings([(pair, bound) for pair, bound in pairs if pair.name in adjacent])
 
 
-def _different_ends(model: Model) -> Iterator[str]:
+def _sector_ends(model: Model) -> Iterator[str]:
     """Yield a warning for each contact with nodes at one end of a sector that coincide with no node of the other end."""
     for (name, nodes), pair in itertools.product(model.interpolated.items(), model.contact):
         n = len(np.intersect1d(nodes, model.mesh.points_of(pair.secondary)))
@@ -91,7 +91,7 @@ def _different_ends(model: Model) -> Iterator[str]:
             )
 
 
-def _lost_loads(model: Model) -> Iterator[str]:
+def _loads_on_supports(model: Model) -> Iterator[str]:
     """Yield a warning for each load that acts only on prescribed displacement components."""
     fixed, _ = model.prescribed()
     for load in model.loads:
@@ -115,7 +115,7 @@ def _moduli(model: Model) -> Iterator[str]:
         )
 
 
-def _named_units(model: Model) -> Iterator[str]:
+def _units(model: Model) -> Iterator[str]:
     """Yield warnings about named units: if they are inconsistent, and for each modulus unlike those of solids."""
     units = model.units
     yield misfit(units)
@@ -148,7 +148,7 @@ def _proportions(model: Model, motion: float) -> Iterator[str]:
     if strain > PLAUSIBLE_STRAIN[1] or 0.0 < strain < PLAUSIBLE_STRAIN[0]:
         yield (
             f"the loads strain the model by about {strain:.2g} (total force over E times the cross-section of the "
-            "model): are loads, lengths and E in one set of units?"
+            "model): are loads, lengths and E in consistent units?"
         )
 
 
@@ -167,21 +167,21 @@ def _peak(ramp: Table | None) -> float:
     return 1.0 if ramp is None else max(abs(value) for _, value in ramp)
 
 
-def _coincident(model: Model) -> str:
+def _close_nodes(model: Model) -> str:
     """Return a warning if nodes of solid cells nearly coincide without a contact or constraint between them."""
     mesh, size = model.mesh, float(np.ptp(model.mesh.points, axis=0).max())
-    # The shortest edge at each node on the surface of a body; infinite at other nodes, which cannot lie on cracks.
+    # Length of the shortest edge at each node on the surface of a body, and infinity at other nodes, which are not on cracks.
     edge = np.full(mesh.n_points, np.inf)
     for name, facets in outer_facets(mesh).items():
         corners = mesh.points[facets[:, : elements.get(name).n_corners]]
         lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         np.minimum.at(edge, facets, lengths.min(axis=1)[:, None])
-    unjoined = np.isfinite(edge)
+    unconnected = np.isfinite(edge)
     for pair in model.contact:
         for group in (pair.secondary, pair.primary):
-            unjoined[mesh.points_of(group) if group else []] = False
-    unjoined[model.related_points()] = False
-    numbers = np.flatnonzero(unjoined)
+            unconnected[mesh.points_of(group) if group else []] = False
+    unconnected[model.related_points()] = False
+    numbers = np.flatnonzero(unconnected)
     pairs = numbers[close_pairs(mesh.points[numbers], SINGLE_PRECISION * size)]
     distance = np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)
     near = distance < NEAR * edge[pairs].min(axis=1)
@@ -192,20 +192,20 @@ def _coincident(model: Model) -> str:
     first = pairs[np.lexsort(mesh.points[pairs[:, 0]].T)[0]]
     point = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
     largest = float(distance.max())
-    where = "where another one is" if largest <= LENGTH_ROUND_OFF * size else f"within {largest:.3g} of another one"
+    relation = "coincide with" if largest <= LENGTH_ROUND_OFF * size else f"lie within {largest:.3g} of"
     return (
-        f"{count} nodes lie {where}, and no contact joins them (first: points {first[0]} and {first[1]} at ({point})): merge "
-        "them in the mesher or with generate.transform.merge_points, or define the contact"
+        f"{count} nodes {relation} another node, and no contact joins them (first: points {first[0]} and {first[1]} at "
+        f"({point})): merge them in the mesher or with generate.transform.merge_points, or define the contact"
     )
 
 
-def _wetted_twice(model: Model) -> list[str]:
+def _shared_fluids(model: Model) -> list[str]:
     """Return the warnings about contacts with fluids that share secondary facets with each other."""
-    groups, wetted = model.mesh.cell_groups, [pair for pair in model.contact if pair.fluid is not None]
+    groups, fluid_pairs = model.mesh.cell_groups, [pair for pair in model.contact if pair.fluid is not None]
     return [
         f"the fluids of contacts '{first.name}' and '{second.name}' both act on {len(shared)} secondary facets, and each "
         "bypasses the seal of the other contact: give each pair separate facets"
-        for first, second in itertools.combinations(wetted, 2)
+        for first, second in itertools.combinations(fluid_pairs, 2)
         if len(shared := np.intersect1d(groups.get(first.secondary, []), groups.get(second.secondary, [])))
     ]
 
@@ -220,13 +220,13 @@ def _friction(model: Model) -> list[str]:
     ]
 
 
-def _penetrating(model: Model, pairs: Pairs, pushed: Array) -> Iterator[str]:
+def _penetration(model: Model, pairs: Pairs, prescribed: Array) -> Iterator[str]:
     """Yield a warning for each contact whose initial penetration exceeds the prescribed motion along its normal.
 
-    `pushed` (dim,) are the largest displacements that supports prescribe [length].
+    `prescribed` (dim,) are the largest displacements that supports prescribe [length].
     """
     for pair, bound in pairs:
-        motion = pushed if not any(pair.motion) else np.maximum(pushed, _peak(pair.ramp) * np.abs(pair.motion))
+        motion = prescribed if not any(pair.motion) else np.maximum(prescribed, _peak(pair.ramp) * np.abs(pair.motion))
         if not motion.any():
             continue  # the penetration is an interference, which loads the bodies
         gap, normal = initial_gaps(bound)
@@ -235,7 +235,7 @@ def _penetrating(model: Model, pairs: Pairs, pushed: Array) -> Iterator[str]:
         row = int(np.argmin(gap + approach))
         if -gap[row] > approach[row]:
             point = bound.secondary.points[row]
-            driver = "supports push" if motion is pushed else "motions push"
+            driver = "supports push" if motion is prescribed else "motions push"
             yield (
                 f"contact '{pair.name}' begins with a penetration of {-gap[row]:.4g} at point {point} "
                 f"{np.array2string(model.mesh.points[point], precision=4)}, more than the {np.abs(normal[row]) @ motion:.4g} "
@@ -244,13 +244,13 @@ def _penetrating(model: Model, pairs: Pairs, pushed: Array) -> Iterator[str]:
             )
 
 
-def _unramped(model: Model, ramp: Ramp) -> Iterator[str]:
+def _missing_ramps(model: Model, ramp: Ramp) -> Iterator[str]:
     """Yield a warning if some items have separate ramps, and the common ramp multiplies the others by more than 1.
 
     A common ramp of more than two points is assumed to be meant for them.
     """
-    top = max(ramp.value(instant) for instant in ramp.instants)
-    if top <= 1.0 or len(ramp.table) > 2:
+    peak = max(ramp.value(instant) for instant in ramp.instants)
+    if peak <= 1.0 or len(ramp.table) > 2:
         return
     items: list[Any] = [*(s for s in model.supports if s.value), *model.loads, *model.temperatures]
     ramps = [(item.name, item.ramp) for item in items]
@@ -258,12 +258,12 @@ def _unramped(model: Model, ramp: Ramp) -> Iterator[str]:
     rotations = {s.group: s.rotation_ramp or s.ramp for s in model.supports if s.rotation is not None}
     ramps += [(f"the rotation of '{group}'", history) for group, history in rotations.items()]
     ramps += [(f"the force on obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.force)]
-    without = [name for name, history in ramps if history is None]
-    if 0 < len(without) < len(ramps):
+    missing = [name for name, history in ramps if history is None]
+    if 0 < len(missing) < len(ramps):
         yield (
-            f"{', '.join(without)} {'has' if len(without) == 1 else 'have'} no ramp, as others have: at load factor {top:g} "
-            f"{'it is' if len(without) == 1 else 'they are'} {top:g} times what was given; to hold it from 1 on give "
-            f"ramp=[(0, 0), (1, 1), ({top:g}, 1)]"
+            f"{', '.join(missing)} {'has' if len(missing) == 1 else 'have'} no ramp, unlike others: at load factor {peak:g} "
+            f"{'it is' if len(missing) == 1 else 'they are'} {peak:g} times the given value; to hold it from 1 on, give "
+            f"ramp=[(0, 0), (1, 1), ({peak:g}, 1)]"
         )
 
 
@@ -300,7 +300,7 @@ def _sample(cells: AnyArray) -> AnyArray:
     return cells[:: max(1, len(cells) // SAMPLE)]
 
 
-def _load_integral(model: Model, load: Load) -> Iterator[str]:
+def _load_quadrature(model: Model, load: Load) -> Iterator[str]:
     """Yield a warning if a load that is a function varies too much within cells for the quadrature of loads."""
     error = total = 0.0
     for value in (value for value in load.values if callable(value)):

@@ -64,8 +64,8 @@ class ContactOptions(FormulationOptions, SharedOptions, total=False):
 
 
 SHARED_OPTIONS = tuple(sorted(SharedOptions.__annotations__))
-# Names of the required and of the optional constants of a cohesive layer and of adhesion. Those in CHOICES have names as
-# values, all others positive numbers.
+# Names of the required and of the optional constants of a cohesive layer and of adhesion. The values of the constants in
+# CHOICES are strings, those of all others are positive numbers.
 LAWS = {
     "cohesion": (
         ("strength", "energy"),
@@ -85,7 +85,7 @@ def pair_options(
     the pair.
     """
     if against_obstacle and "clearance_primary" in options:
-        raise ContactError(f"a rigid obstacle has no nodes to measure from: give contact '{name}' a 'clearance'")
+        raise ContactError(f"a rigid obstacle has no 'clearance_primary': give contact '{name}' a 'clearance'")
     _check_obstacle_temperature(name, options, against_obstacle)
     if "clearance_ramp" in options and not {"clearance", "clearance_primary"} & set(options):
         raise ContactError(f"contact '{name}' has a clearance_ramp, but no clearance that it could multiply")
@@ -110,16 +110,16 @@ def pair_options(
 
 
 def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
-    """Return the cohesive law of a pair, None without one."""
-    chosen = [option for option in LAWS if option in options]
-    if not chosen:
+    """Return the cohesive law of a pair, or None if it has no such law."""
+    laws = [option for option in LAWS if option in options]
+    if not laws:
         return None
     exclusive = ("adhesion", "friction", "penalty", "tangential_penalty", "wear")
-    excess = [option for option in exclusive if option in options and option != chosen[0]]
+    excess = [option for option in exclusive if option in options and option != laws[0]]
     if excess or options.get("kind", "unilateral") != "unilateral":
         other = (excess or ["kind"])[0]
-        raise ContactError(f"contact '{name}' has {chosen[0]}, which excludes {other}: leave out one of the two")
-    option, constants = chosen[0], options[chosen[0]]
+        raise ContactError(f"contact '{name}' has {laws[0]}, which excludes {other}: leave out one of the two")
+    option, constants = laws[0], options[laws[0]]
     required, optional = LAWS[option]
     if not isinstance(constants, Mapping) or not set(required) <= set(constants):
         raise ContactError(f"the {option} of contact '{name}' needs {' and '.join(required)}, each given by name")
@@ -168,14 +168,17 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
     return str(kind)
 
 
-def _positive(name: str, option: str, options: Mapping[str, Any], without: str) -> float | None:
-    """Return the positive number of an option, None if not given; `without` is the effect of omitting the option."""
+def _positive(name: str, option: str, options: Mapping[str, Any], default: str) -> float | None:
+    """Return the positive number of an option, or None if it is not given.
+
+    `default` describes the effect of omitting the option, for messages.
+    """
     value = options.get(option)
     if value is None:
         return None
     check_number(f"the {option} of contact '{name}'", value)
     if not value > 0:
-        raise ContactError(f"{option} = {value} of contact '{name}' must be positive; leave it out for {without}")
+        raise ContactError(f"{option} = {value} of contact '{name}' must be positive; leave it out for {default}")
     return float(value)
 
 
@@ -185,7 +188,7 @@ def _check_obstacle_temperature(name: str, options: Mapping[str, Any], against_o
     if temperature is None:
         if against_obstacle and {"conductance", "friction_heat"} & set(options):
             raise ContactError(
-                f"heat that crosses contact '{name}' needs the temperature of its obstacle: give it obstacle_temperature=..."
+                f"heat flow through contact '{name}' needs the temperature of its obstacle: give it obstacle_temperature=..."
             )
         return
     check_number(f"the obstacle_temperature of contact '{name}'", temperature)
@@ -196,7 +199,7 @@ def _check_obstacle_temperature(name: str, options: Mapping[str, Any], against_o
 
 
 def _friction_heat(name: str, options: Mapping[str, Any]) -> float:
-    """Return the fraction of the frictional work that becomes heat; zero if not given."""
+    """Return the fraction of the frictional work that becomes heat, which is zero by default."""
     fraction = options.get("friction_heat", 0.0)
     check_number(f"the friction_heat of contact '{name}'", fraction)
     if not 0.0 <= fraction <= 1.0:
@@ -207,7 +210,7 @@ def _friction_heat(name: str, options: Mapping[str, Any]) -> float:
 
 
 def _vector(name: str, option: str, options: Mapping[str, Any], dim: int) -> Array | None:
-    """Return the vector (dim,) of an option, None if not given."""
+    """Return the vector (dim,) of an option, or None if it is not given."""
     value = options.get(option)
     if value is None:
         return None
@@ -235,12 +238,13 @@ def _penalty(name: str, options: Mapping[str, Any]) -> float | OverclosureLaw | 
 
 
 def _tangential_penalty(name: str, value: Any) -> Field | None:
-    """Return a number or a function of position as a function; pass None through."""
+    """Return a number or a function of position as a function, and None unchanged."""
     penalty = _function(f"the tangential_penalty of contact '{name}'", value)
-    return None if penalty is None else partial(_all_positive, penalty, name)
+    return None if penalty is None else partial(_positive_values, penalty, name)
 
 
-def _all_positive(penalty: Field, name: str, positions: Array) -> Array:
+def _positive_values(penalty: Field, name: str, positions: Array) -> Array:
+    """Return the tangential penalties (n,) at `positions` (n, dim). Raises ContactError if one is not positive."""
     values = penalty(positions)
     if not (values > 0).all():
         remedy = "leave it out for stick without elastic slip"
@@ -259,7 +263,7 @@ def _check_friction_ramp(name: str, options: Mapping[str, Any]) -> None:
 
 
 def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side: Surface) -> Mask | None:
-    """Return a mask (n_points,) of the nodes of the groups named by an option; None without groups."""
+    """Return a mask (n_points,) of the nodes of the groups named by an option, or None if it names no group."""
     groups = options.get(option)
     if groups is None:
         return None
@@ -280,7 +284,7 @@ def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side:
 
 
 def _function(name: str, value: Any) -> Field | None:
-    """Return a number or a function of position as a function that checks its result; pass None through."""
+    """Return a number or a function of position as a function that checks its result, and None unchanged."""
     if value is None:
         return None
     check_value(name, value)

@@ -20,7 +20,7 @@ from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows, shapes_at
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table
-from fastcontact.model.relation_rows import coincident, less_first, matched, to_facets
+from fastcontact.model.relation_rows import coincident, matched, minus_first, to_facets
 from fastcontact.round_off import ROUND_OFF
 
 # Largest distance, relative to facet size, by which a rotated node of one end may lie off the facets of the other end or
@@ -45,7 +45,10 @@ class PeriodicInterface(NamedTuple):
 
 
 def same_place(interfaces: Sequence[PeriodicInterface], n_points: int) -> Indices | None:
-    """Return, for each node (n_points,), the lowest number of the nodes that coincide with it; None without interfaces."""
+    """Return for each node (n_points,) the lowest number of the nodes that coincide with it.
+
+    The result is None if there are no interfaces.
+    """
     if not interfaces:
         return None
     ends = tuple(np.concatenate(side) for side in zip(*(interface[:2] for interface in interfaces), strict=True))
@@ -66,7 +69,7 @@ def periodic(
     ends : (str, str)
         Groups.
     jump : mapping of int to float
-        Displacement of the second end relative to the first at multiplier 1, by component [length].
+        Displacement of the second end relative to the first one at multiplier 1, by component [length].
     free : sequence of int
         Components in which the jump is equal for all nodes, but unknown.
     translation : sequence of float (dim,), optional
@@ -92,7 +95,7 @@ def periodic(
         unit = np.eye(mesh.dim)[axis]
         rows = _rows(interface, unit, -unit, mesh)
         if axis in free:
-            rows = less_first(rows)
+            rows = minus_first(rows)
         if rows.shape[0]:
             relations.append(MultiPointConstraint(name, rows, float(jump.get(axis, 0.0)), ramp))
     return relations, interface
@@ -128,7 +131,7 @@ def cyclic(
         key=lambda motion: float(nearest(mesh.points[second], mesh.points[first] @ motion[0].T + motion[1])[0].max()),
     )
     match, distance, tolerance = coincident(mesh, (ends[0], first), (ends[1], second), turn, shift)
-    far = int(np.argmax(distance))
+    worst = int(np.argmax(distance))
     same = distance <= tolerance
     interface = PeriodicInterface(first[same], second[match[same]], turn, rotation, sectors)
     if len(first) == len(second) == len(np.unique(match)) and same.all():
@@ -140,7 +143,7 @@ def cyclic(
             if (rows := _rows_to_facets(mesh, dependent, facets, rotation, sign)) is not None:
                 return [MultiPointConstraint(name, _without_zeros(rows))], interface
     raise ModelError(
-        f"{name}: point {first[far]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[far]:.3g} from the "
+        f"{name}: point {first[worst]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[worst]:.3g} from the "
         f"nearest node of '{ends[1]}', and the groups do not consist of facets that coincide: check axis and sectors"
     )
 
@@ -164,7 +167,7 @@ def _rows_to_facets(mesh: Mesh, dependent: str, facets: str, rotation: Rotation,
     other, nodes = surface(mesh, facets), mesh.points_of(dependent).astype(np.intp)
     turn, shift = _motion(rotation, sign)
     corners = other.corners(mesh.points)
-    near = _projected(mesh.points[nodes] @ turn.T + shift, to_facets(mesh, nodes) @ turn.T, other, corners)
+    near = _closest(mesh.points[nodes] @ turn.T + shift, to_facets(mesh, nodes) @ turn.T, other, corners)
     sizes = np.concatenate([np.ptp(block, axis=1).max(axis=1) for block in corners])
     if (near.distance > LARGEST_DISTANCE * sizes[near.facet]).any() or (near.overhang > LARGEST_DISTANCE).any():
         return None
@@ -180,8 +183,8 @@ def _motion(rotation: Rotation, sign: float) -> tuple[Array, Array]:
     return turn, centre - turn @ centre
 
 
-def _projected(positions: Array, inward: Array, other: Surface, corners: list[Array]) -> Closest:
-    """Project positions (n, dim) [length] on the closest facets of a surface, whose nodes are at `corners`.
+def _closest(positions: Array, inward: Array, other: Surface, corners: list[Array]) -> Closest:
+    """Return the projections of positions (n, dim) [length] on the closest facets of a surface with nodes at `corners`.
 
     Where two bodies are in contact, a position lies on facets of both. It is assigned to the body into which `inward`
     (n, dim) points.

@@ -52,8 +52,8 @@ class Supports:
 class Overlap:
     """Penetration of a contact pair at an instant.
 
-    Of the `total` secondary nodes that face the other side, `count` penetrate it. The largest `depth` is that of the node
-    `point` [length].
+    The number of secondary nodes that face the other side is `total`, and `count` of them penetrate it. The
+    largest `depth` [length] occurs at the node `point`.
     """
 
     count: int
@@ -68,7 +68,7 @@ def check_prescribed(pairs: Pairs, supports: Supports) -> None:
     for contact, formulation, worst in _overlaps(pairs, supports):
         if worst.count == worst.total:
             raise ModelError(
-                f"{_described(contact, formulation, worst)}: contact forces cannot change what supports prescribe; prescribe "
+                f"{_summary(contact, formulation, worst)}: contact forces cannot change what supports prescribe; prescribe "
                 "other values, or the displacement of nodes that are not in contact"
             )
 
@@ -76,13 +76,14 @@ def check_prescribed(pairs: Pairs, supports: Supports) -> None:
 def prescribed_overlap_warnings(pairs: Pairs, supports: Supports) -> list[str]:
     """Return a warning for each contact with nodes whose prescribed displacements cause penetration."""
     return [
-        f"{_described(contact, formulation, worst)}: contact forces cannot change what supports prescribe; leave these nodes "
+        f"{_summary(contact, formulation, worst)}: contact forces cannot change what supports prescribe; leave these nodes "
         "out of the support, or out of the contact ('excluded')"
         for contact, formulation, worst in _overlaps(pairs, supports)
     ]
 
 
-def _described(contact: ContactPair, formulation: Formulation, overlap: Overlap) -> str:
+def _summary(contact: ContactPair, formulation: Formulation, overlap: Overlap) -> str:
+    """Return the first part of a message: the number of nodes, the sides and the largest depth."""
     position = ", ".join(f"{x:.6g}" for x in formulation.points[overlap.point])
     preposition = "off" if formulation.options.always_closed else "into"
     other = f"'{contact.primary}'" if contact.primary else "the rigid obstacle"
@@ -103,8 +104,8 @@ def _overlaps(pairs: Pairs, supports: Supports) -> Iterator[tuple[ContactPair, F
         # Nodes without supports are included in the total, whether they face the other side or not.
         unsupported = len(usable) - len(nodes)
         candidates = Candidates(nodes[:, None], np.ones((len(nodes), 1)))
-        at_rest = Configuration.undeformed(formulation.points)
-        gap0, _, _ = _gaps(formulation, candidates, at_rest, with_clearance=False)
+        undeformed = Configuration.undeformed(formulation.points)
+        gap0, _, _ = _gaps(formulation, candidates, undeformed, with_clearance=False)
         overlaps = [_overlap_at(contact, formulation, candidates, gap0, supports, t) for t in supports.instants()]
         worst = max(overlaps, key=lambda overlap: overlap.depth)
         if worst.count:

@@ -15,7 +15,7 @@ from fastcontact.elasticity.loads import Load, Table, check_number
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import OPPOSITE, Mesh
-from fastcontact.model.relation_rows import along, less_first, matched, normals_of
+from fastcontact.model.relation_rows import along, matched, minus_first, normals_of
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
 # Smallest cosine of the angle between the direction of a bolt and the normal of its section [-].
@@ -81,7 +81,7 @@ class Pretension:
         rows = [self._approach(direction, n_dofs) for direction in _tangents(self.normal)]
         approach = self._approach(self.normal, n_dofs)
         if len(self.nodes) > 1:
-            rows.append(less_first(approach))
+            rows.append(minus_first(approach))
         matrix = csr_array(vstack(rows, format="csr"))
         matrix.eliminate_zeros()
         constraints = [MultiPointConstraint(f"the sides of {self.name}", matrix)]
@@ -160,13 +160,13 @@ def pretension(
     if (force is None) == (shortening is None):
         raise ModelError(f"{name} needs either a force or a shortening")
     if shortening is not None and locked_from is not None:
-        raise ModelError(f"{name} has a shortening, which is known at all times: locked_from belongs to a force")
+        raise ModelError(f"{name} has a prescribed shortening: locked_from applies to a force only")
     for name_of_value, value in (("force", force), ("shortening", shortening), ("locked_from", locked_from)):
         if value is not None:
             check_number(f"the {name_of_value} of {name}", value)
-    nodes, facing = _sides(mesh, name, section, opposite)
+    nodes, opposite_nodes = _sides(mesh, name, section, opposite)
     direction = _outward(mesh, name, section, _normal(mesh, name, nodes, normal))
-    return Pretension(label, nodes, facing, direction, force or 0.0, shortening, locked_from, ramp)
+    return Pretension(label, nodes, opposite_nodes, direction, force or 0.0, shortening, locked_from, ramp)
 
 
 def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[Indices, Indices]:
@@ -178,12 +178,12 @@ def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[I
             f"{name}: the mesh is not cut along '{section}', there is no group '{other}': build the model on "
             f"fc.generate.cut(mesh, '{section}'), or name the opposite side"
         )
-    facing = mesh.points_of(other).astype(np.intp)
-    shared = np.intersect1d(nodes, facing)
+    opposite_nodes = mesh.points_of(other).astype(np.intp)
+    shared = np.intersect1d(nodes, opposite_nodes)
     if len(shared):
         raise ModelError(f"{name}: '{section}' and '{other}' share point {shared[0]}: both sides need separate nodes")
-    match = matched(mesh, (section, nodes), (other, facing), [0.0] * mesh.dim)
-    return nodes, facing[match]
+    match = matched(mesh, (section, nodes), (other, opposite_nodes), [0.0] * mesh.dim)
+    return nodes, opposite_nodes[match]
 
 
 def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | None) -> Array:
@@ -196,7 +196,7 @@ def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | Non
     arms = mesh.points[nodes] - mesh.points[nodes].mean(axis=0)
     extent, axes = np.linalg.svd(arms, full_matrices=True)[1:]
     if len(nodes) < mesh.dim or (len(extent) >= mesh.dim and extent[-1] > SINGLE_PRECISION * extent[0]):
-        raise ModelError(f"the nodes of {name} determine no plane: give its normal, along the bolt")
+        raise ModelError(f"the nodes of {name} do not determine a plane: give its normal, along the bolt")
     vector = axes[-1] * np.sign(axes[-1][np.argmax(np.abs(axes[-1]))])
     return np.asarray(np.where(np.abs(vector) < ROUND_OFF, 0.0, vector))
 
@@ -231,8 +231,8 @@ def locked_lengths(
 ) -> dict[str, float]:
     """Return by name the shortenings of the sections that are locked in the load step from the instant `begin` [length].
 
-    The shortening of a newly locked section follows from displacements (n_points, dim) [length]. Later steps use the value
-    `stored` at that time, because their displacements reproduce it only up to round-off.
+    The shortening of a section that is locked in this step is computed from displacements (n_points, dim) [length]. Later
+    steps use the `stored` value, because their displacements reproduce it only up to round-off.
     """
     locked = [bolt for bolt in sections if bolt.locked_from is not None and begin >= bolt.locked_from]
     return {bolt.label: stored[bolt.label] if bolt.label in stored else bolt.shortened(displacement) for bolt in locked}
@@ -247,7 +247,7 @@ def loose_bolts(sections: Sequence[Pretension], modes: Array, force: Array) -> s
     loose = " and ".join(bolt.name for bolt in free if not force[bolt.nodes].any())
     if not loose:
         return ""
-    return f". The force of {loose} is 0: give a loose bolt a small one from the beginning, such as 0.001 of the full force"
+    return f". The force of {loose} is 0: give a loose bolt a small force from the beginning, 0.001 of the full one"
 
 
 def check_locks(sections: Sequence[Pretension], instants: Sequence[float]) -> None:

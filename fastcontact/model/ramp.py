@@ -47,7 +47,7 @@ class Harmonic:
 
 # History of a part of the prescribed displacements; None means the history of the analysis.
 PartHistory = Table | Harmonic | None
-# Largest number of equal steps; more are probably a typing error.
+# Largest number of equal steps. A larger number is probably a typing error.
 MOST_STEPS = 1_000_000
 
 
@@ -72,7 +72,7 @@ def checked_table(rows: Iterable[Iterable[float]], caption: str = "the ramp") ->
 
 
 def table_of(ramp: History, caption: str) -> Table | None:
-    """Return the table of a history, and pass None through. Raises the errors of `checked_table`."""
+    """Return the table of a history, or None if it is None. Raises the errors of `checked_table`."""
     if ramp is None:
         return None
     return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, caption)

@@ -55,13 +55,13 @@ def along(nodes: Indices, directions: Array, n_dofs: int) -> csr_array:
     return nodal_rows(nodes[:, None], directions[:, None], n_dofs)
 
 
-def less_first(rows: csr_array) -> csr_array:
-    """Return the rows (m, n) after the first, less the first one, (m - 1, n)."""
+def minus_first(rows: csr_array) -> csr_array:
+    """Return the rows (m - 1, n) that follow the first of the `rows` (m, n), minus the first row."""
     return csr_array(rows[1:] - csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr")))
 
 
 def matched(mesh: Mesh, first: NodeGroup, second: NodeGroup, translation: Sequence[float] | None) -> Indices:
-    """Return, for each node of the first group, the index of the node of the second with which it coincides when moved.
+    """Return, for each node of the first group, the index of the coincident node of the second group after a translation.
 
     The first group is moved by `translation` (dim,) [length], by default from the centre of its bounding box to that of the
     second group. Each group is given as (name, nodes).
@@ -69,7 +69,7 @@ def matched(mesh: Mesh, first: NodeGroup, second: NodeGroup, translation: Sequen
     Raises
     ------
     ModelError
-        If the groups have different numbers of nodes, or do not coincide, or if nodes at one place cannot be told apart.
+        If the groups have different numbers of nodes, or do not coincide, or if coincident nodes cannot be distinguished.
     """
     (name, nodes), (other, opposite) = first, second
     if len(nodes) != len(opposite):
@@ -81,14 +81,14 @@ def matched(mesh: Mesh, first: NodeGroup, second: NodeGroup, translation: Sequen
     if shift is None:
         raise ModelError(f"the translation {translation} of '{name}' must be {mesh.dim} numbers")
     rows, distance, tolerance = coincident(mesh, first, second, np.eye(mesh.dim), shift)
-    worst, joined = int(np.argmax(distance)), "groups are joined node by node"
+    worst, requirement = int(np.argmax(distance)), "groups are joined node by node"
     if distance[worst] > tolerance:
         raise ModelError(
             f"point {nodes[worst]} of '{name}', moved by {shift}, lies {distance[worst]:.3g} from the nearest node of "
-            f"'{other}': {joined}; give the translation between them, or use another mesh"
+            f"'{other}': {requirement}; give the translation between them, or use another mesh"
         )
     if len(np.unique(rows)) < len(nodes):
-        raise ModelError(f"several nodes of '{name}', moved by {shift}, meet one node of '{other}': {joined}")
+        raise ModelError(f"several nodes of '{name}', moved by {shift}, meet one node of '{other}': {requirement}")
     return rows
 
 
@@ -101,15 +101,16 @@ class Coincident(NamedTuple):
 
 
 def coincident(mesh: Mesh, first: NodeGroup, second: NodeGroup, turn: Array, shift: Array) -> Coincident:
-    """Return the nodes of the second group that lie at those of the first one, turned by `turn` and moved by `shift`.
+    """Return the nodes of the second group that coincide with those of the first, rotated by `turn` and moved by `shift`.
 
-    Each group is given as (name, nodes). Several nodes of a group may lie at one place, those of bodies in contact or of the
-    sides of a crack. The facets of the group on which they lie tell them apart, or else their bodies.
+    Each group is given as (name, nodes). Several nodes of a group may have the same position, for example on bodies in
+    contact or on the two sides of a crack. They are distinguished by the facets of the group to which they belong, or else
+    by their bodies.
 
     Raises
     ------
     ModelError
-        If neither tells them apart.
+        If neither facets nor bodies distinguish them.
     """
     (name, nodes), (other, opposite) = first, second
     x, target = mesh.points[nodes] @ turn.T + shift, mesh.points[opposite]
@@ -126,20 +127,20 @@ def coincident(mesh: Mesh, first: NodeGroup, second: NodeGroup, turn: Array, shi
         candidate, row, mismatch = candidate[order], row[order], mismatch[order]
         best = np.insert(np.diff(row) > 0, 0, True)
         rows[row[best]] = candidate[best]
-        alike = np.flatnonzero(~best[1:] & best[:-1] & (np.diff(mismatch) <= tolerance))
-        if len(alike):
-            node, two = nodes[row[alike[0]]], opposite[candidate[alike[0] : alike[0] + 2]]
+        ambiguous = np.flatnonzero(~best[1:] & best[:-1] & (np.diff(mismatch) <= tolerance))
+        if len(ambiguous):
+            node, pair = nodes[row[ambiguous[0]]], opposite[candidate[ambiguous[0] : ambiguous[0] + 2]]
             raise ModelError(
-                f"points {two[0]} and {two[1]} of '{other}' lie at one place, and neither the facets nor the bodies of the "
-                f"groups tell which of them point {node} of '{name}' meets: join groups of one body at a time"
+                f"points {pair[0]} and {pair[1]} of '{other}' coincide, and neither the facets nor the bodies of the groups "
+                f"determine which of them belongs to point {node} of '{name}': join groups of one body at a time"
             )
     return Coincident(rows, distance, tolerance)
 
 
 def to_facets(mesh: Mesh, nodes: Indices) -> Array:
-    """Return the vectors (n, dim) from nodes (n,) to the mean centre of the outer facets that consist of such nodes [length].
+    """Return the vectors (n, dim) from nodes (n,) to the mean centre of the outer facets around them [length].
 
-    They are zero for nodes without such a facet.
+    Only facets whose nodes are all among `nodes` are considered. The vectors are zero for nodes without such a facet.
     """
     inside, total, count = np.zeros(mesh.n_points, bool), np.zeros_like(mesh.points), np.zeros(mesh.n_points)
     inside[nodes] = True

@@ -19,7 +19,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
 def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
-    """Raise ContactError if two pairs share facets on both sides, in either role, or press shared facets on one obstacle.
+    """Raise ContactError if two pairs share facets on both sides, in either role, or press the same facets on one obstacle.
 
     A surface may face several other surfaces, because the opposite side of each pair then differs.
     """
@@ -42,8 +42,11 @@ def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
                 )
 
 
-def joined_already(mesh: Mesh, sides: tuple[str, str], other: ContactPair) -> bool:
-    """Return whether the sides of `other` share facets with both groups `sides`, in either role; False for an obstacle."""
+def share_facets(mesh: Mesh, sides: tuple[str, str], other: ContactPair) -> bool:
+    """Return whether the two `sides` share facets with the two sides of the pair `other`, in either role.
+
+    The result is False if `other` has an obstacle.
+    """
     if other.obstacle is not None:
         return False
     roles = (other.secondary, other.primary), (other.primary, other.secondary)
@@ -68,13 +71,13 @@ def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
     same_gap = np.allclose(gap, other_gap, rtol=0.0, atol=LENGTH_ROUND_OFF * size)
     if same_gap and np.allclose(normal, other_normal, atol=SINGLE_PRECISION):
         raise ContactError(
-            f"contact '{pair.name}' presses facets of '{pair.secondary}' on the same rigid obstacle as contact "
+            f"contact '{pair.name}' presses facets of '{pair.secondary}' against the same rigid obstacle as contact "
             f"'{other.name}', with {len(nodes)} nodes (first: point {nodes[0]}): leave out one of the two"
         )
 
 
 def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Iterator[str]:
-    """Yield a warning for every two pairs whose sides continue each other at common nodes, on both bodies.
+    """Yield a warning for every two contact pairs whose sides adjoin each other at common nodes, on both bodies.
 
     Each pair has a separate pressure at such a node, but the gap determines only the sum of the two pressures. Their ratio,
     and with it the pressure at neighbouring nodes, is arbitrary. Node-to-segment contact divides the force of a node in the
@@ -88,19 +91,19 @@ def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Ite
             continue
         roles = ((other_sides.secondary, other_sides.primary), (other_sides.primary, other_sides.secondary))
         for secondary, primary in roles:
-            nodes = _common(sides.points, sides.secondary, secondary)
-            if len(nodes) and len(_common(sides.points, sides.primary, primary)):
+            nodes = _common_smooth_nodes(sides.points, sides.secondary, secondary)
+            if len(nodes) and len(_common_smooth_nodes(sides.points, sides.primary, primary)):
                 yield (
-                    f"contacts '{pair.name}' and '{other.name}' continue each other at common nodes of their sides "
-                    f"(number: {len(nodes)}, first: point {nodes[0]}): the pressure near them is not unique; make one "
-                    "contact of both, with one group for each side"
+                    f"contacts '{pair.name}' and '{other.name}' adjoin each other at common nodes of their sides "
+                    f"(number: {len(nodes)}, first: point {nodes[0]}): the pressure near them is not unique; combine "
+                    "the two contacts into one, with one group for each side"
                 )
 
 
-def _common(points: Array, side: Surface, other: Surface) -> Numbers:
+def _common_smooth_nodes(points: Array, side: Surface, other: Surface) -> Numbers:
     """Return the common nodes of two surfaces at which their normals differ by less than CORNER."""
-    nodes, of_side, of_other = np.intersect1d(side.points, other.points, return_indices=True)
+    nodes, side_index, other_index = np.intersect1d(side.points, other.points, return_indices=True)
     if not len(nodes):
         return nodes
-    normals = [nodal_normals(surface, points)[index] for surface, index in ((side, of_side), (other, of_other))]
+    normals = [nodal_normals(surface, points)[index] for surface, index in ((side, side_index), (other, other_index))]
     return np.asarray(nodes[np.einsum("nd,nd->n", *normals) > np.cos(np.radians(CORNER))])

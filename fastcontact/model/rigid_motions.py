@@ -72,7 +72,7 @@ class FreeMotions:
 
     def names(self) -> list[str]:
         """Return a description of each motion: the bodies and elementary motions that it combines."""
-        return ["; ".join(f"{body}: {motion}" for body, motion in self._of_bodies(column)) for column in self.parts.T]
+        return ["; ".join(f"{body}: {motion}" for body, motion in self._body_terms(column)) for column in self.parts.T]
 
     def by_body(self) -> dict[str, list[str]]:
         """Return the names of the motions of each body, without repetition.
@@ -80,20 +80,20 @@ class FreeMotions:
         The motions are combined such that each contains as few elementary motions as possible.
         """
         by_body: dict[str, list[str]] = {}
-        for column in _reduced(self.parts).T:
-            for body, motion in self._of_bodies(column):
+        for column in _column_echelon_form(self.parts).T:
+            for body, motion in self._body_terms(column):
                 by_body.setdefault(body, []).append(motion)
         return {body: list(dict.fromkeys(motions)) for body, motions in by_body.items()}
 
-    def _of_bodies(self, column: Array) -> list[tuple[str, str]]:
+    def _body_terms(self, column: Array) -> list[tuple[str, str]]:
         """Return the name of each body that takes part in a motion (p,), with the description of its motion."""
         rows_of: dict[str, list[int]] = {}
         for i in np.flatnonzero(np.abs(column) > 1e-6 * np.abs(column).max()):
             rows_of.setdefault(self.labels[i].body, []).append(int(i))
-        return [(body, self._described(column, rows)) for body, rows in rows_of.items()]
+        return [(body, self._motion_of_body(column, rows)) for body, rows in rows_of.items()]
 
-    def _described(self, column: Array, rows: list[int]) -> str:
-        """Return the name of the motion of a body: a rotation about a point or line if possible, else elementary ones."""
+    def _motion_of_body(self, column: Array, rows: list[int]) -> str:
+        """Return the name of the motion of a body: a rotation about a point or line if possible, else elementary motions."""
         labels = [self.labels[i] for i in rows]
         translation, rotation = np.zeros((2, 3))
         for i, label in zip(rows, labels, strict=True):
@@ -106,9 +106,9 @@ class FreeMotions:
         if len(centre) == 3 and not translation.any() and len(rows) == 1:
             return labels[0].motion
         point = centre + (np.cross(rotation, translation) / square)[: len(centre)]
-        position = _listed(np.where(np.abs(point) > 1e-5 * size, point, 0.0))
+        position = _vector_text(np.where(np.abs(point) > 1e-5 * size, point, 0.0))
         direction = rotation / rotation[np.argmax(np.abs(rotation))]
-        line = f" along {_listed(np.where(np.abs(direction) > 1e-6, direction, 0.0))}"
+        line = f" along {_vector_text(np.where(np.abs(direction) > 1e-6, direction, 0.0))}"
         return f"rotation about {position}" if len(centre) == 2 else f"rotation about the line through {position}{line}"
 
 
@@ -120,7 +120,7 @@ def grouped(names: Iterable[str]) -> str:
     return "; ".join(f"{body}: {', '.join(motions)}" for body, motions in by_body.items())
 
 
-def _reduced(A: Array) -> Array:
+def _column_echelon_form(A: Array) -> Array:
     """Return the reduced column echelon form (p, k) of a matrix A (p, k) of full column rank."""
     A, column = A.copy(), 0
     for row in A:  # a view, which follows the elimination
@@ -137,7 +137,8 @@ def _reduced(A: Array) -> Array:
     return A
 
 
-def _listed(values: Array) -> str:
+def _vector_text(values: Array) -> str:
+    """Return the components of a vector in parentheses, with four digits."""
     return f"({', '.join(f'{value:.4g}' for value in values)})"
 
 
@@ -162,7 +163,7 @@ def _group_of(mesh: Mesh, members: Indices) -> str:
 def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array | None = None) -> FreeMotions:
     """Return the rigid-body motions that the supports `fixed` (n_points, dim) and the constraints allow.
 
-    Bodies move as a whole, and parts of a body that are connected at single nodes rotate about these. `relations` (m, n_dofs)
+    Parts of a body that are connected only at single or collinear nodes can rotate about these nodes. `relations` (m, n_dofs)
     are the rows R of constraints ``R u = 0``. Points that belong to no body are included if constraints contain them.
     """
     dofs = mesh.n_points * mesh.dim
@@ -181,7 +182,7 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
 
 
 def _body_motions(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
-    """Return the motions of bodies, and of their parts at hinges, that the supports `fixed` (n_points, dim) leave free."""
+    """Return the motions of bodies, and of their parts between hinges, that the supports `fixed` (n_points, dim) allow."""
     rigid = _parts_of(mesh, kinematics)
     moving: list[tuple[Indices, Array]] = []  # nodes (m,) of a part, and its motions (m, dim, k) there
     matrices, labels = [np.empty((0, 0))], []
@@ -202,9 +203,9 @@ def _body_motions(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
     joint = _joint_motions(mesh, rigid, moving)
     coefficients = np.split(joint, np.cumsum([motion.shape[2] for _, motion in moving]))
     displacement = np.zeros((mesh.n_points, mesh.dim, joint.shape[1]))
-    for number, ((members, motion), of_part) in enumerate(zip(moving, coefficients[:-1], strict=True)):
+    for number, ((members, motion), weights) in enumerate(zip(moving, coefficients[:-1], strict=True)):
         in_part = rigid.part[members] == number  # a node at a hinge belongs to several parts
-        displacement[members[in_part]] = motion[in_part] @ of_part
+        displacement[members[in_part]] = motion[in_part] @ weights
     return FreeMotions(
         displacement.reshape(mesh.points.size, joint.shape[1]), np.asarray(block_diag(*matrices), float) @ joint, labels,
         np.unique(rigid.hinge_node),
@@ -221,7 +222,7 @@ def _parts_of(mesh: Mesh, kinematics: str) -> RigidParts:
 
 
 def _joint_motions(mesh: Mesh, rigid: RigidParts, moving: list[tuple[Indices, Array]]) -> Array:
-    """Return the combinations (k, j) of the motions of all parts for which parts stay connected at hinges."""
+    """Return the combinations (k, j) of the motions of all parts for which the parts remain connected at hinges."""
     width = sum(motion.shape[2] for _, motion in moving)
     if not len(rigid.hinge_node):
         return np.eye(width)
@@ -263,7 +264,7 @@ def _null_space(A: Array) -> Array:
 
 
 def resisting(constraints: Constraints, factor: float = 1.0) -> tuple[csr_array, Array]:
-    """Return the rows that span the cone of admissible contact forces, and their gaps at u = 0 [length].
+    """Return the rows that span the cone of admissible contact forces, and the gaps of these rows at u = 0 [length].
 
     Without friction these are the rows of the gaps. With friction they are ``n + mu t`` and ``n - mu t`` in the plane, and in
     3D the EDGES edges of the pyramid circumscribed to Coulomb's cone. Rows of equality constraints appear with both signs.
@@ -285,15 +286,15 @@ def _edges(constraints: Constraints, factor: float) -> tuple[csr_array, Array]:
         angle = 2.0 * np.pi * np.arange(EDGES) / EDGES
         weights = np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / EDGES)
     shear = [T.multiply(factor * constraints.friction[:, None]) for T in constraints.tangents]
-    edges = [constraints.B + sum(weight * T for T, weight in zip(shear, of_edge)) for of_edge in weights]
+    edges = [constraints.B + sum(weight * T for T, weight in zip(shear, edge_weights)) for edge_weights in weights]
     return csr_array(vstack(edges, format="csr")), np.tile(constraints.gap0, len(edges))
 
 
 def generalised(motions: FreeMotions, force: Array, largest: float = 0.0) -> Array:
     """Return the generalised forces (k,) of nodal forces (n_dofs,) on each motion, with round-off set to zero [force].
 
-    Round-off is estimated from these forces and from the `largest` earlier generalised forces (k,), of which they may be the
-    remainder.
+    Round-off is estimated from these forces and from the `largest` earlier generalised forces (k,), since the forces may be
+    the difference of such larger ones.
     """
     work = motions.displacement.T @ force
     scale = np.maximum(np.abs(motions.displacement).T @ np.abs(force), largest)
@@ -301,18 +302,18 @@ def generalised(motions: FreeMotions, force: Array, largest: float = 0.0) -> Arr
     return work
 
 
-def unstopped(gaps: Array, works: Array) -> Array:
+def mechanisms(gaps: Array, works: Array) -> Array:
     """Return the coefficients (k, j) of motions that neither contact nor contact and loads together can stop.
 
-    `gaps` (m, k) are the changes of the gaps and `works` (l, k) the generalised forces of the loads for each motion, whose
-    largest displacement is about 1. A motion is regarded as stopped if it closes a gap, or if it opens one and a load acts on
-    it. The solution decides whether the load presses the body against the contact or pulls it away.
+    `gaps` (m, k) are the changes of the gaps and `works` (l, k) the generalised forces of the loads for each motion. The
+    largest displacement of a motion is about 1. A motion is regarded as stopped if it closes a gap, or if it opens one and a
+    load acts on it. The solution decides whether the load presses the body against the contact or pulls it away.
     """
     k = gaps.shape[1]
     gaps = np.where(np.abs(gaps) > ZERO, gaps, 0.0)
-    indifferent = _null_space(gaps)
-    if indifferent.shape[1]:
-        return indifferent
+    without_gap_change = _null_space(gaps)
+    if without_gap_change.shape[1]:
+        return without_gap_change
     scale = np.abs(works).max(axis=1, initial=0.0)
     driven = works[scale > 0] / scale[scale > 0, None]
     for axis in range(k):
@@ -340,7 +341,7 @@ def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | Non
     gaps : ndarray (m, k)
         Changes of the gaps for each motion [-].
     gap : ndarray (m,)
-        Current gaps; negative ones count as closed [length].
+        Current gaps; negative gaps are regarded as closed [length].
     work : ndarray (k,)
         Generalised force of the loads on each motion [force].
     size : float
@@ -362,7 +363,7 @@ def _farthest(gaps: Array, gap: Array, work: Array, size: float) -> Array:
 def needed_friction(
     constraints: Constraints, motions: FreeMotions, u: Array, work: Array, size: float
 ) -> tuple[float, list[str]] | None:
-    """Return the smallest factor on the coefficients of friction with which rigid bodies are stopped [-], and which slide.
+    """Return the smallest factor on the coefficients of friction with which rigid bodies stop [-], and the moving bodies.
 
     Returns None if the given coefficients suffice even with the pyramid inscribed in Coulomb's cone, or if no factor up to
     MOST_FRICTION suffices. `u` (n_dofs,) are the displacements [length]; `work` and `size` are as in `stopped_at`.
@@ -386,13 +387,13 @@ def needed_friction(
     return high / inscribed, list(motions.combined(sliding[:, None]).by_body())
 
 
-def _extreme(along: Array, gaps: Array, gap: Array, held: Array, bound: float) -> Array:
-    """Return y (k,) that maximises ``along @ y`` for ``gap + gaps @ y >= 0``, ``held @ y = 0`` and ``|y| <= bound``.
+def _extreme(objective: Array, gaps: Array, gap: Array, held: Array, bound: float) -> Array:
+    """Return y (k,) that maximises ``objective @ y`` for ``gap + gaps @ y >= 0``, ``held @ y = 0`` and ``|y| <= bound``.
 
     Returns zeros if the linear programme has no solution.
     """
     from scipy.optimize import linprog
 
     equalities = {"A_eq": held, "b_eq": np.zeros(len(held))} if len(held) else {}
-    optimum = linprog(-along, A_ub=-gaps, b_ub=gap, bounds=(-bound, bound), method="highs", **equalities)
-    return np.zeros(len(along)) if optimum.x is None else np.asarray(optimum.x)
+    optimum = linprog(-objective, A_ub=-gaps, b_ub=gap, bounds=(-bound, bound), method="highs", **equalities)
+    return np.zeros(len(objective)) if optimum.x is None else np.asarray(optimum.x)

@@ -60,7 +60,7 @@ CASES = [
     ("contact side is a solid", 'secondary = "CONT1"', 'secondary = "SPHHAU"',
      r"group 'SPHHAU' contains no facets \(cells of dimension 1\): name a boundary group"),
     ("contact side is a point", 'secondary = "CONT1"', 'secondary = "C1"',
-     r"'C1' is a group of points, but here one of cells is needed \(lines, faces, solids\): name one such as 'CONT1' or 'D1B1'"),
+     r"'C1' is a group of points, but here a group of cells is needed \(lines, faces, solids\): name one such as 'CONT1' or 'D1B1'"),
     ("both sides are the same", 'secondary = "CONT1"', 'secondary = "CONT2"',
      r"contact 'hertz' has 'CONT2' on both sides: name the group of the other body as one of them; contact of a surface with itself is not available"),
     ("sides share nodes", 'primary = "CONT2"', 'primary = "D1B1"',

@@ -167,7 +167,7 @@ DOUBTS = [
         ),
         of(STEEL, supports(BOTTOM="xy")),
         (
-            r"3 nodes lie where another one is, and no contact joins them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact",
+            r"3 nodes coincide with another node, and no contact joins them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact",
         ),
     ),
     Doubt(
@@ -183,7 +183,7 @@ DOUBTS = [
         lambda: block((1.0, 1.0), (2, 2)),
         of(STEEL, supports(BOTTOM="xy"), '[[pressure]]\ngroup = "TOP"\nvalue = 1e-10\n'),
         (
-            r"the loads strain the model by about 1e-13 \(total force over E times the cross-section of the model\): are loads, lengths and E in one set of units\?",
+            r"the loads strain the model by about 1e-13 \(total force over E times the cross-section of the model\): are loads, lengths and E in consistent units\?",
         ),
     ),
     Doubt(
@@ -257,7 +257,7 @@ DOUBTS = [
         ),
         of(STEEL, supports(BOTTOM="xy")),
         (
-            r"3 nodes lie within 1e-07 of another one, and no contact joins them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact",
+            r"3 nodes lie within 1e-07 of another node, and no contact joins them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact",
         ),
     ),
     Doubt(
@@ -286,7 +286,7 @@ DOUBTS = [
             "ramp = [[0.0, 0.0], [1.0, 0.0], [2.0, 1.0]]\n",
         ).replace("ramp.steps = 1", "ramp = { instants = [1.0, 2.0], table = [[0.0, 0.0], [2.0, 2.0]] }"),
         (
-            r"the pressure on 'TOP' has no ramp, as others have: at load factor 2 it is 2 times what was given; to hold it from 1 on give ramp=\[\(0, 0\), \(1, 1\), \(2, 1\)\]",
+            r"the pressure on 'TOP' has no ramp, unlike others: at load factor 2 it is 2 times the given value; to hold it from 1 on, give ramp=\[\(0, 0\), \(1, 1\), \(2, 1\)\]",
         ),
     ),
 ]

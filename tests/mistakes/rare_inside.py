@@ -219,7 +219,7 @@ CALLS = [
     ("multigrid without iterations", stuck, fc.ConvergenceError, r"."),
     ("a stiffness that is not positive definite", indefinite, fc.ModelError, r"the stiffness matrix is not positive definite: check the material and the cells"),
     ("no triangulation is found", no_triangulation, fc.MeshError, r"no triangulation with edges up to .* at the pole and .* far from it was found: change a size slightly, or let it grow"),
-    ("triangles that leave a hole", lambda: _triangulate._checked(np.zeros((3, 3), int), 10, 8), fc.MeshError, r"the triangulation has 3 triangles, but 10 are needed to fill the outline"),
+    ("triangles that leave a hole", lambda: _triangulate._check_count(np.zeros((3, 3), int), 10, 8), fc.MeshError, r"the triangulation has 3 triangles, but 10 are needed to fill the outline"),
     ("a maker of no known finer meshes", no_finer_meshes, fc.errors.CaseError, r"it is not known how the generator 'rings' makes finer meshes: name its arguments in \[study\] as halve = \[\.\.\.\] or double = \[\.\.\.\]"),
     ("an element on other corners", not_makeable, fc.errors.CaseError, r"meshes of tri3 cannot be made from the case's quad4: give a generator"),
     ("a study without a level", no_level, fc.MeshError, r"no level could be solved; .*: the mesh is folded"),

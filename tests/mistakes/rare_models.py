@@ -115,7 +115,7 @@ MISTAKES = [
     Mistake("standard multipliers against an obstacle", lambda: obstacle(motion={"y": -1.0}, formulation="mortar", multipliers="standard"),
             fc.ContactError, r"mortar in 2D needs multipliers='dual' at an obstacle"),
     Mistake("a clearance from an obstacle's nodes", lambda: obstacle(motion={"y": -1.0}, clearance_primary=0.1),
-            fc.ContactError, r"a rigid obstacle has no nodes to measure from: give contact 'plane' a 'clearance'"),
+            fc.ContactError, r"a rigid obstacle has no 'clearance_primary': give contact 'plane' a 'clearance'"),
     Mistake("tied with friction", lambda: pair_of("CONT_UPPER", "CONT_LOWER", kind="tied", friction=0.3), fc.ContactError,
             r"contact 'pair' is tied, which excludes friction: leave out 'friction' or 'kind'"),
     Mistake("tied to an obstacle", lambda: obstacle(motion={"y": -1.0}, kind="tied"), fc.ContactError,

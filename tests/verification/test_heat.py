@@ -391,7 +391,7 @@ def test_what_cannot_be_is_refused_by_its_name():
     model = joined(bar(conductivity=1.0, expansion=1.0), conductance=2.0)
     model.fix_temperature("UPPER_TOP", 1.0)
     model.add_temperature(3.0)
-    with refused(fc.errors.ModelError, match="both given by add_temperature and conducted"):
+    with refused(fc.errors.ModelError, match="both given by add_temperature and computed"):
         model.check()
     model = fc.Model(model.mesh, "plane_strain")
     for group, expansion in (("UPPER", 1.0), ("LOWER", None)):

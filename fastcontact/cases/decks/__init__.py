@@ -1,1 +1,1 @@
-"""Input decks of Abaqus and CalculiX: from keyword blocks to a model with a ramp; nothing is dropped silently."""
+"""Conversion of input decks of Abaqus and CalculiX to models with load steps. A note states each keyword without effect."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array, Mask
-from fastcontact.cases.decks.blocks import Location, Row, defined, folded
+from fastcontact.cases.decks.blocks import Location, Row, key_of, look_up
 from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, Surface, SurfaceEntry
 from fastcontact.cases.decks.element_types import ElementType, element_type
 from fastcontact.contact.obstacles.rigid_side import Rotation
@@ -69,11 +69,11 @@ class Assembly:
     elements : dict of str to dict of int to Element
         Elements by instance and element number.
     resolved : dict of (str, str, str) to list
-        Members of the sets resolved so far, by kind, instance and name.
+        Members of the sets that have been resolved so far, by kind, instance and name.
     surfaces : dict of str to list of (Element, int)
-        Faces of the surfaces resolved so far.
+        Faces of the surfaces that have been resolved so far.
     open : list of (str, str, str)
-        Sets that are being resolved, which reveal a set that contains itself.
+        Sets that are being resolved, for the detection of a set that contains itself.
     """
 
     content: Content
@@ -90,8 +90,8 @@ class Assembly:
         return [element for elements in self.elements.values() for element in elements.values() if element.type]
 
     @cached_property
-    def of_solids(self) -> set[int]:
-        """The points of all solids."""
+    def solid_points(self) -> set[int]:
+        """Points of all solids."""
         return {point for solid in self.solids for point in solid.points}
 
     @cached_property
@@ -110,21 +110,23 @@ class Assembly:
 
     def split_name(self, name: str) -> tuple[str, str]:
         """Split a name into its instance, which may be empty, and the rest: ``Part-1.17`` is node 17 of Part-1."""
-        text = folded(name)
+        text = key_of(name)
         for scope in self.content.instances:
             if text.startswith(scope + "."):
                 return scope, text[len(scope) + 1 :]
         return "", text
 
     def members(self, kind: str, name: str, location: Location) -> list[Any]:
-        """Return the points or the elements, by `kind`, of a set or a number; CaseError if it is not defined."""
+        """Return the points or the elements, by `kind`, of a set or a number. Raises CaseError if it is not defined."""
         scope, rest = self.split_name(name)
         if rest.isdecimal():
-            return [self._existing(kind, scope, int(rest[:19]), location)]
+            return [self._item(kind, scope, int(rest[:19]), location)]
         return self.members_of(kind, scope, rest, location, name)
 
     def members_of(self, kind: str, scope: str, name: str, location: Location, shown: str = "") -> list[Any]:
-        """Return the points or elements of a set of an instance, including those of nested sets; CaseError if undefined.
+        """Return the points or elements of a set of an instance, including those of nested sets.
+
+        Raises CaseError if undefined.
 
         Messages call the set `shown`.
         """
@@ -138,21 +140,21 @@ class Assembly:
             if label in self.open:
                 raise location.refuse(f"set '{part.set_names[name]}' contains itself")
             self.open.append(label)
-            members = [member for entry in sets[name] for member in self._entry(kind, scope, entry)]
+            members = [member for entry in sets[name] for member in self._members_of_entry(kind, scope, entry)]
             self.open.pop()
             self.resolved[label] = list(dict.fromkeys(members)) if len(sets[name]) > 1 or len(members) > 1 else members
         return self.resolved[label]
 
-    def _entry(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
+    def _members_of_entry(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         """Return the points or elements of one entry of a set; numbers of a range that are undefined are ignored."""
         scope = entry.instance or scope
         if scope:
-            defined("instance", scope, self.content.instances, entry)
+            look_up("instance", scope, self.content.instances, entry)
         if entry.name:
-            return self._named(kind, scope, entry)
+            return self._members_by_name(kind, scope, entry)
         items, numbers = self._items_of(kind, scope), entry.numbers
         if not isinstance(numbers, range):
-            return (items[n] if n in items else self._existing(kind, scope, n, entry.location) for n in numbers)
+            return (items[n] if n in items else self._item(kind, scope, n, entry.location) for n in numbers)
         candidates = numbers if len(numbers) <= len(items) else sorted(items)
         existing = [n for n in candidates if n in items and n in numbers]
         if len(existing) < len(numbers):
@@ -160,11 +162,11 @@ class Assembly:
             self.content.note(entry, f"{missing} are not {kind}s and are ignored")
         return (items[n] for n in existing)
 
-    def _named(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
+    def _members_by_name(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         """Return the points or elements of a set that is an entry of a set; a node set may contain an element set."""
         if not scope and any(entry.name.upper().startswith(name) for name in self.content.instances):
             return self.members(kind, entry.name, entry.location)
-        part, name = self.part(scope), folded(entry.name)
+        part, name = self.part(scope), key_of(entry.name)
         if kind == "node" and name not in part.node_sets and name in part.element_sets:
             elements = self.members_of("element", scope, name, entry.location)
             return (point for element in elements for point in element.points)
@@ -174,8 +176,8 @@ class Assembly:
         """Return the points or elements of an instance by number."""
         return self.index.get(scope, {}) if kind == "node" else self.elements.get(scope, {})
 
-    def _existing(self, kind: str, scope: str, number: int, location: Location) -> Any:
-        """Return the point or element with a number; CaseError if there is none."""
+    def _item(self, kind: str, scope: str, number: int, location: Location) -> Any:
+        """Return the point or element with a number. Raises CaseError if there is none."""
         item = self._items_of(kind, scope).get(number)
         if item is None:
             where = f" in instance '{self.content.instances[scope].name}'" if scope else ""
@@ -191,14 +193,20 @@ class Assembly:
         return self.members("element", name, location)
 
     def node(self, name: str, location: Location) -> int:
-        """Return the point of a node number or of a set with one node; CaseError if it is not defined or not unique."""
+        """Return the point of a node number or of a set with one node.
+
+        Raises CaseError if it is not defined or not unique.
+        """
         nodes = self.nodes(name, location)
         if len(nodes) != 1:
             raise location.refuse(f"'{name}' has {len(nodes)} nodes, but one is needed")
         return nodes[0]
 
     def faces(self, name: str, location: Location) -> list[Face]:
-        """Return the faces of a surface, each as an element and the index of its facet; CaseError if it has no faces."""
+        """Return the faces of a surface, each as an element and the index of its facet.
+
+        Raises CaseError if it has no faces.
+        """
         definition, scope = self.surface(name, location)
         if definition.of_nodes:
             complete, _, remaining = self.faces_of_nodes(definition, scope)
@@ -209,7 +217,7 @@ class Assembly:
                     "needs faces, TYPE=ELEMENT"
                 )
             return complete
-        if (label := folded(name)) not in self.surfaces:
+        if (label := key_of(name)) not in self.surfaces:
             faces: dict[Face, None] = {}
             for face in definition.faces:
                 members = self.elements_of(face.of if not scope else f"{scope}.{face.of}", face.location)
@@ -218,7 +226,7 @@ class Assembly:
         return self.surfaces[label]
 
     def surface(self, name: str, location: Location) -> tuple[Surface, str]:
-        """Return the definition of a surface and the instance that contains it; CaseError if it is not defined."""
+        """Return the definition of a surface and the instance that contains it. Raises CaseError if it is not defined."""
         scope, label = self.split_name(name)
         surfaces = self.part(scope).surfaces
         if label not in surfaces:
@@ -229,13 +237,16 @@ class Assembly:
         return surfaces[label], scope
 
     def _type_of_solid(self, element: Element, location: Location) -> ElementType:
-        """Return the type of an element with faces; CaseError if it is not a solid."""
+        """Return the type of an element with faces. Raises CaseError if it is not a solid."""
         if element.type is None:
             raise location.refuse(f"element {element.number} is not a solid, so it has no faces")
         return element.type
 
     def facet(self, element: Element, label: int, location: Location) -> int:
-        """Return the index of the facet of an element with a face label, counted from 1; CaseError if there is none."""
+        """Return the index of the facet of an element with a face label, counted from 1.
+
+        Raises CaseError if there is none.
+        """
         solid = self._type_of_solid(element, location)
         if not 1 <= label <= len(solid.faces):
             raise location.refuse(
@@ -260,10 +271,10 @@ class Assembly:
             points = np.array([element.points for element in members], np.int32)
             faces = members[0].solid.faces
             shapes[name] = len(members), len(faces)
-            of_type = np.full((len(members), len(faces), 4), -1, np.int32)
+            sorted_corners = np.full((len(members), len(faces), 4), -1, np.int32)
             for k, face in enumerate(faces):
-                of_type[:, k, : len(face)] = np.sort(points[:, list(face)], axis=1)
-            corners.append(of_type.reshape(-1, 4))
+                sorted_corners[:, k, : len(face)] = np.sort(points[:, list(face)], axis=1)
+            corners.append(sorted_corners.reshape(-1, 4))
         _, inverse, count = np.unique(np.concatenate(corners), axis=0, return_inverse=True, return_counts=True)
         masks = np.split(count[inverse.ravel()] == 1, np.cumsum([n * m for n, m in shapes.values()])[:-1])
         return {name: mask.reshape(shapes[name]) for name, mask in zip(shapes, masks, strict=True)}
@@ -344,7 +355,7 @@ def facets_of_faces(element: str) -> tuple[int, ...]:
 
 
 def assemble(assembly: Assembly) -> None:
-    """Add the points and elements of all instances to an assembly; CaseError if an element uses an undefined node."""
+    """Add the points and elements of all instances to an assembly. Raises CaseError if an element uses an undefined node."""
     content, n_points, counts = assembly.content, 0, {}  # type: Content, int, dict[str, int]
     coordinates = []
     for scope in assembly.scopes:
@@ -406,7 +417,10 @@ class Target:
 
 
 def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> list[Target]:
-    """Return the targets of a line of a distributed load, with these `numbers` on faces; CaseError if not supported."""
+    """Return the targets of a data line of a distributed load. Raises CaseError if the load is not supported.
+
+    `numbers` are stored with targets on faces.
+    """
     keyword, label = row.location.keyword, row.text(1).upper()
     load = "load " if keyword.endswith("LOAD") else ""
     if keyword in ON_SURFACES:
@@ -415,16 +429,16 @@ def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> li
             raise row.refuse(f"{load}{label[:40]} on a surface is not supported, only {letter}")
         faces = assembly.faces(row.text(0), row.location)
         return [Target(keyword, letter, face, (), numbers) for face in faces]
-    letter, of_elements = ON_ELEMENTS[keyword]
-    every = keyword == "DLOAD" and not row.text(0)
-    elements = assembly.solids if every else assembly.elements_of(row.text(0), row.location)
+    letter, element_loads = ON_ELEMENTS[keyword]
+    on_all_solids = keyword == "DLOAD" and not row.text(0)
+    elements = assembly.solids if on_all_solids else assembly.elements_of(row.text(0), row.location)
     if label[:1] == letter and label[1:].isdigit():
         faces = [(element, assembly.facet(element, int(label[1:]), row.location)) for element in elements]
         return [Target(keyword, letter, face, (), numbers) for face in faces]
-    if label not in of_elements:
-        labels = ", ".join([f"{letter}1", f"{letter}2", "...", *of_elements])
+    if label not in element_loads:
+        labels = ", ".join([f"{letter}1", f"{letter}2", "...", *element_loads])
         raise row.refuse(f"{load}{label[:40]} is not supported; expected one of {labels}")
-    vector = tuple(row.number(3 + i, 0.0) for i in range(of_elements[label]))
+    vector = tuple(row.number(3 + i, 0.0) for i in range(element_loads[label]))
     if vector and not any(vector[-3:]):
         raise row.refuse(f"the direction of {label} is missing")
     return [Target(keyword, label, None, tuple(elements), vector)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembly, Element
-from fastcontact.cases.decks.blocks import Block, Location, defined, folded, registered, unquoted
+from fastcontact.cases.decks.blocks import Block, Location, key_of, look_up, register, unquoted
 from fastcontact.cases.decks.content import Axes, Content, Part
 from fastcontact.mesh.mesh import starts_of
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -33,11 +33,11 @@ def orientation(content: Content, part: Part, block: Block) -> None:
     if len(rows) > 1 and rows[1].number(1, 0.0):
         raise rows[1].refuse("a further rotation of the axes is not supported: rotate the points of the first line")
     axes = Axes(block.location, name, system == "CYLINDRICAL", points, distribution, part)
-    registered("orientation", name, content.orientations, axes, block)
+    register("orientation", name, content.orientations, axes, block)
 
 
 def distribution_table(content: Content, part: Part, block: Block) -> None:
-    """Read *DISTRIBUTION TABLE: the kind of a distribution; CaseError unless it consists of the axes of elements."""
+    """Read *DISTRIBUTION TABLE: the kind of a distribution. Raises CaseError unless it consists of the axes of elements."""
     kinds = [entry.upper() for row in block.rows for entry in row.entries if entry]
     if kinds != ["COORD3D", "COORD3D"]:
         raise block.refuse(f"a distribution of {', '.join(kinds)[:80]} is not supported, only COORD3D, COORD3D of axes")
@@ -46,7 +46,7 @@ def distribution_table(content: Content, part: Part, block: Block) -> None:
 def distribution(content: Content, part: Part, block: Block) -> None:
     """Read *DISTRIBUTION: two points that define the axes of each element, or of all others on a line without element."""
     block.choice("LOCATION", ("ELEMENT",))
-    registered("distribution", block.required("NAME"), content.distributions, block, block)
+    register("distribution", block.required("NAME"), content.distributions, block, block)
 
 
 def transform(content: Content, block: Block) -> None:
@@ -67,8 +67,11 @@ def local_directions(assembly: Assembly) -> dict[int, Array]:
 
 
 def orientation_of(content: Content, name: str, location: Location) -> Axes:
-    """Return the axes of an *ORIENTATION; CaseError if it is undefined, or if it varies but is not used in a section."""
-    axes: Axes = defined("orientation", name, content.orientations, location)
+    """Return the axes of an *ORIENTATION.
+
+    Raises CaseError if it is undefined, or varies by element and is not used in a section.
+    """
+    axes: Axes = look_up("orientation", name, content.orientations, location)
     if axes.distribution and location.keyword != "SOLID SECTION":
         raise location.refuse(
             f"orientation '{name}' varies by element, by a distribution: it can be used in sections only"
@@ -81,7 +84,7 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
 
     Raises CaseError if a member has no axes and there is no default.
     """
-    block = assembly.content.distributions.get(folded(axes.distribution))
+    block = assembly.content.distributions.get(key_of(axes.distribution))
     if block is None:
         raise axes.refuse(f"distribution '{axes.distribution[:80]}' is not defined")
     scopes = [scope for scope in assembly.scopes if assembly.part(scope) is axes.part]
@@ -106,7 +109,7 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
 
 
 def local_axes(axes: Axes, point: Array) -> Array:
-    """Return the local axes (3, 3) [-], in rows, at a point; CaseError if they are not defined there."""
+    """Return the local axes (3, 3) [-], in rows, at a point. Raises CaseError if they are not defined there."""
     a, b = np.reshape(axes.points, (2, 3))
     if axes.cylindrical:
         third, first = b - a, point - a

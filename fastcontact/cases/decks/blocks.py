@@ -71,7 +71,10 @@ class Row(Item):
         return self.entries[index] if index < len(self.entries) else ""
 
     def number(self, index: int, default: float | None = None) -> float:
-        """Return an entry as a number, or `default` if it is empty; CaseError if it is not a number or has no default."""
+        """Return an entry as a number, or `default` if it is empty.
+
+        Raises CaseError if it is not a number or has no default.
+        """
         text = self.text(index)
         if not text:
             if default is None:
@@ -80,7 +83,7 @@ class Row(Item):
         return as_number(self.location, text)
 
     def whole(self, index: int, default: int | None = None) -> int:
-        """Return an entry as an integer; CaseError as for `number`, and if the entry is not an integer."""
+        """Return an entry as an integer. Raises CaseError as for `number`, and if the entry is not an integer."""
         value = self.number(index, default)
         if value != int(value) or abs(value) > LARGEST_WHOLE:
             raise self.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is not a whole number")
@@ -135,11 +138,11 @@ class Block(Item):
         return (row for row in self.lines if any(row.entries))
 
     def numbers(self) -> list[float]:
-        """Return the numbers in all data lines; CaseError if an entry is not a number."""
+        """Return the numbers in all data lines. Raises CaseError if an entry is not a number."""
         return [row.number(i) for row in self.each() for i, text in enumerate(row.entries) if text]
 
     def only(self, variable: str = "") -> Row:
-        """Return the only data line; CaseError unless there is exactly one.
+        """Return the only data line. Raises CaseError unless there is exactly one.
 
         If `variable` is given, the message adds that constants that depend on it are not supported.
         """
@@ -154,7 +157,7 @@ class Block(Item):
         return self.parameters.get(name) or default
 
     def choice(self, name: str, known: tuple[str, ...]) -> str:
-        """Return a parameter as one of the `known` values, by default the first; CaseError for any other value."""
+        """Return a parameter as one of the `known` values, by default the first. Raises CaseError for any other value."""
         value = self.get(name, known[0]).upper()
         for option in known:
             if value.replace(" ", "") == option.replace(" ", ""):
@@ -162,7 +165,7 @@ class Block(Item):
         raise self.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; expected one of {', '.join(known)}")
 
     def required(self, name: str) -> str:
-        """Return the value of a parameter; CaseError if it is missing or has no value."""
+        """Return the value of a parameter. Raises CaseError if it is missing or has no value."""
         value = self.parameters.get(name)
         if not value:
             raise self.refuse(f"the parameter {name} is missing")
@@ -180,7 +183,10 @@ class Source:
 
 
 def as_number(location: Location, text: str) -> float:
-    """Return the number that `text` states, also in Fortran notation (1.D5); CaseError unless it is a finite number."""
+    """Return the number that `text` states, also in Fortran notation (1.D5).
+
+    Raises CaseError unless it is a finite number.
+    """
     try:
         value = float(text.upper().replace("D", "E")) if text[:1].upper() not in "IN" else float("nan")
     except ValueError:
@@ -195,7 +201,7 @@ def unquoted(text: str) -> str:
     return text[1:-1] if len(text) > 1 and text[0] == text[-1] == '"' else text
 
 
-def folded(name: str) -> str:
+def key_of(name: str) -> str:
     """Return a name in the form used for look-up: in upper case, without quotation marks."""
     return name.replace('"', "").strip().upper()
 
@@ -231,7 +237,10 @@ class _Line(NamedTuple):
 
 
 def _contents(path: Path, source: Source) -> bytes:
-    """Return the contents of a file with Unix line ends; FileError if it cannot be read or the deck becomes too large."""
+    """Return the contents of a file with Unix line ends.
+
+    Raises FileError if it cannot be read or the deck becomes too large.
+    """
     source.files.append(path)
     try:
         source.size += path.stat().st_size
@@ -252,7 +261,7 @@ def _lines(contents: bytes, begin: int, end: int, number: int = 1) -> Iterator[_
 
 
 def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
-    """Yield the blocks of a file and of its included files; CaseError if data precede the first keyword."""
+    """Yield the blocks of a file and of its included files. Raises CaseError if data precede the first keyword."""
     source.open.append(path.resolve())
     current: Block | None = None
     contents = _contents(path, source)
@@ -269,19 +278,19 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
                 raise Location(name, line.number, "").refuse("a data line before any keyword")
             continue
         if current is not None:
-            yield _with_lines(current, contents, last, line.begin)
+            yield _with_data(current, contents, last, line.begin)
         location = Location(name, line.number, _keyword(line.text))
-        last = _continued(location, line, lines)
+        last = _join_lines(location, line, lines)
         current = Block(location, _parameters(location, last.text))
         if location.keyword == "INCLUDE":
-            yield from _included(current, name, source)
+            yield from _read_include(current, name, source)
             current = None
     if current is not None:
-        yield _with_lines(current, contents, last, len(contents))
+        yield _with_data(current, contents, last, len(contents))
     source.open.pop()
 
 
-def _with_lines(block: Block, contents: bytes, last: _Line, end: int) -> Block:
+def _with_data(block: Block, contents: bytes, last: _Line, end: int) -> Block:
     """Return a block with its data lines, from `last`, the last line of its keyword, to the byte offset `end`."""
     if last.end >= end:
         return block
@@ -289,14 +298,14 @@ def _with_lines(block: Block, contents: bytes, last: _Line, end: int) -> Block:
     return Block(block.location, block.parameters, Lines(location, contents, last.end, end))
 
 
-def _continued(location: Location, line: _Line, lines: Iterator[_Line]) -> _Line:
+def _join_lines(location: Location, line: _Line, lines: Iterator[_Line]) -> _Line:
     """Return a keyword line joined with its continuation lines, which follow a line that ends with a comma."""
     while line.text.endswith(","):
         following = next(lines, None)
         if following is None:
             break
-        added = "" if following.text.startswith("**") else f" {following.text}"
-        line = _Line(following.number, line.begin, following.end, line.text + added)
+        continuation = "" if following.text.startswith("**") else f" {following.text}"
+        line = _Line(following.number, line.begin, following.end, line.text + continuation)
         if len(line.text) > LONGEST_LINE:
             raise location.refuse(_TOO_LONG)
         if not following.text:
@@ -325,7 +334,7 @@ def _entries(line: str) -> list[str]:
 
 
 def _parameters(location: Location, line: str) -> dict[str, str | None]:
-    """Return the parameters of a keyword line; CaseError if a parameter is repeated."""
+    """Return the parameters of a keyword line. Raises CaseError if a parameter is repeated."""
     parameters: dict[str, str | None] = {}
     for entry in _entries(line)[1:]:
         key, equal, value = entry.partition("=")
@@ -337,8 +346,11 @@ def _parameters(location: Location, line: str) -> dict[str, str | None]:
     return parameters
 
 
-def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
-    """Yield the blocks of the file of an *INCLUDE; CaseError unless the file exists in the folder of the deck or below."""
+def _read_include(block: Block, name: str, source: Source) -> Iterator[Block]:
+    """Yield the blocks of the file of an *INCLUDE.
+
+    Raises CaseError unless the file exists in the folder of the deck or below.
+    """
     file_name = block.required("INPUT")
     for parameter in block.parameters:
         if parameter != "INPUT":
@@ -373,17 +385,17 @@ def refusing(at: Location | Located, about: str = "") -> Iterator[None]:
         raise at.refuse(f"{about}{error}") from error
 
 
-def registered(kind: str, name: str, table: dict[str, Entry], entry: Entry, at: Location | Located) -> Entry:
-    """Add an entry to a table by its name and return the entry; CaseError if the table already has the name."""
-    if folded(name) in table:
+def register(kind: str, name: str, table: dict[str, Entry], entry: Entry, at: Location | Located) -> Entry:
+    """Add an entry to a table by its name and return the entry. Raises CaseError if the table already has the name."""
+    if key_of(name) in table:
         raise at.refuse(f"{kind} '{name}' is defined twice")
-    table[folded(name)] = entry
+    table[key_of(name)] = entry
     return entry
 
 
-def defined(kind: str, name: str, table: Mapping[str, Any], at: Location | Located) -> Any:
-    """Return the entry of a table with a name; CaseError, with the names of all entries, if there is none."""
-    if folded(name) not in table:
+def look_up(kind: str, name: str, table: Mapping[str, Any], at: Location | Located) -> Any:
+    """Return the entry of a table with a name. Raises CaseError, with the names of all entries, if there is none."""
+    if key_of(name) not in table:
         names = ", ".join(entry.name for entry in table.values()) or "none"
         raise at.refuse(f"{kind} '{name}' is not defined; {kind.rpartition(' ')[2]}s: {names}")
-    return table[folded(name)]
+    return table[key_of(name)]

@@ -14,7 +14,7 @@ from fastcontact.arrays import Array
 from fastcontact.cases.decks import interactions
 from fastcontact.cases.decks.assembled import Element, Target
 from fastcontact.cases.decks.axes import axes_by_cell, local_axes, orientation_of
-from fastcontact.cases.decks.blocks import defined, folded, refusing
+from fastcontact.cases.decks.blocks import key_of, look_up, refusing
 from fastcontact.cases.decks.conditions import Component, Conditions, Period
 from fastcontact.cases.decks.constraints import make_rotations, relations_of
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
@@ -117,7 +117,10 @@ class Building:
         self._springs()
 
     def _materials(self) -> tuple[list[tuple[Any, str]], float]:
-        """Return the materials with their groups of solids, and the thickness [length]; CaseError for missing sections."""
+        """Return the materials with their groups of solids, and the thickness [length].
+
+        Raises CaseError for missing sections.
+        """
         thickness: float | None = None
         for scope in self.assembly.scopes:
             for section in self.assembly.part(scope).sections:
@@ -139,12 +142,12 @@ class Building:
         if missing := [element for element in self.assembly.solids if element.section is None]:
             cell = missing[0].cell
             count = f"{len(missing)} element" + "s" * (len(missing) > 1)
-            of_set = f" of set '{cell.set}'" if cell.set else ""
-            raise cell.refuse(f"{count} ({missing[0].number}){of_set} has no section, so no material")
+            set_text = f" of set '{cell.set}'" if cell.set else ""
+            raise cell.refuse(f"{count} ({missing[0].number}){set_text} has no section, so no material")
         by_material: dict[tuple[str, str, bool], list[Any]] = {}
         for element in self.assembly.solids:
             section = element.assigned_section
-            key = (folded(section.material), folded(section.orientation), element.solid.incompatible_modes)
+            key = (key_of(section.material), key_of(section.orientation), element.solid.incompatible_modes)
             by_material.setdefault(key, []).append(element)
         materials = []
         for (name, orientation, modes), members in by_material.items():
@@ -172,28 +175,28 @@ class Building:
         return tuple(tuple(row) for row in local_axes(axes, np.zeros(3)).tolist())
 
     def _material(self, section: Section) -> Material:
-        """Return the material of a section; CaseError if it is undefined or lacks elastic constants."""
-        material: Material = defined("material", section.material, self.content.materials, section)
+        """Return the material of a section. Raises CaseError if it is undefined or lacks elastic constants."""
+        material: Material = look_up("material", section.material, self.content.materials, section)
         if material.law is None and self.content.heat != "alone":
             raise material.refuse(f"material '{material.name}' has no *ELASTIC")
         return material
 
     def _check_contact_pairs(self) -> None:
         """Raise CaseError if a pair is defined twice or has an undefined surface or interaction."""
-        seen: set[str] = set()
+        pair_names: set[str] = set()
         for pair in self.content.pairs:
             secondary_group(self.assembly, pair.secondary, pair.location)
             self.assembly.faces(pair.primary, pair.location)
             if not pair.tied:
-                defined("surface interaction", pair.interaction, self.content.interactions, pair)
-            if folded(pair.name) in seen:
+                look_up("surface interaction", pair.interaction, self.content.interactions, pair)
+            if key_of(pair.name) in pair_names:
                 raise pair.refuse(f"the pair {pair.name} is given twice")
-            seen.add(folded(pair.name))
+            pair_names.add(key_of(pair.name))
 
     def _pressures(self, conditions: Conditions) -> list[Callable[[Model], None]]:
-        """Make groups of facets whose pressures have the same history; return functions that add the pressures to a model."""
+        """Create groups of facets with the same pressure history, and return functions that add the pressures to a model."""
         by_shape = ByShape[tuple[str, str]]()
-        for table, names in conditions.loads.alike():
+        for table, names in conditions.loads.distinct():
             for name in names:
                 for cell, rows in self.assembly.facet_rows([name.face] if name.face else []).items():
                     by_shape.add((name.keyword, cell), table, rows)
@@ -218,14 +221,14 @@ class Building:
         self._temporary_supports(conditions, temporary)
         temporary_names = {name for name, _ in temporary}
         ends = {e.points[1] for e in self.assembly.discrete if e.cell.type == "GAPUNI"}
-        free_ends = ends - self.assembly.of_solids if ends else ends
-        for table, names in conditions.supports.alike():
+        free_ends = ends - self.assembly.solid_points if ends else ends
+        for table, names in conditions.supports.distinct():
             for name in (name for name in names if name not in temporary_names):
                 point, axis, local = name
                 if point in free_ends:
                     self.driven[point, axis] = table
                 elif local:
-                    label = f"the support of {conditions.named(name)} on local axes"
+                    label = f"the support of {conditions.description(name)} on local axes"
                     row = self._support_row(conditions, name)
                     self.local_supports.append(MultiPointConstraint(label, row, 1.0, table))
                 else:
@@ -241,13 +244,13 @@ class Building:
 
     def _temporary_supports(self, conditions: Conditions, temporary: Sequence[tuple[Component, Period]]) -> None:
         """Add the supports that do not act in all steps; those with the same period and history share a constraint."""
-        alike: dict[tuple[Period, Table], list[Component]] = {}
+        by_period: dict[tuple[Period, Table], list[Component]] = {}
         for name, period in (entry for entry in temporary if entry[1].begins < entry[1].ends):
-            alike.setdefault((period, conditions.supports.table(name)), []).append(name)
-        for (period, table), names in alike.items():
+            by_period.setdefault((period, conditions.supports.table(name)), []).append(name)
+        for (period, table), names in by_period.items():
             ends = "" if period.ends == np.inf else f" to {period.ends:g}"
             line = f", line {period.location.line}" if period.location else ""
-            label = f"the support of {conditions.named(names[0])}{line}, from {period.begins:g}{ends}"
+            label = f"the support of {conditions.description(names[0])}{line}, from {period.begins:g}{ends}"
             rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
             limits = (period.begins, period.ends)
             self.local_supports.append(TemporaryConstraint(label, rows, 1.0, table, *limits, keeps=period.keeps))
@@ -261,7 +264,7 @@ class Building:
     def _forces(self, conditions: Conditions) -> None:
         """Add the nodal forces; those along local axes are resolved into their global components."""
         by_shape = ByShape[int]()
-        for table, names in conditions.forces.alike():
+        for table, names in conditions.forces.distinct():
             by_cosine: dict[tuple[int, float], list[int]] = {}
             for point, axis, local in names:
                 direction = conditions.directions[point][axis] if local else np.eye(3)[axis]
@@ -277,7 +280,7 @@ class Building:
     def _body_forces(self, conditions: Conditions) -> None:
         """Add the body forces, weights and centrifugal forces as forces per volume."""
         by_shape = ByShape[tuple[str, tuple[float, ...], str]]()
-        for table, names in conditions.loads.alike():
+        for table, names in conditions.loads.distinct():
             for name in (name for name in names if name.face is None):
                 by_density: dict[tuple[str, float], list[int]] = {}
                 for element in name.elements:
@@ -303,6 +306,7 @@ class Building:
         return material.density
 
     def _springs(self) -> None:
+        """Add the springs. Raises CaseError if an element of *SPRING is not a spring, or a spring has no stiffness."""
         for name, (location, stiffness) in self.content.springs.items():
             for element in self.assembly.elements_of(name, location):
                 if element.cell.type != "SPRINGA":
@@ -311,17 +315,18 @@ class Building:
         check_discrete(self.assembly, "SPRINGA", self.content.springs, "*SPRING")
 
     def _contact(self) -> None:
+        """Add the contact pairs and ties of the deck."""
         for pair in self.content.pairs:
             secondary, primary = (group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary))
             with refusing(pair):
                 options = self._pair_options(pair)
-                if secondary in self.assembly.loose:
+                if secondary in self.assembly.excluded:
                     options.update(self._node_based_options(pair, secondary))
                 self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
 
     def _node_based_options(self, pair: Pair, secondary: str) -> dict[str, Any]:
-        """Return the options that exclude nodes from contact which are on the facets but not in the node-based surface."""
-        options: dict[str, Any] = {"excluded": self._point_group("without contact", self.assembly.loose[secondary])}
+        """Return the options that exclude nodes from contact: those on the facets, but not in the node-based surface."""
+        options: dict[str, Any] = {"excluded": self._point_group("without contact", self.assembly.excluded[secondary])}
         if all(map(all_nodes_carry, self.assembly.groups[secondary])):
             options["formulation"] = "node_to_segment"
         self.content.note(
@@ -331,14 +336,14 @@ class Building:
         return options
 
     def _pair_options(self, pair: Pair) -> dict[str, Any]:
-        """Return the options of a contact pair or a tie; CaseError if its interaction is not supported."""
+        """Return the options of a contact pair or a tie. Raises CaseError if its interaction is not supported."""
         only_heat = self.content.heat == "alone"
         if pair.tied:
             options: dict[str, Any] = {"kind": "gap_only" if only_heat else "tied"}
             if self.content.heat:
                 options["conductance"] = interactions.perfect_conductance(self.content, self.model, pair.location)
             return options
-        law = self.content.interactions[folded(pair.interaction)]
+        law = self.content.interactions[key_of(pair.interaction)]
         options = interactions.conductance_of(self.content, law) if self.content.heat else {}
         if only_heat:
             return {**options, "kind": "gap_only", **self._clearance_option(pair)}
@@ -368,7 +373,7 @@ class Building:
         if not (pair.adjust or glued) and pair.clearance is None:
             return {}
         secondary, primary = (group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary))
-        gaps, positions = nodal_gaps(self.model, secondary, primary, self.assembly.loose.get(secondary, []))
+        gaps, positions = nodal_gaps(self.model, secondary, primary, self.assembly.excluded.get(secondary, []))
         tolerance = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
         if glued:
             if gaps.max() > tolerance or pair.clearance is not None:

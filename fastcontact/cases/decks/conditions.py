@@ -64,13 +64,13 @@ class Conditions:
         self.temperatures: Histories[int] = Histories(content, rest=initial)
         self.periods: dict[Component, Period] = {}  # latest periods; supports without an entry act from the start
         self.ended: list[tuple[Component, Period]] = []  # earlier periods
-        self.fixed_now: set[Component] = set()  # supports with FIXED in the current step
+        self.fixed_in_step: set[Component] = set()  # supports with FIXED in the current step
         self.heat = HeatConditions(assembly, initial)
         self.locks = Locks(assembly)
         self.directions = local_directions(assembly)
-        if assembly.dim == 3:  # rotations of a node have its axes
-            rotations, turned = assembly.rotations, self.directions
-            self.directions = {rotations[p]: axes for p, axes in turned.items() if p in rotations} | turned
+        if assembly.dim == 3:  # the rotations of a node have the axes of the node
+            rotations, rotated = assembly.rotations, self.directions
+            self.directions = {rotations[p]: axes for p, axes in rotated.items() if p in rotations} | rotated
 
     def run(self) -> None:
         """Record the supports and loads of all steps."""
@@ -79,44 +79,44 @@ class Conditions:
             self._supports(condition, before=True)
         self.supports.begin()
         self.heat.temperatures.begin()
-        self.periods.update((name, replace(ALWAYS, keeps=True)) for name in self.fixed_now)
+        self.periods.update((name, replace(ALWAYS, keeps=True)) for name in self.fixed_in_step)
         for number, step in enumerate(content.steps, start=1):
             self.locks.begin(number, [g for g in step.conditions if g.block.keyword == "BOUNDARY"], self.assembly)
             for condition in step.conditions:
-                self._take(condition)
-            self._change(number)
-            for advancing in (self.supports, self.forces, self.loads, self.temperatures, self.heat):
-                advancing.advance(number, step)  # type: ignore[attr-defined]
+                self._record_block(condition)
+            self._update_periods(number)
+            for histories in (self.supports, self.forces, self.loads, self.temperatures, self.heat):
+                histories.advance(number, step)  # type: ignore[attr-defined]
 
-    def _take(self, condition: Condition) -> None:
+    def _record_block(self, condition: Condition) -> None:
         """Record a block of supports or loads of the current step."""
         keyword, block = condition.block.keyword, condition.block
         if keyword == "TEMPERATURE":
-            self.temperatures.take(condition, temperatures_of_block(self.assembly, condition.block))
+            self.temperatures.record(condition, temperatures_of_block(self.assembly, condition.block))
         elif keyword in OF_HEAT:
-            self.heat.take(condition)
+            self.heat.record(condition)
         elif keyword == "BOUNDARY":
             self._supports(condition)
         elif keyword == "CLOAD":
-            self.forces.take(condition, self._forces(block))
+            self.forces.record(condition, self._forces(block))
         else:
             entries = ((t, row.number(2), row.location) for row in block.each() for t in targets(self.assembly, row))
-            self.loads.take(condition, entries)
+            self.loads.record(condition, entries)
 
-    def _change(self, number: int) -> None:
-        """Record the supports that begin or end at the start of step `number`."""
-        begin, changing = number - 1.0, self.supports.changing
-        # A value in this step ends the period of a support with FIXED, and begins another one.
-        valued = (name for name in self.periods if name in changing and name not in self.fixed_now)
-        released = dict.fromkeys(name for name in valued if self._acts(name) and self.periods[name].keeps)
-        for name in (*self.supports.dying, *released):
+    def _update_periods(self, number: int) -> None:
+        """Record the supports that begin or end at the start of step `number`, counted from 1."""
+        begin, step_values = number - 1.0, self.supports.step_values
+        # A value in this step ends the period of a support with FIXED, and a new period begins.
+        candidates = (name for name in self.periods if name in step_values and name not in self.fixed_in_step)
+        released = dict.fromkeys(name for name in candidates if self._acts(name) and self.periods[name].keeps)
+        for name in (*self.supports.removals, *released):
             self.ended.append((name, replace(self.periods.pop(name, ALWAYS), ends=begin)))
-        begun: dict[tuple[Location | None, bool], Period] = {}
-        for name in changing:
+        new_periods: dict[tuple[Location | None, bool], Period] = {}
+        for name in step_values:
             if name in released or not self._acts(name):
-                key = changing.get(name)[2] if begin else None, name in self.fixed_now
-                self.periods[name] = begun.setdefault(key, Period(key[0], begin, keeps=key[1]))
-        self.fixed_now.clear()
+                key = step_values.get(name)[2] if begin else None, name in self.fixed_in_step
+                self.periods[name] = new_periods.setdefault(key, Period(key[0], begin, keeps=key[1]))
+        self.fixed_in_step.clear()
 
     def _acts(self, name: Component) -> bool:
         """Return whether a support acts at the end of the steps recorded so far."""
@@ -127,7 +127,7 @@ class Conditions:
         """Return the supports that do not act in all steps, with their periods."""
         return [*self.ended, *((name, period) for name, period in self.periods.items() if period.begins > 0.0)]
 
-    def named(self, component: Component) -> str:
+    def description(self, component: Component) -> str:
         """Return the description of a displacement component in terms of the deck, for messages."""
         point, axis, _ = component
         if point >= sum(map(len, self.assembly.index.values())):
@@ -135,14 +135,14 @@ class Conditions:
         return f"component {axis + 1} of node {self.assembly.number_of(point)}"
 
     def _supports(self, condition: Condition, before: bool = False) -> None:
-        """Record a block *BOUNDARY, which stands in the current step or, if `before` is true, before all steps."""
+        """Record a block *BOUNDARY of the current step or, if `before` is true, a block that precedes all steps."""
         block = condition.block
         kind = block.get("TYPE", "DISPLACEMENT").upper()
         if kind != "DISPLACEMENT":
             raise block.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
         if condition.new:
-            self.supports.forget()
-            self.heat.temperatures.forget()
+            self.supports.remove_earlier()
+            self.heat.temperatures.remove_earlier()
         driven = False
         for row in block.each():
             if row.text(1) == "11":
@@ -166,23 +166,23 @@ class Conditions:
             self.assembly.content.note(block, "a displacement prescribed before all steps is reached in the first step")
 
     def _support(self, condition: Condition, row: Row, point: int, component: int, value: float) -> None:
-        """Record a support of a point; CaseError if the component does not exist and the value is not zero."""
+        """Record a support of a point. Raises CaseError if the component does not exist and the value is not zero."""
         name = self._component(point, component)
         if name is None:
             if value:
                 raise row.refuse(f"component {component} does not exist at nodes of this model")
             return
-        if self.locks.take(point, component, "FIXED" in condition.block.parameters):
+        if self.locks.record(point, component, "FIXED" in condition.block.parameters):
             return
         sign = 1.0
         if name[0] in self.directions:
-            name, sign = self._local(*name[:2])
+            name, sign = self._local_component(*name[:2])
         if "FIXED" in condition.block.parameters:
-            self.fixed_now.add(name)
+            self.fixed_in_step.add(name)
             if self._acts(name):
                 self.supports.hold(name, row.location)
                 return
-        self.supports.give(name, sign * value, condition.amplitude, row.location)
+        self.supports.set_value(name, sign * value, condition.amplitude, row.location)
 
     def _component(self, point: int, component: int) -> Component | None:
         """Return a component of a point or, for rotations, of the point that represents them; None if it does not exist."""
@@ -194,8 +194,8 @@ class Conditions:
             return (self.assembly.rotations[point], axis, False) if axis >= 0 else None
         return None
 
-    def _local(self, point: int, number: int) -> tuple[Component, float]:
-        """Return the component along a local axis and 1.0, or the parallel global component and 1.0 or -1.0, its sign."""
+    def _local_component(self, point: int, number: int) -> tuple[Component, float]:
+        """Return the component along a local axis and 1.0, or the parallel global component and the sign of the axis."""
         direction = self.directions[point][number]
         axis = int(np.argmax(np.abs(direction)))
         if abs(abs(direction[axis]) - 1.0) < LENGTH_ROUND_OFF and axis < self.assembly.dim:

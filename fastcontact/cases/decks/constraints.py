@@ -21,14 +21,17 @@ from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows, relation, rigid_rows
 
-# Smallest number of nodes of the kinds of *MPC that have no fixed number.
+# Smallest number of nodes of those kinds of *MPC whose number of nodes is not fixed.
 LEAST = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
 # Tolerance of the tests for collinear points and for points on the axis, relative to squared distances.
 FLAT = 1e-9
 
 
 def make_rotations(deck_mesh: DeckMesh) -> None:
-    """Add a point for the rotation of each reference node, before the mesh is made; CaseError in axisymmetric models."""
+    """Add a point for the rotation of each reference node, before the mesh is built.
+
+    Raises CaseError in axisymmetric models.
+    """
     for coupling in deck_mesh.content.couplings:
         point = deck_mesh.node(coupling.reference, coupling.location)
         if coupling.rotation:
@@ -67,7 +70,7 @@ def _equation(deck_mesh: DeckMesh, equation: Equation, axes: Mapping[int, Array]
 
 
 def _pin_rows(deck_mesh: DeckMesh, pin: MultiPoint) -> list[list[Term]]:
-    """Return the equations of nodes with the same displacement; CaseError if the numbers of nodes do not match."""
+    """Return the equations of nodes with the same displacement. Raises CaseError if the numbers of nodes do not match."""
     first, second = (deck_mesh.nodes(name, pin.location) for name in pin.nodes)
     numbers = f"{len(first)} and {len(second)}"
     if len(second) == 1:
@@ -82,7 +85,10 @@ def _pin_rows(deck_mesh: DeckMesh, pin: MultiPoint) -> list[list[Term]]:
 
 
 def _points(deck_mesh: DeckMesh, coupling: Coupling) -> list[int]:
-    """Return the points that a coupling relates to its reference point, in ascending order; CaseError if there are none."""
+    """Return the points that a coupling relates to its reference point, in ascending order.
+
+    Raises CaseError if there are none.
+    """
     if coupling.kind == "nodes":
         points = deck_mesh.nodes(coupling.group, coupling.location)
     elif coupling.kind == "elements":
@@ -135,7 +141,7 @@ def _directions(deck_mesh: DeckMesh, coupling: Coupling, point: int) -> Array:
 
 
 def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[Term]]:
-    """Return the equations of a multi-point constraint; CaseError if it does not suit its nodes or a plane model."""
+    """Return the equations of a multi-point constraint. Raises CaseError if it does not suit its nodes or a plane model."""
     if constraint.kind in ("PIN", "TIE"):
         return _pin_rows(deck_mesh, constraint)
     nodes = [point for name in constraint.nodes for point in deck_mesh.nodes(name, constraint.location)]
@@ -202,7 +208,7 @@ def _terms(points: list[int], coefficients: Array) -> list[Term]:
     ]
 
 
-# Largest number of terms of an equation, all of which the equation couples to each other.
+# Largest number of terms of an equation. All displacements in an equation are coupled to each other.
 MOST_TERMS = 100_000
 
 
@@ -282,13 +288,13 @@ def multi_point(content: Content, block: Block) -> None:
     PIN and TIE give two nodes the same displacement, and BEAM makes the first node follow the second one like a rigid bar.
     PLANE, STRAIGHT and MEANROT continue on lines that begin with a number.
     """
-    continuing: list[tuple[Row, str, list[str]]] = []
+    started: list[tuple[Row, str, list[str]]] = []
     for row in block.each():
         kind, nodes = row.text(0).upper(), [unquoted(entry) for entry in row.entries[1:] if entry]
-        if kind.isdecimal() and continuing:
-            continuing[-1][2].extend([*([row.text(0)] if int(kind) else []), *nodes])
+        if kind.isdecimal() and started:
+            started[-1][2].extend([*([row.text(0)] if int(kind) else []), *nodes])
         elif kind in LEAST:
-            continuing.append((row, kind, nodes))
+            started.append((row, kind, nodes))
         elif kind not in ("PIN", "TIE", "BEAM"):
             kinds = ", ".join(("PIN", "TIE", "BEAM", *LEAST))
             raise row.refuse(f"an MPC of type {kind[:40]} is not supported, only {kinds}")
@@ -298,7 +304,7 @@ def multi_point(content: Content, block: Block) -> None:
             content.couplings.append(Coupling(row.location, nodes[1], nodes[0], "nodes"))
         else:
             content.multi_points.append(MultiPoint(row.location, kind, tuple(nodes)))
-    content.multi_points += [MultiPoint(row.location, kind, tuple(nodes)) for row, kind, nodes in continuing]
+    content.multi_points += [MultiPoint(row.location, kind, tuple(nodes)) for row, kind, nodes in started]
 
 
 def rigid_body(content: Content, block: Block) -> None:

@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fastcontact.cases.decks.blocks import Block, Item, Located, Location, folded
+from fastcontact.cases.decks.blocks import Block, Item, Located, Location, key_of
 
 
 @dataclass(frozen=True, slots=True)
 class Cell(Located):
-    """An element: its type, its node numbers, the location of its *ELEMENT, its own line, and the ELSET of *ELEMENT."""
+    """An element: its type, node numbers, the location `within` which it is defined (*ELEMENT), its line, and its ELSET."""
 
     type: str
     nodes: Sequence[int]
@@ -87,8 +87,8 @@ class Part:
     def add(self, kind: str, name: str, members: list[Members]) -> None:
         """Add entries to a new or an existing set."""
         sets = self.node_sets if kind == "node" else self.element_sets
-        sets.setdefault(folded(name), []).extend(members)
-        self.set_names.setdefault(folded(name), name)
+        sets.setdefault(key_of(name), []).extend(members)
+        self.set_names.setdefault(key_of(name), name)
 
 
 @dataclass
@@ -190,7 +190,7 @@ class MultiPoint(Item):
 
 @dataclass(frozen=True)
 class Coupling(Item):
-    """A rigid body or coupling: a reference node, and the nodes that follow it or (distributing) whose mean motion it has."""
+    """A rigid body or coupling: a reference node, and the nodes that follow it or, if distributing, that it follows."""
 
     reference: str
     group: str
@@ -238,7 +238,7 @@ class Amplitude:
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """A block of supports, loads or temperatures; `new` is true for OP=NEW, which removes earlier ones."""
+    """A block of supports, loads or temperatures; `new` is true for OP=NEW, which removes earlier blocks."""
 
     block: Block
     new: bool

@@ -17,7 +17,7 @@ from fastcontact.analysis.result_warnings import largest_rotation
 from fastcontact.analysis.resultants import multipliers
 from fastcontact.analysis.run import solve_steps
 from fastcontact.arrays import Array, Numbers
-from fastcontact.cases.decks.blocks import Location, folded, read_blocks
+from fastcontact.cases.decks.blocks import Location, key_of, read_blocks
 from fastcontact.cases.decks.building import Building
 from fastcontact.cases.decks.content import Content
 from fastcontact.cases.decks.keywords import read_content
@@ -125,7 +125,7 @@ class Deck:
             If the set does not exist.
         """
         names = {group.upper(): group for group in reversed([*self.model.mesh.point_groups])}
-        return self.model.mesh.points_of(names.get(folded(name), name))
+        return self.model.mesh.points_of(names.get(key_of(name), name))
 
     def point(self, number: int | str) -> int:
         """Return the point number of a node of the deck.
@@ -188,8 +188,8 @@ class Deck:
                 supported[support.rows.indices] = True
         rows = [constraint.rows for constraint in constraints]
         forces = multipliers(reaction.ravel(), rows, supported)
-        of_constraints = sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(supported.size))
-        return reaction - of_constraints.reshape(reaction.shape)
+        constraint_forces = sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(supported.size))
+        return reaction - constraint_forces.reshape(reaction.shape)
 
     def _largest_strain(self, step: StepResult) -> float:
         """Return the largest equivalent strain [-] of the solid cells, computed from nodal stresses."""

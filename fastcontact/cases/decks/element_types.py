@@ -87,7 +87,7 @@ def element_type(name: str) -> ElementType | None:
     return ElementType(name, element, kinematics, note, modes, conducts) if element and kinematics else None
 
 
-def described(name: str) -> str:
+def unsupported_kind(name: str) -> str:
     """Return the kind of an unsupported element type in parentheses, or an empty string for an unknown type."""
-    beginnings = [beginning for beginning in UNSUPPORTED if name.startswith(beginning)]
-    return f" ({UNSUPPORTED[max(beginnings, key=len)]})" if beginnings else ""
+    prefixes = [prefix for prefix in UNSUPPORTED if name.startswith(prefix)]
+    return f" ({UNSUPPORTED[max(prefixes, key=len)]})" if prefixes else ""

@@ -47,7 +47,7 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
     Histories that differ only by a factor share a field. If the histories have corners at fewer times than there are such
     fields, one field for each of these times is added instead.
     """
-    fields = list(ByShape.of((relative_table(table, table[0][1]), points) for table, points in histories.alike()))
+    fields = list(ByShape.of((relative_table(table, table[0][1]), points) for table, points in histories.distinct()))
     times = sorted({time for *_, table in fields for time, _ in table})
     if len(fields) <= len(times):
         for _, points, values, table in fields:
@@ -116,7 +116,7 @@ TEMPERATURE = 11
 
 
 def check_steps(content: Content) -> None:
-    """Set `content.heat` from the steps; CaseError if the procedures or the loads of the steps are inconsistent."""
+    """Set `content.heat` from the steps. Raises CaseError if the procedures or the loads of the steps are inconsistent."""
     first = next((step for step in content.steps if step.heat), None)
     content.heat = first.heat if first else ""
     for number, step in enumerate(content.steps):
@@ -147,17 +147,17 @@ class Spans(Generic[Name]):
 
     def advance(self, history: Histories[Name], begin: float) -> None:
         """Record the loads that begin or end at the load factor `begin`; to be called before `history.advance`."""
-        for name in history.dying:
+        for name in history.removals:
             self._ended.setdefault(name, []).append((self._begun.pop(name), begin))
-        for name in (*history.changing, *history.initial):
+        for name in (*history.step_values, *history.initial):
             self._begun.setdefault(name, begin)
 
     def of(self, names: Iterable[Name]) -> dict[tuple[float, float], list[Name]]:
         """Return the names of loads by the interval of load factors in which they act."""
         by_span: dict[tuple[float, float], list[Name]] = {}
         for name in names:
-            unlimited = [(self._begun[name], np.inf)] if name in self._begun else []
-            for span in (*self._ended.get(name, ()), *unlimited):
+            open_spans = [(self._begun[name], np.inf)] if name in self._begun else []
+            for span in (*self._ended.get(name, ()), *open_spans):
                 by_span.setdefault(span, []).append(name)
         return {(begin, end): members for (begin, end), members in by_span.items() if begin < end}
 
@@ -167,7 +167,7 @@ class HeatConditions:
 
     def __init__(self, assembly: DeckMesh, initial: Mapping[int, float]) -> None:
         self.assembly, content = assembly, assembly.content
-        self.reference = _reference(assembly, initial) if content.heat else 0.0
+        self.reference = _reference_temperature(assembly, initial) if content.heat else 0.0
         self.rest: dict[Target, float] = {}  # ambient temperatures of absent films
         uniform = dict.fromkeys(range(len(assembly.points)), self.reference) if content.heat else {}
         self.temperatures: Histories[int] = Histories(content, rest=uniform)
@@ -193,22 +193,22 @@ class HeatConditions:
         if "FIXED" in condition.block.parameters:
             raise row.refuse("FIXED is not supported for temperatures: give their values")
         for point in self._points_of_solids(row):
-            self.temperatures.give(point, row.number(3, 0.0), condition.amplitude, row.location)
+            self.temperatures.set_value(point, row.number(3, 0.0), condition.amplitude, row.location)
 
     def _points_of_solids(self, row: Row) -> list[int]:
-        """Return the points of the node set in a line; CaseError if a point belongs to no solid."""
+        """Return the points of the node set in a line. Raises CaseError if a point belongs to no solid."""
         points = self.assembly.nodes(row.text(0), row.location)
         for point in points:
-            if point not in self.assembly.of_solids:
+            if point not in self.assembly.solid_points:
                 raise row.refuse(f"node {self.assembly.number_of(point)} belongs to no solid, so it has no temperature")
         return points
 
-    def take(self, condition: Condition) -> None:
+    def record(self, condition: Condition) -> None:
         """Record a block of heat loads of the current step."""
         keyword = condition.block.keyword
         histories: dict[str, Histories[Any]] = {"CFLUX": self.powers, "FILM": self.films, "SFILM": self.films}
         entries = ((name, row.number(2), row.location) for row in condition.block.each() for name in self._names(row))
-        histories.get(keyword, self.fluxes).take(condition, entries)
+        histories.get(keyword, self.fluxes).record(condition, entries)
 
     def _names(self, row: Row) -> Iterator[int | Target]:
         """Yield the points or the targets of a line of a heat load, and remove the films that it replaces."""
@@ -227,15 +227,18 @@ class HeatConditions:
             yield target
 
     def _replace_film(self, film: Target, row: Row) -> None:
-        """Remove an earlier film of the same face with another coefficient; CaseError if the current step defines both."""
+        """Remove an earlier film of the same face with another coefficient.
+
+        Raises CaseError if the current step defines both.
+        """
         self.rest[film] = self.reference
         earlier = self.film_of.get((film.keyword, film.face))
         if earlier is not None and earlier != film:
-            if earlier in self.films.changing:
+            if earlier in self.films.step_values:
                 (new,), (old,) = film.numbers, earlier.numbers
                 raise row.refuse(f"{new:g} is the second film coefficient of this face in one step, after {old:g}")
             if earlier in self.films.tracks and self.films.tracks[earlier].alive:
-                self.films.dying[earlier] = None
+                self.films.removals[earlier] = None
         self.film_of[film.keyword, film.face] = film
 
     def advance(self, number: int, step: Step) -> None:
@@ -248,28 +251,28 @@ class HeatConditions:
         self.begun = self.begun or bool(step.heat)
 
     def loads(self, thickness: float) -> list[Callable[[Model], None]]:
-        """Make the mesh groups of all heat loads, and return functions that add the loads to a model.
+        """Create the mesh groups of all heat loads, and return functions that add the loads to a model.
 
         `thickness` [length] converts nodal heat flows to flows per unit thickness.
         """
         assembly, adders = self.assembly, []  # type: DeckMesh, list[Callable[[Model], None]]
         spans: list[tuple[float, float]] = []
         rises = ByShape[int]()
-        for table, names in self.temperatures.alike():
+        for table, names in self.temperatures.distinct():
             for span, points in self.temperature_spans.of(names).items():
                 spans += [span] * (span not in spans)
                 rises.add(spans.index(span), relative_table(table, self.reference), points)
         for number, nodes, value, table in rises:
             group = assembly.add_points(f"temperature {len(adders)}", nodes)
-            fixed = {"value": _absolute(value, self.reference), "ramp": table, **_limits(spans[number])}
+            fixed = {"value": _absolute_temperature(value, self.reference), "ramp": table, **_limits(spans[number])}
             adders.append(partial(Model.fix_temperature, group=group, **fixed))
-        for _, nodes, value, table in ByShape.of(self.powers.alike()):
+        for _, nodes, value, table in ByShape.of(self.powers.distinct()):
             group = assembly.add_points(f"heat {len(adders)}", nodes)
             powers = tuple((time, power / thickness) for time, power in table)
             adders.append(partial(Model.add_nodal_heat, group=group, value=value, ramp=powers))
         sources = ByShape[str]()
         on_faces = ByShape[tuple[str, str]]()
-        for table, fluxes in self.fluxes.alike():
+        for table, fluxes in self.fluxes.distinct():
             for flux in fluxes:
                 for cell, rows in assembly.facet_rows([flux.face] if flux.face else []).items():
                     on_faces.add((flux.keyword, cell), table, rows)
@@ -282,7 +285,7 @@ class HeatConditions:
             assembly.groups[group := f"{keyword.lower()} {len(adders)}"] = {cell: indices.tolist()}
             adders.append(partial(Model.add_heat_flux, group=group, value=value, ramp=table))
         faces_by_film: dict[tuple[Table, float, tuple[float, float]], list[Face]] = {}
-        for table, films in self.films.alike():
+        for table, films in self.films.distinct():
             for span, members in self.film_spans.of(films).items():
                 for film in members:
                     assert film.face is not None
@@ -307,7 +310,7 @@ def _limits(span: tuple[float, float]) -> dict[str, float]:
     return {name: limit for name, limit in zip(("begins", "ends"), span, strict=True) if np.isfinite(limit)}
 
 
-def _absolute(value: Any, reference: float) -> Any:
+def _absolute_temperature(value: Any, reference: float) -> Any:
     """Return the temperature for a rise `value` above the reference; both are numbers or functions of the position."""
 
     def absolute(points: Array) -> Array:
@@ -316,13 +319,13 @@ def _absolute(value: Any, reference: float) -> Any:
     return absolute if callable(value) else value + reference
 
 
-def _reference(assembly: Assembly, initial: Mapping[int, float]) -> float:
+def _reference_temperature(assembly: Assembly, initial: Mapping[int, float]) -> float:
     """Return the initial temperature of the solids, or zero if it is not uniform and has no effect.
 
     Raises CaseError if it is not uniform and a coupled step computes thermal strains.
     """
     content = assembly.content
-    values = {initial.get(point, 0.0) for point in assembly.of_solids}
+    values = {initial.get(point, 0.0) for point in assembly.solid_points}
     if len(values) == 1:
         return values.pop()
     location = content.initial_temperatures[0].location

@@ -10,7 +10,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.cases.decks.assembled import Assembly, facet_points
-from fastcontact.cases.decks.blocks import Block, Located, Location, folded, refusing
+from fastcontact.cases.decks.blocks import Block, Located, Location, key_of, refusing
 from fastcontact.cases.decks.conditions import Conditions
 from fastcontact.cases.decks.content import Content
 from fastcontact.cases.decks.meshing import DeckMesh
@@ -59,7 +59,7 @@ def gap(content: Content, block: Block) -> None:
     direction = tuple(row.number(i, 0.0) for i in (1, 2, 3))
     if not any(direction):
         raise row.refuse("the direction of the gap elements is missing")
-    content.gaps[folded(block.required("ELSET"))] = (block.location, row.number(0), direction)
+    content.gaps[key_of(block.required("ELSET"))] = (block.location, row.number(0), direction)
 
 
 def spring(content: Content, block: Block) -> None:
@@ -69,7 +69,7 @@ def spring(content: Content, block: Block) -> None:
         raise block.refuse("linear springs along their axis need an empty line, followed by a line with the stiffness")
     if rows[0].text(1):
         raise rows[0].refuse("only linear springs are supported: one stiffness")
-    content.springs[folded(block.required("ELSET"))] = (block.location, rows[0].positive(0, "stiffness"))
+    content.springs[key_of(block.required("ELSET"))] = (block.location, rows[0].positive(0, "stiffness"))
 
 
 def check_discrete(assembly: Assembly, kind: str, properties: Mapping[str, Any], keyword: str) -> None:
@@ -81,7 +81,7 @@ def check_discrete(assembly: Assembly, kind: str, properties: Mapping[str, Any],
 
 
 def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
-    """Make groups of the facets with the nodes of gap elements; CaseError if the nodes do not fill whole facets."""
+    """Create groups of the facets with the nodes of gap elements. Raises CaseError if the nodes do not fill whole facets."""
     groups = []
     check_discrete(deck_mesh, "GAPUNI", deck_mesh.content.gaps, "*GAP")
     for name, (location, clearance, vector) in deck_mesh.content.gaps.items():
@@ -90,7 +90,7 @@ def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
             raise location.refuse("acts on elements of type GAPUNI only")
         set_name = deck_mesh.content.root.set_names.get(name, name)
         ends = np.array([element.points for element in gap_elements], np.intp)
-        bodies = all(point in deck_mesh.of_solids for point in ends[:, 1].tolist())
+        bodies = all(point in deck_mesh.solid_points for point in ends[:, 1].tolist())
         groups.append(
             GapGroup(
                 set_name, location, clearance, np.array(vector)[: deck_mesh.dim] / np.linalg.norm(vector), ends,
@@ -102,7 +102,7 @@ def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
 
 
 def _facet_group(deck_mesh: DeckMesh, group: str, points: Indices, location: Location) -> str:
-    """Make a group of the facets whose nodes are all in `points`; CaseError if a point belongs to no such facet."""
+    """Make a group of the facets whose nodes are all in `points`. Raises CaseError if a point belongs to no such facet."""
     selected = set(points.tolist())
     faces = deck_mesh.faces_within(selected)
     if {p for face in faces for p in facet_points(*face)} != selected:
@@ -136,7 +136,7 @@ def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Condit
                 clearance=gap.clearance - float(distances.mean()),
             )  # fmt: skip
         return {}
-    history = _motion(gap, conditions)
+    history = _prescribed_motion(gap, conditions)
     wall = HalfSpace(
         point=tuple((first @ gap.direction).mean() * gap.direction + gap.clearance * gap.direction),
         normal=tuple(-gap.direction),
@@ -148,8 +148,11 @@ def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Condit
     return {gap.name: dict(gap.ends.tolist())}
 
 
-def _motion(gap: GapGroup, conditions: Conditions) -> Table:
-    """Return the motion [length] of the second nodes along the direction; CaseError unless it is prescribed and uniform."""
+def _prescribed_motion(gap: GapGroup, conditions: Conditions) -> Table:
+    """Return the motion [length] of the second nodes along the direction.
+
+    Raises CaseError unless it is prescribed and uniform.
+    """
     supports, temporary = conditions.supports, {name for name, _ in conditions.temporary()}
     by_axis: list[tuple[float, Array]] = []
     for axis in np.flatnonzero(gap.direction).tolist():

@@ -6,9 +6,9 @@ from array import array
 from collections.abc import Iterator
 from itertools import groupby
 
-from fastcontact.cases.decks.blocks import Block, Row, defined, folded, registered, unquoted
+from fastcontact.cases.decks.blocks import Block, Row, key_of, look_up, register, unquoted
 from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, Surface, SurfaceEntry
-from fastcontact.cases.decks.element_types import described, element_type
+from fastcontact.cases.decks.element_types import element_type, unsupported_kind
 from fastcontact.mesh import elements
 
 # Number of nodes of the supported elements that are not solids.
@@ -43,15 +43,15 @@ def cells(content: Content, part: Part, block: Block) -> None:
     kind = element_type(name)
     if kind is None and name not in DISCRETE:
         where = f" in set '{element_set}'" if element_set else ""
-        count = sum(1 for _ in _joined(block, 0))
+        count = sum(1 for _ in _element_rows(block, 0))
         raise block.refuse(
-            f"element type {name[:40]}{described(name)} is not supported; {count} element{'s' * (count != 1)}{where}"
+            f"element type {name[:40]}{unsupported_kind(name)} is not supported; {count} element{'s' * (count != 1)}{where}"
         )
     n_nodes = DISCRETE[name] if kind is None else elements.get(kind.element).n_nodes
     if kind is not None and kind.note and f"{name}: " not in "".join(content.notes):
         content.note(block, f"{name}: {kind.note}")
     members = array("q")
-    for row in _joined(block, n_nodes):
+    for row in _element_rows(block, n_nodes):
         number = row.whole(0)
         connectivity = array("q", (row.whole(i) for i, entry in enumerate(row.entries) if i and entry))
         if len(connectivity) != n_nodes:
@@ -64,22 +64,22 @@ def cells(content: Content, part: Part, block: Block) -> None:
         part.add("element", element_set, [Members(block.location, members)])
 
 
-def _joined(block: Block, n_nodes: int) -> Iterator[Row]:
+def _element_rows(block: Block, n_nodes: int) -> Iterator[Row]:
     """Yield the data of each element, which may continue on several lines, as one row at the location of the first line."""
-    joined: Row | None = None
+    element_row: Row | None = None
     for row in block.each():
-        joined = row if joined is None else Row(joined.location, joined.entries + row.entries)
-        incomplete = len(joined.entries) < n_nodes + 1
+        element_row = row if element_row is None else Row(element_row.location, element_row.entries + row.entries)
+        incomplete = len(element_row.entries) < n_nodes + 1
         if not (incomplete and (row.continued or (n_nodes >= LONG and len(row.entries) >= 8))):
-            yield joined
-            joined = None
-    if joined is not None:
-        yield joined
+            yield element_row
+            element_row = None
+    if element_row is not None:
+        yield element_row
 
 
 def group(content: Content, part: Part, block: Block) -> None:
-    """Read *NSET or *ELSET: a node set or an element set; CaseError if a range of GENERATE is empty."""
-    name, instance = block.required(block.keyword), folded(block.get("INSTANCE"))
+    """Read *NSET or *ELSET: a node set or an element set. Raises CaseError if a range of GENERATE is empty."""
+    name, instance = block.required(block.keyword), key_of(block.get("INSTANCE"))
     entries: list[Members] = []
     for row in block.each():
         if "GENERATE" in block.parameters:
@@ -100,7 +100,7 @@ def surface(content: Content, part: Part, block: Block) -> None:
     """Read *SURFACE: the faces of elements or the nodes of a surface."""
     name, kind = block.required("NAME"), block.choice("TYPE", ("ELEMENT", "NODE"))
     definition = Surface(name, block.location, kind == "NODE")
-    registered("surface", name, part.surfaces, definition, block)
+    register("surface", name, part.surfaces, definition, block)
     for row in block.each():
         label = row.text(1).upper()
         if not definition.of_nodes and label and not (label[0] == "S" and label[1:].isdigit()):
@@ -111,7 +111,7 @@ def surface(content: Content, part: Part, block: Block) -> None:
 def instance(content: Content, block: Block) -> Instance:
     """Read *INSTANCE: a part with its translation and rotation in the assembly."""
     name, part_name = block.required("NAME"), block.required("PART")
-    new_instance = Instance(name, defined("part", part_name, content.parts, block))
+    new_instance = Instance(name, look_up("part", part_name, content.parts, block))
     rows = block.rows
     if rows:
         new_instance.translation = tuple(rows[0].number(i, 0.0) for i in range(3))
@@ -119,13 +119,13 @@ def instance(content: Content, block: Block) -> Instance:
         new_instance.rotation = tuple(rows[1].number(i) for i in range(7))
     if len(rows) > 2:
         raise rows[2].refuse("an instance has at most two data lines: a translation and a rotation")
-    return registered("instance", name, content.instances, new_instance, block)
+    return register("instance", name, content.instances, new_instance, block)
 
 
 def new_part(content: Content, block: Block) -> Part:
     """Read *PART and return the new part."""
     name = block.required("NAME")
-    return registered("part", name, content.parts, Part(unquoted(name)), block)
+    return register("part", name, content.parts, Part(unquoted(name)), block)
 
 
 def section(content: Content, part: Part, block: Block) -> None:

@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from fastcontact.arrays import AnyArray, Array, Indices
-from fastcontact.cases.decks.blocks import Location, folded
+from fastcontact.cases.decks.blocks import Location, key_of
 from fastcontact.cases.decks.content import Amplitude, Condition, Content, Step
 from fastcontact.model.ramp import Table
 
@@ -49,7 +49,7 @@ class Track:
         return tuple(zip(self.numbers[::2], self.numbers[1::2], strict=True))
 
     def add(self, points: Iterable[tuple[float, float]]) -> None:
-        """Append points; a point at the time of the last point, but with another value, makes a jump."""
+        """Append points. A point with the time of the last point but another value is a jump."""
         for time, value in points:
             end, last = self.numbers[-2:]
             if time <= end:
@@ -121,9 +121,9 @@ class Histories(Generic[Name]):
         Content of the deck.
     tracks : dict
         Track by name.
-    changing : Values
+    step_values : Values
         Values of the current step.
-    dying : dict
+    removals : dict
         Names of earlier values that the current step removes.
     rest : mapping
         Values in the absence of a load or support, by default zero.
@@ -137,87 +137,87 @@ class Histories(Generic[Name]):
 
     content: Content
     tracks: dict[Name, Track] = field(default_factory=dict)
-    changing: Values[Name] = field(default_factory=Values)
-    dying: dict[Name, None] = field(default_factory=dict)
+    step_values: Values[Name] = field(default_factory=Values)
+    removals: dict[Name, None] = field(default_factory=dict)
     rest: Mapping[Name, float] = field(default_factory=dict)
     initial: Values[Name] = field(default_factory=Values)
     time: float = 0.0
     in_total_time: dict[int, Track] = field(default_factory=dict)
 
-    def give(self, name: Name, value: float, amplitude: str, location: Location) -> None:
-        """Set a value for the current step; CaseError if this step has already set a different value."""
-        if name in self.changing:
-            earlier, earlier_amplitude, earlier_location = self.changing.get(name)
+    def set_value(self, name: Name, value: float, amplitude: str, location: Location) -> None:
+        """Set a value for the current step. Raises CaseError if this step has already set a different value."""
+        if name in self.step_values:
+            earlier, earlier_amplitude, earlier_location = self.step_values.get(name)
             if (earlier, earlier_amplitude) != (value, amplitude):
                 raise location.refuse(
                     f"{value:g} is the second value in this step, after {earlier:g} in line {earlier_location.line}: "
                     "programs interpret this differently, so give one value"
                 )
-        self.changing.put(name, value, amplitude, location)
-        self.dying.pop(name, None)
+        self.step_values.put(name, value, amplitude, location)
+        self.removals.pop(name, None)
 
-    def take(self, condition: Condition, entries: Iterable[tuple[Name, float, Location]]) -> None:
+    def record(self, condition: Condition, entries: Iterable[tuple[Name, float, Location]]) -> None:
         """Set the values of the lines of a block; OP=NEW first removes the earlier values of its keyword."""
         if condition.new:
-            self.forget(condition.block.keyword)
+            self.remove_earlier(condition.block.keyword)
         for name, value, location in entries:
-            self.give(name, value, condition.amplitude, location)
+            self.set_value(name, value, condition.amplitude, location)
 
     def hold(self, name: Name, location: Location) -> None:
-        """Hold the value at the end of the last step."""
+        """Set the value for the current step to that at the end of the last step."""
         if name in self.tracks:
-            self.changing.put(name, self.tracks[name].last, "", location)
-            self.dying.pop(name, None)
+            self.step_values.put(name, self.tracks[name].last, "", location)
+            self.removals.pop(name, None)
 
     def begin(self) -> None:
-        """Begin the histories of the values given before all steps, which start at their rest values."""
-        by_rest: dict[float, list[Name]] = {}
-        for name in self.changing:
-            by_rest.setdefault(self.rest.get(name, 0.0), []).append(name)
-        for value, names in by_rest.items():
-            track = Track(array("d", (0.0, value)), self.changing.get(names[0])[2], len(names))
+        """Begin the histories of the values that are given before all steps. They start at the values of `rest`."""
+        by_value: dict[float, list[Name]] = {}
+        for name in self.step_values:
+            by_value.setdefault(self.rest.get(name, 0.0), []).append(name)
+        for value, names in by_value.items():
+            track = Track(array("d", (0.0, value)), self.step_values.get(names[0])[2], len(names))
             self.tracks.update((name, track) for name in names)
-        self.initial, self.changing = self.changing, Values()
+        self.initial, self.step_values = self.step_values, Values()
 
-    def forget(self, keyword: str = "") -> None:
-        """Remove the values of earlier steps, except those whose names have another keyword."""
+    def remove_earlier(self, keyword: str = "") -> None:
+        """Mark the values of earlier steps for removal, except those whose names have a keyword other than `keyword`."""
         self.initial = Values()
         for name, track in self.tracks.items():
-            if track.alive and name not in self.changing and getattr(name, "keyword", keyword) == keyword:
-                self.dying[name] = None
+            if track.alive and name not in self.step_values and getattr(name, "keyword", keyword) == keyword:
+                self.removals[name] = None
 
     def advance(self, number: int, step: Step) -> None:
         """Advance to the end of step `number`, counted from 1."""
         begin, start = float(number - 1), self.time
         self.time += step.period
-        current = self.initial if self.initial.rows else self.changing
+        current = self.initial if self.initial.rows else self.step_values
         if current is self.initial:
-            current.update(self.changing)
-        names = [*current, *self.dying]
+            current.update(self.step_values)
+        names = [*current, *self.removals]
         rests = np.fromiter((self.rest.get(name, 0.0) for name in names), float, len(names))
         values, amplitudes = current.columns()
         alive = np.arange(len(names)) < len(values)
-        values, amplitudes = np.append(values, rests[len(values) :]), [*amplitudes, *[""] * len(self.dying)]
+        values, amplitudes = np.append(values, rests[len(values) :]), [*amplitudes, *[""] * len(self.removals)]
         track_ids = np.fromiter((id(self.tracks.get(name)) for name in names), np.intp, len(names))
-        changed = set()
+        changed_tracks = set()
         for rows in _equal_rows(track_ids, values, np.array(amplitudes), rests, alive):
             value, amplitude = float(values[rows[0]]), amplitudes[rows[0]]
             track = self._track([names[row] for row in rows], float(rests[rows[0]]), current)
-            changed.add(id(track))
+            changed_tracks.add(id(track))
             track.alive = bool(alive[rows[0]])
             self.in_total_time.pop(id(track), None)
             track.add([(begin, track.last)])
             if amplitude:
-                shape = self.content.amplitudes[folded(amplitude)]
+                shape = self.content.amplitudes[key_of(amplitude)]
                 track.add(_amplitude_points(value, shape, begin, start, step.period))
                 if shape.total:
                     track.shape, self.in_total_time[id(track)] = (value, shape), track
             else:
                 track.add([(begin + 1, value)])
         for track_id, track in self.in_total_time.items():
-            if track_id not in changed and track.shape is not None:
+            if track_id not in changed_tracks and track.shape is not None:
                 track.add(_amplitude_points(*track.shape, begin, start, step.period))
-        self.changing, self.initial, self.dying = Values(), Values(), {}
+        self.step_values, self.initial, self.removals = Values(), Values(), {}
 
     def _track(self, names: list[Name], rest: float, current: Values[Name]) -> Track:
         """Return a track for these names only: the existing track, a new track, or a copy of a track with more names."""
@@ -237,7 +237,7 @@ class Histories(Generic[Name]):
         points, end = self.tracks[name].points, float(len(self.content.steps))
         return points if points[-1][0] >= end else (*points, (end, points[-1][1]))
 
-    def alike(self) -> Iterator[tuple[Table, list[Name]]]:
+    def distinct(self) -> Iterator[tuple[Table, list[Name]]]:
         """Yield each distinct history with the names that share it."""
         members: dict[bytes, list[Name]] = {}
         for name, track in self.tracks.items():
@@ -251,19 +251,18 @@ def _equal_rows(*columns: AnyArray) -> Iterator[Indices]:
     order = np.lexsort(columns)
     differs = np.zeros(max(len(order) - 1, 0), bool)
     for column in columns:
-        ordered = column[order]
-        differs |= ordered[1:] != ordered[:-1]
+        sorted_column = column[order]
+        differs |= sorted_column[1:] != sorted_column[:-1]
     bounds = np.array([0, *(np.flatnonzero(differs) + 1), len(order)])[len(order) == 0 :]
     for group in np.argsort(order[bounds[:-1]]):
         yield order[bounds[group] : bounds[group + 1]]
 
 
 class ByShape(Generic[Name]):
-    """Histories of nodes, facets or cells, grouped by a key, such as an axis, and by shape: many values become a few loads.
+    """Histories of nodes, facets or cells, grouped by a key, such as an axis, and by shape, so that few loads are needed.
 
-    Iteration yields the axis, the points, the value and the history
-    of each group. The value is 1 if all points have the same history; otherwise it is a function that returns one value for
-    each point, with the points in ascending order.
+    Iteration yields the axis, the points, the value and the history of each group. The value is 1 if all points have the same
+    history; otherwise it is a function that returns one value for each point, with the points in ascending order.
     """
 
     def __init__(self) -> None:
@@ -278,10 +277,10 @@ class ByShape(Generic[Name]):
         members.extend(points)
 
     @staticmethod
-    def of(alike: Iterable[tuple[Table, Sequence[int]]]) -> ByShape[int]:
+    def of(histories: Iterable[tuple[Table, Sequence[int]]]) -> ByShape[int]:
         """Return the histories of scalar quantities, whose axis is 0."""
         by_shape = ByShape[int]()
-        for table, points in alike:
+        for table, points in histories:
             by_shape.add(0, table, points)
         return by_shape
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, defined, refusing, registered
+from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, look_up, refusing, register
 from fastcontact.cases.decks.content import Content, Interaction, Step
 from fastcontact.cases.decks.histories import JUMP
 from fastcontact.contact.cohesion import ELASTIC
@@ -28,7 +28,7 @@ JUST_BEYOND = 1.0 + 1e-9
 def interaction(content: Content, block: Block) -> Interaction:
     """Read *SURFACE INTERACTION and return the new contact properties, to which the following keywords belong."""
     name = block.required("NAME")
-    properties = registered("surface interaction", name, content.interactions, Interaction(name, block.location), block)
+    properties = register("surface interaction", name, content.interactions, Interaction(name, block.location), block)
     if block.rows:
         block.rows[0].number(0, 1.0)
         content.note(block.rows[0], "the thickness of the interaction has no effect; sections define the thickness")
@@ -38,7 +38,7 @@ def interaction(content: Content, block: Block) -> Interaction:
 def changed_interaction(content: Content, step: Step, block: Block) -> Interaction:
     """Read *CHANGE FRICTION; the *FRICTION below it defines the friction from the start of the current step."""
     name = block.required("INTERACTION")
-    original = defined("surface interaction", name, content.interactions, block)
+    original = look_up("surface interaction", name, content.interactions, block)
     changed = Interaction(name, block.location, friction=-1.0)  # the negative value reveals a missing *FRICTION
     original.friction_changes.append((len(content.steps) - 1, changed))
     return changed
@@ -103,7 +103,7 @@ def gap_heat_generation(content: Content, current: Interaction, block: Block) ->
     current.friction_heat = block.location, share
 
 
-def keep(content: Content, current: Interaction, block: Block) -> None:
+def store(content: Content, current: Interaction, block: Block) -> None:
     """Store *COHESIVE BEHAVIOR, *DAMAGE INITIATION or *DAMAGE EVOLUTION, which are interpreted together."""
     if block.keyword in current.cohesion:
         raise block.refuse(f"surface interaction '{current.name}' has this keyword twice")
@@ -149,7 +149,7 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
         return {"kind": "tied"}
     if initiation is None or evolution is None:
         raise behaviour.refuse("*DAMAGE INITIATION and *DAMAGE EVOLUTION are both needed")
-    strength, shear = _in_modes(initiation, "strengths")
+    strength, shear = _opening_and_shear(initiation, "strengths")
     criterion = INITIATIONS[initiation.choice("CRITERION", tuple(INITIATIONS))]
     constants = {"strength": strength, "shear_strength": shear, "initiation": criterion}
     constants.update(_evolution(evolution, constants, stiffness))
@@ -162,7 +162,7 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
 
 
 def _stiffness(block: Block) -> float | None:
-    """Return the stiffness [pressure / length] of a layer, or None; CaseError if it depends on the direction."""
+    """Return the stiffness [pressure / length] of a layer, or None. Raises CaseError if it depends on the direction."""
     block.choice("TYPE", ("UNCOUPLED",))
     block.choice("ELIGIBILITY", ("CURRENT CONTACTS", "ORIGINAL CONTACTS"))
     if not block.rows:
@@ -181,7 +181,7 @@ def _evolution(block: Block, initiation: dict[str, Any], stiffness: float | None
     kind = block.choice("TYPE", ("DISPLACEMENT", "ENERGY"))
     mode = block.choice("MIXED MODE BEHAVIOR", ("TABULAR", *MODES))
     if kind == "ENERGY" and mode in MODES:
-        energy, shear = _in_modes(block, "energies")
+        energy, shear = _opening_and_shear(block, "energies")
         power = as_number(block.location, block.required("POWER"))
         return {"energy": energy, "shear_energy": shear, "mixed_mode": MODES[mode], "exponent": power}
     if mode in MODES:
@@ -198,8 +198,8 @@ def _evolution(block: Block, initiation: dict[str, Any], stiffness: float | None
     return {"energy": 0.5 * strength * failure_opening}
 
 
-def _in_modes(block: Block, quantity: str) -> tuple[float, float]:
-    """Return the numbers for opening and for sliding; CaseError if those of the two shear directions differ."""
+def _opening_and_shear(block: Block, quantity: str) -> tuple[float, float]:
+    """Return the numbers for opening and for sliding. Raises CaseError if those of the two shear directions differ."""
     row = block.only("modes or fields")
     values = [row.positive(index, "number") for index in range(3)]
     if values[1] != values[2]:
@@ -255,7 +255,7 @@ def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
 
 
 def perfect_conductance(content: Content, model: Model, location: Location) -> Any:
-    """Return the conductance of a tie [power / (area temperature)], so large that the sides have nearly one temperature."""
+    """Return the conductance of a tie [power / (area temperature)], which keeps both sides at nearly the same temperature."""
     largest = max(np.max(material.conductivity) for material, _ in model.materials)
     h = PERFECT * float(largest) / float(np.ptp(model.mesh.points, axis=0).max())
     difference = "the temperatures of the sides differ by about 1e-8 of their variation"

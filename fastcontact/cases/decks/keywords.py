@@ -19,7 +19,7 @@ ANYTHING = "*"
 class Keyword:
     """Properties of a keyword.
 
-    `context` states where the keyword may stand:
+    `context` states where the keyword is admissible:
 
     - "material", "interaction", "coupling" and "procedure": below an open material, interaction, coupling or step;
     - "part": in a part or in the assembly, outside instances and steps;
@@ -102,11 +102,11 @@ TRANSLATED = {
         "material", without_effect("no effect, because heat conduction is steady or temperatures are given"), ANYTHING
     ),
     # Below *SURFACE INTERACTION.
-    "COHESIVE BEHAVIOR": Keyword("interaction", interactions.keep, "TYPE; ELIGIBILITY"),
+    "COHESIVE BEHAVIOR": Keyword("interaction", interactions.store, "TYPE; ELIGIBILITY"),
     "DAMAGE EVOLUTION": Keyword(
-        "interaction", interactions.keep, "TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO", "DEGRADATION"
+        "interaction", interactions.store, "TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO", "DEGRADATION"
     ),
-    "DAMAGE INITIATION": Keyword("interaction", interactions.keep, "CRITERION"),
+    "DAMAGE INITIATION": Keyword("interaction", interactions.store, "CRITERION"),
     "DAMAGE STABILIZATION": Keyword(
         "interaction", without_effect("no effect: damage has no viscous regularisation"), ANYTHING
     ),
@@ -138,7 +138,7 @@ TRANSLATED = {
     # Procedures of steps.
     **dict.fromkeys(
         ("COUPLED TEMPERATURE-DISPLACEMENT", "HEAT TRANSFER", "UNCOUPLED TEMPERATURE-DISPLACEMENT"),
-        Keyword("procedure", steps.heated, "STEADY STATE", SOLUTION_CONTROLS),
+        Keyword("procedure", steps.heat_procedure, "STEADY STATE", SOLUTION_CONTROLS),
     ),
     "FREQUENCY": Keyword("procedure", steps.frequency, "", "EIGENSOLVER; NORMALIZATION; SOLVER; STORAGE; GLOBAL"),
     "STATIC": Keyword("procedure", steps.static, "", SOLUTION_CONTROLS),
@@ -190,8 +190,10 @@ def with_standard_blanks(block: Block) -> Block:
     return replace(block, location=replace(block.location, keyword=keyword), parameters=parameters)
 
 
-def checked(block: Block, about: str) -> Keyword:
-    """Return the properties of a keyword; CaseError if the keyword or one of its parameters is unknown or not supported.
+def keyword_properties(block: Block, about: str) -> Keyword:
+    """Return the properties of a keyword.
+
+    Raises CaseError if the keyword or one of its parameters is unknown or not supported.
 
     `about` precedes messages about keywords outside the scope of the package.
     """
@@ -233,13 +235,13 @@ class Reader:
     step: Step | None = None
     coupling: Block | None = None
 
-    def take(self, block: Block) -> None:
+    def read_block(self, block: Block) -> None:
         """Read one block, which closes the open objects to which its keyword cannot belong."""
         keyword, content = block.keyword, self.content
         if keyword in OUTPUT:
             content.outputs.append(block.location)
             return
-        properties = checked(block, self.material.about if self.material else "")
+        properties = keyword_properties(block, self.material.about if self.material else "")
         context = properties.context
         if self.coupling is not None and keyword not in ("KINEMATIC", "DISTRIBUTING"):
             raise self.coupling.refuse("*KINEMATIC or *DISTRIBUTING must follow")
@@ -261,16 +263,16 @@ class Reader:
             raise block.refuse("is supported for the whole assembly only, not inside a part or instance")
         if context == "part" and self.instance is not None:
             raise block.refuse("is not supported inside an instance: put it into the part or the assembly")
-        opened = properties.read(content, *([] if context in ("deck", "property", "model") else [owner]), block)
+        new_object = properties.read(content, *([] if context in ("deck", "property", "model") else [owner]), block)
         if properties.opens:
-            setattr(self, properties.opens, opened)
+            setattr(self, properties.opens, new_object)
 
 
 def read_content(blocks: Iterable[Block]) -> Content:
-    """Return the content of a deck from its blocks; CaseError with file, line and keyword if a block is invalid."""
+    """Return the content of a deck from its blocks. Raises CaseError with file, line and keyword if a block is invalid."""
     reader = Reader()
     for block in blocks:
-        reader.take(with_standard_blanks(block))
+        reader.read_block(with_standard_blanks(block))
     if reader.step is not None:
         raise reader.step.refuse("the step has no *END STEP: the deck is cut off, or the line is missing")
     if reader.coupling is not None:

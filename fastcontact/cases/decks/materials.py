@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.blocks import Block, as_number, refusing, registered
+from fastcontact.cases.decks.blocks import Block, as_number, refusing, register
 from fastcontact.cases.decks.content import Content, Material
 from fastcontact.elasticity import nonlinear_materials as nonlinear
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
@@ -18,18 +18,18 @@ from fastcontact.elasticity.materials import LinearElastic
 CONSTANTS = {"ISOTROPIC": 2, "ENGINEERING CONSTANTS": 9, "ORTHOTROPIC": 9, "ANISOTROPIC": 21}
 # Poisson's ratio at small strains of a hyperelastic material whose compressibility constant D1 is zero, as in CalculiX.
 DEFAULT_POISSON_RATIO = 0.475
-# Number of deviatoric constants and of compressibility constants of each hyperelastic law; for Ogden, of each term.
+# Number of deviatoric constants and of compressibility constants of each hyperelastic law, and for Ogden of each term.
 HYPERELASTIC = {"NEO HOOKE": (1, 1), "MOONEY-RIVLIN": (2, 1), "YEOH": (3, 3), "OGDEN": (2, 1)}
 # Number of coefficients of expansion and conductivity by type.
 COEFFICIENTS = {"ISO": 1, "ORTHO": 3}
-# Elastic constants in decks of heat transfer alone; they have no effect, since all displacements are fixed.
+# Elastic constants for decks with heat transfer only. They have no effect, since all displacements are fixed.
 ARBITRARY_LAW = LinearElastic(E=1.0, nu=0.0)
 
 
 def material(content: Content, block: Block) -> Material:
     """Read *MATERIAL and return the new material, to which the following keywords belong."""
     name = block.required("NAME")
-    return registered("material", name, content.materials, Material(name, block.location), block)
+    return register("material", name, content.materials, Material(name, block.location), block)
 
 
 def elastic(content: Content, current: Material, block: Block) -> None:
@@ -165,7 +165,10 @@ def expansion(content: Content, current: Material, block: Block) -> None:
 
 
 def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
-    """Return the coefficient of a block, or its coefficients along the axes; CaseError if they depend on the temperature."""
+    """Return the coefficient of a block, or its coefficients along the axes.
+
+    Raises CaseError if they depend on the temperature.
+    """
     kind = block.choice("TYPE", tuple(COEFFICIENTS))
     row, count = block.only("temperatures"), COEFFICIENTS[kind]
     values = tuple(row.number(index) for index in range(count))
@@ -177,7 +180,7 @@ def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
 def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     """Return the model's material with the given `axes`; `modes` is true if its elements have incompatible modes."""
     if content.heat == "alone":
-        return _with_constants(material, ARBITRARY_LAW, axes, conductivity=_conductivity(content, material))
+        return _add_constants(material, ARBITRARY_LAW, axes, conductivity=_conductivity(content, material))
     assert material.law is not None
     law, expansion = material.law(axes), material.expansion
     law = replace(law, density=material.density)
@@ -186,7 +189,7 @@ def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     elif modes:
         law = replace(law, incompatible_modes=True)
     if content.heat or material.conductivity is not None:
-        law = _with_constants(material, law, axes, conductivity=_conductivity(content, material))
+        law = _add_constants(material, law, axes, conductivity=_conductivity(content, material))
     conditions = [condition for step in content.steps for condition in step.conditions]
     heated = content.heat or any(condition.block.keyword == "TEMPERATURE" for condition in conditions)
     if expansion is None:
@@ -195,11 +198,14 @@ def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
         return replace(law, expansion=0.0) if heated else law
     if not heated:
         content.note(material, f"{material.about}without temperatures the expansion has no effect")
-    return _with_constants(material, law, axes, expansion=expansion)
+    return _add_constants(material, law, axes, expansion=expansion)
 
 
 def _conductivity(content: Content, material: Material) -> float | tuple[float, ...] | None:
-    """Return the conductivity of a material; CaseError if temperatures are computed and it is missing or not positive."""
+    """Return the conductivity of a material.
+
+    Raises CaseError if temperatures are computed and it is missing or not positive.
+    """
     block = material.conductivity
     if block is None:
         if content.heat:
@@ -214,7 +220,7 @@ def _conductivity(content: Content, material: Material) -> float | tuple[float, 
     return values
 
 
-def _with_constants(material: Material, law: Any, axes: Any, **constants: Any) -> Any:
+def _add_constants(material: Material, law: Any, axes: Any, **constants: Any) -> Any:
     """Return a material with additional constants; an elastic one becomes orthotropic for constants along the axes."""
     if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
         if isinstance(law, nonlinear.NonlinearElastic):

@@ -10,7 +10,7 @@ import numpy as np
 
 from fastcontact.arrays import Indices
 from fastcontact.cases.decks.assembled import Assembly, Element, Face, assemble, facet_points
-from fastcontact.cases.decks.blocks import Location, folded
+from fastcontact.cases.decks.blocks import Location, key_of
 from fastcontact.cases.decks.content import Content, Surface
 from fastcontact.mesh import topology
 from fastcontact.mesh.mesh import Mesh, starts_of
@@ -38,7 +38,7 @@ class DeckMesh(Assembly):
         Groups of cells, as rows by element type.
     point_groups : dict of str to ndarray (n,) of int
         Groups of points in ascending order.
-    loose : dict of str to list of int
+    excluded : dict of str to list of int
         Points of the facets around a node-based surface that do not belong to the surface, by the group of the facets.
     """
 
@@ -47,7 +47,7 @@ class DeckMesh(Assembly):
     rows: dict[tuple[int, ...], int] = field(default_factory=dict)
     groups: dict[str, dict[str, list[int]]] = field(default_factory=dict)
     point_groups: dict[str, Indices] = field(default_factory=dict)
-    loose: dict[str, list[int]] = field(default_factory=dict)
+    excluded: dict[str, list[int]] = field(default_factory=dict)
 
     @cached_property
     def kinematics(self) -> str:
@@ -178,18 +178,21 @@ def _add_groups(deck_mesh: DeckMesh) -> None:
 
 
 def _add_node_based_surface(deck_mesh: DeckMesh, group: str, definition: Surface, scope: str) -> None:
-    """Add a group of the facets around the nodes of a node-based surface; other points of these facets are `loose`."""
+    """Add a group of the facets around the nodes of a node-based surface; other points of these facets are `excluded`."""
     complete, further, remaining = deck_mesh.faces_of_nodes(definition, scope)
     if not (complete or further):  # the nodes belong to no solid
         return
     deck_mesh.add_facets(group, [*complete, *further])
     if remaining:
         points = {point for face in (*complete, *further) for point in facet_points(*face)}
-        deck_mesh.loose[group] = sorted(points.difference(deck_mesh.surface_nodes(definition, scope)))
+        deck_mesh.excluded[group] = sorted(points.difference(deck_mesh.surface_nodes(definition, scope)))
 
 
 def secondary_group(deck_mesh: DeckMesh, name: str, location: Location) -> str:
-    """Return the group of a surface of faces or nodes; CaseError if one of its nodes is on no outer face of a solid."""
+    """Return the group of a surface of faces or nodes.
+
+    Raises CaseError if one of its nodes is on no outer face of a solid.
+    """
     definition, scope = deck_mesh.surface(name, location)
     if not definition.of_nodes:
         return group_of_surface(deck_mesh, name)
@@ -206,4 +209,4 @@ def secondary_group(deck_mesh: DeckMesh, name: str, location: Location) -> str:
 
 def group_of_surface(deck_mesh: DeckMesh, name: str) -> str:
     """Return the name of the group of a surface, whose case is ignored."""
-    return next(group for group in deck_mesh.groups if folded(group) == folded(name))
+    return next(group for group in deck_mesh.groups if key_of(group) == key_of(name))

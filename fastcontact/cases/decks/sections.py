@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.cases.decks.assembled import Assembly, facet_points
-from fastcontact.cases.decks.blocks import Block, folded, refusing
+from fastcontact.cases.decks.blocks import Block, key_of, refusing
 from fastcontact.cases.decks.content import Condition, Content, PretensionSection, SectorEnds, Sectors
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
@@ -30,7 +30,7 @@ def pretension_section(content: Content, block: Block) -> None:
 class Locks:
     """Load factors at which pretension sections are locked.
 
-    Raises CaseError if the node of a section belongs to a body or to another section.
+    The constructor raises CaseError if the node of a section belongs to a body or to another section.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Locks:
         self.number = 0
         for section in assembly.content.pretension_sections:
             point = assembly.node(section.node, section.location)
-            if point in assembly.of_solids:
+            if point in assembly.solid_points:
                 raise section.refuse(f"node {section.node} belongs to an element: a section needs a separate node")
             if point in self.points:
                 line = self.points[point].location.line
@@ -56,20 +56,20 @@ class Locks:
             self.points[point] = section
 
     def begin(self, number: int, supports: list[Condition], assembly: Assembly) -> None:
-        """Advance to step `number`; CaseError if it releases a locked section."""
+        """Advance to step `number`. Raises CaseError if it releases a locked section."""
         self.number = number
         if not any(condition.new for condition in supports):
             return
         rows = [row for condition in supports for row in condition.block.each()]
-        named = {point for row in rows for point in assembly.nodes(row.text(0), row.location)}
+        points = {point for row in rows for point in assembly.nodes(row.text(0), row.location)}
         for point in self.begins:
-            if point not in named:
+            if point not in points:
                 location = next(condition.block.location for condition in supports if condition.new)
                 raise location.refuse(
                     f"node {self.points[point].node} of a pretension section is released here: a locked section stays locked"
                 )
 
-    def take(self, point: int, component: int, fixed: bool) -> bool:
+    def record(self, point: int, component: int, fixed: bool) -> bool:
         """Return whether a support locks a section, and record the lock."""
         if point not in self.points or component != 1 or not fixed:
             return False
@@ -78,7 +78,10 @@ class Locks:
 
 
 def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
-    """Return the mesh cut along all pretension sections; CaseError for an impossible cut or two sections of a surface."""
+    """Return the mesh cut along all pretension sections.
+
+    Raises CaseError for an impossible cut or two sections of a surface.
+    """
     sections: set[str] = set()
     for section in deck_mesh.content.pretension_sections:
         deck_mesh.faces(section.surface, section.location)
@@ -94,7 +97,7 @@ def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
 
 def add_sections(model: Model, deck_mesh: DeckMesh, locks: Locks) -> list[MultiPointConstraint]:
     """Add the pretension sections to a model and return their constraints, including those of locked sections."""
-    before, links, locked = len(model.relations), [], []
+    n_before, links, locked = len(model.relations), [], []
     for point, section in locks.points.items():
         group, location = group_of_surface(deck_mesh, section.surface), section.location
         normal = None if section.normal is None else section.normal[: deck_mesh.dim]
@@ -105,7 +108,7 @@ def add_sections(model: Model, deck_mesh: DeckMesh, locks: Locks) -> list[MultiP
         if point in locks.begins:
             locked.append(MultiPointConstraint(f"the locked length of line {location.line}", row))
     model.relations.extend(links)
-    return [*model.relations[before:], *locked]
+    return [*model.relations[n_before:], *locked]
 
 
 def _orientation_sign(deck_mesh: DeckMesh, section: PretensionSection) -> float:
@@ -139,7 +142,7 @@ def cyclic_symmetry_model(content: Content, block: Block) -> None:
 
 def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]:
     """Add the cyclic symmetries of a deck to the model and return their constraints."""
-    content, before = deck_mesh.content, len(model.relations)
+    content, n_before = deck_mesh.content, len(model.relations)
     used: set[int] = set()
     for sectors in content.sectors:
         ends = _ends(content, sectors)
@@ -159,12 +162,12 @@ def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]
     for ends in content.sector_ends:
         if id(ends) not in used:
             raise ends.refuse("no *CYCLIC SYMMETRY MODEL defines the number of sectors and the axis")
-    return model.relations[before:]
+    return model.relations[n_before:]
 
 
 def _ends(content: Content, sectors: Sectors) -> SectorEnds:
     """Return the sector ends of a *CYCLIC SYMMETRY MODEL: those of its TIE, or the only ones of the deck."""
-    matching = [ends for ends in content.sector_ends if not sectors.tie or folded(ends.name) == folded(sectors.tie)]
+    matching = [ends for ends in content.sector_ends if not sectors.tie or key_of(ends.name) == key_of(sectors.tie)]
     if len(matching) != 1:
         names = ", ".join(ends.name or f"that of line {ends.location.line}" for ends in content.sector_ends) or "none"
         parameter = f"TIE={sectors.tie[:80]}" if sectors.tie else "TIE is not given"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from fastcontact.cases.decks.blocks import Block, defined, folded
+from fastcontact.cases.decks.blocks import Block, key_of, look_up
 from fastcontact.cases.decks.content import Amplitude, Condition, Content, Step
 
 # Largest number of increments into which a step of a path-dependent model is divided.
@@ -43,7 +43,7 @@ def static(content: Content, step: Step, block: Block) -> None:
             raise row.refuse("the increment and the length of the step must be positive")
 
 
-def heated(content: Content, step: Step, block: Block) -> None:
+def heat_procedure(content: Content, step: Step, block: Block) -> None:
     """Read *HEAT TRANSFER, *COUPLED or *UNCOUPLED TEMPERATURE-DISPLACEMENT: *STATIC with steady heat conduction."""
     if "STEADY STATE" not in block.parameters:
         raise block.refuse("only STEADY STATE is supported, not transient heat conduction")
@@ -92,7 +92,7 @@ def end_step(content: Content, step: Step | None, block: Block) -> None:
 def condition(content: Content, step: Step | None, block: Block) -> None:
     """Store a block of supports or loads of a step, or a *BOUNDARY that precedes all steps."""
     if name := block.get("AMPLITUDE"):
-        defined("amplitude", name, content.amplitudes, block)
+        look_up("amplitude", name, content.amplitudes, block)
     new = Condition(block, block.choice("OP", ("MOD", "NEW")) == "NEW", name)
     if step is not None:
         step.conditions.append(new)
@@ -112,4 +112,4 @@ def amplitude(content: Content, block: Block) -> None:
     times, values = numbers[::2], numbers[1::2]
     if not times or len(times) != len(values) or any(b <= a for a, b in pairwise(times)):
         raise block.refuse(f"amplitude '{name}' needs pairs of time and multiplier, with ascending times")
-    content.amplitudes[folded(name)] = Amplitude(block.location, name, tuple(times), tuple(values), total)
+    content.amplitudes[key_of(name)] = Amplitude(block.location, name, tuple(times), tuple(values), total)

@@ -48,7 +48,7 @@ class Element:
     vtk : int
         Cell type in VTK.
     quadratic : str
-        Name of the serendipity element with the same corners; of a quadratic element its own name.
+        Name of the serendipity element with the same corners; for a quadratic element, its own name.
     dilatation : int, optional
         Degree, 0 or 1, of the polynomial onto which the dilatation of nearly incompressible materials is projected; None if
         gradients are constant, so that no projection is needed.
@@ -157,7 +157,7 @@ def quadratic(name: str, linear: Element, functions: Functions, **others: Any) -
 
 
 def with_middles(linear: Element) -> Array:
-    """Return the nodes (n_nodes, dim) of a linear element and the midpoints of its edges [-]."""
+    """Return the nodes of a linear element, followed by the midpoints of its edges, as an array (n_nodes, dim) [-]."""
     return np.vstack([linear.nodes, linear.nodes[np.array(linear.edges)].sum(axis=1) / 2])
 
 
@@ -165,7 +165,7 @@ def serendipity(box: Element) -> Functions:
     """Return nodes (n_nodes, dim) [-], shape functions and derivatives of a serendipity square or cube.
 
     The function of a mid-side node with the coordinates X is the product of 1 - x^2 for the coordinate x along its edge,
-    where X is 0, and of (1 + x X) / 2 for the others. The function of a corner is its linear function times the sum of all
+    where X is 0, and of (1 + x X) / 2 for the rest. The function of a corner is its linear function times the sum of all
     x X minus dim - 1 (Zienkiewicz and Taylor).
     """
     nodes, dim = with_middles(box), box.dim

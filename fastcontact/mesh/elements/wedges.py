@@ -15,7 +15,7 @@ from fastcontact.mesh.quadrature import gauss_line, prism, triangle_3_sides, tri
 
 NODES, shape, gradient = product(np.column_stack([np.tile(TRI3.nodes, (2, 1)), np.repeat([-1.0, 1.0], 3)]), TRI3, LINE2)
 Z = NODES[:, 2]
-TWICE = np.tile(np.arange(3), 2)  # function of the triangle at each of the six corners
+TWICE = np.tile(np.arange(3), 2)  # number of the triangle corner below or above each of the six corners
 
 WEDGE6 = Element(
     "wedge6", NODES, edges=((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),

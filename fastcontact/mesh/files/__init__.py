@@ -1,1 +1,1 @@
-"""Mesh files, read and written."""
+"""Reading and writing of mesh files."""

@@ -48,7 +48,7 @@ def _keyword(line: str) -> tuple[str, dict[str, str]]:
 
 
 def append_cell_sets(path: Path, mesh: Mesh) -> None:
-    """Append the groups of cells to a file, because meshio would divide them by element type."""
+    """Append the groups of cells to a file as sets. The writer of meshio would divide each group by element type."""
     for name in mesh.group_names:
         if any(character in name for character in ",=*\n") or name != name.strip():
             raise FileError(f"group name '{name}' contains a character that Abaqus files do not permit: rename it")

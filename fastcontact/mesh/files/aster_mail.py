@@ -19,7 +19,7 @@ KINDS = {
     "QUAD9": "quad9", "TETRA4": "tet4", "TETRA10": "tet10", "PENTA6": "wedge6", "PENTA15": "wedge15", "PENTA18": "wedge18",
     "PYRAM5": "pyramid5", "PYRAM13": "pyramid13", "HEXA8": "hex8", "HEXA20": "hex20", "HEXA27": "hex27",
 }  # fmt: skip
-# Elements with another node order in code_aster: node k here is node NODE_ORDER[keyword][k] of code_aster. code_aster orders
+# Elements whose node order differs in code_aster: node k here is node NODE_ORDER[keyword][k] of code_aster. code_aster orders
 # the edges as bottom, vertical, top; fastcontact as bottom, top, vertical.
 _BRICK_EDGES = (*range(12), *range(16, 20), *range(12, 16))
 NODE_ORDER = {
@@ -45,18 +45,18 @@ def read(path: Path) -> tuple[Mesh, dict[str, int]]:
         If the file contains no cells.
     """
     content = _Content(path)
-    words = _words(path)
+    words = _read_words(path)
     for keyword, line in words:
         if keyword.upper() == "FIN":
             try:
                 return mesh_of(content.parts())
             except MeshError as error:
                 raise MeshError(f"'{path}': {error}") from None
-        content.add(keyword.upper(), line, _block(path, keyword, line, words))
+        content.add(keyword.upper(), line, _read_block(path, keyword, line, words))
     raise FileError(f"'{path}' ends without FIN: it is truncated, or not a mesh file of code_aster")
 
 
-def _words(path: Path) -> Iterator[Word]:
+def _read_words(path: Path) -> Iterator[Word]:
     """Yield the words of a file with their line numbers, without comments."""
     try:
         with open(path, encoding="utf-8", errors="replace") as file:
@@ -66,8 +66,8 @@ def _words(path: Path) -> Iterator[Word]:
         raise FileError(f"cannot read '{path}': {error}") from error
 
 
-def _block(path: Path, keyword: str, line: int, words: Iterator[Word]) -> list[Word]:
-    """Return the words of one block without header entries such as ``NOM = x``, of which only the names of groups remain."""
+def _read_block(path: Path, keyword: str, line: int, words: Iterator[Word]) -> list[Word]:
+    """Return the words of one block. Of header entries such as ``NOM = x``, only the names of groups are included."""
     block: list[Word] = []
     for word, number in words:
         if word.upper() == "FINSF":
@@ -104,11 +104,11 @@ class _Content:
                 block[name[0]] = [self._point(node) for node in nodes]
         elif keyword in self._groups:
             if not words:
-                raise self._refusal(line, f"{keyword} has no name")
+                raise self._error(line, f"{keyword} has no name")
             self._groups[keyword].setdefault(words[0][0], []).extend(words[1:])
         elif keyword not in IGNORED:
             keywords = ", ".join([*COORDINATES, *KINDS, *self._groups])
-            raise self._refusal(line, f"{keyword[:40]} is not known; a mesh has {keywords}")
+            raise self._error(line, f"{keyword[:40]} is not known; a mesh has {keywords}")
 
     def parts(self) -> dict[str, Any]:
         """Return points, cells and groups in the format of `meshio_process.plain_content`."""
@@ -136,25 +136,28 @@ class _Content:
     def _rows(self, keyword: str, line: int, words: list[Word], width: int) -> Iterator[list[Word]]:
         """Yield the words of a block in rows of `width` words."""
         if len(words) % width:
-            raise self._refusal(line, f"{keyword} has {len(words)} words, which do not form rows of {width}")
+            raise self._error(line, f"{keyword} has {len(words)} words, which do not form rows of {width}")
         yield from (words[i : i + width] for i in range(0, len(words), width))
 
     def _number(self, word: Word) -> float:
+        """Return a word as a number. Raises FileError if it is not a number."""
         try:
             return float(word[0].upper().replace("D", "E"))
         except ValueError:
-            raise self._refusal(word[1], f"'{word[0][:40]}' is not a number") from None
+            raise self._error(word[1], f"'{word[0][:40]}' is not a number") from None
 
     def _point(self, word: Word) -> str:
+        """Return the name of a node. Raises FileError if the node is not defined."""
         if word[0] not in self._points:
-            raise self._refusal(word[1], f"there is no node '{word[0][:40]}' before this line")
+            raise self._error(word[1], f"there is no node '{word[0][:40]}' before this line")
         return word[0]
 
     def _check_members(self, members: list[Word], names: Any, kind: str) -> None:
         """Raise FileError if a member of a group is not among the `names` of nodes or cells."""
         for word, line in members:
             if word not in names:
-                raise self._refusal(line, f"there is no {kind} '{word[:40]}'")
+                raise self._error(line, f"there is no {kind} '{word[:40]}'")
 
-    def _refusal(self, line: int, text: str) -> FileError:
+    def _error(self, line: int, text: str) -> FileError:
+        """Return a FileError with the file, the line and a text."""
         return FileError(f"'{self._path}', line {line}: {text}")

@@ -18,7 +18,7 @@ MOST_WORDS = 200
 
 
 def readable(path: Path, folder: Path) -> Path:
-    """Return a file that meshio reads: `path`, or a converted copy in a temporary `folder`."""
+    """Return the path of a file that meshio can read: `path`, or a converted copy in the temporary `folder`."""
     with open(path, "rb") as file:
         first, second = (file.readline(256).strip() for _ in range(2))
     converted = folder / "newer.msh"

@@ -23,7 +23,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.files.meshio_content import VERTEX, Block, build_mesh, check_kinds
 from fastcontact.mesh.mesh import Mesh
 
-# Elements with another node order in MED: node k here is node NODE_ORDER[code][k] of MED. MED numbers the base of a solid as
+# Elements whose node order differs in MED: node k here is node NODE_ORDER[code][k] of MED. MED numbers the base of a solid as
 # seen from outside, fastcontact as seen from inside.
 NODE_ORDER = {element.med: element.reversed for element in elements.ELEMENTS.values() if element.dim == 3}
 # MED orders the face centres as bottom, the four sides in turn, top; fastcontact as -x, +x, -y, +y, bottom, top.
@@ -70,6 +70,7 @@ def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
 
 
 def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
+    """Return the name of the mesh to read. Raises FileError if there is no mesh, or several and no `mesh_name`."""
     names = list(file["ENS_MAA"]) if "ENS_MAA" in file else []
     if not names:
         raise FileError(f"'{path}' contains no MED mesh (no entry in ENS_MAA): name a MED file that has one")
@@ -83,6 +84,7 @@ def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
 
 
 def _read_mesh(file: Any, group: Any) -> tuple[Mesh, int]:
+    """Return the mesh stored in an HDF5 group, and the number of its one-node cells."""
     if int(attribute(group, "TYP", 0)) != 0:
         raise MeshError("it is a structured grid: convert it to an unstructured mesh")
     step = _first_step(group)
@@ -121,6 +123,7 @@ def _order(step: Any) -> tuple[int, int]:
 
 
 def _read_points(step: Any, mesh: Any) -> Array:
+    """Return the node coordinates (n_points, dim) [length]. Raises MeshError unless they are Cartesian and complete."""
     flat = values(step["NOE"], "COO")
     stored = step["NOE"]["COO"]
     system = int(attribute(mesh if "REP" in mesh.attrs else stored, "REP", 0))
@@ -137,7 +140,8 @@ def _read_points(step: Any, mesh: Any) -> Array:
 
 
 def _read_blocks(step: Any, families: Families) -> Iterator[Block]:
-    # MED 2 stores faces and edges in separate folders (FAC, ARE); later versions store all cells under MAI.
+    """Yield the cells of each type with their groups."""
+    # MED 2 stores faces and edges in separate folders (FAC, ARE), and later versions store all cells in the folder MAI.
     folders = [step[name] for name in ("MAI", "FAC", "ARE") if name in step]
     entries = [entry for folder in folders for entry in folder.items()]
     foreign = {code: _cell_count(entry) for code, entry in entries if code not in elements.BY_MED and code != "PO1"}
@@ -151,6 +155,7 @@ def _read_blocks(step: Any, families: Families) -> Iterator[Block]:
 
 
 def _members(entry: Any, count: int, families: Families) -> dict[str, Indices]:
+    """Return the rows of each group among `count` cells or nodes of an HDF5 group."""
     if "FAM" not in entry:
         return {}
     numbers = values(entry, "FAM")
@@ -160,6 +165,7 @@ def _members(entry: Any, count: int, families: Families) -> dict[str, Indices]:
 
 
 def _cell_count(entry: Any) -> int:
+    """Return the number of cells of a type, also of types that are not supported."""
     index = entry.get("INN")
     if index is not None:
         return max(len(index) - 1, 0)
@@ -167,6 +173,7 @@ def _cell_count(entry: Any) -> int:
 
 
 def _read_nodes(entry: Any, code: str) -> AnyArray:
+    """Return the connectivity (n_cells, n_nodes) of the cells of a type, in the node order of this package."""
     flat = values(entry, "NOD")
     size = 1 if code == "PO1" else elements.BY_MED[code].n_nodes
     if len(flat) % size:
@@ -189,18 +196,18 @@ def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> No
 def new_file(path: PathLike, mesh: Mesh) -> Iterator[Any]:
     """Open a new MED file, which appears at `path` when it is complete; `mesh` determines the version."""
     version = 4 if "wedge18" in mesh.cells else 3
-    with replacing(path) as temporary, _order_tracked(version >= 4), new_hdf5(temporary) as file:
+    with replacing(path) as temporary, _tracking_order(version >= 4), new_hdf5(temporary) as file:
         _set(file.create_group("INFOS_GENERALES"), MAJ=version, MIN=0, REL=0)
         yield file
 
 
 @contextmanager
-def _order_tracked(wanted: bool) -> Iterator[None]:
-    """Make new HDF5 groups track the order of their members if `wanted`; the MED library requires it in version 4."""
+def _tracking_order(enabled: bool) -> Iterator[None]:
+    """Make new HDF5 groups track the order of their members if `enabled`; the MED library requires it in version 4."""
     import h5py
 
     settings = h5py.get_config()
-    before, settings.track_order = settings.track_order, wanted
+    before, settings.track_order = settings.track_order, enabled
     try:
         yield
     finally:
@@ -215,7 +222,8 @@ def _set(group: Any, **attributes: Any) -> None:
         group.attrs[name] = np.bytes_(value) if isinstance(value, (str, bytes)) else value
 
 
-def _padded(names: Iterable[str]) -> str:
+def _fixed_width(names: Iterable[str]) -> str:
+    """Return names that are padded with blanks to COMPONENT_SIZE characters and joined."""
     return "".join(f"{name:<{COMPONENT_SIZE}}" for name in names)
 
 
@@ -227,7 +235,7 @@ def add_mesh(file: Any, mesh: Mesh, mesh_name: str) -> None:
     group = file.create_group(f"ENS_MAA/{mesh_name}")
     _set(group, DIM=max((elements.get(name).dim for name in mesh.cells), default=mesh.dim), ESP=mesh.dim)
     _set(group, REP=0, SRT=0, TYP=0, NXT=NO_STEP, NXI=NO_STEP, UNT="", DES="fastcontact")
-    _set(group, NOM=_padded(AXES[: mesh.dim]), UNI=_padded([""] * mesh.dim))
+    _set(group, NOM=_fixed_width(AXES[: mesh.dim]), UNI=_fixed_width([""] * mesh.dim))
     step = group.create_group(_step_key(NO_STEP, NO_STEP))
     _set(step, CGT=1, NDT=NO_STEP, NOR=NO_STEP, PDT=-1.0, NXT=NO_STEP, NXI=NO_STEP, PVT=NO_STEP, PVI=NO_STEP)
     folder = file.create_group(f"FAS/{mesh_name}")
@@ -237,6 +245,7 @@ def add_mesh(file: Any, mesh: Mesh, mesh_name: str) -> None:
 
 
 def _write_points(step: Any, mesh: Mesh, folder: Any) -> None:
+    """Write the points of a mesh and the families of its point groups."""
     numbers, families = families_of(mesh.point_groups, mesh.n_points, +1)
     points = step.create_group("NOE")
     _set(points, CGT=1, CGS=1, PFL=NO_PROFILE)
@@ -247,6 +256,7 @@ def _write_points(step: Any, mesh: Mesh, folder: Any) -> None:
 
 
 def _write_cells(step: Any, mesh: Mesh, folder: Any) -> None:
+    """Write the cells of a mesh and the families of its cell groups."""
     numbers, families = families_of(mesh.cell_groups, mesh.n_cells, -1)
     cells = step.create_group("MAI")
     _set(cells, CGT=1)
@@ -263,11 +273,13 @@ def _write_cells(step: Any, mesh: Mesh, folder: Any) -> None:
 
 
 def _write_array(group: Any, name: str, array: AnyArray, count: int) -> None:
+    """Write an array in flat form, with the number of its entities."""
     dataset = group.create_dataset(name, data=np.ascontiguousarray(array).ravel())
     _set(dataset, CGT=1, NBR=count)
 
 
 def _step_key(number: int, iteration: int) -> str:
+    """Return the name of the HDF5 group of a time step."""
     return f"{number:020d}{iteration:020d}"
 
 
@@ -279,7 +291,7 @@ def add_field(
     path = f"CHA/{name}"
     if path not in file:
         _set(file.create_group(path), MAI=mesh_name, TYP=FLOAT64, NCO=len(components), UNT="")
-        _set(file[path], NOM=_padded(components), UNI=_padded([""] * len(components)))
+        _set(file[path], NOM=_fixed_width(components), UNI=_fixed_width([""] * len(components)))
     group = file[path].create_group(_step_key(number, NO_STEP))
     _set(group, NDT=number, NOR=NO_STEP, PDT=float(time), RDT=NO_STEP, ROR=NO_STEP)
     support = group.create_group("NOE")
@@ -415,13 +427,14 @@ def read_families(folder: Any, level: int = 0) -> Families:
     families: Families = {}
     for entry in folder.values():
         if "NUM" in entry.attrs:
-            families[int(attribute(entry, "NUM"))] = _names_in(entry)
+            families[int(attribute(entry, "NUM"))] = _group_names_of(entry)
         elif hasattr(entry, "values") and level < LEVELS:
             families.update(read_families(entry, level + 1))
     return families
 
 
-def _names_in(family: Any) -> tuple[str, ...]:
+def _group_names_of(family: Any) -> tuple[str, ...]:
+    """Return the names of the groups of a family."""
     if "GRO" not in family:
         return ()
     groups = family["GRO"]

@@ -75,17 +75,17 @@ def read_field(
     if over not in OVER:
         raise FileError(f"over must be {' or '.join(OVER)}, not '{over}'")
     name = f"field '{field}' of '{file}'"
-    cells, stored = _cells(mesh, groups), read_file_field(file, field, over)
-    if instant is None and len(stored.values) != 1:
-        raise FileError(f"{name} has {len(stored.values)} instants: select one with instant")
-    row = 0 if instant is None else row_of(instant, stored.times, name)
+    cells, file_field = _cells(mesh, groups), read_file_field(file, field, over)
+    if instant is None and len(file_field.values) != 1:
+        raise FileError(f"{name} has {len(file_field.values)} instants: select one with instant")
+    row = 0 if instant is None else row_of(instant, file_field.times, name)
     if over == "cells":
         centres = np.concatenate([mesh.points[block].mean(axis=1) for block in cells])
         numbers = np.arange(len(centres))
-        rows, _ = _nearest(stored, centres, numbers, mesh, ("cell", "cells"), name)
-        return _complete(stored.values[:, rows], centres, numbers, "cell", name)[row][:, None]
+        rows, _ = _nearest(file_field, centres, numbers, mesh, ("cell", "cells"), name)
+        return _check_complete(file_field.values[:, rows], centres, numbers, "cell", name)[row][:, None]
     points = np.unique(np.concatenate([block.ravel() for block in cells])).astype(np.intp)
-    values = at_points_of(stored, mesh, points, name)[row]
+    values = at_points_of(file_field, mesh, points, name)[row]
     return np.where(np.isfinite(values), values, values[points].mean())
 
 
@@ -115,7 +115,7 @@ def row_of(instant: float, times: Array | None, name: str, error: type[Fastconta
 
 
 def at_points_of(field: FileField, mesh: Mesh, points: Indices, name: str) -> Array:
-    """Return the values (n_instants, n_points) of a field at the given points (k,) of a mesh, and NaN at the others.
+    """Return the values (n_instants, n_points) of a field at the given points (k,) of a mesh, with NaN at other points.
 
     If the file has the points of the mesh in the same order, values are assigned by number, otherwise by position.
 
@@ -131,12 +131,12 @@ def at_points_of(field: FileField, mesh: Mesh, points: Indices, name: str) -> Ar
         rows, tolerance = _nearest(field, mesh.points[points], points, mesh, ("point", "nodes"), name)
         _check_unique(field, mesh.points[points], tolerance, name)
     values = np.full((len(field.values), mesh.n_points), np.nan)
-    values[:, points] = _complete(field.values[:, rows], mesh.points[points], points, "point", name)
+    values[:, points] = _check_complete(field.values[:, rows], mesh.points[points], points, "point", name)
     return values
 
 
-def _in_space(positions: Array) -> Array:
-    """Return positions (n, 2) or (n, 3) with three coordinates."""
+def _in_3d(positions: Array) -> Array:
+    """Return positions (n, 2) or (n, 3) as an array (n, 3), with z = 0 in 2D."""
     return np.pad(positions, ((0, 0), (0, 3 - positions.shape[1])))
 
 
@@ -144,7 +144,7 @@ def _same_points(positions: Array, mesh: Mesh) -> bool:
     """Return whether the points of a file are those of a mesh in the same order."""
     if len(positions) != mesh.n_points:
         return False
-    difference = np.abs(_in_space(positions) - _in_space(mesh.points)).max(initial=0.0)
+    difference = np.abs(_in_3d(positions) - _in_3d(mesh.points)).max(initial=0.0)
     return bool(difference <= COINCIDENT * np.ptp(mesh.points, axis=0).max())
 
 
@@ -153,12 +153,12 @@ def _nearest(
 ) -> tuple[Indices, float]:
     """Return the rows (n,) of a field at positions (n, dim) in a mesh, and the tolerance of the distance [length].
 
-    `numbers` (n,) are those of the points or cells at the positions. In messages, `nouns` are the words for such an item, and
-    for the items on which the field should be written.
+    `numbers` (n,) are those of the points or cells at the positions. The two `nouns` are used in messages: the word for such
+    an item, and the word for the items on which the field should be written.
     """
     assert field.positions is not None
     tolerance = COINCIDENT * float(np.ptp(mesh.points, axis=0).max())
-    distance, rows = nearest(_in_space(field.positions), _in_space(positions))
+    distance, rows = nearest(_in_3d(field.positions), _in_3d(positions))
     far = np.flatnonzero(~(distance <= tolerance))
     if len(far):
         raise MeshError(
@@ -168,8 +168,8 @@ def _nearest(
     return rows, tolerance
 
 
-def _complete(values: Array, positions: Array, numbers: Indices, noun: str, name: str) -> Array:
-    """Return values (n_instants, n) at positions (n, dim). Raises MeshError if a value is missing."""
+def _check_complete(values: Array, positions: Array, numbers: Indices, noun: str, name: str) -> Array:
+    """Return `values` (n_instants, n) at positions (n, dim) unchanged. Raises MeshError if a value is missing."""
     missing = np.flatnonzero(~np.isfinite(values).all(axis=0))
     if len(missing):
         first = f"{noun} {numbers[missing[0]]} {positions[missing[0]]}"
@@ -180,13 +180,13 @@ def _complete(values: Array, positions: Array, numbers: Indices, noun: str, name
 def _check_unique(field: FileField, positions: Array, tolerance: float, name: str) -> None:
     """Raise MeshError if the file has different values at coincident points at one of the positions (n, dim)."""
     assert field.positions is not None
-    near, index = pairs_within(_in_space(field.positions), _in_space(positions), np.full(len(positions), tolerance))
+    near, index = pairs_within(_in_3d(field.positions), _in_3d(positions), np.full(len(positions), tolerance))
     ends = np.searchsorted(index, np.arange(len(positions) + 1))
     for point, first, end in zip(positions, ends[:-1], ends[1:], strict=True):
         members = near[first:end]
         if len(members) > 1 and np.ptp(field.values[:, members], axis=1).max() > 0.0:
             raise MeshError(
-                f"{name} has {len(members)} different values at {_in_space(point[None])[0]}, where bodies touch: write it on "
+                f"{name} has {len(members)} different values at {_in_3d(point[None])[0]}, where bodies touch: write it on "
                 "the nodes of this mesh, in their order"
             )
 
@@ -219,7 +219,7 @@ def read_file_field(path: PathLike, name: str, over: str) -> FileField:
     if suffix in med.MED_SUFFIXES:
         times, field, positions = med.read_field(file, name, at_points)
     elif suffix in VTKHDF_SUFFIXES:
-        times, field, positions = _vtkhdf(file, name, at_points)
+        times, field, positions = _read_vtkhdf(file, name, at_points)
     else:
         field, positions = meshio_files.read_data(file, name, at_points)
         field = field[None]
@@ -235,7 +235,7 @@ def read_file_field(path: PathLike, name: str, over: str) -> FileField:
 def read_temperatures(
     mesh: Mesh, file: PathLike | Sequence[PathLike], field: str, points: Indices, instant: float | None
 ) -> tuple[Array, Array | None]:
-    """Return temperatures (n_instants, n_points) at the given points (k,), and NaN at the others, and their times.
+    """Return temperatures (n_instants, n_points) at the given points (k,), with NaN at other points, and their times.
 
     Temperatures are in the unit of the file [temperature]. Times (n_instants,) are load factors [-]; they are None if the
     file has no times, if several files are given, or with an `instant`.
@@ -250,14 +250,14 @@ def read_temperatures(
         raise ModelError("no file is given for the temperature")
     fields, times = [], []
     for path in files:
-        stored = read_file_field(path, field, "points")
-        values = at_points_of(stored, mesh, points, f"field '{field}' of '{path}'")
+        file_field = read_file_field(path, field, "points")
+        values = at_points_of(file_field, mesh, points, f"field '{field}' of '{path}'")
         if len(files) > 1 and len(values) > 1:
             raise ModelError(
                 f"'{path}' has {len(values)} instants: each of several files must have one, or give a single file"
             )
         fields.append(values)
-        times.append(stored.times)
+        times.append(file_field.times)
     values, time = np.concatenate(fields), times[0] if len(files) == 1 else None
     if instant is None:
         return values, time
@@ -265,7 +265,7 @@ def read_temperatures(
     return values[row : row + 1], None
 
 
-def _vtkhdf(path: Path, name: str, at_points: bool) -> tuple[Array | None, AnyArray, Array]:
+def _read_vtkhdf(path: Path, name: str, at_points: bool) -> tuple[Array | None, AnyArray, Array]:
     """Return the times, the values and the positions of a field of an unstructured grid in VTKHDF.
 
     Fields at points are read at all steps, fields of cells only from files without steps.

@@ -47,9 +47,9 @@ def read_mesh(path: PathLike, *, mesh_name: str | None = None, orient: bool = Tr
 
     The suffix determines the format: MED (``.med``, ``.mmed``, ``.rmed``), code_aster's text (``.mail``), Gmsh of any
     version (``.msh``), Abaqus (``.inp``), VTK (``.vtk``, ``.vtu``), XDMF, Medit (``.mesh``) and all others of meshio.
-    MED groups, Gmsh physical groups, Medit references and Abaqus sets all become groups of cells and points. A flat
-    mesh in 3D coordinates becomes a 2D one; points without cells are kept. The number of reoriented cells is logged by
-    the logger ``fastcontact`` at level INFO, and returned by `read_mesh_report`.
+    MED groups, Gmsh physical groups, Medit references and Abaqus sets are converted to groups of cells and points. A flat
+    mesh with three coordinates is converted to a 2D mesh. Points without cells are kept. The number of reoriented cells
+    is logged by the logger ``fastcontact`` at level INFO, and returned by `read_mesh_report`.
 
     Parameters
     ----------
@@ -105,13 +105,14 @@ def write_mesh(path: PathLike, mesh: Mesh) -> None:
 
     Formats differ in the groups that they can store:
 
-    - ``.med``: everything.
-    - ``.vtk``, ``.vtu``, ``.xdmf``: everything, as arrays of 0 and 1 named ``cell_group:...`` and
+    - ``.med``: all groups.
+    - ``.vtk``, ``.vtu``, ``.xdmf``: all groups, as arrays of 0 and 1 named ``cell_group:...`` and
       ``point_group:...``.
-    - ``.inp`` (Abaqus): all groups as sets; element types are those of meshio for each shape.
-    - ``.msh`` (Gmsh 2.2): one group per cell, the smallest; groups of mixed dimension keep the cells of the highest
-      dimension; empty groups and point groups with the name of a cell group are omitted. A warning states their number.
-    - all others: no groups; a warning states their number.
+    - ``.inp`` (Abaqus): all groups, as sets. Element types are those that meshio uses for each shape.
+    - ``.msh`` (Gmsh 2.2): for each cell only the smallest group that contains it. Groups of mixed dimension keep the cells
+      of the highest dimension. Empty groups and point groups with the name of a cell group are omitted. A warning states
+      what is omitted.
+    - other formats: no groups; a warning states their number.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from fastcontact.mesh.mesh import Mesh
 
 # Gmsh's names for entities of dimension 0 to 3. A tag without a name becomes a group such as "curve_7".
 SHAPES = ("point", "curve", "surface", "volume")
-# Cells with another node order in meshio: node k here is node NODE_ORDER[format][element][k] of meshio. meshio mirrors the
+# Cells whose node order differs in meshio: node k here is node NODE_ORDER[format][element][k] of meshio. meshio mirrors the
 # linear wedge of VTK, as in old documentation of VTK but not in VTK 9.7, and does not reorder Gmsh's 18-node wedge.
 Orders = Mapping[str, tuple[int, ...]]
 NODE_ORDER: dict[str, Orders] = {
@@ -67,37 +67,39 @@ def _cell_group_names(content: Mapping[str, Any], file_format: str) -> list[str]
 
 
 def _blocks(content: Mapping[str, Any], order: Orders) -> list[Block]:
-    foreign: dict[str, int] = {}
+    """Return the cells of each block with their groups. Raises MeshError for cells of an unknown type."""
+    unknown: dict[str, int] = {}
     for kind, count, _ in content["cells"]:
         if kind not in elements.BY_MESHIO and kind != VERTEX:
-            foreign[kind] = foreign.get(kind, 0) + count
-    check_kinds(foreign, elements.BY_MESHIO)
+            unknown[kind] = unknown.get(kind, 0) + count
+    check_kinds(unknown, elements.BY_MESHIO)
     return [_block(content, index, kind, nodes, order) for index, (kind, _, nodes) in enumerate(content["cells"])]
 
 
 def _block(content: Mapping[str, Any], index: int, kind: str, nodes: AnyArray, order: Orders) -> Block:
+    """Return the cells of block number `index` with their groups, in the node order of this package."""
     kind = VERTEX if kind == VERTEX else elements.BY_MESHIO[kind].name
     dim = 0 if kind == VERTEX else elements.get(kind).dim
     groups: dict[str, AnyArray] = {}
     for key, parts in content["cell_data"].items():
         if key in TAGS:
-            _add(groups, _tagged(parts[index], dim, content["field_data"]))
+            _add_to(groups, _groups_of_tags(parts[index], dim, content["field_data"]))
         else:
-            _add(groups, {unquote(key[len(CELL_PREFIX) :]): np.flatnonzero(parts[index])})
+            _add_to(groups, {unquote(key[len(CELL_PREFIX) :]): np.flatnonzero(parts[index])})
     for name, sets in content["cell_sets"].items():
         if not name.startswith("gmsh:") and index < len(sets):
-            _add(groups, {name: np.asarray(sets[index], np.intp).reshape(-1)})
+            _add_to(groups, {name: np.asarray(sets[index], np.intp).reshape(-1)})
     nodes = nodes[:, order[kind]] if kind in order else nodes
     return Block(kind, nodes, {name: rows for name, rows in groups.items() if len(rows)})
 
 
-def _add(groups: dict[str, AnyArray], more: Mapping[str, AnyArray]) -> None:
-    """Add the groups `more` to `groups`; a group of the same name becomes the union of both."""
-    for name, rows in more.items():
+def _add_to(groups: dict[str, AnyArray], additions: Mapping[str, AnyArray]) -> None:
+    """Add the groups `additions` to `groups` in place; a group of the same name becomes the union of both."""
+    for name, rows in additions.items():
         groups[name] = np.union1d(groups[name], rows) if name in groups else rows
 
 
-def _tagged(tags: AnyArray, dim: int, field_data: Mapping[str, Any]) -> dict[str, AnyArray]:
+def _groups_of_tags(tags: AnyArray, dim: int, field_data: Mapping[str, Any]) -> dict[str, AnyArray]:
     """Return the members of each nonzero tag, by the name of the tag for this dimension, or a name such as "curve_7"."""
     if tags.ndim != 1 or tags.dtype.kind not in "iu":
         return {}
@@ -107,14 +109,15 @@ def _tagged(tags: AnyArray, dim: int, field_data: Mapping[str, Any]) -> dict[str
 
 
 def _point_groups(content: Mapping[str, Any]) -> dict[str, AnyArray]:
+    """Return the groups of points from arrays and sets of meshio."""
     groups: dict[str, AnyArray] = {}
     for key, data in content["point_data"].items():
         if key in TAGS:
-            _add(groups, _tagged(data, 0, {}))
+            _add_to(groups, _groups_of_tags(data, 0, {}))
         else:
-            _add(groups, {unquote(key[len(POINT_PREFIX) :]): np.flatnonzero(data)})
+            _add_to(groups, {unquote(key[len(POINT_PREFIX) :]): np.flatnonzero(data)})
     for name, members in content["point_sets"].items():
-        _add(groups, {name: np.asarray(members, np.intp).reshape(-1)})
+        _add_to(groups, {name: np.asarray(members, np.intp).reshape(-1)})
     return groups
 
 
@@ -144,7 +147,7 @@ def build_mesh(
     vertices = [block for block in joined if block.kind == VERTEX]
     if not solid:
         raise MeshError("the mesh has no cells: nothing can be computed on points alone")
-    cell_groups: Groups = {name: np.empty(0, np.intp) for name in names} | _numbered(solid)
+    cell_groups: Groups = {name: np.empty(0, np.intp) for name in names} | _renumbered(solid)
     all_point_groups = {name: np.asarray(members, np.intp) for name, members in point_groups.items()}
     for block in vertices:
         for name in _add_vertices(all_point_groups, block, solid):
@@ -154,11 +157,11 @@ def build_mesh(
     return Mesh(_without_flat_z(coordinates, dim), cells, cell_groups, all_point_groups)
 
 
-def check_kinds(foreign: Mapping[str, int], known: Iterable[str]) -> None:
-    """Raise MeshError if there are cells of unknown kinds, whose numbers `foreign` contains by kind."""
-    if foreign:
-        listed = [f"{count} cells of kind {kind[:MOST_SHOWN]}" for kind, count in list(foreign.items())[:MOST_SHOWN]]
-        more = [f"{len(foreign) - MOST_SHOWN} kinds more"] if len(foreign) > MOST_SHOWN else []
+def check_kinds(unknown: Mapping[str, int], known: Iterable[str]) -> None:
+    """Raise MeshError if there are cells of unknown kinds, whose numbers `unknown` contains by kind."""
+    if unknown:
+        listed = [f"{count} cells of kind {kind[:MOST_SHOWN]}" for kind, count in list(unknown.items())[:MOST_SHOWN]]
+        more = [f"{len(unknown) - MOST_SHOWN} kinds more"] if len(unknown) > MOST_SHOWN else []
         kinds = ", ".join([*listed, *more])
         raise MeshError(f"it has {kinds}, which fastcontact does not know: use only {', '.join(sorted(known))}")
 
@@ -168,7 +171,7 @@ def merged(blocks: Iterable[Block]) -> list[Block]:
     by_kind: dict[str, list[Block]] = {}
     for block in blocks:
         by_kind.setdefault(block.kind, []).append(block)
-    return [Block(kind, np.concatenate([b.nodes for b in same]), _numbered(same)) for kind, same in by_kind.items()]
+    return [Block(kind, np.concatenate([b.nodes for b in same]), _renumbered(same)) for kind, same in by_kind.items()]
 
 
 def without_duplicates(block: Block) -> Block:
@@ -180,7 +183,7 @@ def without_duplicates(block: Block) -> Block:
     return Block(block.kind, block.nodes[unique], groups)
 
 
-def _numbered(blocks: list[Block]) -> Groups:
+def _renumbered(blocks: list[Block]) -> Groups:
     """Return the members of all groups as numbers of cells in the sequence of the blocks."""
     groups: dict[str, list[Indices]] = {}
     start = 0

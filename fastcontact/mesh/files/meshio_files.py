@@ -34,7 +34,7 @@ _STREAMS = threading.Lock()
 ARRAY_FORMATS = ("vtk", "vtu", "xdmf")
 # Formats whose writers are known to keep all cells. Files of other formats are read back.
 COMPLETE_FORMATS = ("vtk", "vtu", "gmsh22", "abaqus")
-# Formats that support points with two coordinates. In other formats the third coordinate is zero, and dropped by reading.
+# Formats that support points with two coordinates. In other formats the third coordinate is zero and is removed on reading.
 FLAT_FORMATS = ("gmsh22", "abaqus", "medit", "su2", "dolfin-xml")
 # Formats that are HDF5 files.
 HDF5_FORMATS = ("cgns", "h5m", "hmf", "exodus")
@@ -46,7 +46,7 @@ USUAL = (".med", ".msh", ".vtu", ".vtk", ".inp", ".xdmf", ".mesh")
 OTHER_FORMATS = "write .med, .vtu or .msh instead"
 
 
-def _refusal(action: str, path: Path, reason: str) -> FileError:
+def _error(action: str, path: Path, reason: str) -> FileError:
     """Return the error for an `action` of meshio that failed."""
     reason = " ".join(reason.split())
     reason = reason if len(reason) <= LONGEST else f"{reason[:LONGEST]}..."
@@ -55,20 +55,21 @@ def _refusal(action: str, path: Path, reason: str) -> FileError:
 
 
 def _log(action: str, path: Path, output: str) -> None:
+    """Log the output of meshio, if there is any."""
     if output:
         logger.info("meshio, to %s %s: %s", action, path, " ".join(output.split()))
 
 
 @contextlib.contextmanager
-def _contained(action: str, path: Path) -> Iterator[None]:
-    """Prevent meshio from printing and from ending the process, and write its output to the log or the error."""
+def _captured_output(action: str, path: Path) -> Iterator[None]:
+    """Prevent meshio from printing and from ending the process. Its output goes to the log or to the message of the error."""
     output = io.StringIO()
     try:
         with _STREAMS, contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
             yield
     except (Exception, SystemExit) as error:
         reason = output.getvalue() if isinstance(error, SystemExit) else str(error)
-        raise _refusal(action, path, reason or type(error).__name__) from error
+        raise _error(action, path, reason or type(error).__name__) from error
     _log(action, path, output.getvalue())
 
 
@@ -92,7 +93,7 @@ def _format(path: Path, writing: bool) -> str:
     return "gmsh"
 
 
-def _content(path: Path, readable: Path, file_format: str, field: str = "") -> dict[str, Any]:
+def _read_content(path: Path, readable: Path, file_format: str, field: str = "") -> dict[str, Any]:
     """Return the content of a file, read from `readable`, which is the file or a converted copy of it.
 
     Raises FileError if meshio cannot read the file.
@@ -100,7 +101,7 @@ def _content(path: Path, readable: Path, file_format: str, field: str = "") -> d
     _check_input(path, file_format)
     content = read_in_process(readable, file_format, field)
     if "error" in content:
-        raise _refusal("read", path, content["error"])
+        raise _error("read", path, content["error"])
     return content
 
 
@@ -113,7 +114,7 @@ def read_data(path: Path, field: str, at_points: bool) -> tuple[AnyArray, AnyArr
     file_format = _format(path, writing=False)
     if file_format == "gmsh":
         raise FileError(f"'{path}': fields of Gmsh files are not read: write the field to a .vtu or .med file")
-    content = _content(path, path, file_format, field)
+    content = _read_content(path, path, file_format, field)
     names, points = content["fields" if at_points else "cell_fields"], content["points"]
     if field not in names:
         raise FileError(f"'{path}': {unknown('field' if at_points else 'field of cells', field, names)}")
@@ -135,9 +136,9 @@ def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
     file_format = _format(path, writing=False)
     if file_format == "gmsh":
         with tempfile.TemporaryDirectory() as folder:
-            content = _content(path, gmsh_versions.readable(path, Path(folder)), file_format)
+            content = _read_content(path, gmsh_versions.readable(path, Path(folder)), file_format)
     else:
-        content = _content(path, path, file_format)
+        content = _read_content(path, path, file_format)
     _log("read", path, content["output"])
     try:
         mesh, dropped = mesh_of(content, file_format)
@@ -176,7 +177,7 @@ def _references(path: Path) -> Iterator[tuple[Path, str]]:
     try:
         items = [item for item in ElementTree.parse(path).iter() if item.get("Format") in ("HDF", "Binary")]
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise _refusal("read", path, f"it is not XML: {error}") from error
+        raise _error("read", path, f"it is not XML: {error}") from error
     except OSError as error:
         raise FileError(f"cannot read '{path}': {error.strerror or error}") from error
     for item in items:
@@ -189,7 +190,7 @@ def _check_references(path: Path) -> None:
     folder = path.resolve().parent
     for reference, kind in _references(path):
         if folder not in (reference.resolve().parent, reference.resolve()):
-            raise _refusal("read", path, f"it refers to the file '{reference.resolve()}', which is not beside it")
+            raise _error("read", path, f"it refers to the file '{reference.resolve()}', which is not beside it")
         existing_file(reference)
         if kind == "HDF":
             with hdf5.opened(reference):
@@ -208,7 +209,7 @@ def write(path: Path, temporary: Path, mesh: Mesh) -> None:
     content = _arguments(mesh, file_format)
     # By default meshio writes the arrays of XDMF to a second file, which cannot be replaced atomically with the first.
     options = {"data_format": "XML"} if file_format == "xdmf" else {}
-    with _contained("write", path):
+    with _captured_output("write", path):
         meshio.write(temporary, meshio.Mesh(**content), file_format=file_format, **options)
     if file_format == "abaqus":
         abaqus.append_cell_sets(temporary, mesh)
@@ -222,9 +223,9 @@ def _arguments(mesh: Mesh, file_format: str) -> dict[str, Any]:
     points = np.pad(mesh.points, [(0, 0), (0, width - mesh.dim)])
     content: dict[str, Any] = {"points": points, "cells": _meshio_cells(mesh, NODE_ORDER.get(file_format, {}))}
     if file_format in ARRAY_FORMATS:
-        return _with_arrays(content, mesh)
+        return _add_arrays(content, mesh)
     if file_format == "gmsh22":
-        return _with_tags(content, mesh)
+        return _add_tags(content, mesh)
     if file_format == "abaqus":
         return {**content, "point_sets": dict(mesh.point_groups)}
     n_groups = len(mesh.cell_groups) + len(mesh.point_groups)
@@ -234,27 +235,29 @@ def _arguments(mesh: Mesh, file_format: str) -> dict[str, Any]:
 
 
 def _meshio_cells(mesh: Mesh, order: Orders) -> list[tuple[str, AnyArray]]:
+    """Return the name and the connectivity of each cell type in the node order of meshio."""
     return [
         (elements.get(name).meshio, block[:, np.argsort(order[name])] if name in order else np.array(block))
         for name, block in mesh.cells.items()
     ]
 
 
-def _with_arrays(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
+def _add_arrays(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     """Return the arguments with an array of 0 and 1 for each group."""
     cell_data = {}
     for name, members in mesh.cell_groups.items():
-        flags = _flags(members, mesh.n_cells)
+        flags = _mask_of(members, mesh.n_cells)
         cell_data[CELL_PREFIX + quote(name)] = np.split(flags, list(mesh.offsets.values())[1:])
-    point_data = {POINT_PREFIX + quote(name): _flags(m, mesh.n_points) for name, m in mesh.point_groups.items()}
+    point_data = {POINT_PREFIX + quote(name): _mask_of(m, mesh.n_points) for name, m in mesh.point_groups.items()}
     return {**content, "cell_data": cell_data, "point_data": point_data}
 
 
-def _flags(members: AnyArray, count: int) -> Numbers:
+def _mask_of(members: AnyArray, count: int) -> Numbers:
+    """Return an array (count,) of integers, 1 for the members of a group and 0 otherwise."""
     return np.bincount(members, minlength=count).astype(np.int32)
 
 
-def _with_tags(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
+def _add_tags(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     """Return the arguments with a physical tag for each cell, and a vertex cell for each point in a group."""
     dims = np.concatenate([np.full(len(block), elements.get(name).dim) for name, block in mesh.cells.items()])
     tags = np.zeros(mesh.n_cells, np.int32)
@@ -265,20 +268,20 @@ def _with_tags(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
             dim, tag = int(dims[members].max()), len(field_data) + 1
             tags[members[dims[members] == dim]] = tag
             field_data[name] = np.array([tag, dim])
-    kept = {name: int((tags[mesh.cell_groups[name]] == tag).sum()) for name, (tag, _) in field_data.items()}
-    lost = {name: len(rows) - kept[name] for name, rows in mesh.cell_groups.items() if len(rows) > kept.get(name, 0)}
+    saved = {name: int((tags[mesh.cell_groups[name]] == tag).sum()) for name, (tag, _) in field_data.items()}
+    lost = {name: len(rows) - saved[name] for name, rows in mesh.cell_groups.items() if len(rows) > saved.get(name, 0)}
     if lost:
         warn(
             f"Gmsh files of version 2.2 store one group per cell: {sum(lost.values())} memberships of the groups "
             f"{', '.join(lost)} are left out; {KEEPS_ALL}"
         )
     blocks = np.split(tags, list(mesh.offsets.values())[1:])
-    cells, blocks = _with_vertices(content["cells"], blocks, mesh.point_groups, field_data)
+    cells, blocks = _add_vertices(content["cells"], blocks, mesh.point_groups, field_data)
     data = {"gmsh:physical": blocks, "gmsh:geometrical": [np.maximum(block, 1) for block in blocks]}
     return {**content, "cells": cells, "cell_data": data, "field_data": field_data}
 
 
-def _with_vertices(
+def _add_vertices(
     cells: list[Any], blocks: list[Any], point_groups: Mapping[str, Any], field_data: dict[str, Any]
 ) -> tuple[list[Any], list[Any]]:
     """Return cells and tags with additional vertices for the groups of points, and add the names of these to `field_data`."""
@@ -300,7 +303,7 @@ def _with_vertices(
 
 def _check_complete(path: Path, temporary: Path, file_format: str, mesh: Mesh) -> None:
     """Read the written file and raise FileError if it differs, because some writers of meshio drop or change cells."""
-    with _contained("read back", path):
+    with _captured_output("read back", path):
         content = library().read(temporary, file_format=file_format)
     stored = content.get_cells_type
     different = [kind for kind, block in _meshio_cells(mesh, {}) if not np.array_equal(stored(kind), block)]

@@ -1,10 +1,9 @@
 """Reading of mesh files with meshio in a child process, with limits of memory and computing time.
 
 meshio allocates memory for the numbers of items that a file states, and some of its readers do not terminate on a truncated
-file. In these cases only the child process ends, and the file is rejected with the reason. Memory
-is not limited on Windows and macOS, and computing time not on Windows; elapsed time and the size of the answer are limited
-on all systems. Frozen applications and programs with embedded Python, which cannot start an interpreter, read without
-limits.
+file. In these cases only the child process ends, and the error states the reason. Memory is not limited on Windows and
+macOS, and computing time is not limited on Windows. Elapsed time and the size of the answer are limited on all systems.
+Frozen applications and programs with embedded Python, which cannot start an interpreter, read files without limits.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from fastcontact._tools.packing import packed, unpacked
 from fastcontact.arrays import AnyArray
 
 # Limits of computing time [s] and of memory [bytes] of the child process: a constant, and a term per byte of the file. meshio
-# 5.3.5 takes up to 0.15 s and 9 MB per megabyte (permas, vtu); the process itself takes 130 MB.
+# 5.3.5 takes up to 0.15 s and 9 MB per megabyte (permas, vtu). The process itself takes 130 MB.
 SECONDS, SECONDS_PER_BYTE = 5.0, 5e-6
 MEMORY, MEMORY_PER_BYTE = 1 << 30, 32
 # Limit of the answer of the child process [bytes]. A compressed file of a few kilobytes can contain many equal points.
@@ -81,7 +80,7 @@ def read_in_process(path: Path, file_format: str, field: str = "") -> dict[str, 
 
 
 def plain_content(path: Path, file_format: str, field: str = "") -> dict[str, Any]:
-    """Read a file in a format of meshio as a dict of lists and arrays. meshio neither prints nor ends the process.
+    """Return the content of a file as a dict of lists and arrays, without output of meshio to the standard streams.
 
     The keys are
 
@@ -143,7 +142,7 @@ def _numbers(values: Any) -> AnyArray | None:
 
 
 def _limit(kind: int, value: int) -> None:
-    """Lower a limit of this process as far as the system allows it."""
+    """Set the resource limit `kind` of this process to `value`, as far as the system allows it."""
     import resource
 
     hard = resource.getrlimit(kind)[1]

@@ -1,4 +1,4 @@
-"""Uniform refinement of 2D meshes, with new nodes on exact curves of the boundary, and detection of such circles."""
+"""Uniform refinement of 2D meshes, with new nodes on exact curves of the boundary, and detection of circles on it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fastcontact.mesh.generate.quadratic import ON_CURVE, Circle, Curve, all_on,
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 
-# Quadratic elements whose nodes are the corners of the children in `RED`; each child has the orientation of its parent.
+# Quadratic elements whose nodes are the corners of the children in `RED`. Each child has the orientation of its parent.
 _LATTICE = {"line2": "line3", "tri3": "tri6", "quad4": "quad9"}
 # Largest angle that a facet of a circle may subtend [radian]. Nodes at larger distances are regarded as those of a polygon.
 _TURN = np.pi / 5
@@ -250,15 +250,15 @@ def circles(mesh: Mesh) -> list[Circle]:
     >>> {round(circle.radius, 9) for circle in generate.circles(generate.half_spheres(size=10.0))}
     {50.0}
     """
-    fitted = []
+    curves = []
     for group in mesh.cell_groups:
         blocks = mesh.cells_of(group, dim=1)
         has_solids = any(elements.get(name).dim == 2 for name in mesh.split(mesh.cell_groups[group]))
         if blocks and not has_solids:
             circle = _circle(mesh, group, list(blocks.values()))
             if circle is not None:
-                fitted.append(circle)
-    return fitted
+                curves.append(circle)
+    return curves
 
 
 def _circle(mesh: Mesh, group: str, blocks: list[AnyArray]) -> Circle | None:

@@ -83,11 +83,11 @@ def sphere_on_block(
     width, height = each(positive, "block_size", (R, R) if block_size is None else block_size)
     sizes: Any = {"size": size, "contact_size": contact_size, "contact_radius": contact_radius, "growth": growth}
     sphere, spacing = sphere_octant(element, R=R, **sizes), _spacing(R, **sizes)
-    horizontal, vertical = graded(width, spacing), graded(height, _shallow(spacing))
+    horizontal, vertical = graded(width, spacing), graded(height, _depth_spacing(spacing))
     names = {"BLOCK": "BLOCK", "XMIN": "SYMMETRY_X", "YMIN": "SYMMETRY_Z", "ZMIN": "CONT_BLOCK", "ZMAX": "BLOCK_BOTTOM"}
     names |= {"XMAX": "BLOCK_SIDE", "YMAX": "BLOCK_SIDE"}
     grid = horizontal, horizontal, vertical
-    block = _mapped(element, grid, lambda x, z, depth: np.column_stack([x, -depth, z]), "BLOCK", names)
+    block = _mapped_box(element, grid, lambda x, z, depth: np.column_stack([x, -depth, z]), "BLOCK", names)
     return union(sphere, with_points_at(block, {"POLE_BLOCK": (0.0, 0.0, 0.0)}))
 
 
@@ -124,8 +124,8 @@ def sphere_octant(
     R = positive("R", R)
     spacing = _spacing(R, size, contact_size, contact_radius, growth)
     eighth = math.pi / 4
-    around = graded(R * eighth, spacing) / R
-    outward = 1.0 - graded((1.0 - INNER) * R, _shallow(spacing))[::-1] / ((1.0 - INNER) * R)
+    angles = graded(R * eighth, spacing) / R
+    outward = 1.0 - graded((1.0 - INNER) * R, _depth_spacing(spacing))[::-1] / ((1.0 - INNER) * R)
     upward = np.linspace(0.0, eighth, count("segments", segments_for(R * eighth, spacing.far)) + 1)
 
     def ball(outside: int) -> Map:
@@ -139,7 +139,7 @@ def sphere_octant(
             cube = np.tan(coordinates)
             length = np.linalg.norm(cube, axis=1, keepdims=True)
             direction = np.divide(cube, length, out=np.zeros_like(cube), where=length > 0)
-            rounded = (1.0 - BULGE) * cube + BULGE * _ball(cube)
+            rounded = (1.0 - BULGE) * cube + BULGE * _to_ball(cube)
             x, z, down = (R * ((1.0 - depth[:, None]) * INNER * rounded + depth[:, None] * direction)).T
             return np.column_stack([x, R - down, z])
 
@@ -149,18 +149,18 @@ def sphere_octant(
     grids = {-1: {}, 0: {"XMAX": "SPHERE_SIDE"}, 1: {"YMAX": "SPHERE_SIDE"}, 2: {"ZMAX": "CONT_SPHERE"}}
     cubes = []
     for outside, outer in grids.items():
-        grid = [around, around, upward]
+        grid = [angles, angles, upward]
         names_of_block = dict(names)
         if outside >= 0:
             grid[outside] = outward
             del names_of_block[("XMIN", "YMIN", "ZMIN")[outside]]
-        cubes.append(_mapped(element, grid, ball(outside), "SPHERE", names_of_block | outer))
-    mesh = merge_points(union(*cubes), 1e-6 * R * float(np.diff(around).min()))
+        cubes.append(_mapped_box(element, grid, ball(outside), "SPHERE", names_of_block | outer))
+    mesh = merge_points(union(*cubes), 1e-6 * R * float(np.diff(angles).min()))
     check_cells(mesh)
     return with_points_at(mesh, {"POLE_SPHERE": (0.0, 0.0, 0.0), "CENTRE": (0.0, R, 0.0)})
 
 
-def _ball(cube: Array) -> Array:
+def _to_ball(cube: Array) -> Array:
     """Map points (n, 3) of the cube [-1, 1]^3 smoothly to the unit ball, and its faces to the sphere (Nowell, 2005)."""
     square = cube * cube
     second, third = np.roll(square, -1, axis=1), np.roll(square, -2, axis=1)
@@ -177,14 +177,14 @@ def _spacing(
     return Spacing(near, far, plateau=plateau, reach=plateau + max(far - near, near) / positive("growth", growth, 1.0))
 
 
-def _shallow(spacing: Spacing) -> Spacing:
+def _depth_spacing(spacing: Spacing) -> Spacing:
     """Return the spacing normal to the surface, whose fine region is half as long as that along the surface."""
     shift = 0.5 * spacing.plateau
     return Spacing(spacing.near, spacing.far, plateau=spacing.plateau - shift, reach=spacing.reach - shift)
 
 
-def _mapped(element: str, grid: Sequence[Array], place: Map, solid: str, names: Mapping[str, str]) -> Mesh:
-    """Return a box with the given grid lines, mapped by `place`, with those groups that `names` contains, renamed."""
+def _mapped_box(element: str, grid: Sequence[Array], place: Map, solid: str, names: Mapping[str, str]) -> Mesh:
+    """Return a box with the given grid lines, mapped by `place`. It has the groups that are keys of `names`, renamed."""
     lattice = on_lines(element, grid, solid)
     sides = {side: lattice.cells_of(side) for side in lattice.cell_groups if side in names and side != solid}
     body = Mesh(place(*lattice.points.T), lattice.solids, {solid: lattice.cell_groups[solid]})

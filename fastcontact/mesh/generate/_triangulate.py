@@ -33,16 +33,16 @@ def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> 
     the end of the previous one. `spacing` defines the longest inner edges.
     """
     outline = np.vstack([nodes[:-1] for _, nodes in sides])
-    points, triangles = triangulated(outline, spacing)
+    points, triangles = triangulate(outline, spacing)
     starts = np.arange(len(outline))
     lines = np.column_stack([starts, np.roll(starts, -1)])
     ends = np.cumsum([len(nodes) - 1 for _, nodes in sides])
     mesh = Mesh(points, {"tri3": triangles}, {solid: np.arange(len(triangles))})
-    of_sides = zip(sides, np.split(lines, ends[:-1]), strict=True)
-    return mesh.with_facets({name: {"line2": block} for (name, _), block in of_sides})
+    named_lines = zip(sides, np.split(lines, ends[:-1]), strict=True)
+    return mesh.with_facets({name: {"line2": block} for (name, _), block in named_lines})
 
 
-def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:
+def triangulate(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:
     """Return points (n_points, 2) [length] and triangles (n_triangles, 3), counter-clockwise, that fill a convex polygon.
 
     The corners of the `outline` (n, 2) [length], counter-clockwise, are the first n points, and no other point lies on it.
@@ -56,7 +56,7 @@ def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:
         if angle > best_angle:
             best, best_angle = points, angle
         if best is not None and best_angle >= good_angle:
-            return best, _checked(delaunay(best), len(best), len(outline))
+            return best, _check_count(delaunay(best), len(best), len(outline))
     raise MeshError(
         f"no triangulation with edges up to {spacing.near:g} at the pole and {spacing.far:g} far from it "
         "was found: change a size slightly, or let it grow over a longer distance"
@@ -71,19 +71,19 @@ def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
     points = relax(points, movable, spacing, 40)
     for _ in range(_ROUNDS):
         points = polish(points, movable, spacing, 20)
-        added = _midpoints_of_long_edges(points, n_fixed, spacing)
-        if not len(added):
+        midpoints = _midpoints_of_long_edges(points, n_fixed, spacing)
+        if not len(midpoints):
             return points
-        points = np.vstack([points, added])
+        points = np.vstack([points, midpoints])
         movable = np.arange(len(points)) >= n_fixed
         # Only points near the new ones are relaxed, because the positions of the others are already good.
-        near = nearest(added, points)[0] < _MOVING_RADIUS * spacing(points)
+        near = nearest(midpoints, points)[0] < _MOVING_RADIUS * spacing(points)
         points = relax(points, movable & near, spacing, 16)
     return None
 
 
 def _midpoints_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> Array:
-    """Return the midpoints (m, 2) of edges that are too long and the longest, relative to the spacing, at both ends."""
+    """Return the midpoints (m, 2) of too long edges. At both ends, no other edge is longer relative to the spacing."""
     edges = edges_of(delaunay(points))
     # Sides of the outline are excluded, but not chords that cut off a corner.
     side = np.isin(edges[:, 1] - edges[:, 0], (1, n_fixed - 1)) & (edges[:, 1] < n_fixed)
@@ -97,8 +97,8 @@ def _midpoints_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> A
     return midpoints[long & (ratio >= worst[edges].max(axis=1))]
 
 
-def _checked(triangles: Indices, n_points: int, n_outline: int) -> Indices:
-    """Return the triangles, after checking by Euler's formula that their number is 2 n_points - 2 - n_outline."""
+def _check_count(triangles: Indices, n_points: int, n_outline: int) -> Indices:
+    """Return `triangles` unchanged. Raises MeshError unless their number is 2 n_points - 2 - n_outline (Euler's formula)."""
     expected = 2 * n_points - 2 - n_outline
     if len(triangles) != expected:
         raise MeshError(
@@ -111,25 +111,25 @@ def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
     """Return points (m, 2) [length] in a convex `outline` (n, 2) [length] at distances of about ``density * spacing``."""
     low, high = outline.min(axis=0), outline.max(axis=0)
     candidates = _lattice(spacing, density, low, high) if spacing.uniform else _rings(spacing, density, low, high)
-    corners = _separated(_corner_seeds(outline, spacing, density), outline, spacing, density)
+    corners = _accepted_seeds(_corner_seeds(outline, spacing, density), outline, spacing, density)
     size = density * spacing(candidates)
-    seeds = candidates[_depth(outline, candidates) > _CLEARANCE * size]
+    seeds = candidates[_depths(outline, candidates) > _CLEARANCE * size]
     if not len(corners):
         return seeds
     free = nearest(corners, seeds)[0] > 0.7 * density * spacing(seeds)
     return np.vstack([corners, seeds[free]])
 
 
-def _separated(seeds: Array, outline: Array, spacing: Spacing, density: float) -> Array:
+def _accepted_seeds(seeds: Array, outline: Array, spacing: Spacing, density: float) -> Array:
     """Return the seeds (m, 2) without those too close to the outline or to earlier seeds, as in narrow bodies."""
     accepted: list[Array] = []
-    for seed, depth, size in zip(seeds, _depth(outline, seeds), density * spacing(seeds), strict=True):
+    for seed, depth, size in zip(seeds, _depths(outline, seeds), density * spacing(seeds), strict=True):
         if depth > 0.4 * size and all(np.hypot(*(seed - other)) > 0.7 * size for other in accepted):
             accepted.append(seed)
     return np.array(accepted).reshape(-1, 2)
 
 
-def _depth(outline: Array, points: Array) -> Array:
+def _depths(outline: Array, points: Array) -> Array:
     """Return the distances (m,) of points to the nearest side of a convex polygon, which are negative outside [length]."""
     sides = np.roll(outline, -1, axis=0) - outline
     normals = np.column_stack([-sides[:, 1], sides[:, 0]]) / np.hypot(sides[:, 0], sides[:, 1])[:, None]
@@ -187,7 +187,7 @@ Size = Callable[[Array], Array]
 
 _STEPS_PER_TRIANGULATION = 4  # steps of `relax` and sweeps of `polish` with one triangulation
 _STEP = 0.2  # pseudo-time of one step of `relax`
-_STRETCH = 1.2  # rest length of bars over their scaled length, so that the points spread
+_STRETCH = 1.2  # rest length of the bars relative to their scaled length; it exceeds 1 so that the points spread
 _DIRECTIONS = np.linspace(0.0, 2 * np.pi, 13)[:-1]
 _TRIALS = np.column_stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 _TRIALS = np.vstack([_TRIALS, 0.5 * _TRIALS])

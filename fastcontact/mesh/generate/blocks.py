@@ -74,11 +74,11 @@ def block(
     left, bottom = each(number, "origin", origin)
     amount = within("distortion", distortion, 0.0, 0.24)
     grid = rectangular(left + width * np.linspace(0, 1, n + 1), bottom + height * np.linspace(0, 1, m + 1))
-    grid += _pattern(n, m) * amount * np.array([width / n, height / m])
-    return _with_corners(grid, element, name)
+    grid += _distortion_pattern(n, m) * amount * np.array([width / n, height / m])
+    return _block_mesh(grid, element, name)
 
 
-def _with_corners(grid: Array, element: str, name: str) -> Mesh:
+def _block_mesh(grid: Array, element: str, name: str) -> Mesh:
     """Return the mesh of a grid with cells of type `element` and with groups for its sides and corners."""
     sides = {side: side for side in ("BOTTOM", "RIGHT", "TOP", "LEFT")}
     mesh = in_element(structured(grid, name, sides, triangles=element in TRIANGLES), element)
@@ -86,7 +86,7 @@ def _with_corners(grid: Array, element: str, name: str) -> Mesh:
     return with_points_at(mesh, {**corners, "TOP_RIGHT": grid[-1, -1], "TOP_LEFT": grid[0, -1]})
 
 
-def _pattern(n: int, m: int) -> Array:
+def _distortion_pattern(n: int, m: int) -> Array:
     """Return irregular but reproducible displacements (n + 1, m + 1, 2) [-] from -1 to 1, which vanish on the sides."""
     i, j = np.indices((n + 1, m + 1))
     shift = np.stack([np.sin(5.1 * i + 2.3 * j + 0.7), np.cos(3.7 * i - 4.3 * j)], axis=2)
@@ -143,11 +143,11 @@ def block_on_block(
         raise MeshError(f"shift = {shift:g} is out of range: the blocks face each other between {limits}")
     lower = block(size_lower, divisions_lower, element, (0.0, -height), name="LOWER", distortion=distortion)
     upper = block(size_upper, divisions_upper, element, (shift, 0.0), name="UPPER", distortion=distortion)
-    return union(_one_of_two(lower, "LOWER", "TOP"), _one_of_two(upper, "UPPER", "BOTTOM"))
+    return union(_named_block(lower, "LOWER", "TOP"), _named_block(upper, "UPPER", "BOTTOM"))
 
 
-def _one_of_two(mesh: Mesh, body: str, contact: str) -> Mesh:
-    """Return a block with the names of groups that it has if it is one of two."""
+def _named_block(mesh: Mesh, body: str, contact: str) -> Mesh:
+    """Return one block of `block_on_block`, with its groups renamed for the body and its side in contact."""
     names = {name: f"{body}_{name}" for name in mesh.group_names}
     return renamed(mesh, {**names, body: body, contact: f"CONT_{body}"})
 
@@ -226,11 +226,11 @@ def _graded_block(element: str, width: float, height: float, near: float, far: f
     """Return a block of quadrangles whose edges along the axes form geometric progressions from the pole."""
     x = width * geometric(width, near, far)
     y = -height * geometric(height, near, far)[::-1]
-    return renamed(_with_corners(rectangular(x, y + 0.0), element, "BLOCK"), _BLOCK_NAMES.get)
+    return renamed(_block_mesh(rectangular(x, y + 0.0), element, "BLOCK"), _BLOCK_NAMES.get)
 
 
 def _free_block(element: str, width: float, height: float, spacing: Spacing) -> Mesh:
-    """Return a block of triangles whose size varies with the distance from the pole, as in the cylinder."""
+    """Return a block of triangles, whose size varies with the distance from the pole in the same way as in the cylinder."""
     corners = [(0.0, 0.0), (0.0, -height), (width, -height), (width, 0.0)]
     names = ["LEFT", "BOTTOM", "RIGHT", "TOP"]
     sides = [

@@ -60,19 +60,19 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
     new_node = np.full(mesh.n_points, -1, np.int32)
     new_node[points] = mesh.n_points + np.arange(len(points), dtype=np.int32)
     sides = _sides_at(mesh, new_node >= 0)
-    moved = _moved(mesh, group, sides, new_node >= 0, _direction(mesh, group, points, normal))
+    beyond_cut = _cells_beyond(mesh, group, sides, new_node >= 0, _direction(mesh, group, points, normal))
     cells = {}
     for name, start in mesh.offsets.items():
         block = mesh.cells[name]
-        new = moved[start : start + len(block), None] & (new_node[block] >= 0)
+        new = beyond_cut[start : start + len(block), None] & (new_node[block] >= 0)
         cells[name] = np.where(new, new_node[block], block)
     point_groups = {
         name: np.concatenate([members, new_node[members[new_node[members] >= 0]]])
         for name, members in mesh.point_groups.items()
     }
     positions = np.concatenate([mesh.points, mesh.points[points]])
-    opened = mesh.replace(points=positions, cells=cells, point_groups=point_groups)
-    return opened.with_facets({group + OPPOSITE: {name: new_node[block] for name, block in facets.items()}})
+    cut_mesh = mesh.replace(points=positions, cells=cells, point_groups=point_groups)
+    return cut_mesh.with_facets({group + OPPOSITE: {name: new_node[block] for name, block in facets.items()}})
 
 
 def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] | None) -> Array:
@@ -97,11 +97,11 @@ class _Sides(NamedTuple):
     nodes: Indices  # distinct sets of nodes in ascending order, filled with -1 (n_rows, MOST_NODES)
 
 
-def _sides_at(mesh: Mesh, touched: Mask) -> _Sides:
-    """Return the facets and the sides of solid cells that have a marked point, or whose cell has one."""
+def _sides_at(mesh: Mesh, marked: Mask) -> _Sides:
+    """Return the facets with a marked point, and all sides of the solid cells with a marked point."""
     nodes, cell, is_facet = [], [], []
     for name, block in {**mesh.solids, **mesh.facets}.items():
-        element, near = elements.get(name), np.flatnonzero(touched[block].any(axis=1))
+        element, near = elements.get(name), np.flatnonzero(marked[block].any(axis=1))
         for side in element.facets if element.dim == mesh.dim else [range(element.n_nodes)]:
             sets = np.sort(block[near][:, list(side)], axis=1)
             nodes.append(np.pad(sets, ((0, 0), (0, MOST_NODES - len(side))), constant_values=-1))
@@ -111,8 +111,8 @@ def _sides_at(mesh: Mesh, touched: Mask) -> _Sides:
     return _Sides(np.concatenate(cell), np.concatenate(is_facet), row.ravel(), distinct.astype(np.intp))
 
 
-def _moved(mesh: Mesh, group: str, sides: _Sides, touched: Mask, direction: Array) -> Mask:
-    """Return whether each cell (n_cells,) gets new nodes: solids beyond a section, and their other facets."""
+def _cells_beyond(mesh: Mesh, group: str, sides: _Sides, marked: Mask, direction: Array) -> Mask:
+    """Return the mask (n_cells,) of cells that get new nodes: solids beyond the section, and their facets outside it."""
     solid, row = sides.cell[~sides.is_facet], sides.row[~sides.is_facet]
     section = np.unique(sides.row[sides.is_facet & np.isin(sides.cell, mesh.cell_groups[group])])
     order, count = np.argsort(row, kind="stable"), np.bincount(row, minlength=len(sides.nodes))
@@ -126,7 +126,7 @@ def _moved(mesh: Mesh, group: str, sides: _Sides, touched: Mask, direction: Arra
     divided = np.isin(np.flatnonzero(count == 2), section)
     graph = coo_array((np.ones((~divided).sum()), tuple(pairs[~divided].T)), shape=(mesh.n_cells, mesh.n_cells))
     part = connected_components(graph, directed=False)[1]
-    height, above = _heights(mesh, touched, direction)
+    height, above = _heights(mesh, marked, direction)
     ends = np.take_along_axis(pairs[divided], np.argsort(height[pairs[divided]], axis=1, kind="stable"), axis=1)
     below, beyond = part[ends].T
     mixed = np.flatnonzero(np.isin(below, beyond) | np.isin(beyond, below))
@@ -138,22 +138,23 @@ def _moved(mesh: Mesh, group: str, sides: _Sides, touched: Mask, direction: Arra
             f"across it (now {direction})"
         )
     # A part without a facet in the section touches it only at edges or nodes.
-    moved = np.isin(part, beyond) | (~np.isin(part, below) & (above > 0.0))
-    outer = sides.is_facet & np.isin(sides.row, row[moved[solid]]) & ~np.isin(sides.row, section)
-    moved[sides.cell[outer]] = True
-    return moved
+    beyond_cut = np.isin(part, beyond) | (~np.isin(part, below) & (above > 0.0))
+    outer = sides.is_facet & np.isin(sides.row, row[beyond_cut[solid]]) & ~np.isin(sides.row, section)
+    beyond_cut[sides.cell[outer]] = True
+    return beyond_cut
 
 
-def _heights(mesh: Mesh, touched: Mask, direction: Array) -> Array:
-    """Return the positions along `direction` [length] of the centres of solid cells, absolute and over their marked points.
+def _heights(mesh: Mesh, marked: Mask, direction: Array) -> Array:
+    """Return the positions of the centres of solid cells along `direction` (2, n_cells) [length].
 
-    The shape is (2, n_cells), with zero for other cells and, in the second row, for those without a marked point.
+    The first row contains the positions, the second row their differences from the mean position of the marked points of the
+    cell. Values are zero for other cells and, in the second row, for cells without a marked point.
     """
     heights = np.zeros((2, mesh.n_cells))
     for name, block in mesh.solids.items():
-        along, near = mesh.points[block] @ direction, touched[block]
+        positions, near = mesh.points[block] @ direction, marked[block]
         cells = slice(mesh.offsets[name], mesh.offsets[name] + len(block))
-        heights[0, cells] = along.mean(axis=1)
-        of_touched = (along * near).sum(axis=1) / np.maximum(near.sum(axis=1), 1)
-        heights[1, cells] = np.where(near.any(axis=1), heights[0, cells] - of_touched, 0.0)
+        heights[0, cells] = positions.mean(axis=1)
+        marked_mean = (positions * near).sum(axis=1) / np.maximum(near.sum(axis=1), 1)
+        heights[1, cells] = np.where(near.any(axis=1), heights[0, cells] - marked_mean, 0.0)
     return heights

@@ -1,8 +1,8 @@
 """Local red-green refinement of 2D meshes of triangles and quadrangles (Bank, Sherman and Weiser, 1983).
 
 A forest contains every cell of an initial mesh and its descendants. Cells without descendants are its leaves. Red refinement
-divides marked leaves into four. Green refinement divides neighbours of smaller leaves in the mesh, but not in the forest, so
-that angles do not deteriorate with repeated refinement.
+divides marked leaves into four. Green refinement divides the neighbours of smaller leaves. It changes only the mesh and not
+the forest, so that angles do not deteriorate with repeated refinement.
 """
 
 from __future__ import annotations
@@ -112,9 +112,9 @@ class Forest:
         marks = {name: marked[a:b] for name, a, b in zip(self.solids, starts[:-1], starts[1:], strict=True)}
         while any(mask.any() for mask in marks.values()):
             for name, mask in marks.items():
-                self._quarter(name, mask)
-            marks = {name: self._too_coarse(name) for name in self.solids}
-        self._halve_lines()
+                self._refine_leaves(name, mask)
+            marks = {name: self._leaves_to_refine(name) for name in self.solids}
+        self._refine_lines()
 
     def _midpoints(self, keys: AnyArray) -> AnyArray:
         """Return the numbers of the midpoints of edges, and -1 for edges that are not divided."""
@@ -123,7 +123,7 @@ class Forest:
         index = np.minimum(np.searchsorted(self._divided, keys), len(self._divided) - 1)
         return np.where(self._divided[index] == keys, self._middle[index], -1)
 
-    def _divide(self, keys: AnyArray) -> None:
+    def _add_midpoints(self, keys: AnyArray) -> None:
         """Add the midpoints of edges that are not divided yet."""
         new = np.setdiff1d(keys, self._divided)
         if not len(new):
@@ -144,12 +144,12 @@ class Forest:
         self._divided = np.concatenate([self._divided, new])[order]
         self._middle = np.concatenate([self._middle, numbers])[order]
 
-    def _quarter(self, name: str, mask: Mask) -> None:
+    def _refine_leaves(self, name: str, mask: Mask) -> None:
         """Divide the marked leaves of one element type: quadrangles and triangles into four, lines into two."""
         leaves = self._leaves[name]
         parents = leaves.corners[mask]
         keys = edges_of(name, parents)
-        self._divide(np.unique(keys))
+        self._add_midpoints(np.unique(keys))
         lattice = [parents, self._midpoints(keys)]
         if name == "quad4":
             lattice.append(len(self.points) + np.arange(len(parents))[:, None])
@@ -161,8 +161,8 @@ class Forest:
             np.concatenate([leaves.root[~mask], np.repeat(leaves.root[mask], len(RED[name]))]),
         )
 
-    def _too_coarse(self, name: str) -> Mask:
-        """Return the mask (n,) of leaves for which there is no green refinement.
+    def _leaves_to_refine(self, name: str) -> Mask:
+        """Return the mask (n,) of leaves that must be divided because there is no green refinement for them.
 
         They have an edge that is divided more than once, or too many divided edges.
         """
@@ -179,13 +179,13 @@ class Forest:
         opposite = (count == 2) & (divided[:, 0] == divided[:, 2]) if name == "quad4" else np.zeros(len(corners), bool)
         return np.asarray(twice.any(axis=1) | ((count > 1) & ~opposite))
 
-    def _halve_lines(self) -> None:
+    def _refine_lines(self) -> None:
         """Divide lines until no line has a divided edge."""
         while "line2" in self._leaves:
             mask = (self._midpoints(edges_of("line2", self._leaves["line2"].corners)) >= 0).ravel()
             if not mask.any():
                 return
-            self._quarter("line2", mask)
+            self._refine_leaves("line2", mask)
 
     def mesh(self) -> tuple[Mesh, AnyArray]:
         """Return the mesh of all leaves, and the leaf (n,) of each of its solid cells, in the order of `Mesh.solids`.
@@ -198,7 +198,7 @@ class Forest:
         owners: dict[str, list[AnyArray]] = {}
         first = 0
         for name, leaves in self._leaves.items():
-            for kind, cells, leaf in self._green(name, leaves.corners):
+            for kind, cells, leaf in self._green_cells(name, leaves.corners):
                 blocks.setdefault(kind, []).append(cells)
                 roots.setdefault(kind, []).append(leaves.root[leaf])
                 owners.setdefault(kind, []).append(first + leaf)
@@ -210,7 +210,7 @@ class Forest:
         check_cells(mesh)
         return mesh, np.concatenate([np.concatenate(owners[kind]) for kind in mesh.solids])
 
-    def _green(self, name: str, corners: AnyArray) -> list[tuple[str, AnyArray, AnyArray]]:
+    def _green_cells(self, name: str, corners: AnyArray) -> list[tuple[str, AnyArray, AnyArray]]:
         """Return element types, cells and the leaf of each cell, after green refinement of leaves with divided edges."""
         if name == "line2":
             return [(name, corners, np.arange(len(corners)))]

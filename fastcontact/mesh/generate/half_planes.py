@@ -88,10 +88,10 @@ def graded_block(
         return graded(length, Spacing(near, far, plateau=plateau, reach=plateau + reach))
 
     lines = [*(coordinates(width, radius) for radius in radii), -coordinates(depth, min(*radii, 2 * depth) / 2)[::-1]]
-    return _named(on_lines(element, lines), lines, radii)
+    return _with_groups(on_lines(element, lines), lines, radii)
 
 
-def _named(mesh: Mesh, lines: list[Array], radii: list[float]) -> Mesh:
+def _with_groups(mesh: Mesh, lines: list[Array], radii: list[float]) -> Mesh:
     """Return the mesh with the groups of `graded_block`."""
     mesh = renamed(mesh, dict.fromkeys(_CORNERS) | (_NAMES_2D if mesh.dim == 2 else _NAMES_3D))
     # The fine region ends at the first grid line at or beyond the radius.
@@ -206,7 +206,7 @@ def crowned_blocks(
         raise MeshError(f"extent = {width:g} is out of range: it must be at most R = {R:g}")
     fine = positive("contact_radius", contact_radius, width / 2, "extent/2")
     size = positive("contact_size", contact_size, fine, "contact_radius")
-    right, down = _lines(size, fine, width, rate), _lines(size, size, width, rate)
+    right, down = _positions(size, fine, width, rate), _positions(size, size, width, rate)
     lattice = on_lines(element, [np.concatenate([-right[:0:-1], right]), -down[::-1]], "LOWER")
     x, y = lattice.points.T
     crown = x**2 / (2 * R) * (1 + y / width)  # the displacement of the nodes decays downward
@@ -217,7 +217,7 @@ def crowned_blocks(
     return union(lower, upper)
 
 
-def _lines(size: float, fine: float, length: float, growth: float) -> Array:
+def _positions(size: float, fine: float, length: float, growth: float) -> Array:
     """Return positions (n + 1,) from 0 to `length`, at distances of about `size` up to `fine` that grow beyond [length]."""
     equal = np.linspace(0.0, fine, segments(round(fine / size)) + 1)
     return np.concatenate([equal, fine + growing(length - fine, size * growth, growth)[1:]])

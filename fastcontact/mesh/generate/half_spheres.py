@@ -135,11 +135,11 @@ def quarter_disc(
     R = positive("R", R)
     if element in TRIANGLES:
         unused(element, "size", "contact_size", arc_sizes=arc_sizes, segments=segments, radial_sizes=radial_sizes)
-        linear = _of_triangles(R, _spacing(R, size, contact_size, contact_radius))
+        linear = _triangle_mesh(R, _spacing(R, size, contact_size, contact_radius))
     else:
         sizes = {"size": size, "contact_size": contact_size, "contact_radius": contact_radius}
         unused(element, "arc_sizes", "radial_sizes", "segments", **sizes)
-        linear = _of_quadrangles(R, arc_sizes, segments, radial_sizes)
+        linear = _quadrangle_mesh(R, arc_sizes, segments, radial_sizes)
     disc = in_element(linear, element, [Circle((0.0, -R), R, group) for group in ("CONT1", "D1B1")])
     return disc if body == "lower" else mirrored(disc, "y", rename=_UPPER)
 
@@ -161,7 +161,7 @@ def _spacing(R: float, size: float | None, contact_size: float | None, contact_r
     return Spacing(near, far, plateau=plateau, reach=R)
 
 
-def _of_triangles(R: float, spacing: Spacing) -> Mesh:
+def _triangle_mesh(R: float, spacing: Spacing) -> Mesh:
     """Return the lower body meshed with tri3 cells."""
     corners, angle_B, angle_D = _corners(R), 0.5 * math.pi, 0.25 * math.pi
     sides = [
@@ -173,7 +173,7 @@ def _of_triangles(R: float, spacing: Spacing) -> Mesh:
     return with_points_at(filled("SPHBAS", sides, spacing), corners)
 
 
-def _of_quadrangles(
+def _quadrangle_mesh(
     R: float, arc_sizes: tuple[float, float] | None, segments: int | None, radial_sizes: tuple[float, float] | None
 ) -> Mesh:
     """Return the lower body meshed with quad4 cells: the square A-P-N-M, and two blocks between the square and the arc."""
@@ -202,7 +202,7 @@ def _three_blocks(R: float, on_arc: Array, outward: Array, equal: Array) -> Mesh
     angle_D = 0.25 * math.pi
     contact_arc = arc((0.0, -R), R, angle_D * on_arc)
     outer_arc = arc((0.0, -R), R, angle_D * (2.0 - equal))
-    bottom, top = line("A1", "P1", on_arc), line("M1", "N1", on_arc)  # of the square
+    bottom, top = line("A1", "P1", on_arc), line("M1", "N1", on_arc)  # sides of the square
     right, radial = line("P1", "N1", equal), line("N1", "D1", outward)
     radial[-1] = contact_arc[-1] = outer_arc[-1]  # D1 is common to three sides, which must agree bitwise
     square = transfinite(bottom, right, top, line("A1", "M1", equal), on_arc, equal)

@@ -165,18 +165,18 @@ def union(*meshes: Mesh) -> Mesh:
         raise MeshError(f"union needs meshes of one dimension, not {[mesh.dim for mesh in meshes]}")
     first_points = np.cumsum([0] + [mesh.n_points for mesh in meshes])[:-1]
     shifted = list(zip(meshes, first_points, strict=True))
-    cells = _joined({name: block + shift for name, block in mesh.cells.items()} for mesh, shift in shifted)
+    cells = _by_name({name: block + shift for name, block in mesh.cells.items()} for mesh, shift in shifted)
     starts = starts_of(cells)
     numbers = [(mesh, _renumbering(mesh, starts)) for mesh in meshes]
     return Mesh(
         np.concatenate([mesh.points for mesh in meshes]),
         cells,
-        _joined({name: new[members] for name, members in mesh.cell_groups.items()} for mesh, new in numbers),
-        _joined({name: members + shift for name, members in mesh.point_groups.items()} for mesh, shift in shifted),
+        _by_name({name: new[members] for name, members in mesh.cell_groups.items()} for mesh, new in numbers),
+        _by_name({name: members + shift for name, members in mesh.point_groups.items()} for mesh, shift in shifted),
     )
 
 
-def _joined(groups_of_meshes: Iterable[Groups]) -> Groups:
+def _by_name(groups_of_meshes: Iterable[Groups]) -> Groups:
     """Return the concatenated arrays of several meshes by name."""
     by_name: dict[str, list[AnyArray]] = {}
     for groups in groups_of_meshes:
@@ -186,7 +186,7 @@ def _joined(groups_of_meshes: Iterable[Groups]) -> Groups:
 
 
 def _renumbering(mesh: Mesh, starts: dict[str, int]) -> AnyArray:
-    """Return the number of each cell of `mesh` in the union, and move the `starts` of element types behind its cells."""
+    """Return the number of each cell of `mesh` in the union, and advance `starts` by the numbers of its cells, in place."""
     numbers = np.empty(mesh.n_cells, np.int64)
     for name, start in mesh.offsets.items():
         n = len(mesh.cells[name])

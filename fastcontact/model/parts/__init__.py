@@ -1,1 +1,1 @@
-"""The parts of a model, each a class that adds its methods to the one before; `Model` is the last."""
+"""Base classes of `Model`. Each of them extends the previous one by the methods for one kind of items."""

@@ -89,7 +89,7 @@ class Support:
 
 
 def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:
-    """Return one or several names of groups as a tuple, and pass None, which means all cells, through."""
+    """Return the names of groups as a tuple, or None, which stands for all cells."""
     if groups is None:
         return None
     names = (groups,) if isinstance(groups, str) else tuple(groups)
@@ -115,8 +115,8 @@ class ModelBase(Suggesting):
         check_known("kinematics", kinematics, KINEMATICS, ModelError)
         check_known("strain", strain, STRAINS, ModelError)
         if (kinematics == "3d") != (mesh.dim == 3):
-            fitting = ", ".join(f"'{name}'" for name in KINEMATICS if (name == "3d") == (mesh.dim == 3))
-            raise ModelError(f"kinematics '{kinematics}' cannot be used with a {mesh.dim}D mesh: use {fitting}")
+            possible = ", ".join(f"'{name}'" for name in KINEMATICS if (name == "3d") == (mesh.dim == 3))
+            raise ModelError(f"kinematics '{kinematics}' cannot be used with a {mesh.dim}D mesh: use {possible}")
         if not mesh.solids:
             raise ModelError(f"the mesh has no solid cells, only {', '.join(mesh.cells) or 'points'}")
         ahead.expect([f"{mesh.dim}d"])
@@ -151,13 +151,13 @@ class ModelBase(Suggesting):
         """Number of displacement components of all points."""
         return self.mesh.n_points * self.mesh.dim
 
-    def _solid_groups(self, groups: Sequence[str] | str | None, otherwise: str) -> tuple[str, ...] | None:
-        """Return the names of groups of solid cells, None for all cells.
+    def _solid_groups(self, groups: Sequence[str] | str | None, consequence: str) -> tuple[str, ...] | None:
+        """Return the names of groups of solid cells, or None for all cells.
 
-        Raises a ModelError that ends with `otherwise` if a group contains no solid cell.
+        Raises a ModelError that ends with `consequence` if a group contains no solid cell.
         """
         names = group_names(groups)
-        check_solids(self.mesh, names, otherwise)
+        check_solids(self.mesh, names, consequence)
         return names
 
     def _cells_of(self, groups: Sequence[str] | None) -> Cells:
@@ -173,21 +173,21 @@ class ModelBase(Suggesting):
         return np.array([point])
 
     def _direction(
-        self, name: str, along: Mapping[str, float], joined: bool, direction: Sequence[float] | None
+        self, name: str, stiffness: Mapping[str, float], between: bool, direction: Sequence[float] | None
     ) -> Array | None:
         """Return the unit vector (dim,) of the axial direction of a spring, or None if no `direction` is given.
 
-        `along` are its axial and transverse stiffnesses. A spring between two nodes, which is `joined`, acts along the line
-        between them by default.
+        `stiffness` contains its axial and transverse stiffnesses. A spring `between` two nodes acts along the line between
+        them by default; other springs are fixed to the ground.
         """
         if direction is None:
-            if along and not joined:
+            if stiffness and not between:
                 raise ModelError(
                     f"{name} has an axial or transverse stiffness but no second node: name it by `to`, give a direction, "
                     "or x, y or z"
                 )
             return None
-        if not along:
+        if not stiffness:
             raise ModelError(f"{name} has a direction, but no axial or transverse stiffness that would use it")
         vector = finite_vector(direction, self.mesh.dim)
         if vector is None or not vector.any():
@@ -267,7 +267,7 @@ class ModelBase(Suggesting):
         return field.moduli, field.rows
 
     def material_field(self) -> MaterialField:
-        """Return the materials of all solid cells. Raises ModelError if a cell has no material or two different ones."""
+        """Return the materials of all solid cells. Raises ModelError if a cell has no material or two different materials."""
         materials = [material for material, _ in self.materials]
         return material_field(self.mesh, self.kinematics, materials, self.material_of_cells())
 
@@ -297,17 +297,17 @@ class ModelBase(Suggesting):
                 )
 
     def _check_all_have_material(self, numbers: dict[str, Numbers]) -> None:
-        """Raise ModelError if a solid cell has no material, that is the number -1."""
-        without = {name: np.flatnonzero(values < 0) for name, values in numbers.items()}
-        total = sum(map(len, without.values()))
+        """Raise ModelError if a solid cell has no material, which the number -1 denotes."""
+        missing = {name: np.flatnonzero(values < 0) for name, values in numbers.items()}
+        total = sum(map(len, missing.values()))
         if not total:
             return
         offsets = self.mesh.offsets
-        cells = np.concatenate([rows + offsets[name] for name, rows in without.items()])
+        cells = np.concatenate([rows + offsets[name] for name, rows in missing.items()])
         groups = [g for g, members in self.mesh.cell_groups.items() if np.isin(members, cells).any()]
-        of_groups = f" in {', '.join(repr(g) for g in groups)}" if groups else ""
+        groups_text = f" in {', '.join(repr(g) for g in groups)}" if groups else ""
         raise ModelError(
-            f"{total} solid cells{of_groups} have no material: assign one to their groups by add_material or [[material]]"
+            f"{total} solid cells{groups_text} have no material: assign one to their groups by add_material or [[material]]"
         )
 
     def internal_forces(self, displacement: Array) -> Array:
@@ -348,7 +348,7 @@ class ModelBase(Suggesting):
             if self.strain == "small":
                 raise ModelError("forces of plastic bodies depend on their history, not on the displacement alone")
             if self.temperatures or self.heat_loads:
-                raise ModelError("forces of bodies that heat expands depend on their temperature: see step.reaction")
+                raise ModelError("forces of bodies with thermal expansion depend on the temperature: see step.reaction")
             return bodies.at(np.reshape(displacement, shape), bodies.beginning).force
         K = stiffness(self.mesh, self.kinematics, field.moduli, field.loops, None, field.treatment)
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)

@@ -18,7 +18,7 @@ from fastcontact.model.parts.initial_states import ModelInitialStates
 from fastcontact.model.periodicity import cyclic, periodic
 from fastcontact.model.pretension import PretensionForce, pretension
 from fastcontact.model.ramp import History, table_of
-from fastcontact.model.relation_rows import NORMAL, along, directions_of, less_first, matched
+from fastcontact.model.relation_rows import NORMAL, along, directions_of, matched, minus_first
 
 
 @typed(ModelError)
@@ -120,7 +120,7 @@ class ModelConnections(ModelInitialStates):
             axes_of(f"couple('{group}')", dict.fromkeys(component, 1.0), self.mesh.dim)
         for name in directions:
             ((nodes, vectors),) = directions_of(self.mesh, group, name)
-            rows = less_first(along(nodes, vectors, self.n_dofs))
+            rows = minus_first(along(nodes, vectors, self.n_dofs))
             self.relations.append(MultiPointConstraint(f"couple('{group}', '{name}')", rows))
 
     def relate_groups(
@@ -286,7 +286,7 @@ class ModelConnections(ModelInitialStates):
         """
         name = f"the cyclic symmetry of '{first}' and '{second}'"
         if self.kinematics == "axisymmetric":
-            raise ModelError(f"{name}: an axisymmetric model is the whole ring already")
+            raise ModelError(f"{name}: an axisymmetric model already represents the entire ring")
         point = (0.0,) * self.mesh.dim if origin is None else tuple(origin)
         axis = (0.0, 0.0, 1.0) if self.mesh.dim == 2 else tuple(direction)
         valid_axis = len(point) == self.mesh.dim and len(axis) == 3 and any(axis)
@@ -359,8 +359,8 @@ class ModelConnections(ModelInitialStates):
         """Couple a reference point to the nodes of a group.
 
         Forces, moments and supports at the reference point are transferred to the group; see `add_force` and `add_moment`.
-        `fastcontact.generate.with_reference_points` adds reference points to a mesh. The coupling is linear, hence valid
-        for small rotations.
+        `fastcontact.generate.with_reference_points` adds reference points to a mesh. The coupling is linear and
+        therefore valid for small rotations only.
 
         Parameters
         ----------
@@ -447,10 +447,10 @@ class ModelConnections(ModelInitialStates):
         """
         name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"
         stiffness = {"axial": axial, "transverse": transverse}
-        along = {key: value for key, value in stiffness.items() if value is not None}
-        vector = self._direction(name, along, to is not None, direction)
-        axes = {} if along and {*components.values()} <= {None} else axes_of(name, components, self.mesh.dim)
-        for value in [*axes.values(), *along.values()]:
+        along_line = {key: value for key, value in stiffness.items() if value is not None}
+        vector = self._direction(name, along_line, to is not None, direction)
+        axes = {} if along_line and {*components.values()} <= {None} else axes_of(name, components, self.mesh.dim)
+        for value in [*axes.values(), *along_line.values()]:
             check_number(f"the stiffness of {name}", value)
             if not value > 0:
                 raise ModelError(f"{name}: the stiffness {value:g} must be positive")
@@ -461,7 +461,7 @@ class ModelConnections(ModelInitialStates):
         if opposite is None:
             if translation is not None:
                 raise ModelError(f"{name} acts on the ground: leave out the translation, or name the group to connect")
-            self.springs.append(grounded(name, nodes, axes, self.n_dofs, self.mesh.dim, along, vector))
+            self.springs.append(grounded(name, nodes, axes, self.n_dofs, self.mesh.dim, along_line, vector))
             return
         if len(nodes) > 1 < len(opposite):
             match = matched(self.mesh, (str(group), nodes), (str(to), opposite), translation)
@@ -469,4 +469,4 @@ class ModelConnections(ModelInitialStates):
         elif translation is not None:
             raise ModelError(f"{name} connects all nodes with a single one: leave out the translation")
         first, second = np.broadcast_arrays(nodes, opposite)
-        self.springs.append(joined(name, self.mesh.points, (first, second), axes, along, vector))
+        self.springs.append(joined(name, self.mesh.points, (first, second), axes, along_line, vector))

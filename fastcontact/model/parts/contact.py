@@ -32,7 +32,7 @@ from fastcontact.model.pair_options import SHARED_OPTIONS, ContactOptions, pair_
 from fastcontact.model.parts.connections import ModelConnections
 from fastcontact.model.periodicity import same_place
 from fastcontact.model.ramp import History, table_of
-from fastcontact.model.repeated_pairs import check_repeated, joined_already
+from fastcontact.model.repeated_pairs import check_repeated, share_facets
 
 log = logging.getLogger("fastcontact")
 
@@ -202,7 +202,7 @@ class ModelContact(ModelConnections):
             ends = [self.mesh.points_of(group) for group in (secondary, primary)]
             if any(np.isin(side, [cut.nodes, cut.opposite]).all() for cut in self.pretensions for side in ends):
                 continue
-            if any(joined_already(self.mesh, (secondary, primary), other) for other in self.contact):
+            if any(share_facets(self.mesh, (secondary, primary), other) for other in self.contact):
                 log.info("contact '%s' is left out, since another contact pairs its facets already", pair.name)
                 continue
             self.add_contact(pair.name, secondary=secondary, primary=primary, formulation=formulation, **options)
@@ -248,9 +248,9 @@ class ModelContact(ModelConnections):
         check_known("contact", contact, names, ModelError)
         fluid = FluidPressure(float(pressure), source, table_of(ramp, f"the ramp of the fluid in contact '{contact}'"))
         index = names.index(contact)
-        wetted = dataclasses.replace(self.contact[index], fluid=fluid)
-        self.bind(wetted)
-        self.contact[index] = wetted
+        pair_with_fluid = dataclasses.replace(self.contact[index], fluid=fluid)
+        self.bind(pair_with_fluid)
+        self.contact[index] = pair_with_fluid
 
     def add_obstacle(
         self,
@@ -329,13 +329,13 @@ class ModelContact(ModelConnections):
             log.info("contact '%s': %s, since %s", name, method(formulation, chosen), reason)
         if formulation == "mortar":
             chosen.setdefault("multipliers", "dual")
-        driving = self._driving(name, components, force)
-        turned = rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
-        moved = displacement, history, driving, *turned
-        self._add_pair(ContactPair(name, secondary, "", formulation, chosen, obstacle, *moved))
+        obstacle_force = self._driving_force(name, components, force)
+        rotation_and_ramp = rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
+        motion_of_obstacle = displacement, history, obstacle_force, *rotation_and_ramp
+        self._add_pair(ContactPair(name, secondary, "", formulation, chosen, obstacle, *motion_of_obstacle))
 
-    def _source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
-        """Return the mask (n_points,) of the points at which fluid enters a contact pair; None without a fluid."""
+    def _fluid_source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
+        """Return the mask (n_points,) of the points at which fluid enters a contact pair, or None if it has no fluid."""
         if pair.fluid is None:
             return None
         mask = np.zeros(self.mesh.n_points, bool)
@@ -358,11 +358,14 @@ class ModelContact(ModelConnections):
         if not facets:  # `bind` raises the error
             return [], False
         simplices = [block for name, block in self.mesh.solids.items() if name in ("tri3", "tet4")]
-        of_simplices = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
-        return list(facets), of_simplices
+        only_simplices = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
+        return list(facets), only_simplices
 
-    def _driving(self, name: str, motion: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
-        """Return the force on obstacle `name` by component, None where its motion is prescribed; empty without forces."""
+    def _driving_force(self, name: str, motion: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
+        """Return the components of the force on obstacle `name`, None where its motion is prescribed.
+
+        The result is empty if no force is given.
+        """
         if not force:
             return ()
         forces = axes_of(f"the force on obstacle '{name}'", dict(force), self.mesh.dim)
@@ -383,6 +386,7 @@ class ModelContact(ModelConnections):
         return ForceDrivenObstacles([pair for pair in self.contact if pair.force], (self.mesh.n_points, self.mesh.dim))
 
     def _add_pair(self, pair: ContactPair) -> None:
+        """Add a contact pair after checking it alone and together with the other pairs."""
         if pair.name in {other.name for other in self.contact}:
             raise ContactError(f"there is already a contact pair '{pair.name}': names must differ")
         bound = self.bind(pair)
@@ -401,8 +405,8 @@ class ModelContact(ModelConnections):
         """
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
-        given = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
-        available = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given)]
+        common = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
+        available = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in common)]
         available += ["motion", "rotation", "force"] * (pair.obstacle is not None)  # arguments of `add_obstacle`
         for option in pair.options:
             check_known(f"option of {pair.formulation}", option, available, ContactError)
@@ -413,8 +417,8 @@ class ModelContact(ModelConnections):
             for interface in self.periodic_interfaces
         ]
         secondary = surface(self.mesh, pair.secondary).with_periodic_ends(ends)
-        against = pair.obstacle is not None
-        options = pair_options(pair.name, pair.options, self.mesh, secondary, against_obstacle=against)
+        has_obstacle = pair.obstacle is not None
+        options = pair_options(pair.name, pair.options, self.mesh, secondary, against_obstacle=has_obstacle)
         primary: Surface | RigidSide
         if pair.obstacle is not None:
             if not kind.against_obstacles:
@@ -431,6 +435,6 @@ class ModelContact(ModelConnections):
         turning = next((e.rotation for e in interfaces if e.rotation and np.isin(e.second, points).any()), None)
         options = dataclasses.replace(
             options, same_place=same_place(interfaces, self.mesh.n_points), turning=turning,
-            source=self._source(pair, secondary, options),
+            source=self._fluid_source(pair, secondary, options),
         )  # fmt: skip
         return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **specific)

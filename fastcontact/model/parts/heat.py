@@ -144,6 +144,7 @@ class ModelHeat(ModelBase):
         self._add_heat(Film(group, coefficient, ambient, table, *_span(begins, ends)))
 
     def _add_heat(self, load: FixedTemperature | Heating | Film) -> None:
+        """Add a heat load after checking it."""
         load.check(self.mesh, self.kinematics)
         self.heat_loads.append(load)
 
@@ -159,7 +160,7 @@ class ModelHeat(ModelBase):
 
     @property
     def point_fields(self) -> list[str]:
-        """Names of the point data of result files that only some models have."""
+        """Names of those point data of result files that only some models have."""
         options = {option for pair in self.contact for option in pair.options}
         present = {
             **dict.fromkeys(("temperature", "heat_reaction"), self.conducts),
@@ -167,7 +168,7 @@ class ModelHeat(ModelBase):
             "contact_damage": bool({"cohesion", "adhesion"} & options),
             "contact_fluid_pressure": any(pair.fluid is not None for pair in self.contact),
         }
-        return [name for name, has in present.items() if has]
+        return [name for name, is_present in present.items() if is_present]
 
     @property
     def expands(self) -> bool:
@@ -219,14 +220,14 @@ class ModelHeat(ModelBase):
         """Raise ModelError if data of the heat conduction problem are missing or its solution is not unique."""
         for pair in self.contact:
             if "friction_heat" in pair.options and not self.conducts:
-                raise ModelError(f"contact '{pair.name}' has friction_heat, but nothing conducts it: fix a temperature")
+                raise ModelError(f"contact '{pair.name}' has friction_heat, but no heat conduction: fix a temperature")
         if not self.conducts:
             return
         if self.temperatures:
-            raise ModelError("temperatures are both given by add_temperature and conducted: use fix_temperature")
+            raise ModelError("temperatures are both given by add_temperature and computed: use fix_temperature")
         if self.interpolated:
             raise ModelError(
-                f"{next(iter(self.interpolated))} connects different meshes and conducts no heat: use equal ones"
+                f"{next(iter(self.interpolated))} connects different meshes and conducts no heat: use equal meshes"
             )
         self.conduction().check()
         without_expansion = [material for material, _ in self.materials if material.expansion is None]
@@ -240,14 +241,14 @@ class ModelHeat(ModelBase):
             if isinstance(load, Film):
                 determined[self.mesh.points_of(load.group)] = True
         _, body = bodies(self.mesh)
-        joined = [np.stack([np.arange(len(body)), self.same_temperature()], axis=1)]
+        links = [np.stack([np.arange(len(body)), self.same_temperature()], axis=1)]
         for pair in self.contact:
             if pair.options.get("obstacle_temperature") is not None:
                 determined[self.mesh.points_of(pair.secondary)] = True
             elif pair.options.get("conductance") is not None:
                 ends = np.concatenate([self.mesh.points_of(pair.secondary), self.mesh.points_of(pair.primary)])
-                joined.append(np.stack([np.full(len(ends), ends[0]), ends], axis=1))
-        undetermined = not_reached(body, determined, np.concatenate(joined))
+                links.append(np.stack([np.full(len(ends), ends[0]), ends], axis=1))
+        undetermined = not_reached(body, determined, np.concatenate(links))
         if len(undetermined):
             raise ModelError(
                 f"nothing determines the temperature of body {body_name(self.mesh, body, undetermined[0])}: fix a "
@@ -256,8 +257,8 @@ class ModelHeat(ModelBase):
 
     def conductances(self) -> dict[str, Conductance]:
         """Return the thermal conductances of the contact pairs, by name of the pair."""
-        by_pair = {pair.name: pair.options.get("conductance") for pair in self.contact}
-        return {name: Conductance(name, value) for name, value in by_pair.items() if value is not None}
+        values = {pair.name: pair.options.get("conductance") for pair in self.contact}
+        return {name: Conductance(name, value) for name, value in values.items() if value is not None}
 
 
 def _span(begins: float | None, ends: float | None) -> tuple[float, float]:

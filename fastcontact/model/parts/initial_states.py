@@ -231,13 +231,14 @@ class ModelInitialStates(ModelLoads):
     def _add_initial(
         self, kind: str, groups: Sequence[str] | str | None, components: Mapping[str, Any], axes: Axes, ramp: History
     ) -> None:
+        """Add an initial stress or strain, as `kind` states."""
         names = self._solid_groups(groups, f": it has no initial {kind}")
         table = table_of(ramp, f"the ramp of the initial {kind}")
         cells = self._cells_of(names)
         self.initial_states.append(initial_state(kind, names, cells, components, axes, self.kinematics, table))
 
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:
-        """Return the sum of the temperature rises (n_points,) [temperature]; None without temperatures.
+        """Return the sum of the temperature rises (n_points,) [temperature], or None if there are none.
 
         `factors` contains the multiplier of each temperature; those of a step result are
         ``step.iterations["temperature_factors"]``.
@@ -248,7 +249,7 @@ class ModelInitialStates(ModelLoads):
         return np.asarray(np.sum(rises, axis=0))
 
     def expanding_rise(self, temperature_factors: Sequence[float], temperature: Array | None) -> Array | None:
-        """Return the temperature rise (n_points,) [temperature] that causes thermal strain; None without thermal strain.
+        """Return the temperature rise (n_points,) [temperature] that causes thermal strain, or None if there is none.
 
         `temperature` (n_points,) [temperature] and `temperature_factors` are described for `stress_offset`.
         """

@@ -299,6 +299,7 @@ class ModelLoads(ModelHeat):
         self._add(Moment(group, axes, table_of(ramp, f"the ramp of {name}")))
 
     def _add(self, load: Load) -> None:
+        """Add a load after checking it."""
         load.check(self.mesh, self.kinematics)
         self.loads.append(load)
 

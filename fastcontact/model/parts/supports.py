@@ -62,11 +62,11 @@ class ModelSupports(ModelContact):
         if not components:
             raise ModelError(f"fix('{group}', ...) has no component: specify, for example, 'x' or 'xy'")
         if axes is not None:
-            self._along_axes(group, dict.fromkeys(components, 0.0), axes, None)
+            self._add_along_axes(group, dict.fromkeys(components, 0.0), axes, None)
         elif components == NORMAL:
             self.prescribe(group, normal=0.0)
         else:
-            self._support(group, dict.fromkeys(components, 0.0), None)
+            self._add_support(group, dict.fromkeys(components, 0.0), None)
 
     def prescribe(
         self,
@@ -120,13 +120,13 @@ class ModelSupports(ModelContact):
         if rotation is not None:
             if axes is not None or normal is not None:
                 raise ModelError(f"the support of '{group}' rotates: give the displacement of its axis as x, y, z")
-            turned = rotation_of(f"the rotation of '{group}'", rotation, self.kinematics)
-            self._support(group, dict.fromkeys("xyz"[: self.mesh.dim], 0.0) | components, ramp, *turned)
+            rotation_and_ramp = rotation_of(f"the rotation of '{group}'", rotation, self.kinematics)
+            self._add_support(group, dict.fromkeys("xyz"[: self.mesh.dim], 0.0) | components, ramp, *rotation_and_ramp)
             return
         if axes is not None:
             if normal is not None:
                 raise ModelError(f"the support of '{group}' acts along its normals or along axes: give one of them")
-            self._along_axes(group, components, axes, ramp)
+            self._add_along_axes(group, components, axes, ramp)
             return
         if normal is not None:
             name = displacement_name("normal", group)
@@ -135,11 +135,11 @@ class ModelSupports(ModelContact):
             values = evaluated(normal, self.mesh.points[nodes], name)
             table = table_of(ramp, f"the ramp of {name}")
             rows = along(nodes, directions, self.n_dofs)
-            self._related_support(group, MultiPointConstraint(name, rows, values, table))
+            self._add_related_support(group, MultiPointConstraint(name, rows, values, table))
         if components or normal is None:
-            self._support(group, components, ramp)
+            self._add_support(group, components, ramp)
 
-    def _along_axes(self, group: str, components: Mapping[str, Value], axes: SupportAxes, ramp: History) -> None:
+    def _add_along_axes(self, group: str, components: Mapping[str, Value], axes: SupportAxes, ramp: History) -> None:
         """Prescribe displacements along the given axes by multi-point constraints."""
         dim, name = self.mesh.dim, f"the support of '{group}'"
         check_points(self.mesh, group, "no displacement can be prescribed on it")
@@ -158,16 +158,18 @@ class ModelSupports(ModelContact):
             rows = along(nodes, np.ascontiguousarray(direction[:, :dim]), self.n_dofs)
             table = table_of(ramp, f"the ramp of {caption}")
             values = evaluated(value, positions, caption)
-            self._related_support(group, MultiPointConstraint(f"{caption} along axes", rows, values, table))
+            self._add_related_support(group, MultiPointConstraint(f"{caption} along axes", rows, values, table))
 
-    def _related_support(self, group: str, relation: MultiPointConstraint) -> None:
+    def _add_related_support(self, group: str, relation: MultiPointConstraint) -> None:
+        """Add a support that is expressed as a multi-point constraint."""
         self.relations.append(relation)
         self.related_supports.append((group, relation))
 
-    def _support(
+    def _add_support(
         self, group: str, components: Mapping[str, Value], ramp: History, rotation: Rotation | None = None,
         rotation_ramp: Table | None = None,
     ) -> None:  # fmt: skip
+        """Add a support for each component of the displacement, after checking it."""
         check_points(self.mesh, group, "no displacement can be prescribed on it")
         for axis, value in axes_of(f"the support of '{group}'", components, self.mesh.dim).items():
             table = table_of(ramp, f"the ramp of the displacement prescribed on '{group}'")
@@ -199,13 +201,13 @@ class ModelSupports(ModelContact):
                 values = histories.get(history, np.zeros(len(nodes)))
                 different = np.flatnonzero((total[nodes, k] != values) & ~new)
                 if len(different):
-                    self._refuse(number, int(nodes[different[0]]))
+                    self._raise_contradiction(number, int(nodes[different[0]]))
                 total[nodes[new], k] = values[new]
             fixed[nodes, k] = True
-        self._hold_axis(fixed, by_ramp)
+        self._fix_axis(fixed, by_ramp)
         return fixed, by_ramp
 
-    def _refuse(self, number: int, node: int) -> None:
+    def _raise_contradiction(self, number: int, node: int) -> None:
         """Raise a ModelError which states that support `number` contradicts an earlier support at `node`."""
         support = self.supports[number]
         for before in self.supports[:number]:
@@ -217,7 +219,7 @@ class ModelSupports(ModelContact):
             f"prescribes {other:g} there{' with another ramp' if value == other else ''}: remove one of the two"
         )
 
-    def _hold_axis(self, fixed: Mask, by_ramp: Mapping[PartHistory, Array]) -> None:
+    def _fix_axis(self, fixed: Mask, by_ramp: Mapping[PartHistory, Array]) -> None:
         """Fix the radial displacement at the axis of an axisymmetric model; raise ModelError if a support contradicts it."""
         axis = self.axis_nodes
         for values in by_ramp.values():
@@ -240,4 +242,4 @@ class ModelSupports(ModelContact):
         supported = [self.mesh.points_of(support.group) for support in self.supports if support.component == 0]
         nodes = np.setdiff1d(self.axis_nodes, np.concatenate(supported)) if supported else self.axis_nodes
         if len(nodes):
-            log.info("axis of symmetry: x is held at %d nodes with x = 0 (first: point %d)", len(nodes), nodes[0])
+            log.info("axis of symmetry: x is fixed at %d nodes with x = 0 (first: point %d)", len(nodes), nodes[0])

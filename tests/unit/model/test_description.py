@@ -152,7 +152,9 @@ def cylinder(inner=0.0):
 def test_one_line_says_which_nodes_are_held(caplog):
     with caplog.at_level(logging.INFO, "fastcontact"):
         cylinder().check()
-    assert [r.message for r in caplog.records] == ["axis of symmetry: x is held at 3 nodes with x = 0 (first: point 0)"]
+    assert [r.message for r in caplog.records] == [
+        "axis of symmetry: x is fixed at 3 nodes with x = 0 (first: point 0)"
+    ]
     caplog.clear()
     held = cylinder()
     held.fix("LEFT", "x")

@@ -390,7 +390,7 @@ def split(mesh, formulation, first, second, **options):
     model = elastic_model(mesh)
     model.add_contact("first", secondary=first[0], primary=first[1], formulation=formulation)
     model.add_contact("second", secondary=second[0], primary=second[1], formulation=formulation, **options)
-    return [text for text in model_warnings(model, fc.linear_ramp(1)) if "continue each other" in text]
+    return [text for text in model_warnings(model, fc.linear_ramp(1)) if "adjoin each other" in text]
 
 
 @pytest.mark.parametrize("formulation", ["continuous", "mortar"])
@@ -405,7 +405,7 @@ def split(mesh, formulation, first, second, **options):
 )
 def test_sides_that_are_split_give_a_warning(mesh, first, second, formulation):
     (text,) = split(mesh, formulation, first, second)
-    assert text.startswith("contacts 'first' and 'second' continue each other at ")
+    assert text.startswith("contacts 'first' and 'second' adjoin each other at ")
 
 
 def test_splitting_does_no_harm_where_nodes_carry_forces(mesh):

@@ -253,7 +253,7 @@ def bar(cut=True):
     [
         ({}, "pretension 'bolt' needs either a force or a shortening"),
         ({"force": 1.0, "shortening": 1.0}, "needs either a force or a shortening"),
-        ({"shortening": 1.0, "locked_from": 1.0}, "locked_from belongs to a force"),
+        ({"shortening": 1.0, "locked_from": 1.0}, "locked_from applies to a force only"),
         ({"force": np.inf}, "the force of pretension 'bolt' is inf"),
         ({"force": 1.0, "opposite": "CUT"}, "share point 2: both sides need separate nodes"),
         ({"force": 1.0, "opposite": "TOP"}, "lies .* from the nearest node of 'TOP'"),
@@ -279,7 +279,7 @@ def test_a_bent_section_needs_a_normal():
     points = np.array(model.mesh.points)
     points[[7, 16], 1] += 0.1
     model.mesh = model.mesh.replace(points=points)
-    with pytest.raises(fc.ModelError, match="determine no plane: give its normal"):
+    with pytest.raises(fc.ModelError, match="do not determine a plane: give its normal"):
         model.add_pretension("bolt", "CUT", force=1.0)
     model.add_pretension("bolt", "CUT", force=1.0, normal=(0.0, 2.0))
     (step,) = fc.solve(model, 1)

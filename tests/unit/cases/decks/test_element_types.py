@@ -2,7 +2,7 @@
 
 import pytest
 
-from fastcontact.cases.decks.element_types import described, element_type
+from fastcontact.cases.decks.element_types import element_type, unsupported_kind
 
 
 @pytest.mark.parametrize(
@@ -15,7 +15,7 @@ from fastcontact.cases.decks.element_types import described, element_type
 )  # fmt: skip
 def test_unsupported_types_are_described(name, kind):
     assert element_type(name) is None
-    assert described(name) == f" ({kind})"
+    assert unsupported_kind(name) == f" ({kind})"
 
 
 @pytest.mark.parametrize("name", ["C3D8I", "C3D8IH", "CPE4I", "CPS4I"])
