@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
-from fastcontact.contact.cohesive_layer import bonded
+from fastcontact.contact.cohesive_layer import cohesive_rows
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints, Geometry, Linearised
 from fastcontact.contact.held_motions import SAME_DIRECTION, HeldMotions, alike, spanned, without
@@ -217,15 +217,16 @@ class Formulation(ABC):
             distance = np.minimum(np.abs(constraints.gaps(at.displacement)), np.abs(constraints.gaps(at.start)))
             constraints = constraints.without(distance > self.options.search_distance)
         if self.options.cohesion is not None:
-            return bonded(self.options.cohesion, constraints, at, _values_at(self._initial_gaps, constraints.positions))
+            initial_gap = _values_at(self._initial_gaps, constraints.positions)
+            return cohesive_rows(self.options.cohesion, constraints, at, initial_gap)
         equality = self.never_opening(constraints.positions, at)
         constraints = replace(constraints, equality=equality, friction=at.friction_factor * constraints.friction)
         if self.options.source is None:
             return constraints
-        from fastcontact.contact.fluid_pressure import AreaVectors, wetted
+        from fastcontact.contact.fluid_pressure import AreaVectors, with_fluid_pressure
 
         areas = AreaVectors(self.secondary, self.points, self.axisymmetric)
-        return wetted(constraints, at, areas, self.options.source[self.secondary.points])
+        return with_fluid_pressure(constraints, at, areas, self.options.source[self.secondary.points])
 
     def _softened(self, constraints: Constraints, at: Configuration) -> Constraints:
         """Return the constraints with the compliances of normal and tangential penalties, if the pair has any."""
