@@ -69,7 +69,7 @@ class Layer:
         return Bond(self.before.positions, sliding, self.damage, released, 0.5 * law.stiffness * float(areas @ squares))
 
 
-def cohesive_rows(law: CohesiveLaw, constraints: Constraints, at: Configuration, initial_gap: Array) -> Constraints:
+def cohesive_rows(law: CohesiveLaw, constraints: Constraints, config: Configuration, initial_gap: Array) -> Constraints:
     """Return equations of a cohesive layer at the points of `constraints`, which must have tangents.
 
     The compliance of the equations follows the traction law. A cohesive layer is free of stress at the initial gaps
@@ -77,9 +77,9 @@ def cohesive_rows(law: CohesiveLaw, constraints: Constraints, at: Configuration,
     the intact layer.
     """
     assert constraints.areas is not None
-    m, u, start = len(constraints), at.displacement.ravel(), at.start.ravel()
+    m, u, start = len(constraints), config.displacement.ravel(), config.start.ravel()
     zeros = np.zeros(m)
-    before = at.bond
+    before = config.bond
     if before is None:
         initial_damage = law.damage(initial_gap, zeros, zeros) if law.reversible else zeros
         before = Bond(constraints.positions, np.zeros_like(constraints.positions), initial_damage)
@@ -89,10 +89,10 @@ def cohesive_rows(law: CohesiveLaw, constraints: Constraints, at: Configuration,
     tangential = zip(constraints.tangents, constraints.directions, constraints.slip0, strict=True)
     slip0 = [s0 + np.einsum("md,md->m", t, sliding) - T @ start for T, t, s0 in tangential]
     slips = [s0 + T @ u for T, s0 in zip(constraints.tangents, slip0, strict=True)]
-    opening = constraints.gaps(at.displacement) - initial_gap
+    opening = constraints.gaps(config.displacement) - initial_gap
     damage = law.damage(opening, np.sqrt(sum((s**2 for s in slips), zeros)), damage)
     # In the first pairing of a step, an obstacle may have moved while the body has not. This opening causes no damage.
-    if at.bond is not None and np.array_equal(u, start):
+    if config.bond is not None and np.array_equal(u, start):
         damage = np.minimum(damage, before.damage)
     intact, jump = damage < 1.0, np.stack([opening, *slips])
     secant = np.tile(np.where(intact, 1.0 - damage, 1.0), (len(jump), 1))

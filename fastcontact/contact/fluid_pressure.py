@@ -99,45 +99,47 @@ class AreaVectors:
         return vectors * inverse[:, None], csr_array(by_node)
 
 
-def with_fluid_pressure(constraints: Constraints, at: Configuration, areas: AreaVectors, source: Mask) -> Constraints:
+def with_fluid_pressure(
+    constraints: Constraints, config: Configuration, areas: AreaVectors, source: Mask
+) -> Constraints:
     """Return the constraints of a pair under the fluid pressure of a configuration.
 
     The fluid enters from the nodes `source` (n_nodes,) of the secondary side. Contact pressures are those of the last
     pairing; before the first one, closed nodes are impermeable.
     """
-    if not at.fluid_pressure > 0.0:
+    if not config.fluid_pressure > 0.0:
         return constraints
     assert constraints.areas is not None
     assert constraints.nodal is not None
     side, points = areas.side, areas.points
     size = float(np.linalg.norm(np.ptp(points[side.points], axis=0)))
-    vectors = areas.at(np.zeros_like(points) if at.linearised is None else at.linearised)[0]
-    gaps = constraints.gaps(at.displacement)
+    vectors = areas.at(np.zeros_like(points) if config.linearised is None else config.linearised)[0]
+    gaps = constraints.gaps(config.displacement)
     nodal, node = constraints.nodal.weighted_gaps(np.where(constraints.usable, gaps, np.inf))
-    if at.pressure is None:
+    if config.pressure is None:
         passable = nodal > LENGTH_ROUND_OFF * size
     else:
         # A node under contact pressure is impermeable, even if only points beside it are closed. Contact pressures are forces
         # per reference area.
-        nominal = at.fluid_pressure * (1.0 if at.linearised is None else np.linalg.norm(vectors, axis=1))
+        nominal = config.fluid_pressure * (1.0 if config.linearised is None else np.linalg.norm(vectors, axis=1))
         facet_size = size / side.n_facets ** (1.0 / (points.shape[1] - 1))
-        passable = (nodal > -EDGE * facet_size) & (at.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
+        passable = (nodal > -EDGE * facet_size) & (config.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
     nodes = connected_nodes(side, source, passable)
     rows = nodes[node] & constraints.usable
     # A force that does not depend on the gap is represented by a linear law of small slope, which vanishes at a distance much
     # larger than the side.
     distance_to_zero = size / SINGLE_PRECISION
     B, weights = _rows_along_area_vectors(constraints.B, rows, side, vectors[node])
-    force = np.where(rows, at.fluid_pressure * constraints.areas, 0.0)
+    force = np.where(rows, config.fluid_pressure * constraints.areas, 0.0)
     at_nodes = csr_array((force, (np.arange(len(node)), node)), shape=(len(node), len(nodes)))
     return replace(
         constraints,
         B=B,
-        gap0=np.where(rows, -distance_to_zero - B @ at.displacement.ravel(), constraints.gap0),
-        softness=np.where(rows, distance_to_zero / (at.fluid_pressure * constraints.areas), constraints.softness),
+        gap0=np.where(rows, -distance_to_zero - B @ config.displacement.ravel(), constraints.gap0),
+        softness=np.where(rows, distance_to_zero / (config.fluid_pressure * constraints.areas), constraints.softness),
         equality=constraints.equality | rows,
         friction=np.where(rows, 0.0, constraints.friction),
-        wetted=Wetted(rows, np.where(nodes, at.fluid_pressure, 0.0), csr_array(weights.T @ at_nodes), areas),
+        wetted=Wetted(rows, np.where(nodes, config.fluid_pressure, 0.0), csr_array(weights.T @ at_nodes), areas),
     )
 
 

@@ -635,11 +635,8 @@ class Differences:
         gap = varied.gaps(displacement)[None]
         if not varied.tangents:
             return varied.force(multiplier), gap
-        normal0, normal, tangents = (
-            normals(self.constraints.directions),
-            normals(varied.directions),
-            self.constraints.directions,
-        )
+        tangents = self.constraints.directions
+        normal0, normal = normals(tangents), normals(varied.directions)
         mean = (normal0 + normal) / (1.0 + np.einsum("md,md->m", normal0, normal))[:, None]
         t0 = [t - np.einsum("md,md->m", t, normal)[:, None] * mean for t in tangents]
         rotation = np.einsum("kmd,jmd->mkj", varied.directions, t0)

@@ -176,23 +176,23 @@ class Formulation(ABC):
         return cls
 
     @abstractmethod
-    def unilateral(self, at: Configuration) -> Constraints:
+    def unilateral(self, config: Configuration) -> Constraints:
         """Pair the two sides, and return the constraints of unilateral contact without penalty or cohesion.
 
         Parameters
         ----------
-        at : Configuration
+        config : Configuration
             Positions of both sides at which they are paired.
         """
 
-    def constraints(self, at: Configuration) -> Constraints:
+    def constraints(self, config: Configuration) -> Constraints:
         """Pair the two sides, and return the constraints of the pair with all its options.
 
         Options are tied contact, penalties, cohesion, fluid pressure, and constraints that never open.
 
         Parameters
         ----------
-        at : Configuration
+        config : Configuration
             Positions of both sides at which they are paired.
 
         Raises
@@ -202,11 +202,11 @@ class Formulation(ABC):
         """
         if self.tied is not None:
             return self.tied.constraints()
-        constraints = self.unilateral(at)
+        constraints = self.unilateral(config)
         if self.options.cohesion is None:
-            constraints = self._softened(constraints, at)
-        if at.elastic_slip is not None and constraints.tangents:
-            previous_slip = _values_at(at.elastic_slip, constraints.positions)
+            constraints = self._softened(constraints, config)
+        if config.elastic_slip is not None and constraints.tangents:
+            previous_slip = _values_at(config.elastic_slip, constraints.positions)
             elastic_slip = np.stack([-np.einsum("md,md->m", t, previous_slip) for t in constraints.directions])
             constraints = replace(constraints, elastic_slip=elastic_slip)
         if self.options.gap_only:
@@ -214,21 +214,21 @@ class Formulation(ABC):
         if self.options.search_distance is not None:
             # A constraint is ignored only if the sides are also far apart at the beginning of the step. Otherwise a large
             # penetration in an intermediate iterate would be ignored.
-            distance = np.minimum(np.abs(constraints.gaps(at.displacement)), np.abs(constraints.gaps(at.start)))
+            distance = np.minimum(np.abs(constraints.gaps(config.displacement)), np.abs(constraints.gaps(config.start)))
             constraints = constraints.without(distance > self.options.search_distance)
         if self.options.cohesion is not None:
             initial_gap = _values_at(self._initial_gaps, constraints.positions)
-            return cohesive_rows(self.options.cohesion, constraints, at, initial_gap)
-        equality = self.never_opening(constraints.positions, at)
-        constraints = replace(constraints, equality=equality, friction=at.friction_factor * constraints.friction)
+            return cohesive_rows(self.options.cohesion, constraints, config, initial_gap)
+        equality = self.never_opening(constraints.positions, config)
+        constraints = replace(constraints, equality=equality, friction=config.friction_factor * constraints.friction)
         if self.options.source is None:
             return constraints
         from fastcontact.contact.fluid_pressure import AreaVectors, with_fluid_pressure
 
         areas = AreaVectors(self.secondary, self.points, self.axisymmetric)
-        return with_fluid_pressure(constraints, at, areas, self.options.source[self.secondary.points])
+        return with_fluid_pressure(constraints, config, areas, self.options.source[self.secondary.points])
 
-    def _softened(self, constraints: Constraints, at: Configuration) -> Constraints:
+    def _softened(self, constraints: Constraints, config: Configuration) -> Constraints:
         """Return the constraints with the compliances of normal and tangential penalties, if the pair has any."""
         normal, tangential, areas = self.options.penalty, self.options.tangential_penalty, constraints.areas
         if normal is None and tangential is None:
@@ -236,7 +236,7 @@ class Formulation(ABC):
         if areas is None:
             raise ContactError(f"formulation '{self.name}' supports no penalty: leave out the option")
         if isinstance(normal, OverclosureLaw):
-            slope, zero = normal.line(-constraints.gaps(at.displacement))
+            slope, zero = normal.line(-constraints.gaps(config.displacement))
             constraints = replace(constraints, gap0=constraints.gap0 + zero, softness=1.0 / (slope * areas), law=normal)
         elif normal is not None:
             constraints = replace(constraints, softness=np.asarray(1.0 / (normal * areas)))
@@ -286,23 +286,23 @@ class Formulation(ABC):
         order = np.argsort(points)
         return np.asarray(order[np.searchsorted(points, constraints.nodes[: moments.shape[0]], sorter=order)])
 
-    def never_opening(self, positions: Array, at: Configuration) -> Mask:
+    def never_opening(self, positions: Array, config: Configuration) -> Mask:
         """Return which constraints (m,) cannot open, given their reference positions (m, dim) [length]."""
-        if self.options.always_closed or at.never_opening is None:
+        if self.options.always_closed or config.never_opening is None:
             return np.full(len(positions), self.options.always_closed)
-        return np.asarray(_values_at(at.never_opening, positions))
+        return np.asarray(_values_at(config.never_opening, positions))
 
-    def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
+    def facing(self, candidates: Candidates, config: Configuration, tolerance: float | None = None) -> Pairing:
         """Return the pairing of candidates on the deformed configuration, with the options of the formulation.
 
         If `tolerance` is given, it replaces `projection_tolerance`.
         """
-        deformed = self.points + at.displacement
+        deformed = self.points + config.displacement
         beyond = self.projection_tolerance if tolerance is None else tolerance
         assert self.normals is not None
         assert beyond is not None
         positions = candidates.positions(deformed)
-        pairing = pair(positions, self.primary, deformed, beyond, self.normals, at.pose, at.rounded)
+        pairing = pair(positions, self.primary, deformed, beyond, self.normals, config.pose, config.rounded)
         if self.normals != "secondary":
             return pairing
         return opposed(pairing, self._secondary_normals(candidates, deformed))
@@ -316,22 +316,22 @@ class Formulation(ABC):
         return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), TINY))
 
     def assembled(
-        self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None, at: Configuration
+        self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None, config: Configuration
     ) -> Constraints:
         """Return the constraints of paired candidates, including tangents if `slides`.
 
         `compliance` couples the constraints, see `Constraints.compliance`.
         """
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
-        gap0 += self.added_gap(candidates, pairing, at) - self.overlap_of_smooth(candidates, pairing, at)
+        gap0 += self.added_gap(candidates, pairing, config) - self.overlap_of_smooth(candidates, pairing, config)
         positions = candidates.positions(self.points)
         if not self.slides:
-            geometry = self._geometry(candidates, pairing, at)
+            geometry = self._geometry(candidates, pairing, config)
             return Constraints(B, gap0, positions, compliance, geometry=geometry)
         axes = tangents(pairing.normal, self._held_at(candidates))
         friction, directions, rubbing = self.options.rubbing(self.friction, axes, candidates)
-        along, slip0 = self.slips(candidates, pairing, rubbing, at)
-        geometry = self._geometry(candidates, pairing, at, directions)
+        along, slip0 = self.slips(candidates, pairing, rubbing, config)
+        geometry = self._geometry(candidates, pairing, config, directions)
         return Constraints(B, gap0, positions, compliance, along, directions, friction, slip0, geometry=geometry)
 
     def _held_at(self, candidates: Candidates) -> Array | None:
@@ -345,7 +345,7 @@ class Formulation(ABC):
         return spanned(held, 1.0 - LENGTH_ROUND_OFF)
 
     def _geometry(
-        self, candidates: Candidates, pairing: Pairing, at: Configuration, directions: Sequence[Array] = ()
+        self, candidates: Candidates, pairing: Pairing, config: Configuration, directions: Sequence[Array] = ()
     ) -> Geometry | None:
         """Return the derivatives of the gaps of paired candidates, and of their slips along k tangents (n, dim).
 
@@ -353,17 +353,17 @@ class Formulation(ABC):
         """
         if self.normals == "secondary":
             return None
-        coordinates = self.points + at.displacement
+        coordinates = self.points + config.displacement
 
         def linearised(multiplier: Array, tangential: Array, displacement: Array) -> Linearised:
             rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
             rise = self.rise(candidates, pairing, rows, coordinates)
-            points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, at.pose, rise=rise)
+            points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, config.pose, rise=rise)
             at_rows = rows, len(multiplier)
             forces = LinearisedPoints(self.secondary, points, None, points.normal, multiplier[rows], place=at_rows)
             if not directions:
                 return forces
-            moved = replace(at, displacement=displacement)
+            moved = replace(config, displacement=displacement)
             slips = self._sliding(points.motion, np.stack(directions)[:, rows], tangential[rows], moved)
             if not isinstance(self.primary, Surface) or self.slip != "symmetric":
                 return replace(forces, slips=slips)
@@ -382,25 +382,25 @@ class Formulation(ABC):
 
         return linearised
 
-    def _sliding(self, mean: csr_array, directions: Array, tangential: Array, at: Configuration) -> Slips:
+    def _sliding(self, mean: csr_array, directions: Array, tangential: Array, config: Configuration) -> Slips:
         """Return the slips of the load step along tangents (k, m, dim).
 
         `mean` (m, n_points) maps displacements of points to displacements relative to the primary side. The motion of a rigid
         obstacle in the step is subtracted. `tangential` (m, k) are the tangential forces [force].
         """
-        moved, turning = at.displacement - at.start, None
+        moved, turning = config.displacement - config.start, None
         total = mean @ moved
         if isinstance(self.primary, RigidSide):
-            current, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-            total -= self.primary.carried(current, before, at.pose, at.pose_start)
-            if at.pose.angle != at.pose_start.angle:  # The motion is an affine function of the positions.
+            current, before = (mean @ (self.points + u) for u in (config.displacement, config.start))
+            total -= self.primary.carried(current, before, config.pose, config.pose_start)
+            if config.pose.angle != config.pose_start.angle:  # The motion is an affine function of the positions.
                 ends = np.vstack([np.zeros(current.shape[1]), np.eye(current.shape[1])])
-                varied = self.primary.carried(ends, ends[:1], at.pose, at.pose_start)
+                varied = self.primary.carried(ends, ends[:1], config.pose, config.pose_start)
                 turning = varied[1:] - varied[0]
-        return Slips(directions, tangential, total, moved, self.points + at.start, turning=turning)
+        return Slips(directions, tangential, total, moved, self.points + config.start, turning=turning)
 
     def slips(
-        self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
+        self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], config: Configuration
     ) -> tuple[tuple[csr_array, ...], Array]:
         """Return the slips of candidates in the load step, as an affine function of the displacements.
 
@@ -410,7 +410,7 @@ class Formulation(ABC):
         pairing : Pairing
         directions : sequence of k ndarray (n, dim)
             Unit tangents.
-        at : Configuration
+        config : Configuration
 
         Returns
         -------
@@ -423,20 +423,22 @@ class Formulation(ABC):
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
         slip0 = np.zeros((len(along), len(pairing.paired)))
         if isinstance(self.primary, RigidSide):
-            moved = self.carried(candidates, at)
+            moved = self.carried(candidates, config)
             slip0 = -np.stack([np.einsum("nd,nd->n", t, moved) for t in directions])
         elif self.slip == "symmetric":
-            slip0 = self._closing_slip(candidates, pairing, directions, at)
+            slip0 = self._closing_slip(candidates, pairing, directions, config)
         return along, slip0
 
-    def added_gap(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
+    def added_gap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
         """Return the contribution (n,) of clearances and wear to the gaps of candidates; zero if unpaired [length]."""
-        added = self.options.added_gap(candidates, pairing, self.primary, self.points, at.clearance_factor)
-        if at.worn is None:
+        added = self.options.added_gap(candidates, pairing, self.primary, self.points, config.clearance_factor)
+        if config.worn is None:
             return added
-        return added + np.where(pairing.paired, np.einsum("nk,nk->n", candidates.shape, at.worn[candidates.nodes]), 0.0)
+        return added + np.where(
+            pairing.paired, np.einsum("nk,nk->n", candidates.shape, config.worn[candidates.nodes]), 0.0
+        )
 
-    def overlap_of_smooth(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
+    def overlap_of_smooth(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
         """Return by how much the smooth surfaces outside of the facets reduce the gaps (n,) of candidates [length]."""
         closer, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
         if (
@@ -446,7 +448,7 @@ class Formulation(ABC):
             or not isinstance(self.primary, Surface)
         ):
             return closer
-        deformed = self.points + at.displacement
+        deformed = self.points + config.displacement
         axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
         on_secondary = candidates.facet[rows], candidates.xi[rows]
         closer[rows] = self.smoothing.overlap(on_secondary, (pairing.facet[rows], pairing.xi[rows]), axes)
@@ -464,25 +466,25 @@ class Formulation(ABC):
         slope = factor * self.smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
         return slope if pairing.beyond is None else np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
 
-    def carried(self, candidates: Candidates, at: Configuration) -> Array:
+    def carried(self, candidates: Candidates, config: Configuration) -> Array:
         """Return the displacements (n, dim) of the points of an obstacle opposite to candidates in the step [length]."""
         assert isinstance(self.primary, RigidSide)
-        current, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
-        return self.primary.carried(current, before, at.pose, at.pose_start)
+        current, before = (candidates.positions(self.points + u) for u in (config.displacement, config.start))
+        return self.primary.carried(current, before, config.pose, config.pose_start)
 
     @cached_property
     def _held_nodes(self) -> Indices:
         """The secondary nodes that supports hold, numbered on the side."""
         return np.flatnonzero(np.isin(self.secondary.points, () if self.held is None else self.held.nodes))
 
-    def _opposite_held(self, nodes: Indices, at: Configuration) -> tuple[Pairing, Array]:
+    def _opposite_held(self, nodes: Indices, config: Configuration) -> tuple[Pairing, Array]:
         """Return the pairing of secondary `nodes` (n,), and the directions in which their projections are held.
 
         The directions are given by projectors (n, dim, dim), interpolated between the nodes of the opposite facets.
         """
         assert self.held is not None
         candidates = Candidates(self.secondary.points[nodes][:, None], np.ones((len(nodes), 1)))
-        pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, BESIDE))
+        pairing = self.facing(candidates, config, max(self.projection_tolerance or 0.0, BESIDE))
         held_primary = np.zeros((len(nodes), *2 * self.points.shape[1:]))
         if isinstance(self.primary, Surface):
             rows = np.flatnonzero(pairing.paired)
@@ -490,33 +492,33 @@ class Formulation(ABC):
             held_primary[rows] = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
         return pairing, held_primary
 
-    def _both_held(self, at: Configuration) -> Array:
+    def _both_held(self, config: Configuration) -> Array:
         """Return projectors (n_nodes, dim, dim) onto directions in which both sides are held."""
         held, nodes = np.zeros((len(self.secondary.points), *2 * self.points.shape[1:])), self._held_nodes
         if len(nodes) and self.held is not None:
-            P, (_, Q) = self.held.at(self.secondary.points[nodes]), self._opposite_held(nodes, at)
+            P, (_, Q) = self.held.at(self.secondary.points[nodes]), self._opposite_held(nodes, config)
             held[nodes] = spanned(P @ Q @ P, 0.5)
         return held
 
-    def undetermined(self, at: Configuration) -> Mask:
+    def undetermined(self, config: Configuration) -> Mask:
         """Return which nodes (n_nodes,) belong to facets whose traction is undetermined.
 
         Supports hold all nodes of such a facet and the other side in one direction. If supports hold the whole side along the
         contact, as in a slice in plane strain, the traction in this direction vanishes and is not undetermined.
         """
-        both = self._both_held(at)
+        both = self._both_held(config)
         if not both.any():
             return np.zeros(len(both), bool)
-        along = without(both, nodal_normals(self.secondary, self.points + at.displacement), np.sqrt(0.5))
+        along = without(both, nodal_normals(self.secondary, self.points + config.displacement), np.sqrt(0.5))
         across = both - along
         if not self.options.tied:
-            since_begin = replace(at, start=np.zeros_like(at.displacement))
+            since_begin = replace(config, start=np.zeros_like(config.displacement))
             along = self._without_motion(since_begin) if self.friction else np.zeros_like(both)
         elsewhere = np.eye(both.shape[1]) - spanned(along.mean(axis=0)[None], 1.0 - LENGTH_ROUND_OFF)[0]
         across, along = (held - _without_whole_facets(held, self.secondary) for held in (across, along))
         return np.asarray(np.trace(across + elsewhere @ along @ elsewhere, axis1=1, axis2=2) > 0.5)
 
-    def without_slip(self, at: Configuration) -> list[tuple[Array, Mask]]:
+    def without_slip(self, config: Configuration) -> list[tuple[Array, Mask]]:
         """Return directions in which supports hold both sides without relative motion.
 
         In a plane of symmetry or on an axis, slip in these directions is zero for every traction, so that the traction is
@@ -528,23 +530,23 @@ class Formulation(ABC):
         list of (ndarray (n_nodes, dim), ndarray of bool (n_nodes,))
             Unit vectors, each with the secondary nodes that are held in this direction.
         """
-        held = _without_whole_facets(self._without_motion(at), self.secondary)
+        held = _without_whole_facets(self._without_motion(config), self.secondary)
         return alike(held, self.points[self.secondary.points])
 
-    def _without_motion(self, at: Configuration) -> Array:
+    def _without_motion(self, config: Configuration) -> Array:
         """Return projectors (n_nodes, dim, dim) onto the directions of `without_slip`, also those of whole facets."""
         held, nodes = np.zeros((len(self.secondary.points), *2 * self.points.shape[1:])), self._held_nodes
         if not len(nodes) or self.held is None:
             return held
-        pairing, held_opposite = self._opposite_held(nodes, at)
+        pairing, held_opposite = self._opposite_held(nodes, config)
         points = self.secondary.points[nodes]
-        both, moved = self.held.at(points), (at.displacement - at.start)[points]
+        both, moved = self.held.at(points), (config.displacement - config.start)[points]
         if isinstance(self.primary, RigidSide):
-            moved = moved - self.carried(Candidates(points[:, None], np.ones((len(nodes), 1))), at)
+            moved = moved - self.carried(Candidates(points[:, None], np.ones((len(nodes), 1))), config)
         else:
             rows = np.flatnonzero(pairing.paired)
             facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
-            held_primary, motion = self.held.at(facing.nodes), (at.displacement - at.start)[facing.nodes]
+            held_primary, motion = self.held.at(facing.nodes), (config.displacement - config.start)[facing.nodes]
             mean = np.einsum("nk,nkd->nd", facing.shape, motion)
             # If an inclined normal meets the primary side slightly beside a held node, the motion of the other nodes of that
             # facet is ignored.
@@ -558,7 +560,9 @@ class Formulation(ABC):
         closing = np.einsum("nd,nd->n", moved, pairing.normal)
         closing = np.where(np.linalg.norm(along, axis=1) > np.sqrt(0.5), closing, 0.0)
         moved -= closing[:, None] * pairing.normal
-        both = without(both, moved, LENGTH_ROUND_OFF * max(np.abs(at.displacement).max(), np.abs(at.start).max()))
+        both = without(
+            both, moved, LENGTH_ROUND_OFF * max(np.abs(config.displacement).max(), np.abs(config.start).max())
+        )
         held[nodes] = both
         return held
 
@@ -577,7 +581,7 @@ class Formulation(ABC):
         return replace(side, periodic_ends=(*side.periodic_ends, (nodes, nodes, reflections)))
 
     def _closing_slip(
-        self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
+        self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], config: Configuration
     ) -> Array:
         """Return the correction (k, n) of slips by the motion that closes gaps [length].
 
@@ -586,7 +590,7 @@ class Formulation(ABC):
         the gap closes along the mean of the normals of both sides, which is exact for two bodies that are mirror images.
         """
         assert isinstance(self.primary, Surface)
-        deformed, start = self.points + at.displacement, self.points + at.start
+        deformed, start = self.points + config.displacement, self.points + config.start
         slip0 = np.zeros((len(directions), len(pairing.paired)))
         rows = np.flatnonzero(pairing.paired)
         facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
@@ -603,31 +607,31 @@ class Formulation(ABC):
             slip0[k, rows] = np.einsum("nd,nd->n", along[rows], mean) * opening
         return slip0
 
-    def first_contact(self, at: Configuration) -> tuple[Array, Array]:
+    def first_contact(self, config: Configuration) -> tuple[Array, Array]:
         """Return the point of first contact (dim,) [length], and the unit normal (dim,) of the primary side there [-].
 
         The point is the secondary node with the smallest gap to the undeformed primary side. If several gaps are equal, it is
         the node nearest to the origin.
         """
         positions = self.points[self.secondary.points]
-        gap, normal = self.nodal_gap(replace(at, displacement=np.zeros_like(self.points)))
+        gap, normal = self.nodal_gap(replace(config, displacement=np.zeros_like(self.points)))
         nearest_nodes = np.flatnonzero(gap <= gap.min() + LENGTH_ROUND_OFF * np.ptp(positions, axis=0).max())
         first = nearest_nodes[np.argmin(np.linalg.norm(positions[nearest_nodes], axis=1))]
         return positions[first], normal[first]
 
     def nodal_gap(
-        self, at: Configuration, with_clearance: bool = True, displacement: Array | None = None
+        self, config: Configuration, with_clearance: bool = True, displacement: Array | None = None
     ) -> tuple[Array, Array]:
         """Return the gaps of the secondary nodes, and the opposite normals.
 
         Parameters
         ----------
-        at : Configuration
+        config : Configuration
             Positions of both sides at which the nodes are paired.
         with_clearance : bool
             Whether the gaps include clearances and wear.
         displacement : ndarray (n_points, dim), optional
-            Displacements for which the gaps are evaluated; by default those of `at` [length].
+            Displacements for which the gaps are evaluated; by default those of `config` [length].
 
         Returns
         -------
@@ -637,24 +641,24 @@ class Formulation(ABC):
             Unit normals of the primary side [-].
         """
         nodes = Candidates.nodes_of(self.secondary)
-        pairing = self.facing(nodes, at, max(self.projection_tolerance or 0.0, BESIDE))
+        pairing = self.facing(nodes, config, max(self.projection_tolerance or 0.0, BESIDE))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
-        gap0 -= self.overlap_of_smooth(nodes, pairing, at)
+        gap0 -= self.overlap_of_smooth(nodes, pairing, config)
         if with_clearance:
-            gap0 += self.added_gap(nodes, pairing, at)
-        u = at.displacement if displacement is None else displacement
+            gap0 += self.added_gap(nodes, pairing, config)
+        u = config.displacement if displacement is None else displacement
         return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
 
-    def nodal_slip(self, at: Configuration) -> Array:
+    def nodal_slip(self, config: Configuration) -> Array:
         """Return the slip increment (m, dim) of the secondary nodes [length].
 
         Nodes beyond the end of the other side may also carry pressure, through parts of their facets.
         """
         nodes = Candidates.nodes_of(self.secondary)
-        pairing = self.facing(nodes, at, np.inf)
+        pairing = self.facing(nodes, config, np.inf)
         directions = tangents(pairing.normal)
-        rows, slip0 = self.slips(nodes, pairing, directions, at)
-        along = np.stack([row @ (at.displacement - at.start).ravel() for row in rows])
+        rows, slip0 = self.slips(nodes, pairing, directions, config)
+        along = np.stack([row @ (config.displacement - config.start).ravel() for row in rows])
         along += slip0
         slip = np.einsum("kn,knd->nd", along, np.stack(directions))
         return np.where(pairing.paired[:, None], slip, 0.0)

@@ -255,11 +255,11 @@ class PressureFieldFormulation(Formulation):
         return np.concatenate([field.independent, field.around[single, field.shape[single].argmax(axis=1)]])
 
     def of_points(
-        self, candidates: Candidates, pairing: Pairing, field: PressureField, at: Configuration
+        self, candidates: Candidates, pairing: Pairing, field: PressureField, config: Configuration
     ) -> Constraints:
         """Return the constraints of paired integration points, with the compliance C of the pressure field."""
         projection = replace(field.projection, eliminable=self.eliminable, quadratic=self.secondary.order > 1)
-        constraints = self.assembled(candidates, pairing, projection, at)
+        constraints = self.assembled(candidates, pairing, projection, config)
         directions, turning = constraints.directions, self.options.turning
         if constraints.tangents and turning is not None:
             axes = turning.axes(constraints.positions), turning.axes(self.points[self.secondary.points])
@@ -267,13 +267,13 @@ class PressureFieldFormulation(Formulation):
             directions = tuple(np.einsum("mde,md->me", axes[0], t) for t in directions)
         if constraints.tangents and constraints.geometry is not None:
             constraints = replace(constraints, geometry=partial(_elastic, constraints.geometry, projection, field.axes))
-        Z = self._tractions_at_supports(field, constraints, directions, at) if self.friction else np.empty(0)
+        Z = self._tractions_at_supports(field, constraints, directions, config) if self.friction else np.empty(0)
         return replace(
             constraints, low_rank_compliance=Z, areas=field.areas, nodal=field, coupled_directions=directions
         )  # fmt: skip
 
     def _tractions_at_supports(
-        self, field: PressureField, constraints: Constraints, directions: tuple[Array, ...], at: Configuration
+        self, field: PressureField, constraints: Constraints, directions: tuple[Array, ...], config: Configuration
     ) -> Array:
         """Return the factor of a compliance that determines tangential tractions at nodes where both sides are held.
 
@@ -285,7 +285,7 @@ class PressureFieldFormulation(Formulation):
         `Constraints.low_rank_compliance`, or an empty array if no such node exists.
         """
         factors = []
-        for held, nodes in self.without_slip(at):
+        for held, nodes in self.without_slip(config):
             columns = np.flatnonzero(nodes[field.independent])
             if len(columns):
                 Z = field.projection.compliance_factor(columns)

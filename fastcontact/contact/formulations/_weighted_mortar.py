@@ -155,16 +155,16 @@ class WeightedMortar(Formulation):
         )
         return small or super().alternates(constraints)
 
-    def unilateral(self, at: Configuration) -> Constraints:
+    def unilateral(self, config: Configuration) -> Constraints:
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
-        means = self._means(self.points + at.displacement, at)
+        means = self._means(self.points + config.displacement, config)
         # Tied pairs have separate equations for the directions in which both sides are held.
-        held = self.without_slip(at) if self.slides and not self.options.tied else []
-        constraints, slip_data = self._weighted_gaps(at, means, held)
-        return replace(constraints, geometry=partial(self._linearised, at, means, held, constraints, slip_data))
+        held = self.without_slip(config) if self.slides and not self.options.tied else []
+        constraints, slip_data = self._weighted_gaps(config, means, held)
+        return replace(constraints, geometry=partial(self._linearised, config, means, held, constraints, slip_data))
 
     def _weighted_gaps(
-        self, at: Configuration, means: Means, held: list[tuple[Array, Mask]]
+        self, config: Configuration, means: Means, held: list[tuple[Array, Mask]]
     ) -> tuple[Constraints, tuple[Array, Array] | None]:
         """Return the constraints without their derivatives, and the data of their slips.
 
@@ -173,19 +173,13 @@ class WeightedMortar(Formulation):
         """
         coverage, rows, across, weight, mean, closer, normal = means
         B = rows_of(mean, normal)
-        gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(rows, across, weight)
+        gap0 = B @ self.points.ravel() + config.clearance_factor * self._clearance(rows, across, weight)
         gap0 -= np.einsum("nd,nd->n", closer, normal)
-        if at.worn is not None:
-            gap0 += rows @ at.worn / weight
+        if config.worn is not None:
+            gap0 += rows @ config.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
-        constraints = Constraints(
-            B,
-            gap0,
-            self.points[points],
-            areas=weight,
-            nodes=nodes,
-            nodal=WeightedPressures(weight, *self._whole_side),
-        )
+        pressures = WeightedPressures(weight, *self._whole_side)
+        constraints = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=pressures)
         if not self.slides:
             return constraints, None
         candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
@@ -194,14 +188,14 @@ class WeightedMortar(Formulation):
             projectors[nodes_held] += axis[nodes_held, :, None] * axis[nodes_held, None, :]
         friction, directions, rubbing = self.options.rubbing(self.friction, tangents(normal, projectors), candidates)
         slips, additional = self._slips(rubbing, held, coverage, mean, rows, weight)
-        length, closing_direction = self._closing_motion(constraints, normal, at)
+        length, closing_direction = self._closing_motion(constraints, normal, config)
         closing = length[:, None] * closing_direction
         # Part of the relative motion that is not slip: that of a rigid obstacle, or minus the motion that closes the gap.
         if not isinstance(self.primary, RigidSide):
             non_slip = -closing if self.slip == "symmetric" else np.zeros_like(closing)
         else:
-            current, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-            non_slip = self.primary.carried(current, before, at.pose, at.pose_start)
+            current, before = (mean @ (self.points + u) for u in (config.displacement, config.start))
+            non_slip = self.primary.carried(current, before, config.pose, config.pose_start)
         slip0 = -np.stack([np.einsum("nd,nd->n", t, non_slip) for t in rubbing])
         for axis, is_held, motion in additional:
             transverse = closing - np.where(is_held, np.einsum("md,md->m", closing, axis), 0.0)[:, None] * axis
@@ -210,69 +204,69 @@ class WeightedMortar(Formulation):
         constraints = replace(constraints, tangents=slips, directions=directions, friction=friction, slip0=slip0)
         return constraints, (np.stack(rubbing), length)
 
-    def _means(self, deformed: Array, at: Configuration, with_gap: Mask | None = None) -> Means:
+    def _means(self, deformed: Array, config: Configuration, with_gap: Mask | None = None) -> Means:
         """Return the mean relative motions of nodes at the coordinates `deformed` (n_points, dim) [length].
 
         `with_gap` (m,) are the nodes with gaps; by default, they result from the overlap.
         """
-        overlap = self._overlap(deformed, at.pose)
+        overlap = self._overlap(deformed, config.pose)
         weights = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
         if with_gap is None:
-            with_gap = self._nodes_with_gaps(weights, LEAST if at.rounded else COVERED)
+            with_gap = self._nodes_with_gaps(weights, LEAST if config.rounded else COVERED)
         coverage = self._coverage(overlap, weights, with_gap)
         rows, across, closer = self._weighted_integrals(coverage)
         # The gap of an excluded node is omitted, but the functions of its neighbours are not extended over its area.
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         mean = scaled(csr_array(rows - across), 1.0 / weight)
-        normal = self._mean_normals(overlap, deformed, at.pose)
+        normal = self._mean_normals(overlap, deformed, config.pose)
         return Means(coverage, rows, across, weight, mean, closer / weight[:, None], normal)
 
     def _linearised(
-        self, at: Configuration, means: Means, held: list[tuple[Array, Mask]], constraints: Constraints,
+        self, config: Configuration, means: Means, held: list[tuple[Array, Mask]], constraints: Constraints,
         slip_data: tuple[Array, Array] | None, multiplier: Array, tangential: Array, displacement: Array,
     ) -> Linearised:  # fmt: skip
         """Return the linearisation of contact forces, mean gaps and slips; see `linearised_geometry`.
 
         `constraints` and `slip_data` are the results of `_weighted_gaps` for the other arguments.
         """
-        with_gap = means.coverage.with_gap
-        if isinstance(self.primary, Surface) and (self.points.shape[1] == 3 or self._ends_within(at, multiplier)):
+        nodes = means.coverage.with_gap
+        if isinstance(self.primary, Surface) and (self.points.shape[1] == 3 or self._ends_within(config, multiplier)):
 
             def constraints_after(motion: Array) -> Constraints:
-                moved = replace(at, displacement=at.displacement + motion)
-                return self._weighted_gaps(moved, self._means(self.points + moved.displacement, at, with_gap), held)[0]
+                moved = replace(config, displacement=config.displacement + motion)
+                return self._weighted_gaps(moved, self._means(self.points + moved.displacement, config, nodes), held)[0]
 
             sides = np.concatenate([self.secondary.points, self.primary.points])
-            motions = displacement, displacement - at.start, displacement - at.displacement
+            motions = displacement, displacement - config.start, displacement - config.displacement
             step = DIFFERENCES**1.5 * float(np.ptp(self.points[sides], axis=0).max())
             return Differences(constraints, constraints_after, (multiplier, tangential), motions, sides, step)
-        at, deformed = replace(at, displacement=displacement), self.points + displacement
-        linearised = self._at_points(at, means, multiplier)
+        config, deformed = replace(config, displacement=displacement), self.points + displacement
+        linearised = self._at_points(config, means, multiplier)
         if slip_data is None:
             return linearised
         directions, length = slip_data
-        slips = self._sliding(means.motion, directions, tangential, at)
+        slips = self._sliding(means.motion, directions, tangential, config)
         if not isinstance(self.primary, RigidSide) and self.slip == "symmetric":
             opening = means.motion @ slips.start - means.closer
             closing = Closing.of(means.normal, NodalNormals(self.secondary, deformed), opening, length)
             slips = replace(slips, total=slips.total + closing.vector, closing=closing)
         return replace(linearised, slips=slips)
 
-    def _ends_within(self, at: Configuration, multiplier: Array) -> bool:
+    def _ends_within(self, config: Configuration, multiplier: Array) -> bool:
         """Return whether the primary side, or that of one of its bodies, ends within facets that carry forces."""
         assert isinstance(self.primary, Surface)
-        deformed, tolerance = self.points + at.displacement, self.projection_tolerance or 0.0
+        deformed, tolerance = self.points + config.displacement, self.projection_tolerance or 0.0
         ends = ((b.local, facets_at_ends(b, self.primary, deformed, tolerance)) for b in self.secondary.blocks)
         return any(multiplier[local[facets]].any() for local, facets in ends)
 
-    def _at_points(self, at: Configuration, means: Means, multiplier: Array) -> LinearisedPoints:
+    def _at_points(self, config: Configuration, means: Means, multiplier: Array) -> LinearisedPoints:
         """Return the linearisation of contact forces and mean gaps, with the projections of the integration points.
 
         The segments are kept constant. The variation of a cut has no effect if the integrand is continuous across it, which
         is the case except at ends of the primary side.
         """
-        deformed, is_loaded, overlap = self.points + at.displacement, multiplier != 0.0, means.coverage.overlap
+        deformed, is_loaded, overlap = self.points + config.displacement, multiplier != 0.0, means.coverage.overlap
         functions, tests, n_points, facet_offset = list[Blocks](), list[Blocks](), 0, 0
         nodes, shapes, facets = [], [], []
         of_blocks = zip(self.secondary.blocks, self._test, means.coverage.functions, overlap.points, strict=True)
@@ -288,18 +282,18 @@ class WeightedMortar(Formulation):
             facets.append(facet_offset + facet)
             n_points, facet_offset = n_points + len(facet), facet_offset + len(block.facets)
         candidates = Candidates(filled_up(nodes), filled_up(shapes), np.concatenate(facets))
-        pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", at.pose)
+        pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", config.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
         normals = "facet" if self.normals == "secondary" else self.normals
         rise = self.rise(candidates, pairing, rows, deformed)
-        points = faced(candidates, pairing, rows, self.primary, deformed, normals, at.pose, True, rise)
+        points = faced(candidates, pairing, rows, self.primary, deformed, normals, config.pose, True, rise)
         weighted = scaled(csr_array(assembled(functions, size)[:, rows]), 1.0 / means.weight)
         mean = csr_array(assembled(tests, size)[:, rows])
         separate_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
             column = self.secondary.points[:, None]
             at_nodes, all_nodes = Candidates(column, np.ones(column.shape)), np.arange(len(column))
-            separate_normals = faced(at_nodes, pairing, all_nodes, self.primary, deformed, self.normals, at.pose)
+            separate_normals = faced(at_nodes, pairing, all_nodes, self.primary, deformed, self.normals, config.pose)
         elif self.normals == "secondary":
             separate_normals = NodalNormals(self.secondary, deformed)
         return LinearisedPoints(self.secondary, points, weighted, means.normal, multiplier, mean, separate_normals)
@@ -319,7 +313,7 @@ class WeightedMortar(Formulation):
             held = np.trace(projectors, axis1=1, axis2=2) > self.points.shape[1] - 0.5
         return full_areas, full_area, quadratic, held
 
-    def _closing_motion(self, constraints: Constraints, normal: Array, at: Configuration) -> tuple[Array, Array]:
+    def _closing_motion(self, constraints: Constraints, normal: Array, config: Configuration) -> tuple[Array, Array]:
         """Return the lengths (m,) by which gaps close in the step [length], and the directions (m, dim) of this motion.
 
         This motion is not slip. As in `Formulation`, the directions are those of the means of the normals of both sides, or
@@ -327,10 +321,10 @@ class WeightedMortar(Formulation):
         """
         direction = normal
         if not isinstance(self.primary, RigidSide):
-            direction = normal - nodal_normals(self.secondary, self.points + at.displacement)
+            direction = normal - nodal_normals(self.secondary, self.points + config.displacement)
             direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), TINY)  # zero at unpaired nodes
         lean = np.einsum("nd,nd->n", normal, direction)
-        gap = np.where(constraints.usable & (lean > 0.0), constraints.gaps(at.start), 0.0)
+        gap = np.where(constraints.usable & (lean > 0.0), constraints.gaps(config.start), 0.0)
         return gap / np.where(lean > 0.0, lean, 1.0), direction
 
     def _slips(

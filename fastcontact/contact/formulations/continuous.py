@@ -144,13 +144,13 @@ class Continuous(PressureFieldFormulation):
         independent = np.flatnonzero((weight != 0.0) & ~excluded & (even.diagonal() != 0.0))
         return csr_array((values @ spread(self.secondary, excluded, independent))[:, independent]), independent
 
-    def unilateral(self, at: Configuration) -> Constraints:
+    def unilateral(self, config: Configuration) -> Constraints:
         """Pair the integration points on the deformed configuration, and return one constraint per point."""
-        pairing = self.facing(self._candidates, at)
+        pairing = self.facing(self._candidates, config)
         areas = self._field.projection.areas
         at_axis = self._at_axis
         pairing.paired[~(areas > ROUND_OFF * areas.max()) & ~at_axis] = False
-        constraints = self.of_points(self._candidates, pairing, self._field, at)
+        constraints = self.of_points(self._candidates, pairing, self._field, config)
         if at_axis.any():  # There is no slip on the axis.
             constraints = replace(constraints, friction=np.where(at_axis, 0.0, constraints.friction))
         return constraints

@@ -211,9 +211,9 @@ class SegmentMortar(PressureFieldFormulation):
         weighted = dim == 3 or str(options.get("multipliers", "standard")) != "standard"
         return WeightedMortar if weighted else SegmentMortar
 
-    def unilateral(self, at: Configuration) -> Constraints:
+    def unilateral(self, config: Configuration) -> Constraints:
         """Intersect the facets on the deformed configuration, and return one constraint per integration point."""
-        deformed = self.points + at.displacement
+        deformed = self.points + config.displacement
         assert isinstance(self.primary, Surface)
         block, borders = self.secondary.blocks[0], self.options.borders(self.secondary)
         n_gauss = block.facets.shape[1] + 1 if self.n_gauss is None else self.n_gauss
@@ -221,7 +221,7 @@ class SegmentMortar(PressureFieldFormulation):
         points = line_points(block, self.primary, self.points, deformed, *options)
         facet, shape, area = points.facet, points.shape, points.area
         candidates = Candidates(self.secondary.facets[facet], shape, facet, points.xi[:, None])
-        pairing_of_points = self.facing(candidates, at)
+        pairing_of_points = self.facing(candidates, config)
         paired = np.repeat(pairing_of_points.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
         covered = np.bincount(facet, weights=np.where(paired, area, 0.0))
@@ -233,7 +233,7 @@ class SegmentMortar(PressureFieldFormulation):
         values = determined(self.secondary, self._whole, [mass], self.options.excluded_nodes(self.secondary))
         samples = self.secondary.local[facet], shape
         field = PressureField.of_points(samples, (usable_area, area), self._rho, self.repeated(values), renewed=True)
-        return self.of_points(candidates, pairing, field, at)
+        return self.of_points(candidates, pairing, field, config)
 
 
 FORMULATION = SegmentMortar

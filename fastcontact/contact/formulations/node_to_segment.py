@@ -67,13 +67,13 @@ class NodeToSegment(Formulation):
                 )
         self._candidates = Candidates.nodes_of(self.secondary)
 
-    def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
+    def facing(self, candidates: Candidates, config: Configuration, tolerance: float | None = None) -> Pairing:
         """Return the pairing of candidates with facets or, if `opposite` is ``"node"``, with the nearest primary nodes."""
-        pairing = super().facing(candidates, at, tolerance)
+        pairing = super().facing(candidates, config, tolerance)
         if self.opposite == "facet":
             return pairing
         assert isinstance(self.primary, Surface)
-        deformed, nodes = self.points + at.displacement, Candidates.nodes_of(self.primary)
+        deformed, nodes = self.points + config.displacement, Candidates.nodes_of(self.primary)
         rows = nearest(deformed[self.primary.points], candidates.positions(deformed))[1]
         normal = pairing.normal
         if self.normals in ("facet", "averaged"):  # The normal at a node is the mean over its facets.
@@ -82,13 +82,13 @@ class NodeToSegment(Formulation):
         assert nodes.xi is not None
         return replace(pairing, facet=nodes.facet[rows], xi=nodes.xi[rows], normal=normal, beyond=None)
 
-    def unilateral(self, at: Configuration) -> Constraints:
+    def unilateral(self, config: Configuration) -> Constraints:
         """Pair the nodes on the deformed configuration, and return one constraint per secondary node."""
-        pairing = self.facing(self._candidates, at)
+        pairing = self.facing(self._candidates, config)
         pairing.paired[self.options.out(self._candidates)] = False
         areas = self._nodal.nodal_areas
         usable = np.where(areas > ROUND_OFF * areas.max(), areas, np.inf)
-        constraints = self.assembled(self._candidates, pairing, None, at)
+        constraints = self.assembled(self._candidates, pairing, None, config)
         if self.opposite == "node":
             constraints = replace(constraints, geometry=None)
         return replace(constraints, areas=usable, nodes=self.secondary.points.astype(np.intp), nodal=self._nodal)
