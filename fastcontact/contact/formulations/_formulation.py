@@ -56,16 +56,16 @@ from fastcontact.errors import ContactError, unknown
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 SLIPS = ("symmetric", "primary")
-# Sine of the angle between the normal of a surface and a plane of symmetry above which the surface has a corner at the plane.
-# Octagons, with an angle of 22.5 degrees, have corners there irrespective of round-off.
+# Sine of the largest angle between the normal of a surface and a plane of symmetry at which the surface of the full model has
+# no corner at the plane. Octagons, with an angle of 22.5 degrees, have corners there irrespective of round-off.
 LEANING = float(np.sin(np.radians(21.0)))
 
 
 @dataclass(eq=False)
 class Formulation(ABC):
-    """A contact formulation for one pair of surfaces; instances are immutable.
+    """A contact formulation for one pair of surfaces.
 
-    Subclasses are dataclasses. The fields that they add are options of the formulation.
+    Instances are immutable. Subclasses are dataclasses, and the fields that they add are options of the formulation.
 
     Parameters
     ----------
@@ -88,14 +88,14 @@ class Formulation(ABC):
 
         - ``"facet"``: normal of the primary facet at the projection. Default in 2D without `surface_smoothing`.
         - ``"averaged"``: normal interpolated between averaged nodal normals of the primary side. Default in all other cases,
-          because with discontinuous normals the pairing of a point opposite an edge may not converge.
+          because the pairing of a point opposite an edge may not converge with discontinuous normals.
         - ``"secondary"``: opposite of the averaged normal of the secondary side at the point.
         - A vector (dim,) of any length: a constant normal, which points out of the primary body. Points are projected along
-          it.
+          this vector.
     slip : str
-        ``"symmetric"``: a relative displacement that closes a gap along the mean of the normals of both sides is not slip.
-        ``"primary"``: all relative displacement along the tangents of the primary side is slip, also if the gap closes
-        obliquely, as in code_aster.
+        With ``"symmetric"``, a relative displacement that closes a gap along the mean of the normals of both sides is not
+        slip. With ``"primary"``, every relative displacement along the tangents of the primary side is slip, even if the gap
+        closes obliquely, as in code_aster.
     surface_smoothing : bool
         Whether to measure the gap between the smooth surfaces that the facets of curved sides approximate, see
         `surface_smoothing`. Mortar sets it by default.
@@ -122,7 +122,7 @@ class Formulation(ABC):
     name: ClassVar[str]
     # Whether the primary side may be a rigid obstacle.
     against_obstacles: ClassVar[bool] = True
-    # Whether each node has one gap, weighted over the facets around it.
+    # Whether each node has one gap, which is weighted over the adjacent facets.
     weighs_gaps: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
@@ -140,8 +140,8 @@ class Formulation(ABC):
         if self.surface_smoothing and not isinstance(self.primary, Surface):
             raise ContactError("surface_smoothing needs two meshed sides: leave it out at an obstacle")
         if self.friction:
-            self.secondary = self._mirrored(self.secondary)
-            self.primary = self._mirrored(self.primary) if isinstance(self.primary, Surface) else self.primary
+            self.secondary = self._reflected(self.secondary)
+            self.primary = self._reflected(self.primary) if isinstance(self.primary, Surface) else self.primary
 
     @cached_property
     def smoothing(self) -> Smoothing | None:
@@ -167,7 +167,7 @@ class Formulation(ABC):
         return True
 
     def alternates(self, constraints: Constraints) -> bool:
-        """Return whether pairings like `constraints` may alternate: points between two facets with different normals."""
+        """Return whether pairings like `constraints` may alternate, because points lie between facets with other normals."""
         return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
 
     @classmethod
@@ -204,7 +204,7 @@ class Formulation(ABC):
             return self.tied.constraints()
         constraints = self.unilateral(config)
         if self.options.cohesion is None:
-            constraints = self._softened(constraints, config)
+            constraints = self._with_penalties(constraints, config)
         if config.elastic_slip is not None and constraints.tangents:
             previous_slip = _values_at(config.elastic_slip, constraints.positions)
             elastic_slip = np.stack([-np.einsum("md,md->m", t, previous_slip) for t in constraints.directions])
@@ -212,8 +212,8 @@ class Formulation(ABC):
         if self.options.gap_only:
             return constraints.without(np.ones(len(constraints), bool))
         if self.options.search_distance is not None:
-            # A constraint is ignored only if the sides are also far apart at the beginning of the step. Otherwise a large
-            # penetration in an intermediate iterate would be ignored.
+            # A constraint is ignored only if the sides are also far apart at the beginning of the step. Otherwise,
+            # constraints with a large penetration in an intermediate iterate would be ignored.
             distance = np.minimum(np.abs(constraints.gaps(config.displacement)), np.abs(constraints.gaps(config.start)))
             constraints = constraints.without(distance > self.options.search_distance)
         if self.options.cohesion is not None:
@@ -228,7 +228,7 @@ class Formulation(ABC):
         areas = AreaVectors(self.secondary, self.points, self.axisymmetric)
         return with_fluid_pressure(constraints, config, areas, self.options.source[self.secondary.points])
 
-    def _softened(self, constraints: Constraints, config: Configuration) -> Constraints:
+    def _with_penalties(self, constraints: Constraints, config: Configuration) -> Constraints:
         """Return the constraints with the compliances of normal and tangential penalties, if the pair has any."""
         normal, tangential, areas = self.options.penalty, self.options.tangential_penalty, constraints.areas
         if normal is None and tangential is None:
@@ -266,12 +266,12 @@ class Formulation(ABC):
     def _tied_at_supports(self, constraints: Constraints, moments: csr_array, areas: Array | None) -> csr_array | None:
         """Return the `reduction` of the multipliers of a tied pair; None if no node is held by supports on both sides."""
         # Directions in which all nodes of a facet are held are ignored.
-        held = _without_whole_facets(self._both_held(Configuration.undeformed(self.points)), self.secondary)
+        held = _without_complete_facets(self._held_on_both_sides(Configuration.undeformed(self.points)), self.secondary)
         if not (held.any() and constraints.tangents):
             return None
         nodes = self.nodes_of(constraints, moments)
         frames = [moments @ direction for direction in (normals(constraints.directions), *constraints.directions)]
-        # The nearest orthonormal axes to the means do not depend on the choice of the tangents.
+        # The orthonormal axes nearest to the means do not depend on the choice of the tangents.
         left, lengths, right = np.linalg.svd(np.stack(frames, axis=1))
         axes = (left * (lengths > 0.0)[:, None]) @ right
         sizes = np.ones(len(nodes)) if areas is None else np.where(np.isfinite(areas), areas, 0.0)
@@ -293,16 +293,16 @@ class Formulation(ABC):
         return np.asarray(_values_at(config.never_opening, positions))
 
     def facing(self, candidates: Candidates, config: Configuration, tolerance: float | None = None) -> Pairing:
-        """Return the pairing of candidates on the deformed configuration, with the options of the formulation.
+        """Return the pairing of candidates in the deformed configuration, with the options of the formulation.
 
         If `tolerance` is given, it replaces `projection_tolerance`.
         """
         deformed = self.points + config.displacement
-        beyond = self.projection_tolerance if tolerance is None else tolerance
+        largest_overhang = self.projection_tolerance if tolerance is None else tolerance
         assert self.normals is not None
-        assert beyond is not None
+        assert largest_overhang is not None
         positions = candidates.positions(deformed)
-        pairing = pair(positions, self.primary, deformed, beyond, self.normals, config.pose, config.rounded)
+        pairing = pair(positions, self.primary, deformed, largest_overhang, self.normals, config.pose, config.rounded)
         if self.normals != "secondary":
             return pairing
         return opposed(pairing, self._secondary_normals(candidates, deformed))
@@ -326,15 +326,15 @@ class Formulation(ABC):
         gap0 += self.added_gap(candidates, pairing, config) - self.overlap_of_smooth(candidates, pairing, config)
         positions = candidates.positions(self.points)
         if not self.slides:
-            geometry = self._geometry(candidates, pairing, config)
+            geometry = self._linearised_geometry(candidates, pairing, config)
             return Constraints(B, gap0, positions, compliance, geometry=geometry)
-        axes = tangents(pairing.normal, self._held_at(candidates))
+        axes = tangents(pairing.normal, self._held_directions(candidates))
         friction, directions, rubbing = self.options.rubbing(self.friction, axes, candidates)
-        along, slip0 = self.slips(candidates, pairing, rubbing, config)
-        geometry = self._geometry(candidates, pairing, config, directions)
-        return Constraints(B, gap0, positions, compliance, along, directions, friction, slip0, geometry=geometry)
+        slip_rows, slip0 = self.slips(candidates, pairing, rubbing, config)
+        geometry = self._linearised_geometry(candidates, pairing, config, directions)
+        return Constraints(B, gap0, positions, compliance, slip_rows, directions, friction, slip0, geometry=geometry)
 
-    def _held_at(self, candidates: Candidates) -> Array | None:
+    def _held_directions(self, candidates: Candidates) -> Array | None:
         """Return projectors (n, dim, dim) onto the directions in which all nodes of a candidate are held.
 
         None without friction, or if no node is held.
@@ -344,7 +344,7 @@ class Formulation(ABC):
         held = np.einsum("nk,nkde->nde", candidates.shape, self.held.at(candidates.nodes))
         return spanned(held, 1.0 - LENGTH_ROUND_OFF)
 
-    def _geometry(
+    def _linearised_geometry(
         self, candidates: Candidates, pairing: Pairing, config: Configuration, directions: Sequence[Array] = ()
     ) -> Geometry | None:
         """Return the derivatives of the gaps of paired candidates, and of their slips along k tangents (n, dim).
@@ -364,7 +364,7 @@ class Formulation(ABC):
             if not directions:
                 return forces
             moved = replace(config, displacement=displacement)
-            slips = self._sliding(points.motion, np.stack(directions)[:, rows], tangential[rows], moved)
+            slips = self._load_step_slips(points.motion, np.stack(directions)[:, rows], tangential[rows], moved)
             if not isinstance(self.primary, Surface) or self.slip != "symmetric":
                 return replace(forces, slips=slips)
             averaged, smooth = points.averaged, None
@@ -382,22 +382,22 @@ class Formulation(ABC):
 
         return linearised
 
-    def _sliding(self, mean: csr_array, directions: Array, tangential: Array, config: Configuration) -> Slips:
+    def _load_step_slips(self, mean: csr_array, directions: Array, tangential: Array, config: Configuration) -> Slips:
         """Return the slips of the load step along tangents (k, m, dim).
 
         `mean` (m, n_points) maps displacements of points to displacements relative to the primary side. The motion of a rigid
         obstacle in the step is subtracted. `tangential` (m, k) are the tangential forces [force].
         """
-        moved, turning = config.displacement - config.start, None
-        total = mean @ moved
+        increment, rotation_gradient = config.displacement - config.start, None
+        total = mean @ increment
         if isinstance(self.primary, RigidSide):
-            current, before = (mean @ (self.points + u) for u in (config.displacement, config.start))
-            total -= self.primary.carried(current, before, config.pose, config.pose_start)
+            current, initial = (mean @ (self.points + u) for u in (config.displacement, config.start))
+            total -= self.primary.carried(current, initial, config.pose, config.pose_start)
             if config.pose.angle != config.pose_start.angle:  # The motion is an affine function of the positions.
                 ends = np.vstack([np.zeros(current.shape[1]), np.eye(current.shape[1])])
-                varied = self.primary.carried(ends, ends[:1], config.pose, config.pose_start)
-                turning = varied[1:] - varied[0]
-        return Slips(directions, tangential, total, moved, self.points + config.start, turning=turning)
+                unit_motions = self.primary.carried(ends, ends[:1], config.pose, config.pose_start)
+                rotation_gradient = unit_motions[1:] - unit_motions[0]
+        return Slips(directions, tangential, total, increment, self.points + config.start, turning=rotation_gradient)
 
     def slips(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], config: Configuration
@@ -420,44 +420,45 @@ class Formulation(ABC):
             Minus the motion of a rigid primary side in the step; between two bodies, minus the tangential displacement that
             closes the gap, if `slip` is ``"symmetric"`` [length].
         """
-        along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
-        slip0 = np.zeros((len(along), len(pairing.paired)))
+        rows = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
+        slip0 = np.zeros((len(rows), len(pairing.paired)))
         if isinstance(self.primary, RigidSide):
-            moved = self.carried(candidates, config)
-            slip0 = -np.stack([np.einsum("nd,nd->n", t, moved) for t in directions])
+            obstacle_motion = self.carried(candidates, config)
+            slip0 = -np.stack([np.einsum("nd,nd->n", t, obstacle_motion) for t in directions])
         elif self.slip == "symmetric":
             slip0 = self._closing_slip(candidates, pairing, directions, config)
-        return along, slip0
+        return rows, slip0
 
     def added_gap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
         """Return the contribution (n,) of clearances and wear to the gaps of candidates; zero if unpaired [length]."""
-        added = self.options.added_gap(candidates, pairing, self.primary, self.points, config.clearance_factor)
+        clearance = self.options.added_gap(candidates, pairing, self.primary, self.points, config.clearance_factor)
         if config.worn is None:
-            return added
-        return added + np.where(
+            return clearance
+        return clearance + np.where(
             pairing.paired, np.einsum("nk,nk->n", candidates.shape, config.worn[candidates.nodes]), 0.0
         )
 
     def overlap_of_smooth(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
-        """Return by how much the smooth surfaces outside of the facets reduce the gaps (n,) of candidates [length]."""
-        closer, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
+        """Return the lengths (n,) by which smooth surfaces reduce the gaps of candidates, compared with facets [length]."""
+        overlap, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
         if (
             self.smoothing is None
             or candidates.facet is None
             or candidates.xi is None
             or not isinstance(self.primary, Surface)
         ):
-            return closer
+            return overlap
         deformed = self.points + config.displacement
         axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
         on_secondary = candidates.facet[rows], candidates.xi[rows]
-        closer[rows] = self.smoothing.overlap(on_secondary, (pairing.facet[rows], pairing.xi[rows]), axes)
-        return closer
+        overlap[rows] = self.smoothing.overlap(on_secondary, (pairing.facet[rows], pairing.xi[rows]), axes)
+        return overlap
 
     def rise(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
         """Return the derivatives (n, dim - 1) of `overlap_of_smooth` along primary facets [length]; None without smoothing.
 
-        `rows` (n,) are candidates, `deformed` (n_points, dim) are current coordinates. Facets have straight extensions.
+        `rows` (n,) are numbers of candidates, and `deformed` (n_points, dim) the current coordinates. The derivatives are
+        zero on the straight extensions of facets.
         """
         if self.smoothing is None or candidates.facet is None or not isinstance(self.primary, Surface):
             return None
@@ -467,17 +468,17 @@ class Formulation(ABC):
         return slope if pairing.beyond is None else np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
 
     def carried(self, candidates: Candidates, config: Configuration) -> Array:
-        """Return the displacements (n, dim) of the points of an obstacle opposite to candidates in the step [length]."""
+        """Return the displacements (n, dim) in the step of the obstacle points opposite to candidates [length]."""
         assert isinstance(self.primary, RigidSide)
-        current, before = (candidates.positions(self.points + u) for u in (config.displacement, config.start))
-        return self.primary.carried(current, before, config.pose, config.pose_start)
+        current, initial = (candidates.positions(self.points + u) for u in (config.displacement, config.start))
+        return self.primary.carried(current, initial, config.pose, config.pose_start)
 
     @cached_property
     def _held_nodes(self) -> Indices:
         """The secondary nodes that supports hold, numbered on the side."""
         return np.flatnonzero(np.isin(self.secondary.points, () if self.held is None else self.held.nodes))
 
-    def _opposite_held(self, nodes: Indices, config: Configuration) -> tuple[Pairing, Array]:
+    def _held_projections(self, nodes: Indices, config: Configuration) -> tuple[Pairing, Array]:
         """Return the pairing of secondary `nodes` (n,), and the directions in which their projections are held.
 
         The directions are given by projectors (n, dim, dim), interpolated between the nodes of the opposite facets.
@@ -488,41 +489,42 @@ class Formulation(ABC):
         held_primary = np.zeros((len(nodes), *2 * self.points.shape[1:]))
         if isinstance(self.primary, Surface):
             rows = np.flatnonzero(pairing.paired)
-            facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
-            held_primary[rows] = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
+            feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
+            held_primary[rows] = np.einsum("nk,nkde->nde", feet.shape, self.held.at(feet.nodes))
         return pairing, held_primary
 
-    def _both_held(self, config: Configuration) -> Array:
+    def _held_on_both_sides(self, config: Configuration) -> Array:
         """Return projectors (n_nodes, dim, dim) onto directions in which both sides are held."""
         held, nodes = np.zeros((len(self.secondary.points), *2 * self.points.shape[1:])), self._held_nodes
         if len(nodes) and self.held is not None:
-            P, (_, Q) = self.held.at(self.secondary.points[nodes]), self._opposite_held(nodes, config)
+            P, (_, Q) = self.held.at(self.secondary.points[nodes]), self._held_projections(nodes, config)
             held[nodes] = spanned(P @ Q @ P, 0.5)
         return held
 
     def undetermined(self, config: Configuration) -> Mask:
         """Return which nodes (n_nodes,) belong to facets whose traction is undetermined.
 
-        Supports hold all nodes of such a facet and the other side in one direction. If supports hold the whole side along the
-        contact, as in a slice in plane strain, the traction in this direction vanishes and is not undetermined.
+        This is the case if supports hold all nodes of a facet, and the other side, in one direction. If supports hold the
+        complete side in a direction along the contact, as in a slice in plane strain, the traction in this direction vanishes
+        and is not undetermined.
         """
-        both = self._both_held(config)
-        if not both.any():
-            return np.zeros(len(both), bool)
-        along = without(both, nodal_normals(self.secondary, self.points + config.displacement), np.sqrt(0.5))
-        across = both - along
+        held_both = self._held_on_both_sides(config)
+        if not held_both.any():
+            return np.zeros(len(held_both), bool)
+        along = without(held_both, nodal_normals(self.secondary, self.points + config.displacement), np.sqrt(0.5))
+        across = held_both - along
         if not self.options.tied:
             since_begin = replace(config, start=np.zeros_like(config.displacement))
-            along = self._without_motion(since_begin) if self.friction else np.zeros_like(both)
-        elsewhere = np.eye(both.shape[1]) - spanned(along.mean(axis=0)[None], 1.0 - LENGTH_ROUND_OFF)[0]
-        across, along = (held - _without_whole_facets(held, self.secondary) for held in (across, along))
+            along = self._held_without_motion(since_begin) if self.friction else np.zeros_like(held_both)
+        elsewhere = np.eye(held_both.shape[1]) - spanned(along.mean(axis=0)[None], 1.0 - LENGTH_ROUND_OFF)[0]
+        across, along = (held - _without_complete_facets(held, self.secondary) for held in (across, along))
         return np.asarray(np.trace(across + elsewhere @ along @ elsewhere, axis1=1, axis2=2) > 0.5)
 
     def without_slip(self, config: Configuration) -> list[tuple[Array, Mask]]:
         """Return directions in which supports hold both sides without relative motion.
 
         In a plane of symmetry or on an axis, slip in these directions is zero for every traction, so that the traction is
-        undetermined. If one side is free, or is moved relative to the other, friction acts and determines it. Directions in
+        undetermined. If one side is free, or moves relative to the other, friction determines the traction. Directions in
         which all nodes of a facet are held are ignored.
 
         Returns
@@ -530,50 +532,49 @@ class Formulation(ABC):
         list of (ndarray (n_nodes, dim), ndarray of bool (n_nodes,))
             Unit vectors, each with the secondary nodes that are held in this direction.
         """
-        held = _without_whole_facets(self._without_motion(config), self.secondary)
+        held = _without_complete_facets(self._held_without_motion(config), self.secondary)
         return alike(held, self.points[self.secondary.points])
 
-    def _without_motion(self, config: Configuration) -> Array:
-        """Return projectors (n_nodes, dim, dim) onto the directions of `without_slip`, also those of whole facets."""
+    def _held_without_motion(self, config: Configuration) -> Array:
+        """Return projectors (n_nodes, dim, dim) onto the directions of `without_slip`, including those of complete facets."""
         held, nodes = np.zeros((len(self.secondary.points), *2 * self.points.shape[1:])), self._held_nodes
         if not len(nodes) or self.held is None:
             return held
-        pairing, held_opposite = self._opposite_held(nodes, config)
+        pairing, held_opposite = self._held_projections(nodes, config)
         points = self.secondary.points[nodes]
-        both, moved = self.held.at(points), (config.displacement - config.start)[points]
+        common, slip = self.held.at(points), (config.displacement - config.start)[points]
         if isinstance(self.primary, RigidSide):
-            moved = moved - self.carried(Candidates(points[:, None], np.ones((len(nodes), 1))), config)
+            slip = slip - self.carried(Candidates(points[:, None], np.ones((len(nodes), 1))), config)
         else:
             rows = np.flatnonzero(pairing.paired)
-            facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
-            held_primary, motion = self.held.at(facing.nodes), (config.displacement - config.start)[facing.nodes]
-            mean = np.einsum("nk,nkd->nd", facing.shape, motion)
-            # If an inclined normal meets the primary side slightly beside a held node, the motion of the other nodes of that
-            # facet is ignored.
-            excess = np.einsum("nk,nkde,nkd->ne", facing.shape, held_primary, motion - mean[:, None])
-            moved[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(held_opposite[rows], hermitian=True), excess)
-            both = spanned(both @ held_opposite @ both, 0.5)
-        along = np.einsum("nde,ne->nd", both, pairing.normal)
-        both = without(both, pairing.normal, np.sqrt(0.5))
+            feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
+            held_primary, motion = self.held.at(feet.nodes), (config.displacement - config.start)[feet.nodes]
+            mean = np.einsum("nk,nkd->nd", feet.shape, motion)
+            # If an inclined normal intersects the primary side slightly beside a held node, the motion of the other nodes of
+            # this facet is ignored.
+            excess = np.einsum("nk,nkde,nkd->ne", feet.shape, held_primary, motion - mean[:, None])
+            slip[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(held_opposite[rows], hermitian=True), excess)
+            common = spanned(common @ held_opposite @ common, 0.5)
+        normal_part = np.einsum("nde,ne->nd", common, pairing.normal)
+        common = without(common, pairing.normal, np.sqrt(0.5))
         # Where the normal is held, a motion along it closes the gap and is not slip. Elsewhere the normal may be inclined to
         # the held directions, such as at the edge of a plane of symmetry.
-        closing = np.einsum("nd,nd->n", moved, pairing.normal)
-        closing = np.where(np.linalg.norm(along, axis=1) > np.sqrt(0.5), closing, 0.0)
-        moved -= closing[:, None] * pairing.normal
-        both = without(
-            both, moved, LENGTH_ROUND_OFF * max(np.abs(config.displacement).max(), np.abs(config.start).max())
-        )
-        held[nodes] = both
+        closing = np.einsum("nd,nd->n", slip, pairing.normal)
+        closing = np.where(np.linalg.norm(normal_part, axis=1) > np.sqrt(0.5), closing, 0.0)
+        slip -= closing[:, None] * pairing.normal
+        tolerance = LENGTH_ROUND_OFF * max(np.abs(config.displacement).max(), np.abs(config.start).max())
+        common = without(common, slip, tolerance)
+        held[nodes] = common
         return held
 
-    def _mirrored(self, side: Surface) -> Surface:
+    def _reflected(self, side: Surface) -> Surface:
         """Return a side whose averaged normals at planes of symmetry are those of the full model.
 
         A plane of symmetry is recognised by supports along its normal at the edge of the side.
         """
         if self.held is None or not np.isin(side.points, self.held.nodes).any():
             return side
-        held = _without_whole_facets(self.held.at(side.points), side)
+        held = _without_complete_facets(self.held.at(side.points), side)
         normal = nodal_normals(side, self.points)
         across = np.linalg.norm(np.einsum("nde,ne->nd", held, normal), axis=1)
         nodes = np.flatnonzero(held.any(axis=(1, 2)) & (across < LEANING))
@@ -593,18 +594,18 @@ class Formulation(ABC):
         deformed, start = self.points + config.displacement, self.points + config.start
         slip0 = np.zeros((len(directions), len(pairing.paired)))
         rows = np.flatnonzero(pairing.paired)
-        facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
+        feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
         primary_normals = at_nodes_of_facets(smooth_normals(self.primary, deformed))[pairing.facet[rows]]
-        primary_normals = interpolated(primary_normals, facing)
+        primary_normals = interpolated(primary_normals, feet)
         mean = primary_normals - self._secondary_normals(Candidates(nodes, shape), deformed)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > LENGTH_ROUND_OFF)
         offset = np.einsum("nk,nkd->nd", shape, start[nodes])
-        offset -= np.einsum("nk,nkd->nd", facing.shape, start[facing.nodes])
+        offset -= np.einsum("nk,nkd->nd", feet.shape, start[feet.nodes])
         opening = np.einsum("nd,nd->n", mean, offset)
-        for k, along in enumerate(directions):
-            slip0[k, rows] = np.einsum("nd,nd->n", along[rows], mean) * opening
+        for k, tangent in enumerate(directions):
+            slip0[k, rows] = np.einsum("nd,nd->n", tangent[rows], mean) * opening
         return slip0
 
     def first_contact(self, config: Configuration) -> tuple[Array, Array]:
@@ -652,37 +653,37 @@ class Formulation(ABC):
     def nodal_slip(self, config: Configuration) -> Array:
         """Return the slip increment (m, dim) of the secondary nodes [length].
 
-        Nodes beyond the end of the other side may also carry pressure, through parts of their facets.
+        It includes nodes beyond the end of the other side, which may carry pressure because parts of their facets face it.
         """
         nodes = Candidates.nodes_of(self.secondary)
         pairing = self.facing(nodes, config, np.inf)
         directions = tangents(pairing.normal)
         rows, slip0 = self.slips(nodes, pairing, directions, config)
-        along = np.stack([row @ (config.displacement - config.start).ravel() for row in rows])
-        along += slip0
-        slip = np.einsum("kn,knd->nd", along, np.stack(directions))
+        components = np.stack([row @ (config.displacement - config.start).ravel() for row in rows])
+        components += slip0
+        slip = np.einsum("kn,knd->nd", components, np.stack(directions))
         return np.where(pairing.paired[:, None], slip, 0.0)
 
 
-def _without_whole_facets(held: Array, side: Surface) -> Array:
+def _without_complete_facets(held: Array, side: Surface) -> Array:
     """Return projectors (n_nodes, dim, dim) without directions in which all nodes of a facet are held.
 
     `held` (n_nodes, dim, dim) are the projectors onto the directions in which the nodes of `side` are held.
     """
     span = np.zeros_like(held)
     for block in side.blocks:
-        around = held[block.local]
-        vectors = np.linalg.eigh(around.mean(axis=1))[1]
-        is_common = np.einsum("fdk,fnde,fek->fnk", vectors, around, vectors).min(axis=1) >= SAME_DIRECTION**2
+        of_nodes = held[block.local]
+        vectors = np.linalg.eigh(of_nodes.mean(axis=1))[1]
+        is_common = np.einsum("fdk,fnde,fek->fnk", vectors, of_nodes, vectors).min(axis=1) >= SAME_DIRECTION**2
         vectors = np.where(is_common[:, None], vectors, 0.0)
         np.add.at(span, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
     return spanned(held - held @ spanned(span, 0.5) @ held, 0.5)
 
 
 def _values_at(points_and_values: tuple[Array, AnyArray], positions: Array) -> AnyArray:
-    """Return, for each of `positions` (m, dim), the value at the nearest point with a known value.
+    """Return the values (m, ...) at the known points nearest to `positions` (m, dim).
 
-    `points_and_values` are the k points (k, dim) with known values [length], and the values (k, ...).
+    `points_and_values` are the k known points (k, dim) [length], and their values (k, ...).
     """
     points, values = points_and_values
     return np.asarray(values[nearest(points, positions)[1]])

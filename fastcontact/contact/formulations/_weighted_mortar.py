@@ -246,7 +246,7 @@ class WeightedMortar(Formulation):
         if slip_data is None:
             return linearised
         directions, length = slip_data
-        slips = self._sliding(means.motion, directions, tangential, config)
+        slips = self._load_step_slips(means.motion, directions, tangential, config)
         if not isinstance(self.primary, RigidSide) and self.slip == "symmetric":
             opening = means.motion @ slips.start - means.closer
             closing = Closing.of(means.normal, NodalNormals(self.secondary, deformed), opening, length)
