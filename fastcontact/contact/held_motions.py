@@ -61,7 +61,7 @@ class HeldMotions:
             index = np.searchsorted(nodes, single_nodes)
             np.add.at(projectors, index, np.einsum("md,me->mde", normals, normals))
             constrained = np.unique(index)
-            projectors[constrained] = spanned(projectors[constrained], SINGLE_PRECISION)
+            projectors[constrained] = eigenspaces(projectors[constrained], SINGLE_PRECISION)
         return cls(nodes, projectors, np.zeros_like(supported) if driven is None else driven)
 
     def at(self, nodes: NDArray[np.integer]) -> Array:
@@ -88,14 +88,14 @@ def _rows_of_single_nodes(mpc_rows: csr_array, dim: int) -> tuple[Indices, Array
     return node[first[single_node]], normals[rows[single_node]] / length[single_node, None]
 
 
-def spanned(tensors: Array, least: float) -> Array:
+def eigenspaces(tensors: Array, least: float) -> Array:
     """Return projectors (n, dim, dim) onto the eigenvectors of symmetric `tensors` whose eigenvalues are at least `least`."""
     values, vectors = np.linalg.eigh(tensors)
     vectors = np.where(values[:, None, :] >= least, vectors, 0.0)
     return np.asarray(vectors @ vectors.transpose(0, 2, 1))
 
 
-def without(projectors: Array, vectors: Array, least: Array | float) -> Array:
+def deflate(projectors: Array, vectors: Array, least: Array | float) -> Array:
     """Return projectors (n, dim, dim) from which the directions of the projected `vectors` (n, dim) are removed.
 
     Vectors whose projection is shorter than `least` are ignored.
@@ -106,7 +106,7 @@ def without(projectors: Array, vectors: Array, least: Array | float) -> Array:
     return projectors - inside[:, :, None] * inside[:, None, :]
 
 
-def alike(projectors: Array, positions: Array) -> list[tuple[Array, Mask]]:
+def direction_fields(projectors: Array, positions: Array) -> list[tuple[Array, Mask]]:
     """Return fields of directions in which nodes are held, such as the normals of a plane of symmetry or of a curved rim.
 
     Nodes that are held in one direction form a field if their directions are nearly equal, or if directions of other nodes
@@ -145,7 +145,7 @@ def alike(projectors: Array, positions: Array) -> list[tuple[Array, Mask]]:
         held = np.einsum("nd,nde,ne->n", field, remaining, field) >= SAME_DIRECTION**2
         field[held] = _unit(np.einsum("nde,ne->nd", remaining[held], field[held]))
         directions.append((field, held))
-        remaining[held] = without(remaining[held], field[held], 0.0)
+        remaining[held] = deflate(remaining[held], field[held], 0.0)
     return directions
 
 

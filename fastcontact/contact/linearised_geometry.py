@@ -85,7 +85,7 @@ class NodalNormals:
             if angle_gradient is not None:
                 np.add.at(total, block.local, np.einsum("fqkd,fkd->fq", angle_gradient, du_nodes)[:, :, None] * normal)
         self._side.add_across_ends(total)
-        return across(self.normal, total) / self._length
+        return transverse(self.normal, total) / self._length
 
 
 def _angle_gradient(element: elements.Element, nodes: Array) -> Array | None:
@@ -105,8 +105,8 @@ def _angle_gradient(element: elements.Element, nodes: Array) -> Array | None:
         length = [np.linalg.norm(edge, axis=1, keepdims=True) for edge in edges]
         unit = [edge / size for edge, size in zip(edges, length, strict=True)]
         for end, a, b, size in zip(ends, unit, unit[::-1], length, strict=True):
-            perpendicular = across(a, b)
-            slope = -perpendicular / (size * np.linalg.norm(perpendicular, axis=1, keepdims=True))
+            direction = transverse(a, b)
+            slope = -direction / (size * np.linalg.norm(direction, axis=1, keepdims=True))
             gradient[:, corner, end] += slope
             gradient[:, corner, corner] -= slope
     return gradient
@@ -155,10 +155,10 @@ class InterpolatedNormals:
 
     def along(self, du: Array) -> Array:
         """See `NodalNormals.along`."""
-        return across(self.normal, self._local @ self._nodal.along(du)) / self._length
+        return transverse(self.normal, self._local @ self._nodal.along(du)) / self._length
 
 
-def across(normal: Array, vector: Array) -> Array:
+def transverse(normal: Array, vector: Array) -> Array:
     """Return the components of vectors (n, dim) perpendicular to unit vectors (n, dim)."""
     return np.asarray(vector - np.einsum("nd,nd->n", normal, vector)[:, None] * normal)
 
@@ -313,7 +313,7 @@ class _ObstaclePoints:
         """See `_SurfacePoints.along`; there are no reference coordinates."""
         motion = self.motion @ du
         normal = np.einsum("nde,ne->nd", self._gradient, motion)
-        foot = across(self.normal, motion) - self._gap * normal
+        foot = transverse(self.normal, motion) - self._gap * normal
         return Variation(np.zeros((len(normal), 0)), csr_array(self.motion.shape), foot, normal)
 
 
@@ -371,7 +371,7 @@ class Closing:
         the primary normals and of o, all (n, dim).
         """
         mean = self.mean
-        d_mean = across(mean, primary - self.secondary.along(du)) / self.size
+        d_mean = transverse(mean, primary - self.secondary.along(du)) / self.size
         a, d_a = (mean, d_mean) if self.along_mean else normal
         cosine = np.einsum("nd,nd->n", a, mean)
         numerator = np.einsum("nd,nd->n", d_a, self.opening) + np.einsum("nd,nd->n", a, opening)
@@ -576,7 +576,7 @@ class LinearisedPoints:
             return -self.nodal.along(du)
         if self.nodal is not None:
             return self.nodal.along(du).normal
-        return across(self.normal, self._mean(at_points)) / self._length
+        return transverse(self.normal, self._mean(at_points)) / self._length
 
     def _mean(self, vectors: Array) -> Array:
         """Return the sums (m, dim) of vectors at the points (n, dim), weighted with `tests`."""

@@ -98,7 +98,7 @@ class PairOptions:
         """Whether the constraints of all paired points are equations from the beginning."""
         return self.kind in ("tied", "bilateral")
 
-    def out(self, candidates: Candidates) -> Mask:
+    def excludes(self, candidates: Candidates) -> Mask:
         """Return the candidates (n,) whose node with the largest weight is excluded from contact."""
         n = len(candidates.nodes)
         return np.zeros(n, bool) if self.excluded is None else candidates.belonging_to(self.excluded)
@@ -120,7 +120,7 @@ class PairOptions:
         """Return which nodes (m,) of a side are excluded from contact."""
         return np.zeros(len(side.points), bool) if self.excluded is None else self.excluded[side.points]
 
-    def rubbing(
+    def friction_axes(
         self, friction: float, directions: Sequence[Array], candidates: Candidates
     ) -> tuple[Array, tuple[Array, ...], tuple[Array, ...]]:
         """Return coefficients of friction, and tangents that are aligned with the direction without friction.
@@ -139,7 +139,7 @@ class PairOptions:
             Coefficients of friction of the candidates, zero where there is no friction in any direction [-].
         tangents : tuple of k ndarray (n, dim)
             Unit tangents, rotated such that the first is the direction without friction at frictionless candidates.
-        rubbing : tuple of k ndarray (n, dim)
+        slip_axes : tuple of k ndarray (n, dim)
             The same tangents, set to zero in the direction without friction.
         """
         direction = self.frictionless_along
@@ -176,7 +176,7 @@ class PairOptions:
         return factor * clearances
 
 
-def spread(side: Surface, excluded: Mask, givers: Indices) -> csr_array:
+def nodal_map(side: Surface, excluded: Mask, givers: Indices) -> csr_array:
     """Return the map (m, m) from independent to nodal values of a multiplier field, for a side with `excluded` nodes (m,).
 
     The value at an excluded node is the mean of the values at its neighbours among the nodes `givers`. A uniform field

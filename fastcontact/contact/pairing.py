@@ -22,7 +22,7 @@ from fastcontact.contact.projection import (
     at_nodes_of_facets,
     closest_of_kinds,
     facet_normals,
-    interpolated,
+    interpolate,
     nodal_normals,
     places,
     smooth_ends,
@@ -73,7 +73,7 @@ class Candidates:
         nodes = [np.repeat(block.facets, len(of_block), axis=0) for block, _, of_block in blocks]
         shapes = [np.tile(elements.get(block.element).shape(of_block), (n, 1)) for block, n, of_block in blocks]
         coordinates = [np.tile(of_block, (n, 1)) for _, n, of_block in blocks]
-        return cls(filled_up(nodes), filled_up(shapes), facet, np.concatenate(coordinates))
+        return cls(padded(nodes), padded(shapes), facet, np.concatenate(coordinates))
 
     @classmethod
     def nodes_of(cls, side: Surface) -> Candidates:
@@ -217,7 +217,7 @@ def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array
         changes to the normal of the facet.
     """
     normals = at_nodes_of_facets([facet_normals(block, coordinates) for block in primary.blocks])[facet]
-    normals = interpolated(normals, places(primary, facet, xi))
+    normals = interpolate(normals, places(primary, facet, xi))
     on_triangle = np.column_stack([xi, 1.0 - xi.sum(axis=1)]).min(axis=1)
     distance = np.where(primary.triangular[facet], on_triangle, 0.5 * (1.0 - np.abs(xi).max(axis=1)))
     weight = np.clip(1.0 - distance / ROUNDED, 0.0, 1.0)[:, None]
@@ -254,7 +254,7 @@ def _at_smooth_ends(primary: Surface, coordinates: Array, closest: Closest) -> M
     return np.asarray(overhangs & smooth[closest.facet, (closest.xi[:, 0] > 0.0).astype(np.intp)])
 
 
-def filled_up(arrays: Sequence[AnyArray]) -> AnyArray:
+def padded(arrays: Sequence[AnyArray]) -> AnyArray:
     """Return arrays (n_i, k_i) concatenated along the first axis, padded to the largest k_i.
 
     Integers are padded with the last entry of the row, floating-point numbers with zeros.
@@ -394,7 +394,7 @@ def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSid
     return result
 
 
-def opposed(pairing: Pairing, normals: Array) -> Pairing:
+def with_secondary_normals(pairing: Pairing, normals: Array) -> Pairing:
     """Return the pairing with the opposites of secondary `normals` (n, dim); candidates that face away become unpaired."""
     valid = np.einsum("nd,nd->n", pairing.normal, normals) < -FACING
     return replace(pairing, normal=np.where(valid[:, None], -normals, pairing.normal), paired=pairing.paired & valid)

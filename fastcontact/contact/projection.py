@@ -193,7 +193,7 @@ def facet_angles(element: elements.Element, nodes: Array) -> Array:
     return angle
 
 
-def interpolated(normals: Array, points: Places) -> Array:
+def interpolate(normals: Array, points: Places) -> Array:
     """Return unit normals (n, dim) at points, interpolated between the normals (n, k, dim) at the nodes of their facets."""
     normal = np.einsum("nk,nkd->nd", points.shape, normals)
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
@@ -377,7 +377,7 @@ def along_line_normals(
         np.ascontiguousarray(points), corners, at_nodes, counts, neighbour, facet, xi, overhang, *work
     )
     xi = xi[:, None]
-    return facet, xi, overhang, interpolated(normals[facet], places(side, facet, xi))
+    return facet, xi, overhang, interpolate(normals[facet], places(side, facet, xi))
 
 
 def smooth_ends(side: Surface, normals: Array) -> Mask:

@@ -11,7 +11,7 @@ is reduced as at the ends of mortar lines (Bernardi et al., section 3): in a dir
 multiplier of a node is the mean of those of its neighbours, so that uniform tractions remain possible (`reduction`).
 
 Equal displacements on both sides of a gap would resist rigid rotations, because the forces on the two sides would have
-different lines of action. Therefore a rigid arm spans the gap and rotates with the primary facet (`with_arms`).
+different lines of action. Therefore a rigid arm spans the gap and rotates with the primary facet (`with_rigid_arms`).
 The relative displacement along a tangent t is ``t . (u_s - u_p) + g n . du_p/dt`` with the gap g, the normal n and the
 derivative along t on the primary facet. It vanishes in any small rotation of both sides.
 """
@@ -82,7 +82,9 @@ class TiedPair:
         return components[0], np.column_stack(components[1:])
 
 
-def tied(constraints: Constraints, moments: csr_array, areas: Array | None, reduction: csr_array | None) -> TiedPair:
+def tied_pair(
+    constraints: Constraints, moments: csr_array, areas: Array | None, reduction: csr_array | None
+) -> TiedPair:
     """Return the equations of a tied pair, given `constraints` with tangents; see `moments_of` and `TiedPair`."""
     size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), TINY)
     positions = abs(moments) @ constraints.positions / size[:, None]
@@ -160,7 +162,7 @@ def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: 
     return matrix
 
 
-def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, points: Array) -> Constraints:
+def with_rigid_arms(constraints: Constraints, pairing: Pairing, primary: Surface, points: Array) -> Constraints:
     """Return constraints whose tangential rows vanish in small rigid rotations of both sides, also across a gap.
 
     Parameters

@@ -16,7 +16,7 @@ from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.cohesive_layer import cohesive_rows
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints, Geometry, Linearised
-from fastcontact.contact.held_motions import SAME_DIRECTION, HeldMotions, alike, spanned, without
+from fastcontact.contact.held_motions import SAME_DIRECTION, HeldMotions, deflate, direction_fields, eigenspaces
 from fastcontact.contact.linearised_geometry import (
     Closing,
     InterpolatedNormals,
@@ -36,22 +36,22 @@ from fastcontact.contact.pairing import (
     checked_normals,
     gap_rows,
     normals,
-    opposed,
     pair,
     rows_along,
     tangents,
+    with_secondary_normals,
 )
 from fastcontact.contact.projection import (
     BESIDE,
     at_nodes_of_facets,
-    interpolated,
+    interpolate,
     nodal_normals,
     places,
     smooth_normals,
 )
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
-from fastcontact.contact.tied import TiedPair, moments_of, reduction, tied, with_arms
+from fastcontact.contact.tied import TiedPair, moments_of, reduction, tied_pair, with_rigid_arms
 from fastcontact.errors import ContactError, unknown
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
@@ -153,7 +153,7 @@ class Formulation(ABC):
         return Smoothing.of(self.secondary, self.primary, self.points)
 
     @property
-    def slides(self) -> bool:
+    def has_tangents(self) -> bool:
         """Whether the constraints need tangents, for friction, tying or cohesion."""
         cohesion = self.options.cohesion
         return bool(self.friction) or self.options.tied or not (cohesion is None or cohesion.reversible)
@@ -259,9 +259,9 @@ class Formulation(ABC):
         if isinstance(self.primary, Surface) and constraints.tangents:
             # Near a concave edge two facets may be equally close. The projection along averaged normals is unique.
             pairing = pair(constraints.positions, self.primary, self.points, np.inf, "averaged")
-            constraints = with_arms(constraints, pairing, self.primary, self.points)
+            constraints = with_rigid_arms(constraints, pairing, self.primary, self.points)
         moments, areas = moments_of(constraints)
-        return tied(constraints, moments, areas, self._tied_at_supports(constraints, moments, areas))
+        return tied_pair(constraints, moments, areas, self._tied_at_supports(constraints, moments, areas))
 
     def _tied_at_supports(self, constraints: Constraints, moments: csr_array, areas: Array | None) -> csr_array | None:
         """Return the `reduction` of the multipliers of a tied pair; None if no node is held by supports on both sides."""
@@ -305,7 +305,7 @@ class Formulation(ABC):
         pairing = pair(positions, self.primary, deformed, largest_overhang, self.normals, config.pose, config.rounded)
         if self.normals != "secondary":
             return pairing
-        return opposed(pairing, self._secondary_normals(candidates, deformed))
+        return with_secondary_normals(pairing, self._secondary_normals(candidates, deformed))
 
     def _secondary_normals(self, candidates: Candidates, deformed: Array) -> Array:
         """Return averaged unit normals (n, dim) of the secondary side at candidates."""
@@ -318,19 +318,19 @@ class Formulation(ABC):
     def assembled(
         self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None, config: Configuration
     ) -> Constraints:
-        """Return the constraints of paired candidates, including tangents if `slides`.
+        """Return the constraints of paired candidates, including tangents if `has_tangents`.
 
         `compliance` couples the constraints, see `Constraints.compliance`.
         """
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
-        gap0 += self.added_gap(candidates, pairing, config) - self.overlap_of_smooth(candidates, pairing, config)
+        gap0 += self.added_gap(candidates, pairing, config) - self.smoothing_overlap(candidates, pairing, config)
         positions = candidates.positions(self.points)
-        if not self.slides:
+        if not self.has_tangents:
             geometry = self._linearised_geometry(candidates, pairing, config)
             return Constraints(B, gap0, positions, compliance, geometry=geometry)
         axes = tangents(pairing.normal, self._held_directions(candidates))
-        friction, directions, rubbing = self.options.rubbing(self.friction, axes, candidates)
-        slip_rows, slip0 = self.slips(candidates, pairing, rubbing, config)
+        friction, directions, slip_axes = self.options.friction_axes(self.friction, axes, candidates)
+        slip_rows, slip0 = self.slips(candidates, pairing, slip_axes, config)
         geometry = self._linearised_geometry(candidates, pairing, config, directions)
         return Constraints(B, gap0, positions, compliance, slip_rows, directions, friction, slip0, geometry=geometry)
 
@@ -342,7 +342,7 @@ class Formulation(ABC):
         if self.held is None or not len(self.held.nodes) or not self.friction:
             return None
         held = np.einsum("nk,nkde->nde", candidates.shape, self.held.at(candidates.nodes))
-        return spanned(held, 1.0 - LENGTH_ROUND_OFF)
+        return eigenspaces(held, 1.0 - LENGTH_ROUND_OFF)
 
     def _linearised_geometry(
         self, candidates: Candidates, pairing: Pairing, config: Configuration, directions: Sequence[Array] = ()
@@ -357,7 +357,7 @@ class Formulation(ABC):
 
         def linearised(multiplier: Array, tangential: Array, displacement: Array) -> Linearised:
             rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
-            rise = self.rise(candidates, pairing, rows, coordinates)
+            rise = self.smoothing_slope(candidates, pairing, rows, coordinates)
             points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, config.pose, rise=rise)
             at_rows = rows, len(multiplier)
             forces = LinearisedPoints(self.secondary, points, None, points.normal, multiplier[rows], place=at_rows)
@@ -392,10 +392,10 @@ class Formulation(ABC):
         total = mean @ increment
         if isinstance(self.primary, RigidSide):
             current, initial = (mean @ (self.points + u) for u in (config.displacement, config.start))
-            total -= self.primary.carried(current, initial, config.pose, config.pose_start)
+            total -= self.primary.rigid_motion(current, initial, config.pose, config.pose_start)
             if config.pose.angle != config.pose_start.angle:  # The motion is an affine function of the positions.
                 ends = np.vstack([np.zeros(current.shape[1]), np.eye(current.shape[1])])
-                unit_motions = self.primary.carried(ends, ends[:1], config.pose, config.pose_start)
+                unit_motions = self.primary.rigid_motion(ends, ends[:1], config.pose, config.pose_start)
                 rotation_gradient = unit_motions[1:] - unit_motions[0]
         return Slips(directions, tangential, total, increment, self.points + config.start, turning=rotation_gradient)
 
@@ -423,7 +423,7 @@ class Formulation(ABC):
         rows = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
         slip0 = np.zeros((len(rows), len(pairing.paired)))
         if isinstance(self.primary, RigidSide):
-            obstacle_motion = self.carried(candidates, config)
+            obstacle_motion = self.rigid_motion(candidates, config)
             slip0 = -np.stack([np.einsum("nd,nd->n", t, obstacle_motion) for t in directions])
         elif self.slip == "symmetric":
             slip0 = self._closing_slip(candidates, pairing, directions, config)
@@ -438,7 +438,7 @@ class Formulation(ABC):
             pairing.paired, np.einsum("nk,nk->n", candidates.shape, config.worn[candidates.nodes]), 0.0
         )
 
-    def overlap_of_smooth(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
+    def smoothing_overlap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
         """Return the lengths (n,) by which smooth surfaces reduce the gaps of candidates, compared with facets [length]."""
         overlap, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
         if (
@@ -454,8 +454,8 @@ class Formulation(ABC):
         overlap[rows] = self.smoothing.overlap(on_secondary, (pairing.facet[rows], pairing.xi[rows]), axes)
         return overlap
 
-    def rise(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
-        """Return the derivatives (n, dim - 1) of `overlap_of_smooth` along primary facets [length]; None without smoothing.
+    def smoothing_slope(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
+        """Return the derivatives (n, dim - 1) of `smoothing_overlap` along primary facets [length]; None without smoothing.
 
         `rows` (n,) are numbers of candidates, and `deformed` (n_points, dim) the current coordinates. The derivatives are
         zero on the straight extensions of facets.
@@ -467,11 +467,11 @@ class Formulation(ABC):
         slope = factor * self.smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
         return slope if pairing.beyond is None else np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
 
-    def carried(self, candidates: Candidates, config: Configuration) -> Array:
+    def rigid_motion(self, candidates: Candidates, config: Configuration) -> Array:
         """Return the displacements (n, dim) in the step of the obstacle points opposite to candidates [length]."""
         assert isinstance(self.primary, RigidSide)
         current, initial = (candidates.positions(self.points + u) for u in (config.displacement, config.start))
-        return self.primary.carried(current, initial, config.pose, config.pose_start)
+        return self.primary.rigid_motion(current, initial, config.pose, config.pose_start)
 
     @cached_property
     def _held_nodes(self) -> Indices:
@@ -498,7 +498,7 @@ class Formulation(ABC):
         held, nodes = np.zeros((len(self.secondary.points), *2 * self.points.shape[1:])), self._held_nodes
         if len(nodes) and self.held is not None:
             P, (_, Q) = self.held.at(self.secondary.points[nodes]), self._held_projections(nodes, config)
-            held[nodes] = spanned(P @ Q @ P, 0.5)
+            held[nodes] = eigenspaces(P @ Q @ P, 0.5)
         return held
 
     def undetermined(self, config: Configuration) -> Mask:
@@ -511,12 +511,12 @@ class Formulation(ABC):
         held_both = self._held_on_both_sides(config)
         if not held_both.any():
             return np.zeros(len(held_both), bool)
-        along = without(held_both, nodal_normals(self.secondary, self.points + config.displacement), np.sqrt(0.5))
+        along = deflate(held_both, nodal_normals(self.secondary, self.points + config.displacement), np.sqrt(0.5))
         across = held_both - along
         if not self.options.tied:
             since_begin = replace(config, start=np.zeros_like(config.displacement))
             along = self._held_without_motion(since_begin) if self.friction else np.zeros_like(held_both)
-        elsewhere = np.eye(held_both.shape[1]) - spanned(along.mean(axis=0)[None], 1.0 - LENGTH_ROUND_OFF)[0]
+        elsewhere = np.eye(held_both.shape[1]) - eigenspaces(along.mean(axis=0)[None], 1.0 - LENGTH_ROUND_OFF)[0]
         across, along = (held - _without_complete_facets(held, self.secondary) for held in (across, along))
         return np.asarray(np.trace(across + elsewhere @ along @ elsewhere, axis1=1, axis2=2) > 0.5)
 
@@ -533,7 +533,7 @@ class Formulation(ABC):
             Unit vectors, each with the secondary nodes that are held in this direction.
         """
         held = _without_complete_facets(self._held_without_motion(config), self.secondary)
-        return alike(held, self.points[self.secondary.points])
+        return direction_fields(held, self.points[self.secondary.points])
 
     def _held_without_motion(self, config: Configuration) -> Array:
         """Return projectors (n_nodes, dim, dim) onto the directions of `without_slip`, including those of complete facets."""
@@ -544,7 +544,7 @@ class Formulation(ABC):
         points = self.secondary.points[nodes]
         common, slip = self.held.at(points), (config.displacement - config.start)[points]
         if isinstance(self.primary, RigidSide):
-            slip = slip - self.carried(Candidates(points[:, None], np.ones((len(nodes), 1))), config)
+            slip = slip - self.rigid_motion(Candidates(points[:, None], np.ones((len(nodes), 1))), config)
         else:
             rows = np.flatnonzero(pairing.paired)
             feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
@@ -554,16 +554,16 @@ class Formulation(ABC):
             # this facet is ignored.
             excess = np.einsum("nk,nkde,nkd->ne", feet.shape, held_primary, motion - mean[:, None])
             slip[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(held_opposite[rows], hermitian=True), excess)
-            common = spanned(common @ held_opposite @ common, 0.5)
+            common = eigenspaces(common @ held_opposite @ common, 0.5)
         normal_part = np.einsum("nde,ne->nd", common, pairing.normal)
-        common = without(common, pairing.normal, np.sqrt(0.5))
+        common = deflate(common, pairing.normal, np.sqrt(0.5))
         # Where the normal is held, a motion along it closes the gap and is not slip. Elsewhere the normal may be inclined to
         # the held directions, such as at the edge of a plane of symmetry.
         closing = np.einsum("nd,nd->n", slip, pairing.normal)
         closing = np.where(np.linalg.norm(normal_part, axis=1) > np.sqrt(0.5), closing, 0.0)
         slip -= closing[:, None] * pairing.normal
         tolerance = LENGTH_ROUND_OFF * max(np.abs(config.displacement).max(), np.abs(config.start).max())
-        common = without(common, slip, tolerance)
+        common = deflate(common, slip, tolerance)
         held[nodes] = common
         return held
 
@@ -597,7 +597,7 @@ class Formulation(ABC):
         feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
         primary_normals = at_nodes_of_facets(smooth_normals(self.primary, deformed))[pairing.facet[rows]]
-        primary_normals = interpolated(primary_normals, feet)
+        primary_normals = interpolate(primary_normals, feet)
         mean = primary_normals - self._secondary_normals(Candidates(nodes, shape), deformed)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > LENGTH_ROUND_OFF)
@@ -644,7 +644,7 @@ class Formulation(ABC):
         nodes = Candidates.nodes_of(self.secondary)
         pairing = self.facing(nodes, config, max(self.projection_tolerance or 0.0, BESIDE))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
-        gap0 -= self.overlap_of_smooth(nodes, pairing, config)
+        gap0 -= self.smoothing_overlap(nodes, pairing, config)
         if with_clearance:
             gap0 += self.added_gap(nodes, pairing, config)
         u = config.displacement if displacement is None else displacement
@@ -677,7 +677,7 @@ def _without_complete_facets(held: Array, side: Surface) -> Array:
         is_common = np.einsum("fdk,fnde,fek->fnk", vectors, of_nodes, vectors).min(axis=1) >= SAME_DIRECTION**2
         vectors = np.where(is_common[:, None], vectors, 0.0)
         np.add.at(span, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
-    return spanned(held - held @ spanned(span, 0.5) @ held, 0.5)
+    return eigenspaces(held - held @ eigenspaces(span, 0.5) @ held, 0.5)
 
 
 def _values_at(points_and_values: tuple[Array, AnyArray], positions: Array) -> AnyArray:

@@ -35,7 +35,7 @@ from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.integration import NO_AREA, areas_of_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import Closing, Differences, LinearisedPoints, NodalNormals, Points, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import FACING, Candidates, Normals, filled_up, pair, tangents
+from fastcontact.contact.pairing import FACING, Candidates, Normals, padded, pair, tangents
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.contact.search.limits import BEYOND
 from fastcontact.contact.surface import Surface
@@ -159,7 +159,7 @@ class WeightedMortar(Formulation):
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
         means = self._means(self.points + config.displacement, config)
         # Tied pairs have separate equations for the directions in which both sides are held.
-        held = self.without_slip(config) if self.slides and not self.options.tied else []
+        held = self.without_slip(config) if self.has_tangents and not self.options.tied else []
         constraints, slip_data = self._weighted_gaps(config, means, held)
         return replace(constraints, geometry=partial(self._linearised, config, means, held, constraints, slip_data))
 
@@ -180,14 +180,14 @@ class WeightedMortar(Formulation):
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
         pressures = WeightedPressures(weight, *self._whole_side)
         constraints = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=pressures)
-        if not self.slides:
+        if not self.has_tangents:
             return constraints, None
         candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
         projectors = np.zeros((*normal.shape, normal.shape[1]))
         for axis, nodes_held in held:
             projectors[nodes_held] += axis[nodes_held, :, None] * axis[nodes_held, None, :]
-        friction, directions, rubbing = self.options.rubbing(self.friction, tangents(normal, projectors), candidates)
-        slips, additional = self._slips(rubbing, held, coverage, mean, rows, weight)
+        mu, directions, slip_axes = self.options.friction_axes(self.friction, tangents(normal, projectors), candidates)
+        slips, additional = self._slips(slip_axes, held, coverage, mean, rows, weight)
         length, closing_direction = self._closing_motion(constraints, normal, config)
         closing = length[:, None] * closing_direction
         # Part of the relative motion that is not slip: that of a rigid obstacle, or minus the motion that closes the gap.
@@ -195,14 +195,14 @@ class WeightedMortar(Formulation):
             non_slip = -closing if self.slip == "symmetric" else np.zeros_like(closing)
         else:
             current, before = (mean @ (self.points + u) for u in (config.displacement, config.start))
-            non_slip = self.primary.carried(current, before, config.pose, config.pose_start)
-        slip0 = -np.stack([np.einsum("nd,nd->n", t, non_slip) for t in rubbing])
+            non_slip = self.primary.rigid_motion(current, before, config.pose, config.pose_start)
+        slip0 = -np.stack([np.einsum("nd,nd->n", t, non_slip) for t in slip_axes])
         for axis, is_held, motion in additional:
             transverse = closing - np.where(is_held, np.einsum("md,md->m", closing, axis), 0.0)[:, None] * axis
             apparent_slip = np.einsum("md,md->m", motion @ transverse, axis)
-            slip0 += np.stack([np.einsum("md,md->m", t, axis) * apparent_slip for t in rubbing])
-        constraints = replace(constraints, tangents=slips, directions=directions, friction=friction, slip0=slip0)
-        return constraints, (np.stack(rubbing), length)
+            slip0 += np.stack([np.einsum("md,md->m", t, axis) * apparent_slip for t in slip_axes])
+        constraints = replace(constraints, tangents=slips, directions=directions, friction=mu, slip0=slip0)
+        return constraints, (np.stack(slip_axes), length)
 
     def _means(self, deformed: Array, config: Configuration, with_gap: Mask | None = None) -> Means:
         """Return the mean relative motions of nodes at the coordinates `deformed` (n_points, dim) [length].
@@ -281,11 +281,11 @@ class WeightedMortar(Formulation):
             shapes.append(shape)
             facets.append(facet_offset + facet)
             n_points, facet_offset = n_points + len(facet), facet_offset + len(block.facets)
-        candidates = Candidates(filled_up(nodes), filled_up(shapes), np.concatenate(facets))
+        candidates = Candidates(padded(nodes), padded(shapes), np.concatenate(facets))
         pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", config.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
         normals = "facet" if self.normals == "secondary" else self.normals
-        rise = self.rise(candidates, pairing, rows, deformed)
+        rise = self.smoothing_slope(candidates, pairing, rows, deformed)
         points = faced(candidates, pairing, rows, self.primary, deformed, normals, config.pose, True, rise)
         weighted = scaled(csr_array(assembled(functions, size)[:, rows]), 1.0 / means.weight)
         mean = csr_array(assembled(tests, size)[:, rows])

@@ -24,8 +24,8 @@ from fastcontact.contact.integration import (
     fine_rule,
     gauss_rule,
 )
-from fastcontact.contact.pair_options import spread
-from fastcontact.contact.pairing import Candidates, Normals, filled_up
+from fastcontact.contact.pair_options import nodal_map
+from fastcontact.contact.pairing import Candidates, Normals, padded
 from fastcontact.contact.surface import FacetBlock
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import shapes_at
@@ -80,8 +80,8 @@ class Continuous(PressureFieldFormulation):
         self._candidates = Candidates.inside(self.secondary, rules)
         rho = self.augmentation * self.modulus / shortest
         all_areas = np.concatenate(areas)
-        areas_of_points = np.where(self.options.out(self._candidates), 0.0, all_areas)
-        nodes = filled_up(local)
+        areas_of_points = np.where(self.options.excludes(self._candidates), 0.0, all_areas)
+        nodes = padded(local)
         P = shapes_at(self._candidates.shape, nodes, len(self.secondary.points))
         field = self.repeated(self._independent_values(P, areas_of_points))
         points = nodes, self._candidates.shape
@@ -142,7 +142,7 @@ class Continuous(PressureFieldFormulation):
             even = csr_array(diags_array(has_weight) + diags_array(1.0 - has_weight) @ even)
         values = csr_array(diags_array((~excluded).astype(float)) @ even + diags_array(excluded.astype(float)))
         independent = np.flatnonzero((weight != 0.0) & ~excluded & (even.diagonal() != 0.0))
-        return csr_array((values @ spread(self.secondary, excluded, independent))[:, independent]), independent
+        return csr_array((values @ nodal_map(self.secondary, excluded, independent))[:, independent]), independent
 
     def unilateral(self, config: Configuration) -> Constraints:
         """Pair the integration points on the deformed configuration, and return one constraint per point."""
@@ -165,7 +165,7 @@ class Continuous(PressureFieldFormulation):
         areas = self._field.projection.areas
         if self.integration != "node" or not self.axisymmetric or self.options.penalty is not None:
             return np.zeros(len(areas), bool)
-        return (areas == 0.0) & ~self.options.out(self._candidates)
+        return (areas == 0.0) & ~self.options.excludes(self._candidates)
 
 
 def _simpson(element: str) -> quadrature.Rule:

@@ -37,7 +37,7 @@ from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.formulations._weighted_mortar import WeightedMortar
 from fastcontact.contact.integration import NO_AREA, areas_of_rule, facet_measure
-from fastcontact.contact.pair_options import spread
+from fastcontact.contact.pair_options import nodal_map
 from fastcontact.contact.pairing import Candidates, Normals
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.errors import ContactError
@@ -97,7 +97,7 @@ def _smallest_eigenvalues(full: Array, mass: Array) -> Array:
     return np.asarray(np.linalg.eigvalsh(inverse @ mass @ inverse.transpose(0, 2, 1))[:, 0])
 
 
-def determined(
+def independent_values(
     side: Surface, fields: list[WholeFacets], masses: list[Array], excluded: Mask
 ) -> tuple[csr_array, Indices]:
     """Return the map from the independent values of the field to all nodal values, and the nodes of the independent values.
@@ -133,7 +133,7 @@ def determined(
             if not (chosen[nodes].any() or excluded[nodes].all()):
                 chosen[nodes[np.argmax(np.where(excluded[nodes], -np.inf, mass[facet].sum(axis=1)))]] = True
     independent = np.flatnonzero(chosen)
-    values = spread(side, excluded, independent) if excluded.any() else csr_array(diags_array(chosen.astype(float)))
+    values = nodal_map(side, excluded, independent) if excluded.any() else csr_array(diags_array(chosen.astype(float)))
     if any((degree[degree >= 0] < 2).any() for degree in degrees):
         values = _with_interpolated_rows(csr_array(values), fields, degrees, chosen, excluded)
     return csr_array(csr_array(values)[:, independent]), independent
@@ -225,12 +225,12 @@ class SegmentMortar(PressureFieldFormulation):
         paired = np.repeat(pairing_of_points.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
         covered = np.bincount(facet, weights=np.where(paired, area, 0.0))
-        usable = paired & (covered > NO_AREA * total)[facet] & (area > 0) & ~self.options.out(candidates)
+        usable = paired & (covered > NO_AREA * total)[facet] & (area > 0) & ~self.options.excludes(candidates)
         pairing = replace(pairing_of_points, paired=usable)
         usable_area, (n, k) = np.where(usable, area, 0.0), self.secondary.facets.shape
         mass = np.zeros((n, k, k))
         np.add.at(mass, facet, usable_area[:, None, None] * shape[:, :, None] * shape[:, None, :])
-        values = determined(self.secondary, self._whole, [mass], self.options.excluded_nodes(self.secondary))
+        values = independent_values(self.secondary, self._whole, [mass], self.options.excluded_nodes(self.secondary))
         samples = self.secondary.local[facet], shape
         field = PressureField.of_points(samples, (usable_area, area), self._rho, self.repeated(values), renewed=True)
         return self.of_points(candidates, pairing, field, config)

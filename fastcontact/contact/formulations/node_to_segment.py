@@ -85,7 +85,7 @@ class NodeToSegment(Formulation):
     def unilateral(self, config: Configuration) -> Constraints:
         """Pair the nodes on the deformed configuration, and return one constraint per secondary node."""
         pairing = self.facing(self._candidates, config)
-        pairing.paired[self.options.out(self._candidates)] = False
+        pairing.paired[self.options.excludes(self._candidates)] = False
         areas = self._nodal.nodal_areas
         usable = np.where(areas > ROUND_OFF * areas.max(), areas, np.inf)
         constraints = self.assembled(self._candidates, pairing, None, config)

@@ -68,7 +68,7 @@ class RigidSide:
             raise ContactError("the distance from a rigid obstacle must be real numbers, not complex ones")
         return distance_and_normal
 
-    def carried(self, positions: Array, before: Array, pose: Pose, pose0: Pose) -> Array:
+    def rigid_motion(self, positions: Array, before: Array, pose: Pose, pose0: Pose) -> Array:
         """Return the displacements (n, dim) of points on the surface of the obstacle due to its motion [length].
 
         The slip of a point that moves from `before` to `positions` (n, dim) [length] is its displacement minus this result.
