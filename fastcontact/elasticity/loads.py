@@ -356,12 +356,12 @@ def axes_of(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, 
 
     Raises ModelError, which begins with `caption`, if all components are None, or an axis does not exist in `dim` dimensions.
     """
-    given_components = {name: value for name, value in components.items() if value is not None}
-    if not given_components:
+    specified = {name: value for name, value in components.items() if value is not None}
+    if not specified:
         raise ModelError(f"{caption} has no component: give for example y=-1.0")
-    for name in given_components:
+    for name in specified:
         check_known("component", name, "xyz"[:dim], ModelError, f"{caption}: ")
-    return {"xyz".index(name): value for name, value in given_components.items()}
+    return {"xyz".index(name): value for name, value in specified.items()}
 
 
 def _quadrature(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array, Array, Array]:

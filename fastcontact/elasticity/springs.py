@@ -161,8 +161,8 @@ def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
         remedy = f"use {softer:.0e} or less, or a multi-point constraint (relate, relate_groups), which is exact"
         lost = round(math.log10(ratio))
         if ratio > ERROR_RATIO:
-            digits_left = "no digit" if lost >= DIGITS else f"{DIGITS - lost} of {DIGITS} digits"
-            raise ModelError(f"{text}: results would keep {digits_left}; {remedy}")
+            left = "no digit" if lost >= DIGITS else f"{DIGITS - lost} of {DIGITS} digits"
+            raise ModelError(f"{text}: results would keep {left}; {remedy}")
         texts.append(
             f"{text}: results lose up to {lost} of {DIGITS} digits, and with contact its force is accurate only to this "
             f"ratio times the convergence criteria; {remedy}"
