@@ -22,7 +22,7 @@ from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, largest
 from fastcontact.contact.cohesive_layer import Layer
-from fastcontact.contact.conductance import crossing
+from fastcontact.contact.conductance import heat_transfer
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
@@ -148,7 +148,7 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
         configuration = problem.configuration(name, start, load, displacement, u)
         constraints, force, gap = _normal_state(problem, settled, name, rows, configuration)
         assert constraints.nodal is not None
-        link = crossing(constraints, pair.secondary, pair.primary, pair.points.shape)
+        link = heat_transfer(constraints, pair.secondary, pair.primary, pair.points.shape)
         area_ratio = np.ones(n)  # ratio of deformed to undeformed area at each node
         if heat.finite:
             before, after = areas(pair, displacement)

@@ -212,7 +212,7 @@ def contact_work(
     displacement = configuration.displacement - configuration.start
     if isinstance(pair.primary, RigidSide):  # relative to the obstacle
         points = pair.secondary.points
-        displacement[points] -= pair.carried(Candidates(points[:, None], np.ones((len(points), 1))), configuration)
+        displacement[points] -= pair.rigid_motion(Candidates(points[:, None], np.ones((len(points), 1))), configuration)
     (work_after, energy_after), (work_before, energy_before) = (
         forces.normal_work(other, displacement) for forces, other in ((after, before), (before, after))
     )

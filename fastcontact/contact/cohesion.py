@@ -57,7 +57,10 @@ class CohesiveLaw:
     mixed_mode: str = "bk"
 
     def limits(self, opening: Array, sliding: Array) -> tuple[Array, Array]:
-        """Return the separations (m,) at damage initiation and at break, for ratios of opening to sliding (m,) [length]."""
+        """Return the separations (m,) at damage initiation and at break [length].
+
+        They depend only on the ratio of `opening` to `sliding` (m,) [length], the mode ratio.
+        """
         normal, shear = self.strength / self.stiffness, self.shear_strength / self.stiffness
         square = np.maximum(opening, 0.0) ** 2 + sliding**2
         shear_fraction = np.divide(sliding**2, square, out=np.zeros_like(square), where=square > 0.0)
@@ -76,21 +79,27 @@ class CohesiveLaw:
         return onset, 2.0 * energy / (self.stiffness * onset)
 
     def damage(self, opening: Array, sliding: Array, previous: Array) -> Array:
-        """Return the damage (m,) [-] at openings and slidings (m,) [length], unless reversible at least `previous` (m,)."""
+        """Return the damage (m,) [-] at openings and slidings (m,) [length].
+
+        Unless the law is reversible, the damage is at least `previous` (m,).
+        """
         onset, final = self.limits(opening, sliding)
         separation = np.maximum(np.hypot(np.maximum(opening, 0.0), sliding), onset)
         damage = np.minimum(final * (separation - onset) / (separation * (final - onset)), 1.0)
         return damage if self.reversible else np.maximum(damage, previous)
 
     def released(self, opening: Array, sliding: Array, damage: Array) -> Array:
-        """Return the energy per area dissipated by damage (m,), at the mode ratio of opening and sliding (m,)."""
+        """Return the energy (m,) dissipated per area by the damage (m,), at the mode ratio of opening and sliding (m,)."""
         onset, final = self.limits(opening, sliding)
         separation = onset * final / (final - damage * (final - onset))
         return 0.5 * self.stiffness * onset * final * (separation - onset) / (final - onset)
 
 
 def cohesive_law(strength: float, energy: float, *, reversible: bool = False, **options: Any) -> CohesiveLaw:
-    """Return a law; by default, sliding has the limits of opening, and damage begins at ELASTIC of the opening at break."""
+    """Return a law. By default the limits of sliding are those of opening.
+
+    Without a given stiffness, damage begins at the fraction ELASTIC of the opening at break.
+    """
     stiffness = options.pop("stiffness", strength**2 / (2.0 * ELASTIC * energy))
     options = {"shear_strength": strength, "shear_energy": energy, **options}
     return CohesiveLaw(strength, energy, stiffness, **options, reversible=reversible)
@@ -121,7 +130,7 @@ class Bond:
     stored: float = 0.0
 
     def at(self, positions: Array) -> tuple[Array, Array]:
-        """Return sliding (n, dim) [length] and damage (n,) at the positions nearest to `positions` (n, dim) [length]."""
+        """Return the sliding (n, dim) [length] and damage (n,) at the points of the layer nearest to `positions` (n, dim)."""
         if np.array_equal(positions, self.positions):
             return self.sliding, self.damage
         rows = nearest(self.positions, positions)[1]

@@ -1,8 +1,8 @@
-"""Cohesive layer between the sides of a contact pair, by equality constraints whose compliance follows a traction law.
+"""Cohesive layers between the sides of contact pairs, as equality constraints whose compliance follows a traction law.
 
-In each pairing the law is linearised, by the secant where the layer unloads or reloads, and by a nearly constant traction
-where it softens. Matrices then remain positive definite, and the iteration over pairings converges to every state that is
-stable under prescribed displacements.
+The law is linearised in each pairing: by the secant where the layer unloads or reloads, and by a nearly constant traction
+where it softens. The matrices then remain positive definite, and the iteration over pairings converges to every state that
+is stable under prescribed displacements.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from fastcontact.contact.cohesion import ELASTIC, Bond, CohesiveLaw
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 
-# Ratio of the stiffness of the linearised layer where it softens to that of the intact layer: the magnitude of the ratio of
-# both slopes of the default law. With a smaller ratio, the iteration for a beam glued by nodes does not converge.
-LEVEL = ELASTIC
+# Stiffness of the linearised layer where it softens, relative to that of the intact layer. It is the magnitude of the ratio
+# of the two slopes of the default law. With a smaller ratio, the iteration for a beam glued at its nodes does not converge.
+SOFTENING_SLOPE = ELASTIC
 
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """The rows of a cohesive layer, m for openings and m for sliding along each tangent; see `constraints.Tied`.
+    """Cohesive layer with m constraints for its openings and m for sliding along each tangent; see `constraints.Tied`.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Layer:
     damage : ndarray (m,)
         Damage at which the law is linearised [-].
     separation, rest : ndarray (1 + k, m)
-        Opening and sliding at which the law is linearised, and at which the traction of the linearised law vanishes [length].
+        Opening and sliding at which the law is linearised, and those at which the linearised traction vanishes [length].
     """
 
     law: CohesiveLaw
@@ -56,9 +56,9 @@ class Layer:
 
     def after(self, constraints: Constraints, u: Array) -> Bond:
         """Return the state of the layer at the end of a step with displacements u (n_dofs,) [length]."""
-        end = (constraints.gap0 + constraints.B @ u).reshape(self.rest.shape) + self.rest
-        # Rows of broken constraints along tangents are zero, so that `end` does not contain their slips.
-        opening, *slips = np.where(self.damage < 1.0, end, self.separation)
+        separation = (constraints.gap0 + constraints.B @ u).reshape(self.rest.shape) + self.rest
+        # The tangential rows of broken constraints are zero, so that `separation` does not contain their slips.
+        opening, *slips = np.where(self.damage < 1.0, separation, self.separation)
         sliding = sum((s[:, None] * t for s, t in zip(slips, self.directions)), np.zeros_like(self.before.sliding))
         slip, law = np.linalg.norm(sliding, axis=1), self.law
         areas = np.where(np.isfinite(self.areas), self.areas, 0.0)
@@ -69,36 +69,37 @@ class Layer:
         return Bond(self.before.positions, sliding, self.damage, released, 0.5 * law.stiffness * float(areas @ squares))
 
 
-def bonded(law: CohesiveLaw, constraints: Constraints, at: Configuration, initial_gap: Array) -> Constraints:
-    """Return `constraints`, which have tangents, as a cohesive layer: equations whose compliance follows its law.
+def cohesive_rows(law: CohesiveLaw, constraints: Constraints, config: Configuration, initial_gap: Array) -> Constraints:
+    """Return equations of a cohesive layer at the points of `constraints`, which must have tangents.
 
-    The initial gaps `initial_gap` (m,) [length] do not load a cohesive layer, whereas adhesion acts across them. Broken
-    constraints may close again, with the stiffness of the intact layer.
+    The compliance of the equations follows the traction law. A cohesive layer is free of stress at the initial gaps
+    `initial_gap` (m,) [length], whereas adhesion acts across them. Broken constraints may close again, with the stiffness of
+    the intact layer.
     """
     assert constraints.areas is not None
-    m, u, start = len(constraints), at.displacement.ravel(), at.start.ravel()
-    zero = np.zeros(m)
-    before = at.bond
+    m, u, start = len(constraints), config.displacement.ravel(), config.start.ravel()
+    zeros = np.zeros(m)
+    before = config.bond
     if before is None:
-        initial_damage = law.damage(initial_gap, zero, zero) if law.reversible else zero
+        initial_damage = law.damage(initial_gap, zeros, zeros) if law.reversible else zeros
         before = Bond(constraints.positions, np.zeros_like(constraints.positions), initial_damage)
-    initial_gap = zero if law.reversible else initial_gap
+    initial_gap = zeros if law.reversible else initial_gap
     sliding, damage = before.at(constraints.positions)
     before = Bond(constraints.positions, sliding, damage, before.released)
     tangential = zip(constraints.tangents, constraints.directions, constraints.slip0, strict=True)
     slip0 = [s0 + np.einsum("md,md->m", t, sliding) - T @ start for T, t, s0 in tangential]
     slips = [s0 + T @ u for T, s0 in zip(constraints.tangents, slip0, strict=True)]
-    opening = constraints.gaps(at.displacement) - initial_gap
-    damage = law.damage(opening, np.sqrt(sum((s**2 for s in slips), zero)), damage)
-    # In the first pairing of a step an obstacle may have moved already, but the body not yet: this opening is no damage.
-    if at.bond is not None and np.array_equal(u, start):
+    opening = constraints.gaps(config.displacement) - initial_gap
+    damage = law.damage(opening, np.sqrt(sum((s**2 for s in slips), zeros)), damage)
+    # In the first pairing of a step, an obstacle may have moved while the body has not. This opening causes no damage.
+    if config.bond is not None and np.array_equal(u, start):
         damage = np.minimum(damage, before.damage)
     intact, jump = damage < 1.0, np.stack([opening, *slips])
     secant = np.tile(np.where(intact, 1.0 - damage, 1.0), (len(jump), 1))
     secant[0, opening < 0.0] = 1.0
-    softening = intact & (damage > (0.0 if law.reversible else before.damage)) & (secant > LEVEL)
-    slope = np.where(softening, LEVEL, secant)
-    unused = np.empty(0)
+    softening = intact & (damage > (0.0 if law.reversible else before.damage)) & (secant > SOFTENING_SLOPE)
+    slope = np.where(softening, SOFTENING_SLOPE, secant)
+    default = np.empty(0)
     layer = Layer(law, constraints.directions, constraints.areas, before, damage, jump, jump * (1.0 - secant / slope))
     return replace(
         constraints,
@@ -110,6 +111,6 @@ def bonded(law: CohesiveLaw, constraints: Constraints, at: Configuration, initia
         areas=np.tile(constraints.areas, len(jump)),
         nodes=None if constraints.nodes is None else np.tile(constraints.nodes, len(jump)),
         compliance=None, tangents=(), directions=(), tied=layer,
-        friction=unused, slip0=unused, tangential_softness=unused, elastic_slip=unused, low_rank_compliance=unused,
+        friction=default, slip0=default, tangential_softness=default, elastic_slip=default, low_rank_compliance=default,
         branches=(softening + 2 * (opening < 0.0) + 4 * ~intact).ravel().astype(np.int8),
-    ).without(np.concatenate([zero > 0.0, *[~intact] * len(slip0)]))  # fmt: skip
+    ).without(np.concatenate([zeros > 0.0, *[~intact] * len(slip0)]))  # fmt: skip

@@ -26,45 +26,45 @@ TABLES = ("pressure", "gap")
 
 
 class Conductance:
-    """Heat flow across a contact per area and temperature difference.
+    """Thermal conductance of a contact: heat flow per area and temperature difference.
 
-    Raises ContactError if `given` is not a valid conductance.
+    Raises ContactError if `law` has none of the forms below.
 
     Parameters
     ----------
     name : str
         Name of the contact pair, for messages.
-    given : float, callable, sequence or mapping
+    law : float, callable, sequence or mapping
         A number, which applies where the sides touch; a function of pressures and gaps (m,), which also applies where the
         sides are open; pairs (pressure, conductance), which apply where the sides touch; or a mapping of ``"pressure"`` to
         such pairs and of ``"gap"`` to pairs (gap, conductance), which apply where the sides are open, or everywhere if there
         are no pairs for pressure [power / (area temperature)].
     """
 
-    def __init__(self, name: str, given: Any) -> None:
-        self.name, self.given = name, given
-        self._number = float(given) if isinstance(given, (int, float)) and not isinstance(given, bool) else None
+    def __init__(self, name: str, law: Any) -> None:
+        self.name, self._law = name, law
+        self._constant = float(law) if isinstance(law, (int, float)) and not isinstance(law, bool) else None
         self._tables: dict[str, Array] = {}
-        if self._number is not None:
-            if not 0.0 <= self._number < np.inf:
-                raise ContactError(f"the conductance {given} of contact '{name}' must be a number, zero or more")
-        elif not callable(given):
-            tables = given if isinstance(given, Mapping) else {"pressure": given}
+        if self._constant is not None:
+            if not 0.0 <= self._constant < np.inf:
+                raise ContactError(f"the conductance {law} of contact '{name}' must be a number, zero or more")
+        elif not callable(law):
+            tables = law if isinstance(law, Mapping) else {"pressure": law}
             if not tables or not set(tables) <= set(TABLES):
-                raise self._no_table()
+                raise self._invalid()
             self._tables = {key: self._table(rows) for key, rows in tables.items()}
 
     def _table(self, rows: Any) -> Array:
         try:
             table = np.array([[float(value) for value in row] for row in rows]).reshape(-1, 2)
         except (TypeError, ValueError):
-            raise self._no_table() from None
+            raise self._invalid() from None
         ascending = (np.diff(table[:, 0]) > 0.0).all()
         if not (len(table) and np.isfinite(table).all() and ascending and table.min() >= 0.0):
-            raise self._no_table()
+            raise self._invalid()
         return table
 
-    def _no_table(self) -> ContactError:
+    def _invalid(self) -> ContactError:
         return ContactError(
             f"the conductance of contact '{self.name}' must be a number, a function of pressures and gaps, or tables of "
             "nonnegative, ascending pairs: [(0.0, 100.0), (10.0, 5000.0)] by pressure, or "
@@ -73,9 +73,9 @@ class Conductance:
 
     @property
     def sampled(self) -> Any:
-        """Values that identify the conductance: the argument `given` itself or, for a function, samples of its values."""
-        if not callable(self.given):
-            return self.given
+        """Values that identify the conductance: the argument itself or, for a function, samples of its values."""
+        if not callable(self._law):
+            return self._law
         scale = np.concatenate([[0.0], np.logspace(-9, 9, 37)])
         return [self(scale, np.zeros(len(scale))), self(np.zeros(len(scale)), scale)]
 
@@ -84,16 +84,16 @@ class Conductance:
 
         Raises ContactError if a function fails or does not return nonnegative numbers of this shape.
         """
-        touching = gap == 0.0
-        if self._number is not None:
-            return np.where(touching, self._number, 0.0)
-        if not callable(self.given):
-            at = {"pressure": pressure, "gap": gap}
-            interpolated = {key: np.interp(at[key], *table.T) for key, table in self._tables.items()}
-            closed = interpolated.get("pressure", interpolated.get("gap", 0.0))
-            return np.where(touching, closed, interpolated.get("gap", 0.0))
+        closed = gap == 0.0
+        if self._constant is not None:
+            return np.where(closed, self._constant, 0.0)
+        if not callable(self._law):
+            arguments = {"pressure": pressure, "gap": gap}
+            interpolated = {key: np.interp(arguments[key], *table.T) for key, table in self._tables.items()}
+            closed_values = interpolated.get("pressure", interpolated.get("gap", 0.0))
+            return np.where(closed, closed_values, interpolated.get("gap", 0.0))
         try:
-            h = np.asarray(self.given(pressure, gap), float)
+            h = np.asarray(self._law(pressure, gap), float)
         except Exception as error:
             raise ContactError(
                 f"the conductance of contact '{self.name}' fails: {type(error).__name__}: {error}"
@@ -108,8 +108,8 @@ class Conductance:
 
 
 @dataclass(frozen=True, eq=False)
-class Crossing:
-    """The discrete heat transfer of a contact pair.
+class HeatTransfer:
+    """Discrete heat transfer between the two sides of a contact pair.
 
     Attributes
     ----------
@@ -133,16 +133,17 @@ class Crossing:
         return csr_array(self.jump.T @ diags_array(h * self.area) @ self.jump)
 
     def shared(self, power: Array) -> Array:
-        """Return the nodal powers (n_points,) of heat generated at the interface (m,), half of it on each side [power]."""
+        """Return the nodal powers (n_points,) of heat generated at the constraints (m,), half of it on each side [power]."""
         return np.asarray(0.5 * (self.secondary.T @ power + self.primary.T @ power))
 
 
-def crossing(
+def heat_transfer(
     constraints: Constraints, secondary: Surface, primary: Surface | RigidSide, shape: tuple[int, ...]
-) -> Crossing:
-    """Return the heat transfer between two sides at constraints, whose rows weight displacements along one normal each.
+) -> HeatTransfer:
+    """Return the heat transfer between the two sides of a contact pair.
 
-    A rigid primary side has no points and thus no weights. `shape` is that of the points of the mesh, (n_points, dim).
+    The weights of temperatures are those of the displacements along the normal of each constraint. A rigid primary side has
+    no points and thus no weights. `shape` is that of the points of the mesh, (n_points, dim).
     """
     n, dim = shape
     on_secondary = np.zeros(n, bool)
@@ -157,4 +158,4 @@ def crossing(
     assert constraints.areas is not None
     facing = np.isfinite(constraints.areas) & (length > 0.0)
     rows_of_side = csr_array(rows @ diags_array(on_secondary.astype(float)))
-    return Crossing(rows_of_side, csr_array(rows_of_side - rows), np.where(facing, constraints.areas, 0.0))
+    return HeatTransfer(rows_of_side, csr_array(rows_of_side - rows), np.where(facing, constraints.areas, 0.0))

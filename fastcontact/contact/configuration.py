@@ -40,8 +40,8 @@ class Configuration:
     pressure : ndarray (n_nodes,), optional
         Pressure at the secondary nodes in the last pairing, including that of fluid [pressure]; None before the first one.
     rounded : bool
-        Whether the normals of facets vary continuously across edges, see `pairing.pair`, and nodes with dual functions and a
-        small overlap have no gap, because pairings alternated.
+        Whether pairings have alternated between two states. Then the normals of facets vary continuously across edges, see
+        `pairing.pair`, and nodes of dual mortar with a small overlap have no gap.
     linearised : ndarray (n_points, dim), optional
         Displacements at which the tangent of bodies in finite strain is computed [length]; None for small strains.
     friction_factor : float
@@ -65,9 +65,9 @@ class Configuration:
 
     @classmethod
     def displaced(cls, displacement: Array) -> Configuration:
-        """Return the configuration with displacements (n_points, dim) [length] that begins with the undeformed state."""
-        still = Pose(np.zeros(displacement.shape[1]))
-        return cls(displacement, np.zeros_like(displacement), still, still)
+        """Return the configuration with a displacement (n_points, dim) [length] in a step that begins undeformed."""
+        initial_pose = Pose(np.zeros(displacement.shape[1]))
+        return cls(displacement, np.zeros_like(displacement), initial_pose, initial_pose)
 
     @classmethod
     def undeformed(cls, points: Array) -> Configuration:

@@ -52,7 +52,7 @@ class NodalField(Protocol):
 
     @property
     def covered(self) -> Array | float:
-        """Covered fraction of nodal areas, see `NodalField`; 1 unless a formulation integrates over parts of facets."""
+        """Covered fraction of the nodal areas, see `NodalField`; 1 if a formulation integrates over complete facets only."""
         return 1.0
 
     def pressure(self, force: Array) -> Array:
@@ -66,16 +66,17 @@ class NodalField(Protocol):
         return np.column_stack([self.pressure(component) for component in force.T])
 
     def over_whole_side(self, force: Array) -> Array:
-        """Return nodal pressures (n_nodes,) [pressure] whose integral over the complete secondary side is the sum of `force`.
+        """Return nodal pressures (n_nodes,) [pressure] per unit of the complete area of each node.
 
-        They refer to the complete area of each node, including parts without an opposite facet.
+        The area includes parts without an opposite facet. The integral of these pressures over the complete secondary side
+        is the sum of `force` (m,) [force].
         """
         return self.pressure(force) * self.covered
 
     def shares(self, force: Array) -> Array:
-        """Return the distribution (n_nodes,) of the sum of normal forces (m,) to the nodes [force].
+        """Return the normal forces (m,) of the constraints, distributed to the nodes (n_nodes,) [force].
 
-        It is the product of `over_whole_side` and the nodal areas, except at nodes whose areas vanish.
+        The result is the product of `over_whole_side` and the nodal areas, except at nodes whose areas vanish.
         """
         return self.over_whole_side(force) * self.nodal_areas
 
@@ -99,7 +100,7 @@ class NodalField(Protocol):
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
         """Return the nodes in contact.
 
-        If a formulation has one constraint per node, these are the nodes of active constraints.
+        For formulations with one constraint per node, they are the nodes of the active constraints.
 
         Parameters
         ----------
@@ -117,9 +118,10 @@ class NodalField(Protocol):
         return active
 
     def initially_active(self, gap: Array, pressure: Array, last: Mask) -> Mask:
-        """Return an initial active set (m,) for gaps (m,) [length] and the last nodal pressures (n_nodes,) [pressure].
+        """Return an initial guess (m,) of the active set.
 
-        If each constraint exists in every pairing, the `last` active set (m,) is the best initial guess.
+        `gap` (m,) are the gaps [length], and `pressure` (n_nodes,) and `last` (m,) the nodal pressures [pressure] and the
+        active set of the previous pairing. If all pairings have the same constraints, `last` is the best guess.
         """
         return last
 
@@ -149,7 +151,10 @@ class Linearised(Protocol):
     """Contact forces, gaps and slips of one pair, linearised about a pairing and its solution; see `linearised_geometry`."""
 
     def along(self, du: Array) -> tuple[Array, Array]:
-        """Return the variation of nodal forces (n_points, dim) [force] and of gaps and slips (1 + k, m) [length] along du."""
+        """Return the directional derivatives along `du` (n_points, dim) [length].
+
+        They are those of the nodal forces (n_points, dim) [force] and of the gaps and slips (1 + k, m) [length].
+        """
         ...
 
 
@@ -159,7 +164,7 @@ Geometry = Callable[[Array, Array, Array], Linearised]
 
 
 class Tied(Protocol):
-    """Linear equations with their multipliers instead of contact inequalities, see `tied.TiedPair`."""
+    """Linear equations that replace the contact inequalities of a pair, see `tied.TiedPair`."""
 
     @property
     def directions(self) -> tuple[Array, ...]:
@@ -174,10 +179,10 @@ class Tied(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """Inequality constraints ``gap = gap0 + B u + C multiplier >= 0`` with non-negative multipliers, and equations.
+    """Contact constraints ``gap0 + B u + C multiplier >= 0`` with multipliers >= 0, or equations.
 
-    If an optional attribute is None, it is zero, or the constraints do not have the feature. Empty arrays are replaced by
-    zeros for all constraints.
+    An optional attribute is None if it is zero or if the constraints lack the feature. Empty arrays are replaced by zeros
+    for all constraints.
 
     Attributes
     ----------
@@ -291,39 +296,39 @@ class Constraints:
         return np.zeros(len(self)) if self.areas is None else np.where(np.isfinite(self.areas), self.areas, 0.0)
 
     def moved_past(self, rows: Indices, Q: csr_array | None) -> Mask:
-        """Return along which tangents (k, q) of the constraints `rows` (q,) supports and obstacles impose a slip.
+        """Return whether supports or obstacles impose a slip along each tangent (k, q) of the constraints `rows` (q,).
 
         The tangents are rotated by Q ((1 + k) q, (1 + k) q) if it is given, see `cone_newton.aligning`.
         """
         if self.driven is None:
             return np.zeros((len(self.tangents), len(rows)), bool)
         slips = np.vstack([np.zeros(len(rows)), self.driven[:, rows]])
-        turned = slips if Q is None else (Q @ slips.ravel()).reshape(slips.shape)
-        return np.asarray(np.abs(turned[1:]) > LENGTH_ROUND_OFF)
+        rotated = slips if Q is None else (Q @ slips.ravel()).reshape(slips.shape)
+        return np.asarray(np.abs(rotated[1:]) > LENGTH_ROUND_OFF)
 
     def gaps(self, displacement: Array) -> Array:
-        """Return ``gap0 + B u`` (m,) for displacements (n_points, dim), which does not include the compliance [length]."""
+        """Return the gaps ``gap0 + B u`` (m,) for displacements (n_points, dim), without the compliance [length]."""
         return np.asarray(self.gap0 + self.B @ displacement.ravel())
 
-    def without(self, open_for_now: Mask) -> Constraints:
-        """Return a copy in which the constraints `open_for_now` (m,) cannot close."""
-        if not open_for_now.any():
+    def without(self, open_constraints: Mask) -> Constraints:
+        """Return a copy in which the constraints `open_constraints` (m,) cannot close."""
+        if not open_constraints.any():
             return self
-        keep = diags_array((~open_for_now).astype(float))
+        keep = diags_array((~open_constraints).astype(float))
         rows = [csr_array(keep @ matrix) for matrix in (self.B, *self.tangents)]
         for matrix in rows:
             matrix.eliminate_zeros()
         return replace(self, B=rows[0], tangents=tuple(rows[1:]))
 
     def gaps_at_rest(self) -> Array:
-        """Return the gaps, then the slips along each tangent, at u = 0 without contact forces (1 + k, m) [length]."""
+        """Return the gaps and the slips along each tangent (1 + k, m) at u = 0 without contact forces [length]."""
         return np.vstack([self.gap0, self.slip0 + self.elastic_slip])
 
     def force(self, multiplier: Array, tangential: Array | None = None) -> Array:
         """Return the nodal contact forces (n_dofs,) for multipliers (m,) and tangential forces (m, k) [force]."""
         total: Array = self.B.T @ multiplier
-        for tangent, along in zip(self.tangents, () if tangential is None else tangential.T, strict=True):
-            total += tangent.T @ along
+        for tangent, forces in zip(self.tangents, () if tangential is None else tangential.T, strict=True):
+            total += tangent.T @ forces
         return total
 
     def normal_forces(self, multiplier: Array) -> Array:
@@ -344,10 +349,10 @@ class Constraints:
         """
         slips = self.tangential_softness[:, None] * tangential
         if self.compliance is not None:
-            along = self.coupled_directions or self.directions
-            forces = multiplier[:, None] * normals(along) + np.einsum("mk,kmd->md", tangential, np.stack(along))
+            axes = self.coupled_directions or self.directions
+            forces = multiplier[:, None] * normals(axes) + np.einsum("mk,kmd->md", tangential, np.stack(axes))
             elastic = np.column_stack([self.compliance.apply(component) for component in forces.T])
-            slips += np.einsum("md,kmd->mk", elastic, np.stack(along))
+            slips += np.einsum("md,kmd->mk", elastic, np.stack(axes))
         return np.einsum("mk,kmd->md", slips, np.stack(self.directions))
 
     def pressure(self, multiplier: Array) -> Array:
@@ -392,25 +397,25 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
     count, nodes = max(len(pair.tangents) for pair in pairs), [pair.nodes for pair in pairs if pair.nodes is not None]
     tangents = [pair.tangents or (csr_array(pair.B.shape),) * count for pair in pairs]
 
-    joined: dict[str, Any] = {
+    columns: dict[str, Any] = {
         name: np.concatenate([getattr(pair, name) for pair in pairs])
         for name in ("gap0", "positions", "friction", "equality", "softness", "tangential_softness")
     }
     for name in ("slip0", "elastic_slip"):  # zero for pairs without tangents
-        joined[name] = np.hstack([np.resize(getattr(pair, name), (count, len(pair))) for pair in pairs])
+        columns[name] = np.hstack([np.resize(getattr(pair, name), (count, len(pair))) for pair in pairs])
     factors = [np.zeros((1 + count, *pair.low_rank_compliance.shape[1:])) for pair in pairs]
     for factor, pair in zip(factors, pairs, strict=True):
         factor[: 1 + len(pair.tangents)] = pair.low_rank_compliance
     return StackedConstraints(
         B=csr_array(vstack([pair.B for pair in pairs], format="csr")),
         compliance=_BlockDiagonal(pairs) if any(pair.compliance is not None for pair in pairs) else None,
-        tangents=tuple(csr_array(vstack(along, format="csr")) for along in zip(*tangents, strict=True)),
+        tangents=tuple(csr_array(vstack(rows, format="csr")) for rows in zip(*tangents, strict=True)),
         directions=_stacked_directions(pairs),
         low_rank_compliance=np.stack([block_diag(*component) for component in zip(*factors, strict=True)]),
         nodes=None if len(nodes) < len(pairs) else np.concatenate(nodes),
         coupled_directions=_stacked_directions(pairs, coupled=True),
         parts=by_pair,
-        **joined,
+        **columns,
     )
 
 
@@ -421,8 +426,8 @@ def _stacked_directions(pairs: list[Constraints], coupled: bool = False) -> tupl
     """
     directions = [(pair.coupled_directions if coupled else ()) or pair.directions for pair in pairs]
     count = max(map(len, directions))
-    filled = [along or (np.zeros_like(pair.positions),) * count for along, pair in zip(directions, pairs, strict=True)]
-    return tuple(np.vstack(of_axis) for of_axis in zip(*filled, strict=True))
+    tangents = [t or (np.zeros_like(pair.positions),) * count for t, pair in zip(directions, pairs, strict=True)]
+    return tuple(np.vstack(of_axis) for of_axis in zip(*tangents, strict=True))
 
 
 class _Softened:
@@ -455,21 +460,21 @@ class _BlockDiagonal:
 
     def block(self, rows: Indices) -> Array:
         values = np.zeros((len(rows), len(rows)))
-        for compliance, (in_block, numbers) in zip(self._compliances, by_block(rows, self._sizes), strict=True):
+        for compliance, (in_block, rows_of_pair) in zip(self._compliances, by_block(rows, self._sizes), strict=True):
             if compliance is not None and len(in_block):
-                values[np.ix_(in_block, in_block)] = compliance.block(numbers)
+                values[np.ix_(in_block, in_block)] = compliance.block(rows_of_pair)
         return values
 
     def among(self, rows: Indices) -> Array | FieldCompliance:
         blocks = []
-        for inner, (_, numbers) in zip(self._compliances, by_block(rows, self._sizes), strict=True):
-            n = len(numbers)
-            compliance = FieldCompliance.none(n) if inner is None or not n else inner.among(numbers)
+        for inner, (_, rows_of_pair) in zip(self._compliances, by_block(rows, self._sizes), strict=True):
+            n = len(rows_of_pair)
+            compliance = FieldCompliance.none(n) if inner is None or not n else inner.among(rows_of_pair)
             if not isinstance(compliance, FieldCompliance):
                 return self.block(rows)
             blocks.append(compliance)
         return FieldCompliance.stacked(blocks, lambda: self.block(rows))
 
     def apply(self, multiplier: Array) -> Array:
-        of_pairs = zip(self._compliances, np.split(multiplier, np.cumsum(self._sizes)[:-1]), strict=True)
-        return np.concatenate([np.zeros(len(own)) if inner is None else inner.apply(own) for inner, own in of_pairs])
+        blocks = zip(self._compliances, np.split(multiplier, np.cumsum(self._sizes)[:-1]), strict=True)
+        return np.concatenate([np.zeros(len(y)) if C is None else C.apply(y) for C, y in blocks])

@@ -1,16 +1,17 @@
 """Centre of a contact zone, and distances from it on the secondary surface.
 
-In axisymmetry the middle lies on the axis if the surface reaches the axis, or if it faces along the axis and its radius
-changes monotonically. Otherwise the middle is the centre of pressure of the contact, completed by reflection at the planes of
-symmetry that it reaches: a half or quarter model has its middle on these planes. In a plane of symmetry, supports
-prescribe zero displacement along its normal at an end of the surface, and the opposite body does not extend beyond it.
+In axisymmetry the middle lies on the axis if the surface reaches the axis, or if the surface faces along the axis and its
+radius changes monotonically. Otherwise the middle is the centre of pressure. If the contact reaches planes of symmetry, it
+is completed by reflection, so that the middle of a half or quarter model lies on these planes. A plane of symmetry is
+recognised by supports that prescribe zero displacement along its normal at an end of the surface, if the opposite body does
+not extend beyond the plane.
 
-In plane models, positions are arc lengths along the surface, so that a ring is unrolled. The same holds in axisymmetry where
-the surface runs along the axis rather than across it, as in a press fit of cylinders, or closes on itself, like that of an
-O-ring. In 3D, positions are distances from the line through the middle along the mean normal.
+In plane models, positions are arc lengths along the surface, so that a ring is unrolled. The same holds in axisymmetry if
+the surface runs along the axis, as in a press fit of cylinders, or is closed, like that of an O-ring. In 3D, positions are
+distances from the line through the middle along the mean normal.
 
-The half-width of a contact in a plane model is that of its projection along the mean normal. For a pin in a hole it is half
-the chord, not half the arc.
+The half-width of a contact in a plane model is measured on its projection along the mean normal. For a pin in a hole it is
+half the chord, not half the arc.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ from fastcontact.contact.surface import Surface
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Largest distance of nodes from a plane of symmetry, relative to the size of the surface, and smallest cosine of the angle
-# between directions that are regarded as one. Coordinates in files may have six digits.
+# between directions that are regarded as parallel. Coordinates in files may have six digits.
 PLANE, PARALLEL = 2e-5, 1.0 - SINGLE_PRECISION
 
 
 @dataclass(frozen=True, eq=False)
 class UnrolledLine:
-    """A polygonal line through nodes.
+    """Polygonal line through the nodes of a surface in 2D.
 
     Attributes
     ----------
@@ -54,12 +55,12 @@ class UnrolledLine:
 
     @property
     def length(self) -> float:
-        """Length of the whole line [length]."""
+        """Total length of the line [length]."""
         return float(self.abscissa[-1])
 
     @classmethod
     def straight(cls, middle: Array, direction: Array, reach: float) -> UnrolledLine:
-        """Return the straight line along `direction` (2,) that extends from `middle` (2,) by `reach` both ways [length]."""
+        """Return a straight line along `direction` (2,) that extends by `reach` on both sides of `middle` (2,) [length]."""
         return cls(middle + np.outer([-reach, reach], direction), np.array([0.0, 2.0 * reach]))
 
     def at(self, length: float) -> Array:
@@ -68,24 +69,24 @@ class UnrolledLine:
 
     def lengths(self, positions: Array) -> Array:
         """Return the arc length (n,) of the point of the line nearest to each of `positions` (n, 2) [length]."""
-        last = len(self.nodes) - 1
-        node = nearest(self.nodes, positions)[1]
+        n_segments = len(self.nodes) - 1
+        nearest_node = nearest(self.nodes, positions)[1]
         best, arc_length = np.full(len(positions), np.inf), np.zeros(len(positions))
-        for piece in (np.clip(node - 1, 0, last - 1), np.clip(node, 0, last - 1)):
-            begin, along = self.nodes[piece], self.nodes[piece + 1] - self.nodes[piece]
-            size = np.einsum("nd,nd->n", along, along)
-            fraction = np.clip(np.einsum("nd,nd->n", positions - begin, along) / size, 0.0, 1.0)
-            distance = np.linalg.norm(begin + fraction[:, None] * along - positions, axis=1)
+        for segment in (np.clip(nearest_node - 1, 0, n_segments - 1), np.clip(nearest_node, 0, n_segments - 1)):
+            begin, tangent = self.nodes[segment], self.nodes[segment + 1] - self.nodes[segment]
+            squared_length = np.einsum("nd,nd->n", tangent, tangent)
+            fraction = np.clip(np.einsum("nd,nd->n", positions - begin, tangent) / squared_length, 0.0, 1.0)
+            distance = np.linalg.norm(begin + fraction[:, None] * tangent - positions, axis=1)
             nearer = distance < best
             best[nearer] = distance[nearer]
-            arc_length[nearer] = (self.abscissa[piece] + fraction * np.sqrt(size))[nearer]
+            arc_length[nearer] = (self.abscissa[segment] + fraction * np.sqrt(squared_length))[nearer]
         return arc_length
 
 
 def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> UnrolledLine | None:
-    """Return a surface in a plane model as one line; None if it has several pieces or branches.
+    """Return the line of a surface in a plane model; None if the surface has several pieces or branches.
 
-    A closed line is cut open at the node farthest from `middle` (2,) [length] or, without a middle, at its lowest node.
+    A closed line is cut at the node farthest from `middle` (2,) [length] or, without a middle, at its lowest node.
     """
     if surface.abscissa.any():
         return UnrolledLine(coordinates[surface.points], surface.abscissa)
@@ -101,7 +102,7 @@ def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> Unro
 
 
 def _loop(surface: Surface) -> list[int] | None:
-    """Return the nodes of a surface, as rows of its points, in order around one closed line; None if it is open."""
+    """Return the nodes, as rows of the points of a surface, in order along its closed line; None if there is no such line."""
     next_node: dict[int, int] = {}
     for block in surface.blocks:
         middles = block.local[:, 2:]
@@ -121,23 +122,25 @@ def _loop(surface: Surface) -> list[int] | None:
 
 @dataclass(frozen=True, eq=False)
 class ContactMiddle:
-    """The middle of a contact in one step.
+    """Middle of a contact zone in a load step.
 
     Attributes
     ----------
     position : ndarray (dim,)
         Position of the middle on the surface, or on the axis [length].
     line : UnrolledLine, optional
-        The surface as a line along which positions are arc lengths; `start` is the arc length at the middle [length].
+        The surface as a line, along which positions are arc lengths.
+    start : float
+        Arc length at the middle [length].
     reversed : bool
-        Whether arc lengths are counted in the opposite direction of the line.
+        Whether arc lengths increase against the direction of the line.
     direction : ndarray (dim,), optional
         Direction of the line from which distances are measured [-].
     ignored : tuple of ndarray (dim,)
         Unit vectors along which the model represents an infinite surface [-].
     tangent : ndarray (dim,), optional
-        Direction along which half-widths are measured [-]. If None, as for a middle on the axis, in 3D, and on a ring that
-        is in contact along its whole circumference, half-widths are measured by `places`.
+        Direction along which half-widths are measured [-]. If None, half-widths are measured by `places`: for a middle on the
+        axis, in 3D, and on a ring that is in contact along its complete circumference.
     """
 
     position: Array
@@ -149,16 +152,16 @@ class ContactMiddle:
     tangent: Array | None = None
 
     def places(self, positions: Array) -> Array:
-        """Return the distances (n,) of reference positions (n, dim) from the middle, with a sign along a line [length]."""
+        """Return the distances (n,) of reference positions (n, dim) from the middle, signed along a line [length]."""
         if self.line is not None:
-            along = self.line.lengths(positions) - self.start
+            arc_length = self.line.lengths(positions) - self.start
             if self.line.closed:
-                along -= self.line.length * np.round(along / self.line.length)
-            return -along if self.reversed else along
-        arm = positions - self.position
+                arc_length -= self.line.length * np.round(arc_length / self.line.length)
+            return -arc_length if self.reversed else arc_length
+        offset = positions - self.position
         for direction in (*self.ignored, *(() if self.direction is None else (self.direction,))):
-            arm -= (arm @ direction)[:, None] * direction
-        return np.asarray(np.linalg.norm(arm, axis=1))
+            offset -= (offset @ direction)[:, None] * direction
+        return np.asarray(np.linalg.norm(offset, axis=1))
 
 
 def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask, gap: Array) -> ContactMiddle:
@@ -192,12 +195,15 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
         ]
         planes = [plane for plane, is_reached in zip(planes, reached, strict=True) if is_reached]
     if dim == 2:
-        return _along_line(surface, pair.points, weight, planes, mean)
-    return _in_space(points, weight, planes, mean)
+        return _middle_in_2d(surface, pair.points, weight, planes, mean)
+    return _middle_in_3d(points, weight, planes, mean)
 
 
-def _in_space(points: Array, weight: Array, planes: list[tuple[Array, Indices]], mean: Array) -> ContactMiddle:
-    """Return the middle on a surface in 3D; parallel planes of symmetry at both ends represent an infinite surface."""
+def _middle_in_3d(points: Array, weight: Array, planes: list[tuple[Array, Indices]], mean: Array) -> ContactMiddle:
+    """Return the middle on a surface in 3D.
+
+    Parallel planes of symmetry at two opposite ends represent an infinite surface.
+    """
     centre, single, ignored = weight @ points, list[tuple[Array, float]](), list[Array]()
     for axis, nodes in planes:
         if sum(axis is other for other, _ in planes) == 1:
@@ -214,7 +220,7 @@ def _in_space(points: Array, weight: Array, planes: list[tuple[Array, Indices]],
 
 
 def _radius_is_monotone(surface: Surface, coordinates: Array) -> bool:
-    """Return whether the radius changes monotonically along a surface; True for a surface that is not one line."""
+    """Return whether the radius changes monotonically along a surface; True if the surface is not a single line."""
     line = unrolled(surface, coordinates, None)
     if line is None:
         return True
@@ -223,9 +229,10 @@ def _radius_is_monotone(surface: Surface, coordinates: Array) -> bool:
 
 
 def symmetry_planes(pair: Formulation) -> list[tuple[Array, Indices]]:
-    """Return, for each plane of symmetry at an end of a surface, its unit normal (dim,) and the nodes of the surface on it.
+    """Return the planes of symmetry at the ends of the secondary surface.
 
-    Supports prescribe zero displacement along its normal, and the opposite body does not extend beyond the plane.
+    Each is given by its unit normal (dim,) and the nodes of the surface in the plane. Supports prescribe zero displacement
+    along the normal, and the opposite body does not extend beyond the plane.
     """
     surface, coordinates, motions = pair.secondary, pair.points, pair.held
     if motions is None:
@@ -253,25 +260,25 @@ def symmetry_planes(pair: Formulation) -> list[tuple[Array, Indices]]:
 def _held_directions(projectors: Array) -> Array:
     """Return distinct unit vectors (k, dim) along which nodes are held, given their `projectors` (n, dim, dim).
 
-    If a node is held in several directions, those of other nodes are chosen first, then coordinate axes.
+    For a node that is held in several directions, the directions of other nodes are preferred, then the coordinate axes.
     """
     dim = projectors.shape[1]
     directions = np.empty((0, dim))
     distinct = np.unique(np.round(projectors, 9).reshape(-1, dim * dim), axis=0).reshape(-1, dim, dim)
     for P in distinct[np.argsort(np.trace(distinct, axis1=1, axis2=2), kind="stable")]:
-        preferred = np.concatenate([directions, np.eye(dim)])
-        inside = preferred[np.linalg.norm(preferred @ P, axis=1) > PARALLEL]
-        for n in [*inside, *np.linalg.eigh(P)[1].T[::-1]]:
+        candidates = np.concatenate([directions, np.eye(dim)])
+        in_range = candidates[np.linalg.norm(candidates @ P, axis=1) > PARALLEL]
+        for n in [*in_range, *np.linalg.eigh(P)[1].T[::-1]]:
             if (length := np.linalg.norm(P @ n)) > 0.5:
-                along = P @ n / length * (1.0 if n[np.argmax(np.abs(n))] > 0.0 else -1.0)
-                P = P - np.outer(along, along)
-                if not (np.abs(directions @ along) > PARALLEL).any():
-                    directions = np.vstack([directions, along])
+                direction = P @ n / length * (1.0 if n[np.argmax(np.abs(n))] > 0.0 else -1.0)
+                P = P - np.outer(direction, direction)
+                if not (np.abs(directions @ direction) > PARALLEL).any():
+                    directions = np.vstack([directions, direction])
     return directions
 
 
 def _weights(force: Array, gap: Array) -> Array:
-    """Return the weights (n_nodes,) of the nodes in the centre of pressure, with sum 1 [-]."""
+    """Return the weights (n_nodes,) of the nodes for the centre of pressure, whose sum is 1 [-]."""
     weight, total = force, float(force.sum())
     if total <= 1e-6 * float(np.abs(force).sum()):  # no force, or tension of equal magnitude
         weight = np.abs(force)
@@ -283,10 +290,13 @@ def _weights(force: Array, gap: Array) -> Array:
     return weight
 
 
-def _along_line(
+def _middle_in_2d(
     surface: Surface, coordinates: Array, weight: Array, planes: list[tuple[Array, Indices]], mean: Array
 ) -> ContactMiddle:
-    """Return the middle on a surface in a plane model; a surface in several pieces is projected along its mean normal."""
+    """Return the middle on a surface in a plane model.
+
+    A surface in several pieces is projected along its mean normal.
+    """
     points, length = coordinates[surface.points], float(np.linalg.norm(mean))
     centre, tangent = weight @ points, np.array([-mean[1], mean[0]]) / (length or 1.0)
     line = unrolled(surface, coordinates, centre if length > FACING else None)

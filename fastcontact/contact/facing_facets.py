@@ -18,7 +18,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import cells_of_outer_facets, outer_facets
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Distance of the sample points near nodes from these nodes, relative to that of the nodes from the middle of the facet.
+# Distance of a sample point from its node, relative to the distance of the node from the middle of the facet.
 INSET = 0.02
 
 
@@ -42,24 +42,24 @@ class OuterFacets:
 
     @classmethod
     def of(cls, mesh: Mesh, body_of_cells: Indices) -> OuterFacets:
-        """Return the outer facets of the cells whose body, in `body_of_cells` (n_cells,) of int, is not -1."""
+        """Return the outer facets of all cells with a body; `body_of_cells` (n_cells,) is -1 for the others."""
         blocks, cells = {}, []
         for name, facets in outer_facets(mesh).items():
-            behind = cells_of_outer_facets(mesh)[name]
-            kept = body_of_cells[behind] >= 0
-            blocks[name] = facets[kept]
-            cells.append(behind[kept])
+            cell_of_facet = cells_of_outer_facets(mesh)[name]
+            selected = body_of_cells[cell_of_facet] >= 0
+            blocks[name] = facets[selected]
+            cells.append(cell_of_facet[selected])
         cell = np.concatenate(cells).astype(np.intp)
         return cls(mesh, blocks, body_of_cells[cell], cell)
 
     @cached_property
     def first(self) -> Indices:
-        """The number of the first facet of each block, and the total number."""
+        """Number of the first facet of each block, and the total number of facets."""
         return np.cumsum([0, *map(len, self.blocks.values())])
 
     @cached_property
     def samples(self) -> tuple[Indices, Array, Array]:
-        """Sample points inside the facets: facet (m,), position (m, dim) [length] and outward normal (m, dim) of each."""
+        """Facets (m,), positions (m, dim) [length] and outward normals (m, dim) of sample points inside the facets."""
         facet, point, normal = [], [], []
         for (name, facets), first in zip(self.blocks.items(), self.first):
             element = elements.get(name)
@@ -75,7 +75,7 @@ class OuterFacets:
 
     @cached_property
     def area(self) -> Array:
-        """Areas (n,), in 2D lengths [length^(dim - 1)]."""
+        """Areas (n,) of the facets, in 2D lengths [length^(dim - 1)]."""
         areas = [np.empty(0)]
         for name, facets in self.blocks.items():
             _, gradient, weights = elements.get(name).tables
@@ -84,24 +84,27 @@ class OuterFacets:
 
     @cached_property
     def size(self) -> Array:
-        """Sizes (n,) [length]."""
+        """Sizes (n,) of the facets: lengths in 2D, square roots of areas in 3D [length]."""
         return np.asarray(self.area ** (1.0 / (self.mesh.dim - 1)))
 
     @cached_property
     def spacing(self) -> Array:
-        """Distances between nodes (n,) [length]: half the size of quadratic facets."""
+        """Distances (n,) between the nodes of each facet [length]; for quadratic facets half the size."""
         order = [elements.get(name).order for name in self.blocks]
         return self.size / np.repeat(order, np.diff(self.first))
 
     @cached_property
     def boxes(self) -> tuple[Array, Array]:
-        """Lower and upper corners (n, dim) of the boxes around the nodes [length]."""
+        """Lower and upper corners (n, dim) of the bounding boxes of the nodes of each facet [length]."""
         corners = [self.mesh.points[facets] for facets in self.blocks.values()]
         return np.concatenate([c.min(axis=1) for c in corners]), np.concatenate([c.max(axis=1) for c in corners])
 
     @cached_property
     def smooth_face(self) -> Indices:
-        """The smooth face (n,) of each facet: adjacent facets without a corner between them share one."""
+        """Number (n,) of the smooth face to which each facet belongs.
+
+        Adjacent facets belong to the same smooth face if there is no corner between them.
+        """
         keys, facet, normal = [], [], []
         for (name, facets), first in zip(self.blocks.items(), self.first):
             element = elements.get(name)
@@ -115,9 +118,9 @@ class OuterFacets:
         edge_normal /= np.linalg.norm(edge_normal, axis=1, keepdims=True)
         order = np.lexsort(key.T)
         row, next_row = order[:-1], order[1:]
-        joined = (key[row] == key[next_row]).all(axis=1)
-        joined &= np.einsum("nd,nd->n", edge_normal[row], edge_normal[next_row]) > np.cos(np.radians(CORNER))
-        first_of, second_of = number[row[joined]], number[next_row[joined]]
+        is_smooth = (key[row] == key[next_row]).all(axis=1)
+        is_smooth &= np.einsum("nd,nd->n", edge_normal[row], edge_normal[next_row]) > np.cos(np.radians(CORNER))
+        first_of, second_of = number[row[is_smooth]], number[next_row[is_smooth]]
         graph = coo_array((np.ones(len(first_of)), (first_of, second_of)), shape=(len(self.body),) * 2)
         return np.asarray(connected_components(graph, directed=False)[1], np.intp)
 
@@ -144,56 +147,56 @@ class Facing:
     gap: Array
 
 
-def facing(outside: OuterFacets, distance: float | None, angle: float) -> Facing:
+def facing(facets: OuterFacets, distance: float | None, angle: float) -> Facing:
     """Return the points at which facets face another body; see `find_contacts` for `distance` [length] and `angle` [degrees].
 
-    A third body between two bodies hides them from each other, since only the closest facet of all other bodies counts.
+    Only the closest facet of all other bodies counts, so that a third body between two bodies hides them from each other.
     """
-    everywhere = np.ones(len(outside.body), bool)
-    near = _search(outside, distance, angle, everywhere)
+    everywhere = np.ones(len(facets.body), bool)
+    close = _search(facets, distance, angle, everywhere)
     if distance is not None:
-        return near
-    # Smooth faces that are close to each other somewhere also face each other where their gap is larger.
-    face = outside.smooth_face
-    key = np.sort(np.column_stack([face[near.facet], face[near.opposite]]), axis=1) @ [len(face), 1]
-    far = _search(outside, np.inf, angle, np.isin(face, face[np.concatenate([near.facet, near.opposite])]))
-    far_key = np.sort(np.column_stack([face[far.facet], face[far.opposite]]), axis=1) @ [len(face), 1]
-    ahead, touching = np.isin(far_key, key) & (far.gap > 0.0), near.gap <= 0.0
-    fields = ((near.facet, far.facet), (near.opposite, far.opposite), (near.gap, far.gap))
-    return Facing(*(np.concatenate([from_near[touching], from_far[ahead]]) for from_near, from_far in fields))
+        return close
+    # Two smooth faces that are close to each other in one place also face each other where their gap is larger.
+    face = facets.smooth_face
+    key = np.sort(np.column_stack([face[close.facet], face[close.opposite]]), axis=1) @ [len(face), 1]
+    distant = _search(facets, np.inf, angle, np.isin(face, face[np.concatenate([close.facet, close.opposite])]))
+    distant_key = np.sort(np.column_stack([face[distant.facet], face[distant.opposite]]), axis=1) @ [len(face), 1]
+    ahead, touching = np.isin(distant_key, key) & (distant.gap > 0.0), close.gap <= 0.0
+    fields = ((close.facet, distant.facet), (close.opposite, distant.opposite), (close.gap, distant.gap))
+    return Facing(*(np.concatenate([of_close[touching], of_distant[ahead]]) for of_close, of_distant in fields))
 
 
-def _search(outside: OuterFacets, distance: float | None, angle: float, among: Mask) -> Facing:
-    """Return the facets of other bodies that the sample points of the facets `among` (n,) face."""
-    facing_of_bodies = [_faced_by(outside, body, distance, angle, among) for body in np.unique(outside.body)]
+def _search(facets: OuterFacets, distance: float | None, angle: float, searched: Mask) -> Facing:
+    """Return the facets of other bodies that the sample points of the facets `searched` (n,) face."""
+    facing_of_bodies = [_facing_of_body(facets, body, distance, angle, searched) for body in np.unique(facets.body)]
     return Facing(*(np.concatenate(of_bodies) for of_bodies in zip(*facing_of_bodies, strict=True)))
 
 
-def _faced_by(
-    outside: OuterFacets, body: int, distance: float | None, angle: float, among: Mask
+def _facing_of_body(
+    facets: OuterFacets, body: int, distance: float | None, angle: float, searched: Mask
 ) -> tuple[Indices, Indices, Array]:
-    """Return the arrays of `Facing` for the points in those facets of one body that are `among` (n,)."""
-    facet_of_point, point, normal = outside.samples
-    (low, high), size = outside.boxes, outside.size
-    of_body = outside.body == body
+    """Return the arrays of `Facing` for the points in those facets of one body that are `searched` (n,)."""
+    facet_of_point, point, normal = facets.samples
+    (low, high), size = facets.boxes, facets.size
+    of_body = facets.body == body
     reach = float(size.max()) if distance is None else distance
     begin, end = low[of_body].min(axis=0) - reach, high[of_body].max(axis=0) + reach
     others = ~of_body & ((high >= begin) & (low <= end)).all(axis=1)
-    candidates = np.flatnonzero((of_body & among)[facet_of_point])
+    candidates = np.flatnonzero((of_body & searched)[facet_of_point])
     if others.any():
-        at, begin, end = point[candidates], low[others].min(axis=0) - reach, high[others].max(axis=0) + reach
-        candidates = candidates[((at >= begin) & (at <= end)).all(axis=1)]
+        position, begin, end = point[candidates], low[others].min(axis=0) - reach, high[others].max(axis=0) + reach
+        candidates = candidates[((position >= begin) & (position <= end)).all(axis=1)]
     if not others.any() or not len(candidates):
         return np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0)
-    kinds = outside.facets(np.flatnonzero(others)).values()
-    closest = closest_of_kinds(point[candidates], [outside.mesh.points[block] for block in kinds])
+    kinds = facets.facets(np.flatnonzero(others)).values()
+    closest = closest_of_kinds(point[candidates], [facets.mesh.points[block] for block in kinds])
     facet, opposite = facet_of_point[candidates], np.flatnonzero(others)[closest.facet]
     difference = point[candidates] - closest.position
     gap = np.einsum("nd,nd->n", difference, closest.normal)
     offset = np.linalg.norm(difference - gap[:, None] * closest.normal, axis=1)
     larger = np.maximum(size[facet], size[opposite])
-    opposed = np.einsum("nd,nd->n", normal[candidates], closest.normal) <= -np.cos(np.radians(angle))
+    opposite_normals = np.einsum("nd,nd->n", normal[candidates], closest.normal) <= -np.cos(np.radians(angle))
     near = closest.distance <= (larger if distance is None else distance) + LENGTH_ROUND_OFF * larger
     ahead = offset <= np.abs(gap) * np.tan(np.radians(angle)) + LENGTH_ROUND_OFF * larger
-    kept = opposed & near & ahead
-    return facet[kept], opposite[kept], gap[kept]
+    accepted = opposite_normals & near & ahead
+    return facet[accepted], opposite[accepted], gap[accepted]

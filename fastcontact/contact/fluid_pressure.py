@@ -1,10 +1,10 @@
-"""Pressure penetration: fluid between the sides of a contact pair, where they are open and connected with its source.
+"""Pressure penetration: fluid enters between the sides of a contact pair from a source, wherever they are open.
 
 A node is open to the fluid if its contact pressure is at most the fluid pressure or, in the first pairing, if its gap is
-open. Open nodes of one facet are connected. There the fluid pressure replaces the contact pressure: it acts on the secondary
-side along its own normals, and on the primary side along the normal of the gap, over the area covered by the secondary side.
-In finite strain normals and areas are those of the deformed surface at which the bodies are linearised; their variation
-enters the tangent.
+open. Open nodes of the same facet are connected. At open nodes that are connected with the source, the fluid pressure
+replaces the contact pressure. It acts on the secondary side along the normals of this side, and on the primary side along the
+normal of the gap, over the area that the secondary side covers. With finite strains, normals and areas are those of the
+deformed surface at which the bodies are linearised, and their variation enters the tangent.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ EDGE = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Wetted:
-    """Region reached by the fluid.
+    """Region that the fluid has reached.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Wetted:
     pressure : ndarray (n_nodes,)
         Fluid pressure at the secondary nodes [pressure].
     spread : csr_array (n_points, n_nodes)
-        Matrix from the `areas` at the secondary nodes to forces on the points, in the opposite direction [force].
+        Matrix whose product with the area vectors at the secondary nodes is minus the nodal forces [force].
     areas : AreaVectors
     """
 
@@ -51,7 +51,7 @@ class Wetted:
     areas: AreaVectors
 
     def force(self, displacement: Array) -> Array:
-        """Return the forces (n_points, dim) on the secondary side at a `displacement` (n_points, dim) [length] [force]."""
+        """Return the nodal forces (n_points, dim) [force] at a `displacement` (n_points, dim) [length]."""
         return np.asarray(-(self.spread @ self.areas.at(displacement)[0]))
 
     def stiffness(self, displacement: Array) -> csr_array:
@@ -65,7 +65,7 @@ class Wetted:
 class AreaVectors:
     """Outward area vectors of the deformed secondary side at its nodes, per reference area (Nanson's formula).
 
-    They are means over the facets around a node, weighted with the square of its shape function, which is positive.
+    They are means over the facets around a node, weighted with the square of its shape function, which cannot be negative.
     """
 
     side: Surface
@@ -94,56 +94,60 @@ class AreaVectors:
                 for nodes in (block.local, block.facets)
             )
             blocks.append((rows, columns, derivative.reshape(*rows.shape, -1)))
-        share = np.divide(1.0, areas, out=np.zeros(n), where=areas > 0.0)
-        by_node = diags_array(np.repeat(share, dim)) @ assembled(blocks, (n * dim, self.points.size))
-        return vectors * share[:, None], csr_array(by_node)
+        inverse = np.divide(1.0, areas, out=np.zeros(n), where=areas > 0.0)
+        by_node = diags_array(np.repeat(inverse, dim)) @ assembled(blocks, (n * dim, self.points.size))
+        return vectors * inverse[:, None], csr_array(by_node)
 
 
-def wetted(constraints: Constraints, at: Configuration, areas: AreaVectors, source: Mask) -> Constraints:
-    """Return `constraints` under the fluid pressure of a configuration.
+def with_fluid_pressure(
+    constraints: Constraints, config: Configuration, areas: AreaVectors, source: Mask
+) -> Constraints:
+    """Return the constraints of a pair under the fluid pressure of a configuration.
 
-    The fluid comes from the nodes `source` (n_nodes,) of the secondary side. Contact pressures are those of the last
+    The fluid enters from the nodes `source` (n_nodes,) of the secondary side. Contact pressures are those of the last
     pairing; before the first one, closed nodes are impermeable.
     """
-    if not at.fluid_pressure > 0.0:
+    if not config.fluid_pressure > 0.0:
         return constraints
     assert constraints.areas is not None
     assert constraints.nodal is not None
     side, points = areas.side, areas.points
     size = float(np.linalg.norm(np.ptp(points[side.points], axis=0)))
-    vectors = areas.at(np.zeros_like(points) if at.linearised is None else at.linearised)[0]
-    gaps = constraints.gaps(at.displacement)
+    vectors = areas.at(np.zeros_like(points) if config.linearised is None else config.linearised)[0]
+    gaps = constraints.gaps(config.displacement)
     nodal, node = constraints.nodal.weighted_gaps(np.where(constraints.usable, gaps, np.inf))
-    if at.pressure is None:
+    if config.pressure is None:
         passable = nodal > LENGTH_ROUND_OFF * size
     else:
         # A node under contact pressure is impermeable, even if only points beside it are closed. Contact pressures are forces
         # per reference area.
-        nominal = at.fluid_pressure * (1.0 if at.linearised is None else np.linalg.norm(vectors, axis=1))
+        nominal = config.fluid_pressure * (1.0 if config.linearised is None else np.linalg.norm(vectors, axis=1))
         facet_size = size / side.n_facets ** (1.0 / (points.shape[1] - 1))
-        passable = (nodal > -EDGE * facet_size) & (at.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
-    nodes = reached(side, source, passable)
+        passable = (nodal > -EDGE * facet_size) & (config.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
+    nodes = connected_nodes(side, source, passable)
     rows = nodes[node] & constraints.usable
-    # A force independent of the gap is represented by a linear law of small slope, whose zero lies far beyond the side.
+    # A force that does not depend on the gap is represented by a linear law of small slope, which vanishes at a distance much
+    # larger than the side.
     distance_to_zero = size / SINGLE_PRECISION
-    B, weights = _along(constraints.B, rows, side, vectors[node])
-    force = np.where(rows, at.fluid_pressure * constraints.areas, 0.0)
+    B, weights = _rows_along_area_vectors(constraints.B, rows, side, vectors[node])
+    force = np.where(rows, config.fluid_pressure * constraints.areas, 0.0)
     at_nodes = csr_array((force, (np.arange(len(node)), node)), shape=(len(node), len(nodes)))
     return replace(
         constraints,
         B=B,
-        gap0=np.where(rows, -distance_to_zero - B @ at.displacement.ravel(), constraints.gap0),
-        softness=np.where(rows, distance_to_zero / (at.fluid_pressure * constraints.areas), constraints.softness),
+        gap0=np.where(rows, -distance_to_zero - B @ config.displacement.ravel(), constraints.gap0),
+        softness=np.where(rows, distance_to_zero / (config.fluid_pressure * constraints.areas), constraints.softness),
         equality=constraints.equality | rows,
         friction=np.where(rows, 0.0, constraints.friction),
-        wetted=Wetted(rows, np.where(nodes, at.fluid_pressure, 0.0), csr_array(weights.T @ at_nodes), areas),
+        wetted=Wetted(rows, np.where(nodes, config.fluid_pressure, 0.0), csr_array(weights.T @ at_nodes), areas),
     )
 
 
-def _along(B: csr_array, rows: Mask, side: Surface, vectors: Array) -> tuple[csr_array, csr_array]:
-    """Return B (m, n_dofs) in `rows` (m,) along the normals of the secondary `side`, and its weights (m, n_points).
+def _rows_along_area_vectors(B: csr_array, rows: Mask, side: Surface, vectors: Array) -> tuple[csr_array, csr_array]:
+    """Return B (m, n_dofs) with entries along area vectors in `rows` (m,), and their weights (m, n_points).
 
-    `vectors` (m, dim) are area vectors per area [-]; on the primary side their component along the normal of the gap acts.
+    `vectors` (m, dim) are the area vectors of the secondary `side` per area [-]. On the primary side, their component along
+    the normal of the gap acts.
     """
     (m, n_dofs), dim = B.shape, vectors.shape[1]
     entries = B.tocoo()
@@ -153,19 +157,18 @@ def _along(B: csr_array, rows: Mask, side: Surface, vectors: Array) -> tuple[csr
     np.add.at(normal, (row[on_secondary], component[on_secondary]), entries.data[on_secondary])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = np.divide(normal, length, out=normal, where=length > 0.0)
-    kept = on_secondary & rows[row]
-    weights = csr_array(
-        (entries.data[kept] * normal[row[kept], component[kept]], (row[kept], point[kept])), shape=(m, n_dofs // dim)
-    )
-    covered = np.where(rows, -np.einsum("md,md->m", vectors, normal), 1.0)
-    on_primary = csr_array((entries.data * covered[row] * ~kept, (row, entries.col)), shape=B.shape)
-    along = csr_array(on_primary + rows_of(weights, -vectors))
-    along.eliminate_zeros()
-    return along, weights
+    moved = on_secondary & rows[row]
+    values = entries.data[moved] * normal[row[moved], component[moved]]
+    weights = csr_array((values, (row[moved], point[moved])), shape=(m, n_dofs // dim))
+    area_ratio = np.where(rows, -np.einsum("md,md->m", vectors, normal), 1.0)
+    on_primary = csr_array((entries.data * area_ratio[row] * ~moved, (row, entries.col)), shape=B.shape)
+    with_area_vectors = csr_array(on_primary + rows_of(weights, -vectors))
+    with_area_vectors.eliminate_zeros()
+    return with_area_vectors, weights
 
 
-def reached(side: Surface, source: Mask, passable: Mask) -> Mask:
-    """Return which `passable` nodes (n_nodes,) are connected with passable nodes of the `source` by facets of a side."""
+def connected_nodes(side: Surface, source: Mask, passable: Mask) -> Mask:
+    """Return which `passable` nodes (n_nodes,) the facets of a side connect with passable nodes of the `source`."""
     nodes, connected = np.flatnonzero(passable), np.zeros(len(passable), bool)
     component = connected_components(side.beside[nodes][:, nodes], directed=False)[1]
     connected[nodes] = np.isin(component, component[source[nodes]])

@@ -50,7 +50,8 @@ class FoundContact:
     gap : (float, float)
         Smallest and largest gap, negative if bodies overlap [length].
     reason : str
-        Why this side is the secondary one: ``"finer"``, ``"softer"``, ``"smaller"``, or ``"alike"`` for an arbitrary choice.
+        Property by which the secondary side was chosen: ``"finer"``, ``"softer"``, ``"smaller"``, or ``"alike"`` for an
+        arbitrary choice.
     """
 
     name: str
@@ -65,7 +66,7 @@ class FoundContact:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FoundContacts(Sequence[FoundContact]):
-    """Result of `find_contacts`: a sequence of `FoundContact` that prints as a table.
+    """Result of `find_contacts`: a sequence of `FoundContact` that is printed as a table.
 
     Attributes
     ----------
@@ -107,7 +108,10 @@ class FoundContacts(Sequence[FoundContact]):
         return html_table(self._rows("{:.4g}"), _COLUMNS, "Contacts found")
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the table as a ``pandas.DataFrame``, lengths as numbers; FileError if pandas is not installed."""
+        """Return the table as a ``pandas.DataFrame`` with lengths as numbers.
+
+        Raises FileError if pandas is not installed.
+        """
         try:
             import pandas
         except ImportError as error:
@@ -132,23 +136,23 @@ def find_contacts(
 ) -> FoundContacts:
     """Find the surfaces of different bodies that face each other, and choose the secondary side of each pair.
 
-    Sample points of all outer facets are projected on the closest facet of any other body. Two facets face each other
+    Sample points of all outer facets are projected onto the closest facet of any other body. Two facets face each other
     if the distance along their normals is small enough and the normals are opposed. A surface with edges at which the
     normals differ by 48 degrees or more is split into one pair for each smooth face, since a side of a pair has one
-    normal at each node. The secondary side is the one with the finer mesh; between equally fine sides it is that of the
-    softer body, otherwise the smaller one.
+    normal at each node. The secondary side is the one with the finer mesh. If both meshes are equally fine, it is the side
+    of the softer body, and if both bodies are equally stiff, the smaller side.
 
     Parameters
     ----------
     mesh : Mesh
     distance : float, optional
-        Largest gap or overlap [length]. By default smooth faces of two bodies form a pair if their distance is at most
-        the size of the larger of two opposite facets somewhere. The pair then extends as far as the normals are opposed.
+        Largest gap or overlap [length]. By default, smooth faces of two bodies form a pair if, at some point, their distance
+        is at most the size of the larger of the two facets there. The pair then extends as far as the normals are opposed.
     angle : float
         Largest deviation of the normals from opposite directions, more than 0 and less than 90 [degrees].
     groups : sequence of str, optional
-        Groups of solid cells that form the bodies; by default the connected sets of cells. Self-contact of a body is
-        not searched.
+        Groups of solid cells that form the bodies; by default each connected set of cells is a body. Self-contact of a body
+        is not detected.
     moduli : mapping of str to array_like (n_cells,), optional
         Moduli of the solid cells, by element type [pressure]; `Model.add_contacts` takes them from the materials.
 
@@ -178,22 +182,22 @@ def find_contacts(
     body = _bodies_of_cells(mesh, groups)
     if body.max(initial=-1) < 1:
         return FoundContacts(mesh)
-    outside = OuterFacets.of(mesh, body)
-    search = facing(outside, distance, angle)
+    outer = OuterFacets.of(mesh, body)
+    search = facing(outer, distance, angle)
     modulus = np.ones(mesh.n_cells)
     for name, values in (moduli or {}).items():
         modulus[mesh.offsets[name] : mesh.offsets[name] + len(mesh.cells[name])] = values
     names = list(groups) if groups is not None else _names(mesh, body)
     pairs: list[FoundContact] = []
     sides: dict[str, Mapping[str, ArrayLike]] = {}
-    for pair, facets in _pairs(outside, search, modulus, names):
-        sides.update(zip((pair.secondary, pair.primary), map(outside.facets, facets)))
+    for pair, facets in _pairs(outer, search, modulus, names):
+        sides.update(zip((pair.secondary, pair.primary), map(outer.facets, facets)))
         pairs.append(pair)
     return FoundContacts(mesh.with_facets(sides), tuple(pairs))
 
 
 def nothing_found(mesh: Mesh, distance: float | None, angle: float, groups: Sequence[str] | None) -> str:
-    """Return a message that says why `find_contacts` finds no pairs, and what to change."""
+    """Return a message that explains why `find_contacts` finds no pairs, and states the remedy."""
     if groups is None and _whole_bodies(mesh).max() < 1:
         return (
             "the mesh is one body, since nodes connect all of its cells: name groups of cells as bodies, or duplicate the "
@@ -232,7 +236,7 @@ def _bodies_of_cells(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
 
 
 def _whole_bodies(mesh: Mesh) -> Numbers:
-    """Return the body (n_points,) of each point, -1 for points of no cell; both sides of a cut belong to one body."""
+    """Return the body (n_points,) of each point, -1 for points without cells; both sides of a cut belong to the same body."""
     count, body = bodies(mesh)
     cuts = [name for name in mesh.group_names if name + OPPOSITE in mesh.group_names]
     sides = [body[[mesh.points_of(name)[0], mesh.points_of(name + OPPOSITE)[0]]] for name in cuts]
@@ -242,7 +246,7 @@ def _whole_bodies(mesh: Mesh) -> Numbers:
 
 
 def _names(mesh: Mesh, body: Indices) -> list[str]:
-    """Return names of the bodies: the cell group of a body, up to four groups that form it, or its number from 1."""
+    """Return names of the bodies: the cell group of the body, up to four groups that form it, or its number."""
     count = np.bincount(body[body >= 0])
     groups_of_body: list[dict[str, Indices]] = [{} for _ in count]
     for group, cells in mesh.cell_groups.items():
@@ -260,44 +264,44 @@ def _names(mesh: Mesh, body: Indices) -> list[str]:
 
 
 def _pairs(
-    outside: OuterFacets, search: Facing, modulus: Array, names: Sequence[str]
+    outer: OuterFacets, search: Facing, modulus: Array, names: Sequence[str]
 ) -> Iterator[tuple[FoundContact, tuple[Indices, Indices]]]:
-    """Yield the pairs of smooth faces of two bodies each with the facets of both sides.
+    """Yield the pairs of smooth faces of two bodies, each together with the facets of both sides.
 
     `modulus` (n_cells,) are the moduli of the cells [pressure], and `names` those of the bodies.
     """
-    bodies_of_points = np.sort(np.column_stack([outside.body[search.facet], outside.body[search.opposite]]), axis=1)
+    bodies_of_points = np.sort(np.column_stack([outer.body[search.facet], outer.body[search.opposite]]), axis=1)
     for pair in np.unique(bodies_of_points, axis=0):
-        rows = np.flatnonzero((bodies_of_points == pair).all(axis=1))
-        ends = np.column_stack([search.facet[rows], search.opposite[rows]])
-        swapped = outside.body[ends[:, 0]] != pair[0]
-        ends[swapped] = ends[swapped][:, ::-1]
-        secondary, reason = _secondary(outside, ends, modulus)
-        ends, numbers = (ends, pair) if secondary == 0 else (ends[:, ::-1], pair[::-1])
-        face = outside.smooth_face[ends[:, 0]]
+        samples = np.flatnonzero((bodies_of_points == pair).all(axis=1))
+        facet_pairs = np.column_stack([search.facet[samples], search.opposite[samples]])
+        reversed_rows = outer.body[facet_pairs[:, 0]] != pair[0]
+        facet_pairs[reversed_rows] = facet_pairs[reversed_rows][:, ::-1]
+        secondary, reason = _secondary(outer, facet_pairs, modulus)
+        facet_pairs, numbers = (facet_pairs, pair) if secondary == 0 else (facet_pairs[:, ::-1], pair[::-1])
+        face = outer.smooth_face[facet_pairs[:, 0]]
         for number, surface in enumerate(faces := np.unique(face), start=1):
-            of_surface = face == surface
-            gap, spacing = search.gap[rows[of_surface]], _spacing(outside, ends[of_surface])
-            sides = np.unique(ends[of_surface, 0]), np.unique(ends[of_surface, 1])
-            both = names[numbers[0]], names[numbers[1]]
-            title = " on ".join(both) + (f" {number}" if len(faces) > 1 else "")
+            on_face = face == surface
+            gap, spacing = search.gap[samples[on_face]], _spacing(outer, facet_pairs[on_face])
+            sides = np.unique(facet_pairs[on_face, 0]), np.unique(facet_pairs[on_face, 1])
+            names_of_pair = names[numbers[0]], names[numbers[1]]
+            title = " on ".join(names_of_pair) + (f" {number}" if len(faces) > 1 else "")
             yield FoundContact(
-                title, both, f"{title} (secondary)", f"{title} (primary)", (len(sides[0]), len(sides[1])),
+                title, names_of_pair, f"{title} (secondary)", f"{title} (primary)", (len(sides[0]), len(sides[1])),
                 (float(spacing[0]), float(spacing[1])), (float(gap.min()), float(gap.max())), reason,
             ), sides  # fmt: skip
 
 
-def _spacing(outside: OuterFacets, ends: Indices) -> Array:
+def _spacing(outer: OuterFacets, facet_pairs: Indices) -> Array:
     """Return the geometric means (2,) of the distances between nodes of facets (n, 2) that face each other [length]."""
-    return np.asarray(np.exp(np.log(outside.spacing[ends]).mean(axis=0)))
+    return np.asarray(np.exp(np.log(outer.spacing[facet_pairs]).mean(axis=0)))
 
 
-def _secondary(outside: OuterFacets, ends: Indices, modulus: Array) -> tuple[int, str]:
-    """Return which side of facets (n, 2) should be the secondary one, and the reason."""
+def _secondary(outer: OuterFacets, facet_pairs: Indices, modulus: Array) -> tuple[int, str]:
+    """Return which column of pairs of facets (n, 2) should be the secondary side, and the reason."""
     measures = (
-        ("finer", _spacing(outside, ends)),
-        ("softer", modulus[outside.cell[ends]].mean(axis=0)),
-        ("smaller", np.array([outside.area[np.unique(side)].sum() for side in ends.T])),
+        ("finer", _spacing(outer, facet_pairs)),
+        ("softer", modulus[outer.cell[facet_pairs]].mean(axis=0)),
+        ("smaller", np.array([outer.area[np.unique(side)].sum() for side in facet_pairs.T])),
     )
     for reason, values in measures:
         if values.min() < (1.0 - ALIKE) * values.max():

@@ -1,7 +1,7 @@
 """Directions in which supports or multi-point constraints hold nodes.
 
-A held direction is described by orthogonal projectors P (dim, dim): the component ``P u`` of the displacement u of a node
-is prescribed.
+The held directions of a node are described by an orthogonal projector P (dim, dim): the component ``P u`` of the displacement
+u of the node is prescribed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.projection import CORNER
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION, TINY
 
-# Cosine of the largest angle between directions at two nodes that are joined into one field, such as along a curved rim.
+# Cosine of the largest angle between directions at two adjacent nodes that belong to the same field, as along a curved rim.
 SAME_DIRECTION = float(np.cos(np.radians(0.5 * CORNER)))
 
 
@@ -41,7 +41,7 @@ class HeldMotions:
 
     @classmethod
     def of(cls, supported: Mask, mpc_rows: csr_array, driven: Mask | None = None) -> HeldMotions:
-        """Return the prescribed components.
+        """Return the prescribed components of supports and multi-point constraints.
 
         Parameters
         ----------
@@ -61,7 +61,7 @@ class HeldMotions:
             index = np.searchsorted(nodes, single_nodes)
             np.add.at(projectors, index, np.einsum("md,me->mde", normals, normals))
             constrained = np.unique(index)
-            projectors[constrained] = spanned(projectors[constrained], SINGLE_PRECISION)
+            projectors[constrained] = eigenspaces(projectors[constrained], SINGLE_PRECISION)
         return cls(nodes, projectors, np.zeros_like(supported) if driven is None else driven)
 
     def at(self, nodes: NDArray[np.integer]) -> Array:
@@ -88,17 +88,17 @@ def _rows_of_single_nodes(mpc_rows: csr_array, dim: int) -> tuple[Indices, Array
     return node[first[single_node]], normals[rows[single_node]] / length[single_node, None]
 
 
-def spanned(tensors: Array, least: float) -> Array:
+def eigenspaces(tensors: Array, least: float) -> Array:
     """Return projectors (n, dim, dim) onto the eigenvectors of symmetric `tensors` whose eigenvalues are at least `least`."""
     values, vectors = np.linalg.eigh(tensors)
     vectors = np.where(values[:, None, :] >= least, vectors, 0.0)
     return np.asarray(vectors @ vectors.transpose(0, 2, 1))
 
 
-def without(projectors: Array, vectors: Array, least: Array | float) -> Array:
-    """Return projectors (n, dim, dim) without the directions of the projections of `vectors` (n, dim).
+def deflate(projectors: Array, vectors: Array, least: Array | float) -> Array:
+    """Return projectors (n, dim, dim) from which the directions of the projected `vectors` (n, dim) are removed.
 
-    A projection shorter than `least` is ignored.
+    Vectors whose projection is shorter than `least` are ignored.
     """
     inside = np.einsum("nde,ne->nd", projectors, vectors)
     length = np.linalg.norm(inside, axis=1, keepdims=True)
@@ -106,12 +106,12 @@ def without(projectors: Array, vectors: Array, least: Array | float) -> Array:
     return projectors - inside[:, :, None] * inside[:, None, :]
 
 
-def alike(projectors: Array, positions: Array) -> list[tuple[Array, Mask]]:
+def direction_fields(projectors: Array, positions: Array) -> list[tuple[Array, Mask]]:
     """Return fields of directions in which nodes are held, such as the normals of a plane of symmetry or of a curved rim.
 
     Nodes that are held in one direction form a field if their directions are nearly equal, or if directions of other nodes
-    lie in between. Nodes that are held in several directions are added to these fields. At other nodes, a field is
-    interpolated.
+    lie in between. Nodes that are held in several directions are added to these fields. At the remaining nodes, each
+    field is interpolated.
 
     Parameters
     ----------
@@ -129,31 +129,31 @@ def alike(projectors: Array, positions: Array) -> list[tuple[Array, Mask]]:
     while len(seeds := np.flatnonzero(rank := np.trace(remaining, axis1=1, axis2=2).round())):
         least = rank[seeds].min()
         seeds = seeds[rank[seeds] == least]
-        seeds = seeds if least == 1 else seeds[:1]  # several directions: an arbitrary choice
+        seeds = seeds if least == 1 else seeds[:1]  # if all nodes are held in several directions, start from any node
         axis = np.linalg.eigh(remaining[seeds])[1][:, :, -1]
-        away = np.where(np.abs(axis @ axis.T) >= SAME_DIRECTION, _distances(positions[seeds], positions[seeds]), 0.0)
-        order, predecessor = breadth_first_order(minimum_spanning_tree(csr_array(away)), 0, directed=False)
+        apart = np.where(np.abs(axis @ axis.T) >= SAME_DIRECTION, _distances(positions[seeds], positions[seeds]), 0.0)
+        order, predecessor = breadth_first_order(minimum_spanning_tree(csr_array(apart)), 0, directed=False)
         for child in order[1:]:  # orient each vector like its predecessor in the tree of nearest neighbours
             axis[child] *= np.sign(axis[child] @ axis[predecessor[child]])
         # Elsewhere, directions are interpolated with powers of the inverse distances as weights. With this power, the
         # contributions of distant nodes decrease faster than their number increases.
-        along = np.tile(axis[order][0], (len(positions), 1))
+        field = np.tile(axis[order][0], (len(positions), 1))
         if not (axis[order] @ axis[order][0] > 1.0 - ROUND_OFF).all():
-            away = _distances(positions, positions[seeds[order]])
-            along = _unit((away.min(axis=1, keepdims=True) / away) ** (1 + axis.shape[1]) @ axis[order])
-        along[seeds[order]] = axis[order]
-        held = np.einsum("nd,nde,ne->n", along, remaining, along) >= SAME_DIRECTION**2
-        along[held] = _unit(np.einsum("nde,ne->nd", remaining[held], along[held]))
-        directions.append((along, held))
-        remaining[held] = without(remaining[held], along[held], 0.0)
+            apart = _distances(positions, positions[seeds[order]])
+            field = _unit((apart.min(axis=1, keepdims=True) / apart) ** (1 + axis.shape[1]) @ axis[order])
+        field[seeds[order]] = axis[order]
+        held = np.einsum("nd,nde,ne->n", field, remaining, field) >= SAME_DIRECTION**2
+        field[held] = _unit(np.einsum("nde,ne->nd", remaining[held], field[held]))
+        directions.append((field, held))
+        remaining[held] = deflate(remaining[held], field[held], 0.0)
     return directions
 
 
-def _distances(points: Array, others: Array) -> Array:
-    """Return the distances (n, m) between points (n, dim) and others (m, dim), replaced by TINY if zero [length]."""
+def _distances(points: Array, other_points: Array) -> Array:
+    """Return the distances (n, m) between points (n, dim) and other points (m, dim), at least TINY [length]."""
     from scipy.spatial.distance import cdist
 
-    return np.maximum(cdist(points, others), TINY)
+    return np.maximum(cdist(points, other_points), TINY)
 
 
 def _unit(vectors: Array) -> Array:

@@ -12,7 +12,7 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.round_off import SINGLE_PRECISION
 
-# Nodal areas below this fraction of the mean count as zero, because the pressures of such nodes would be nearly arbitrary.
+# Nodal areas below this fraction of the mean count as zero, because the pressures at these nodes would be nearly arbitrary.
 NO_AREA = 1e-3
 
 
@@ -53,7 +53,7 @@ def fine_rule(element: str) -> quadrature.Rule:
 
 
 def all_nodes_carry(element: str) -> bool:
-    """Return whether a uniform pressure has compressive forces at all nodes of a facet.
+    """Return whether a uniform pressure on a facet has compressive forces at all of its nodes.
 
     At the corners of six-node triangles the forces vanish, and at those of eight-node quadrangles they are tensile.
     """
@@ -92,9 +92,10 @@ def even_at_axis(surface: Surface, points: Array) -> csr_array:
     """Return the map (m, m) from the values of a field at nodes off the axis to those at all nodes.
 
     If the end of a quadratic line lies on the axis, the integral of its shape function vanishes. The force of this node
-    hardly depends on its value: divided by the area of the facet, it is a 60th of the difference to the value at the other
-    end. Errors of forces would be amplified accordingly. Since a smooth field is an even function of the radius r, the value
-    follows from those at the radii r1 and r2 of the two other nodes as (r2^2 p1 - r1^2 p2) / (r2^2 - r1^2). `points`
+    hardly depends on the value p there: divided by the area of the facet, the force is a 60th of the difference between p and
+    the value at the other end. Errors of forces would be amplified accordingly. A smooth field is an even function of the
+    radius r. Therefore p follows from the values p1 and p2 at the radii r1 and r2 of the two other nodes, as
+    (r2^2 p1 - r1^2 p2) / (r2^2 - r1^2). `points`
     (n_points, dim) are the coordinates of all points [length]; the column of an end is empty, and all other nodes keep their
     values.
     """
@@ -111,9 +112,9 @@ def even_at_axis(surface: Surface, points: Array) -> csr_array:
 
 
 def lumped_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:
-    """Return the share (m,) of each node of a surface in the area of its facets, which is positive for all elements [area].
+    """Return lumped areas (m,) of the nodes of a surface, which are positive for all element types [area].
 
-    The shares in a facet are proportional to the integrals of the squares of the shape functions, as for lumped masses
+    Within a facet, they are proportional to the integrals of the squares of the shape functions, as for lumped masses
     (Hinton, Rock and Zienkiewicz, Earthq. Eng. Struct. Dyn. 4, 1976). `points` (n_points, dim) are the coordinates of all
     points [length].
     """

@@ -1,7 +1,7 @@
 r"""Linearised contact geometry: variation of contact forces, gaps and slips with the displacements.
 
 The constraint rows depend on the displacements, because points slide over the opposite facets and normals rotate. A
-secondary point :math:`x` with the shape functions :math:`N_s` and the contact force :math:`p = \lambda n + \tau`, faces the
+secondary point :math:`x` with the shape functions :math:`N_s` and the contact force :math:`p = \lambda n + \tau` faces the
 primary point :math:`y(\xi) = \sum_k N_k(\xi) y_k` with the normal n. A variation of the displacements
 changes the nodal forces f and the gap g of the point, in addition to their changes with constant rows, by
 
@@ -12,7 +12,7 @@ changes the nodal forces f and the gap g of the point, in addition to their chan
 (Laursen, Computational Contact and Impact Mechanics, 2002, section 5.3; Wriggers, Computational Contact Mechanics, 2006,
 chapter 9; for mortar Popp, Gee and Wall, 2009, with friction Gitterle, Popp, Gee and Wall, 2010). Tangents t follow the
 normal without spin, :math:`\delta t = - (t \cdot \delta n) n`, because a spin would only rotate the components of tangential
-forces and slips. `Slips` contains the equations of slips.
+forces and slips. The equations of slips are in `Slips`.
 """
 
 from __future__ import annotations
@@ -79,13 +79,13 @@ class NodalNormals:
         """Return the variation (m, dim) [-] of the normals for a variation `du` (n_points, dim) of displacements [length]."""
         total = np.zeros_like(self.normal)
         for block, slope, normal, dual_axes, angle_gradient in self._blocks:
-            moved = du[block.facets]
-            tilt = np.einsum("fqk,qka->fqa", normal @ np.swapaxes(moved, 1, 2), slope)
+            du_nodes = du[block.facets]
+            tilt = np.einsum("fqk,qka->fqa", normal @ np.swapaxes(du_nodes, 1, 2), slope)
             np.add.at(total, block.local, -np.einsum("fqad,fqa->fqd", dual_axes, tilt))
             if angle_gradient is not None:
-                np.add.at(total, block.local, np.einsum("fqkd,fkd->fq", angle_gradient, moved)[:, :, None] * normal)
+                np.add.at(total, block.local, np.einsum("fqkd,fkd->fq", angle_gradient, du_nodes)[:, :, None] * normal)
         self._side.add_across_ends(total)
-        return across(self.normal, total) / self._length
+        return transverse(self.normal, total) / self._length
 
 
 def _angle_gradient(element: elements.Element, nodes: Array) -> Array | None:
@@ -105,8 +105,8 @@ def _angle_gradient(element: elements.Element, nodes: Array) -> Array | None:
         length = [np.linalg.norm(edge, axis=1, keepdims=True) for edge in edges]
         unit = [edge / size for edge, size in zip(edges, length, strict=True)]
         for end, a, b, size in zip(ends, unit, unit[::-1], length, strict=True):
-            perpendicular = across(a, b)
-            slope = -perpendicular / (size * np.linalg.norm(perpendicular, axis=1, keepdims=True))
+            direction = transverse(a, b)
+            slope = -direction / (size * np.linalg.norm(direction, axis=1, keepdims=True))
             gradient[:, corner, end] += slope
             gradient[:, corner, corner] -= slope
     return gradient
@@ -155,10 +155,10 @@ class InterpolatedNormals:
 
     def along(self, du: Array) -> Array:
         """See `NodalNormals.along`."""
-        return across(self.normal, self._local @ self._nodal.along(du)) / self._length
+        return transverse(self.normal, self._local @ self._nodal.along(du)) / self._length
 
 
-def across(normal: Array, vector: Array) -> Array:
+def transverse(normal: Array, vector: Array) -> Array:
     """Return the components of vectors (n, dim) perpendicular to unit vectors (n, dim)."""
     return np.asarray(vector - np.einsum("nd,nd->n", normal, vector)[:, None] * normal)
 
@@ -186,7 +186,7 @@ class Variation(NamedTuple):
 
 
 class _SurfacePoints:
-    """Points that face a meshed side, and the variation of their projections and normals.
+    """Points paired with a meshed side, and the variation of their projections and normals.
 
     Parameters
     ----------
@@ -225,35 +225,35 @@ class _SurfacePoints:
         self, candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface, coordinates: Array,
         normals: object, closest: bool, rise: Array | None,
     ) -> None:  # fmt: skip
-        at, n_points, facet = pairing.places(primary, rows), len(coordinates), pairing.facet[rows]
-        nodes, shape = np.hstack([candidates.nodes[rows], at.nodes]), np.hstack([candidates.shape[rows], -at.shape])
+        feet, n_points, facet = pairing.places(primary, rows), len(coordinates), pairing.facet[rows]
+        nodes, shape = np.hstack([candidates.nodes[rows], feet.nodes]), np.hstack([candidates.shape[rows], -feet.shape])
         self.motion = shapes_at(shape, nodes, n_points)
-        self._at = at
+        self._at = feet
         self.axes = self._slopes(coordinates)
         self.apart = self.motion @ coordinates
         self.normal, self.averaged = pairing.normal[rows], None
         self._bend = np.zeros_like(self.axes)
         self._facet: Array | None = None  # facet normals, where these vary
         if normals == "facet" or closest:
-            self._facet, bend = self.normal, self._facet_bend(primary, coordinates, facet, pairing.xi[rows], at)
+            self._facet, bend = self.normal, self._facet_bend(primary, coordinates, facet, pairing.xi[rows], feet)
         if normals == "facet":
             self._bend = bend
         elif isinstance(normals, str):
-            self.averaged = InterpolatedNormals.smooth(primary, coordinates, facet, at)
-            self.normal, self._bend = self.averaged.normal, self.averaged.bend(at.gradient)
+            self.averaged = InterpolatedNormals.smooth(primary, coordinates, facet, feet)
+            self.normal, self._bend = self.averaged.normal, self.averaged.bend(feet.gradient)
         else:
             self.normal = np.broadcast_to(np.array(normals, float), self.normal.shape)
         # With the tangent vectors a_i, the distance g along the direction d of the projection, and the motion v of points
         # relative to the facing points, ``a_i dxi_i + g dd = dv``. The component along d is eliminated.
-        along, bend = (pairing.normal[rows], bend) if closest else (self.normal, self._bend)
-        frame = np.stack(tangents(along), axis=1)
+        direction, bend = (pairing.normal[rows], bend) if closest else (self.normal, self._bend)
+        frame = np.stack(tangents(direction), axis=1)
         self._closest, self._bent = closest, normals == "facet"
-        self._gap = np.einsum("nd,nd->n", self.apart, along)[:, None]
+        self._gap = np.einsum("nd,nd->n", self.apart, direction)[:, None]
         inverse = np.linalg.inv(np.einsum("ntd,nid->nti", frame, self.axes + self._gap[:, :, None] * bend))
         self._inverse = inverse @ frame
         self._foot = self.axes if rise is None else self.axes + rise[:, :, None] * self.normal[:, None]
 
-    def _facet_bend(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, at: Places) -> Array:
+    def _facet_bend(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, feet: Places) -> Array:
         """Return the derivatives (n, dim - 1, dim) of facet normals along facets, and store the dual axes of the facets."""
         self._dual_axes = np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes)
         if primary.order == 1 and xi.shape[1] == 1:
@@ -262,7 +262,7 @@ class _SurfacePoints:
         steps = 0.5 * np.eye(xi.shape[1])
         above, below = ([places(primary, facet, xi + sign * h).gradient for h in steps] for sign in (1.0, -1.0))
         second = np.stack(above, axis=3) - np.stack(below, axis=3)
-        curvature = np.einsum("nkij,nkd,nd->nij", second, coordinates[at.nodes], self.normal)
+        curvature = np.einsum("nkij,nkd,nd->nij", second, coordinates[feet.nodes], self.normal)
         return -np.einsum("njd,nij->nid", self._dual_axes, curvature)
 
     def _slopes(self, values: Array) -> Array:
@@ -271,22 +271,22 @@ class _SurfacePoints:
 
     def along(self, du: Array) -> Variation:
         """Return the variation of projections and normals for a variation `du` (n_points, dim) of displacements [length]."""
-        moved, of_facet = self.motion @ du, np.zeros_like(self.normal)
+        relative_motion, tilt_of_facet = self.motion @ du, np.zeros_like(self.normal)
         if self._facet is not None:
             tilt = np.einsum("nid,nd->ni", self._slopes(du), self._facet)
-            of_facet = -np.einsum("nid,ni->nd", self._dual_axes, tilt)
-        at_fixed_xi = of_facet if self._bent else np.zeros_like(of_facet)
+            tilt_of_facet = -np.einsum("nid,ni->nd", self._dual_axes, tilt)
+        at_fixed_xi = tilt_of_facet if self._bent else np.zeros_like(tilt_of_facet)
         if self.averaged is not None:
             at_fixed_xi = self.averaged.along(du)
-        turned = of_facet if self._closest else at_fixed_xi
-        xi = np.einsum("nid,nd->ni", self._inverse, moved - self._gap * turned)
+        normal_variation = tilt_of_facet if self._closest else at_fixed_xi
+        xi = np.einsum("nid,nd->ni", self._inverse, relative_motion - self._gap * normal_variation)
         foot = np.einsum("nid,ni->nd", self._foot, xi)
         motion = shapes_at(-np.einsum("nki,ni->nk", self._at.gradient, xi), self._at.nodes, len(du))
         return Variation(xi, motion, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._bend, xi))
 
 
 class _ObstaclePoints:
-    """Points that face a rigid obstacle, which has no nodes. The normals depend on the positions of the points.
+    """Points paired with a rigid obstacle, which has no nodes, and the variation of their normals with their positions.
 
     Parameters
     ----------
@@ -311,9 +311,9 @@ class _ObstaclePoints:
 
     def along(self, du: Array) -> Variation:
         """See `_SurfacePoints.along`; there are no reference coordinates."""
-        moved = self.motion @ du
-        normal = np.einsum("nde,ne->nd", self._gradient, moved)
-        foot = across(self.normal, moved) - self._gap * normal
+        motion = self.motion @ du
+        normal = np.einsum("nde,ne->nd", self._gradient, motion)
+        foot = transverse(self.normal, motion) - self._gap * normal
         return Variation(np.zeros((len(normal), 0)), csr_array(self.motion.shape), foot, normal)
 
 
@@ -322,7 +322,7 @@ Points: TypeAlias = _SurfacePoints | _ObstaclePoints
 
 @dataclass(frozen=True, eq=False)
 class Closing:
-    """Part q m of a relative motion that closes a gap, with ``q = a . o / a . m``; see `Slips`.
+    """Part q m of the relative motion, with ``q = a . o / a . m``, which closes the gap; see `Slips`.
 
     Attributes
     ----------
@@ -356,8 +356,8 @@ class Closing:
         mean = primary - secondary.normal
         size = np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), TINY)
         mean /= size
-        along = np.einsum("nd,nd->n", mean, opening)
-        return cls(mean, size, secondary, opening, along if length is None else length, length is None)
+        opening_along_mean = np.einsum("nd,nd->n", mean, opening)
+        return cls(mean, size, secondary, opening, opening_along_mean if length is None else length, length is None)
 
     @property
     def vector(self) -> Array:
@@ -371,13 +371,13 @@ class Closing:
         the primary normals and of o, all (n, dim).
         """
         mean = self.mean
-        turned = across(mean, primary - self.secondary.along(du)) / self.size
-        a, varied = (mean, turned) if self.along_mean else normal
-        lean = np.einsum("nd,nd->n", a, mean)
-        change = np.einsum("nd,nd->n", varied, self.opening) + np.einsum("nd,nd->n", a, opening)
-        change -= self.length * (np.einsum("nd,nd->n", varied, mean) + np.einsum("nd,nd->n", a, turned))
-        q = np.divide(change, lean, out=np.zeros_like(lean), where=(self.length != 0.0) & (lean != 0.0))
-        return q[:, None] * mean + self.length[:, None] * turned
+        d_mean = transverse(mean, primary - self.secondary.along(du)) / self.size
+        a, d_a = (mean, d_mean) if self.along_mean else normal
+        cosine = np.einsum("nd,nd->n", a, mean)
+        numerator = np.einsum("nd,nd->n", d_a, self.opening) + np.einsum("nd,nd->n", a, opening)
+        numerator -= self.length * (np.einsum("nd,nd->n", d_a, mean) + np.einsum("nd,nd->n", a, d_mean))
+        q = np.divide(numerator, cosine, out=np.zeros_like(cosine), where=(self.length != 0.0) & (cosine != 0.0))
+        return q[:, None] * mean + self.length[:, None] * d_mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -424,7 +424,7 @@ class Slips:
         return np.einsum("nk,knd->nd", self.forces, self.tangents)
 
     def along(
-        self, du: Array, varied: Variation, points: Points, weights: csr_array | None,
+        self, du: Array, variation: Variation, points: Points, weights: csr_array | None,
         normals: tuple[Array, Array, Array],
     ) -> Array:  # fmt: skip
         """Return the variation (k, n) of slips for a variation of the displacements [length].
@@ -433,7 +433,7 @@ class Slips:
         ----------
         du : ndarray (n_points, dim)
             Variation of the displacements [length].
-        varied : Variation
+        variation : Variation
             Variation of `points`.
         points : Points
         weights : csr_array (n, n_points) or None
@@ -443,29 +443,29 @@ class Slips:
         """
 
         def by_sliding(values: Array) -> Array:
-            return _weighted(weights, varied.motion @ values)
+            return _sums(weights, variation.motion @ values)
 
-        change, (normal, turned, primary) = by_sliding(self.motion), normals
+        change, (normal, d_normal, primary) = by_sliding(self.motion), normals
         if self.turning is not None:
-            change -= _weighted(weights, points.motion @ du @ self.turning)
+            change -= _sums(weights, points.motion @ du @ self.turning)
         if self.closing is not None:
             # The openings that weighted gaps close are those of smooth surfaces, whose variation `foot` contains.
-            of_start = by_sliding(self.start) if self.closing.along_mean else -change - _weighted(weights, varied.foot)
-            change += self.closing.along(du, (normal, turned), primary, of_start)
-        leaning = np.einsum("nd,nd->n", normal, self.total)
+            d_opening = by_sliding(self.start) if self.closing.along_mean else -change - _sums(weights, variation.foot)
+            change += self.closing.along(du, (normal, d_normal), primary, d_opening)
+        normal_part = np.einsum("nd,nd->n", normal, self.total)
         T = self.tangents
-        return np.einsum("knd,nd->kn", T, change) - np.einsum("knd,nd,n->kn", T, turned, leaning)
+        return np.einsum("knd,nd->kn", T, change) - np.einsum("knd,nd,n->kn", T, d_normal, normal_part)
 
 
-def _weighted(weights: csr_array | None, values: Array) -> Array:
+def _sums(weights: csr_array | None, values: Array) -> Array:
     return values if weights is None else np.asarray(weights @ values)
 
 
-def _turned(multiplier: Array, tangential: Array | None, normal: Array, varied: Array) -> Array:
-    """Return the variation (n, dim) of forces due to the variation `varied` (n, dim) of their normals."""
-    change = multiplier[:, None] * varied
+def _force_variation(multiplier: Array, tangential: Array | None, normal: Array, d_normal: Array) -> Array:
+    """Return the variation (n, dim) of contact forces due to the variation `d_normal` (n, dim) of their normals."""
+    change = multiplier[:, None] * d_normal
     if tangential is not None:
-        change -= np.einsum("nd,nd->n", tangential, varied)[:, None] * normal
+        change -= np.einsum("nd,nd->n", tangential, d_normal)[:, None] * normal
     return change
 
 
@@ -515,17 +515,17 @@ class LinearisedPoints:
         """See `constraints.Linearised`."""
         varied = self.points.along(du)
         normal = self._normals(du, varied.normal)
-        gaps = np.einsum("md,md->m", _weighted(self.functions, self.points.apart), normal)[None]
-        gaps -= np.einsum("md,md->m", self.normal, _weighted(self.functions, varied.foot))
+        gaps = np.einsum("md,md->m", _sums(self.functions, self.points.apart), normal)[None]
+        gaps -= np.einsum("md,md->m", self.normal, _sums(self.functions, varied.foot))
         if self.slips is not None:
             primary = normal
             if self.smooth is not None:
                 turned = self.smooth[0].along(du) + np.einsum("nid,ni->nd", self.smooth[1], varied.xi)
-                primary = _weighted(self.functions, turned)
+                primary = _sums(self.functions, turned)
             normals = self.normal, normal, primary
             gaps = np.vstack([gaps, self.slips.along(du, varied, self.points, self.functions, normals)])
         tangential = None if self.slips is None else self.slips.force
-        force = _turned(self.multiplier, tangential, self.normal, normal)
+        force = _force_variation(self.multiplier, tangential, self.normal, normal)
         if self.compliance is not None and self.slips is not None:
             gaps += self._elastic(normal, force)
         force = force if self.functions is None else self.functions.T @ force
@@ -539,14 +539,14 @@ class LinearisedPoints:
         """Return the variation (1 + k, m) of elastic gaps and slips [length] due to those of normals and forces (m, dim)."""
         assert self.compliance is not None
         assert self.slips is not None
-        stretched, varied = self._stretched, self.compliance(force)
-        gaps = np.einsum("md,md->m", normal, stretched) + np.einsum("md,md->m", self.normal, varied)
-        slips = np.einsum("kmd,md->km", self.slips.tangents, varied)
-        slips -= np.einsum("kmd,md->km", self.slips.tangents, normal) * np.einsum("md,md->m", self.normal, stretched)
+        elastic, d_elastic = self._elastic_displacements, self.compliance(force)
+        gaps = np.einsum("md,md->m", normal, elastic) + np.einsum("md,md->m", self.normal, d_elastic)
+        slips = np.einsum("kmd,md->km", self.slips.tangents, d_elastic)
+        slips -= np.einsum("kmd,md->km", self.slips.tangents, normal) * np.einsum("md,md->m", self.normal, elastic)
         return np.vstack([gaps, slips])
 
     @cached_property
-    def _stretched(self) -> Array:
+    def _elastic_displacements(self) -> Array:
         """Elastic displacements (m, dim) of the constraints [length]."""
         assert self.compliance is not None
         return self.compliance(self._forces)
@@ -571,12 +571,12 @@ class LinearisedPoints:
     def _normals(self, du: Array, at_points: Array) -> Array:
         """Return the variation (m, dim) of the normals of the constraints, given the variation (n, dim) at the points."""
         if self.tests is None:
-            return _weighted(self.functions, at_points)
+            return _sums(self.functions, at_points)
         if isinstance(self.nodal, NodalNormals):
             return -self.nodal.along(du)
         if self.nodal is not None:
             return self.nodal.along(du).normal
-        return across(self.normal, self._mean(at_points)) / self._length
+        return transverse(self.normal, self._mean(at_points)) / self._length
 
     def _mean(self, vectors: Array) -> Array:
         """Return the sums (m, dim) of vectors at the points (n, dim), weighted with `tests`."""
@@ -588,16 +588,16 @@ class LinearisedPoints:
 
 @dataclass(frozen=True, eq=False)
 class Differences:
-    """Contact forces, gaps and slips of one pair, linearised by one-sided differences.
+    """Contact forces, gaps and slips of one pair, linearised by one-sided finite differences.
 
-    The differences are taken at the mean of the displacements of the pairing and of its solution, where the error of a Newton
-    step is a tenth of that at either of them.
+    The differences are taken at the mean of the displacements of the pairing and of its solution. The error of a Newton step
+    is then a tenth of that with differences at either of them.
 
     Attributes
     ----------
     constraints : Constraints
     moved : Callable
-        Function from motions (n_points, dim) after the pairing of `constraints` [length] to constraints that are paired then.
+        Function that moves all points by (n_points, dim) [length] after the pairing of `constraints`, and pairs them again.
     forces : (ndarray (m,), ndarray (m, k))
         Multipliers and tangential forces of the solution with `constraints` [force].
     motions : (ndarray (n_points, dim), ndarray (n_points, dim), ndarray (n_points, dim))
@@ -630,31 +630,29 @@ class Differences:
 
         Tangents follow the normals.
         """
-        (multiplier, tangential), (displacement, slid, change) = self.forces, self.motions
-        at = self.moved(0.5 * change + motion)
-        gap = at.gaps(displacement)[None]
-        if not at.tangents:
-            return at.force(multiplier), gap
-        before, now, tangents = (
-            normals(self.constraints.directions),
-            normals(at.directions),
-            self.constraints.directions,
-        )
-        mean = (before + now) / (1.0 + np.einsum("md,md->m", before, now))[:, None]
-        following = [t - np.einsum("md,md->m", t, now)[:, None] * mean for t in tangents]
-        turned = np.einsum("kmd,jmd->mkj", at.directions, following)
-        slip = np.stack([T @ slid.ravel() for T in at.tangents]) + at.slip0
-        force = at.force(multiplier, np.einsum("mkj,mj->mk", turned, tangential))
-        return force, np.vstack([gap, np.einsum("mkj,km->jm", turned, slip)])
+        (multiplier, tangential), (displacement, increment, change) = self.forces, self.motions
+        varied = self.moved(0.5 * change + motion)
+        gap = varied.gaps(displacement)[None]
+        if not varied.tangents:
+            return varied.force(multiplier), gap
+        tangents = self.constraints.directions
+        normal0, normal = normals(tangents), normals(varied.directions)
+        mean = (normal0 + normal) / (1.0 + np.einsum("md,md->m", normal0, normal))[:, None]
+        t0 = [t - np.einsum("md,md->m", t, normal)[:, None] * mean for t in tangents]
+        rotation = np.einsum("kmd,jmd->mkj", varied.directions, t0)
+        slip = np.stack([T @ increment.ravel() for T in varied.tangents]) + varied.slip0
+        force = varied.force(multiplier, np.einsum("mkj,mj->mk", rotation, tangential))
+        return force, np.vstack([gap, np.einsum("mkj,km->jm", rotation, slip)])
 
 
 def faced(
     candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface | RigidSide, coordinates: Array,
     normals: object, pose: Pose, closest: bool = False, rise: Array | None = None,
 ) -> Points:  # fmt: skip
-    """Return the points in the rows `rows` (n,) of `pairing`, which was computed at `coordinates` (n_points, dim) [length].
+    """Return the paired points in the rows `rows` (n,) of `pairing`, with the variation of their projections.
 
-    `pose` applies to obstacles. `normals`, `closest` and `rise` apply to meshed primary sides, see `_SurfacePoints`.
+    The pairing was computed at `coordinates` (n_points, dim) [length]. `pose` applies to obstacles. `normals`, `closest` and
+    `rise` apply to meshed primary sides, see `_SurfacePoints`.
     """
     if not isinstance(primary, RigidSide):
         return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, closest, rise)

@@ -1,4 +1,4 @@
-"""Multiplier fields: projection of point forces onto the field, and compliance C of the forces that it does not represent.
+"""Multiplier fields: projection of point forces onto the field, and compliance C of the remaining components of the forces.
 
 For the formulas and symbols see `formulations._pressure_field`.
 """
@@ -78,16 +78,16 @@ class Projection:
 
     def apply(self, multiplier: Array) -> Array:
         """Return ``C @ multiplier`` (m,) [length] for point forces (m,) [force]."""
-        inside = self.areas > 0
-        pressure = np.divide(multiplier, self.areas, out=np.zeros_like(multiplier), where=inside)
-        return np.where(inside, pressure - self.P @ self.field(np.where(inside, multiplier, 0.0)), 0.0) / self.rho
+        with_area = self.areas > 0
+        pressure = np.divide(multiplier, self.areas, out=np.zeros_like(multiplier), where=with_area)
+        return np.where(with_area, pressure - self.P @ self.field(np.where(with_area, multiplier, 0.0)), 0.0) / self.rho
 
     def field(self, multiplier: Array) -> Array:
         """Return the independent values (k,) of the multiplier field [pressure] for point forces (m,) [force]."""
         return np.zeros(self.P.shape[1]) if self.mass is None else self.mass.solve(self.P.T @ multiplier)
 
     def compliance_factor(self, columns: Indices) -> Array:
-        r"""Return the factor Z (m, h) of the compliance that is added if h values of the multiplier field are removed.
+        r"""Return the factor Z (m, h) of a compliance that replaces h values of the multiplier field.
 
         At supported nodes, for example on an axis or in a plane of symmetry, the slip of a facet has one nodal value fewer
         than its multiplier field. A field that alternates from node to node and decays along the surface then does no work

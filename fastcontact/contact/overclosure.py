@@ -16,7 +16,7 @@ FARTHEST = 3.0
 
 
 class OverclosureLaw(ABC):
-    """Contact pressure as a function of the overclosure, negative for gaps."""
+    """Contact pressure as a function of the overclosure, which is minus the gap."""
 
     @abstractmethod
     def line(self, overclosure: Array) -> tuple[Array, Array]:
@@ -37,7 +37,7 @@ class TabularLaw(OverclosureLaw):
     name : str
         Name of the contact pair, for messages.
     table : array_like (n, 2)
-        Overclosures, ascending, negative ones being gaps [length], and pressures, ascending from zero [pressure].
+        Overclosures in ascending order, negative for gaps [length], and pressures, which ascend from zero [pressure].
     """
 
     def __init__(self, name: str, table: Sequence[Any] | Array) -> None:
@@ -83,13 +83,13 @@ class ExponentialLaw(OverclosureLaw):
 
     def line(self, overclosure: Array) -> tuple[Array, Array]:
         """See `OverclosureLaw.line`."""
-        clipped = np.clip(overclosure, -self._clearance, FARTHEST * self._clearance)
-        return self._rate * self._pressure * np.exp(self._rate * clipped), clipped - 1.0 / self._rate
+        h = np.clip(overclosure, -self._clearance, FARTHEST * self._clearance)
+        return self._rate * self._pressure * np.exp(self._rate * h), h - 1.0 / self._rate
 
     def energy(self, pressure: Array) -> Array:
         """See `OverclosureLaw.energy`."""
         ends = self._pressure * np.exp(self._rate * self._clearance * np.array([-1.0, FARTHEST]))
-        p, clipped = np.maximum(pressure, 0.0), np.clip(pressure, *ends)
+        p, exponential_part = np.maximum(pressure, 0.0), np.clip(pressure, *ends)
         below, beyond = np.minimum(p, ends[0]), np.maximum(p, ends[1])
-        straight = 0.5 * below**2 / ends[0] + 0.5 * (beyond**2 - ends[1] ** 2) / ends[1]
-        return np.asarray((straight + clipped - ends[0]) / self._rate)
+        linear_parts = 0.5 * below**2 / ends[0] + 0.5 * (beyond**2 - ends[1] ** 2) / ends[1]
+        return np.asarray((linear_parts + exponential_part - ends[0]) / self._rate)

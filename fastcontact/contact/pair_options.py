@@ -30,8 +30,8 @@ class PairOptions:
     Attributes
     ----------
     clearance, clearance_primary : callable, optional
-        Functions from reference positions (n, dim) [length] on the secondary and on the primary side to lengths (n,) that are
-        added to the gap: a positive clearance, or a negative interference [length].
+        Functions of reference positions (n, dim) on the secondary and on the primary side [length], which return lengths (n,)
+        that are added to the gap: positive clearances or negative interferences [length].
     excluded, frictionless : ndarray of bool (n_points,), optional
         Nodes without contact, and nodes without friction.
     frictionless_along : ndarray (dim,), optional
@@ -98,7 +98,7 @@ class PairOptions:
         """Whether the constraints of all paired points are equations from the beginning."""
         return self.kind in ("tied", "bilateral")
 
-    def out(self, candidates: Candidates) -> Mask:
+    def excludes(self, candidates: Candidates) -> Mask:
         """Return the candidates (n,) whose node with the largest weight is excluded from contact."""
         n = len(candidates.nodes)
         return np.zeros(n, bool) if self.excluded is None else candidates.belonging_to(self.excluded)
@@ -109,17 +109,18 @@ class PairOptions:
         if mask is None:
             return np.empty(0, np.intp), np.empty(0)
         order = np.argsort(elements.get(side.element).nodes[:, 0])
-        inside = mask[side.facets[:, order]]
-        # The shape functions of adjacent nodes are equal at 0 on linear lines, and at -2/3 and 2/3 on quadratic lines.
-        equal = np.linspace(-2 / 3, 2 / 3, 2) if len(order) == 3 else np.zeros(1)
-        facet, edge = np.nonzero(inside[:, 1:] != inside[:, :-1])
-        return facet, equal[edge]
+        excluded = mask[side.facets[:, order]]
+        # The border lies where the shape functions of two adjacent nodes are equal: at 0 on linear lines, and at -2/3 and 2/3
+        # on quadratic lines.
+        crossover = np.linspace(-2 / 3, 2 / 3, 2) if len(order) == 3 else np.zeros(1)
+        facet, edge = np.nonzero(excluded[:, 1:] != excluded[:, :-1])
+        return facet, crossover[edge]
 
     def excluded_nodes(self, side: Surface) -> Mask:
         """Return which nodes (m,) of a side are excluded from contact."""
         return np.zeros(len(side.points), bool) if self.excluded is None else self.excluded[side.points]
 
-    def rubbing(
+    def friction_axes(
         self, friction: float, directions: Sequence[Array], candidates: Candidates
     ) -> tuple[Array, tuple[Array, ...], tuple[Array, ...]]:
         """Return coefficients of friction, and tangents that are aligned with the direction without friction.
@@ -138,48 +139,48 @@ class PairOptions:
             Coefficients of friction of the candidates, zero where there is no friction in any direction [-].
         tangents : tuple of k ndarray (n, dim)
             Unit tangents, rotated such that the first is the direction without friction at frictionless candidates.
-        rubbing : tuple of k ndarray (n, dim)
+        slip_axes : tuple of k ndarray (n, dim)
             The same tangents, set to zero in the direction without friction.
         """
-        along = self.frictionless_along
-        is_frictionless = np.full(len(candidates.nodes), along is not None)
+        direction = self.frictionless_along
+        is_frictionless = np.full(len(candidates.nodes), direction is not None)
         if self.frictionless is not None:
             is_frictionless = candidates.belonging_to(self.frictionless)
-        if along is None:
+        if direction is None:
             return np.where(is_frictionless, 0.0, friction), tuple(directions), tuple(directions)
         normal = normals(directions)
-        free = along - (normal @ along)[:, None] * normal
-        length = np.linalg.norm(free, axis=1, keepdims=True)
-        across = is_frictionless[:, None] & (length > SINGLE_PRECISION * np.linalg.norm(along))
-        first = np.where(across, free / np.where(across, length, 1.0), directions[0])
-        rotated = (first, *(np.where(across, np.cross(normal, first), tangent) for tangent in directions[1:]))
-        return np.full(len(is_frictionless), friction), rotated, (np.where(across, 0.0, first), *rotated[1:])
+        projected = direction - (normal @ direction)[:, None] * normal
+        length = np.linalg.norm(projected, axis=1, keepdims=True)
+        has_direction = is_frictionless[:, None] & (length > SINGLE_PRECISION * np.linalg.norm(direction))
+        first = np.where(has_direction, projected / np.where(has_direction, length, 1.0), directions[0])
+        rotated = (first, *(np.where(has_direction, np.cross(normal, first), tangent) for tangent in directions[1:]))
+        return np.full(len(is_frictionless), friction), rotated, (np.where(has_direction, 0.0, first), *rotated[1:])
 
     def added_gap(
         self, candidates: Candidates, pairing: Pairing, primary: object, reference: Array, factor: float
     ) -> Array:
-        """Return the contribution (n,) of clearances, multiplied by `factor`, to the gaps of candidates; zero if unpaired.
+        """Return the clearances (n,) of candidates, multiplied by `factor`; zero for unpaired candidates [length].
 
         `reference` (n_points, dim) are the undeformed coordinates of all points [length].
         """
-        added = np.zeros(len(candidates.nodes))
+        clearances = np.zeros(len(candidates.nodes))
         rows = np.flatnonzero(pairing.paired)
         if not len(rows):
-            return added
+            return clearances
         if self.clearance is not None:
             position = np.einsum("nk,nkd->nd", candidates.shape[rows], reference[candidates.nodes[rows]])
-            added[rows] += self.clearance(position)
+            clearances[rows] += self.clearance(position)
         if self.clearance_primary is not None and isinstance(primary, Surface):
-            at = places(primary, pairing.facet[rows], pairing.xi[rows])
-            added[rows] += self.clearance_primary(np.einsum("nk,nkd->nd", at.shape, reference[at.nodes]))
-        return factor * added
+            feet = places(primary, pairing.facet[rows], pairing.xi[rows])
+            clearances[rows] += self.clearance_primary(np.einsum("nk,nkd->nd", feet.shape, reference[feet.nodes]))
+        return factor * clearances
 
 
-def spread(side: Surface, excluded: Mask, givers: Indices) -> csr_array:
+def nodal_map(side: Surface, excluded: Mask, givers: Indices) -> csr_array:
     """Return the map (m, m) from independent to nodal values of a multiplier field, for a side with `excluded` nodes (m,).
 
-    The value at an excluded node is the mean of the values at its neighbours among the nodes `givers`, so that a uniform
-    field stays uniform. It is zero if there are no such neighbours. All other nodal values are independent.
+    The value at an excluded node is the mean of the values at its neighbours among the nodes `givers`. A uniform field
+    therefore remains uniform. It is zero if there are no such neighbours. All other nodal values are independent.
     """
     m = len(side.points)
     if not excluded.any():

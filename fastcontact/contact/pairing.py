@@ -22,7 +22,7 @@ from fastcontact.contact.projection import (
     at_nodes_of_facets,
     closest_of_kinds,
     facet_normals,
-    interpolated,
+    interpolate,
     nodal_normals,
     places,
     smooth_ends,
@@ -73,7 +73,7 @@ class Candidates:
         nodes = [np.repeat(block.facets, len(of_block), axis=0) for block, _, of_block in blocks]
         shapes = [np.tile(elements.get(block.element).shape(of_block), (n, 1)) for block, n, of_block in blocks]
         coordinates = [np.tile(of_block, (n, 1)) for _, n, of_block in blocks]
-        return cls(filled_up(nodes), filled_up(shapes), facet, np.concatenate(coordinates))
+        return cls(padded(nodes), padded(shapes), facet, np.concatenate(coordinates))
 
     @classmethod
     def nodes_of(cls, side: Surface) -> Candidates:
@@ -156,8 +156,8 @@ def pair(
         sides have the same line of action, and their moments are in equilibrium.
     normals : str or sequence of float
         ``"facet"`` for the normals of facets, a unit vector (dim,) for this normal everywhere, or any other string for
-        normals interpolated between averaged nodal normals, which are continuous except at corners. In the latter two cases
-        candidates are projected along the normals.
+        normals interpolated between averaged nodal normals, which are continuous except at corners. Unless they are
+        ``"facet"`` normals, candidates are projected along them.
     obstacle : Pose, optional
         Position and rotation of a rigid obstacle.
     rounded : bool
@@ -175,15 +175,15 @@ def pair(
     if isinstance(primary, RigidSide):
         pose = Pose(np.zeros(candidates.shape[1])) if obstacle is None else obstacle
         _, normal, paired, offset = primary.facing(candidates, pose)
-        nowhere = np.zeros(len(candidates), np.intp)
-        return Pairing(nowhere, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
+        no_facet = np.zeros(len(candidates), np.intp)
+        return Pairing(no_facet, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
     closest = closest_of_kinds(candidates, primary.corners(coordinates))
     if normals == "facet" and not rounded:
-        continued = _at_smooth_ends(primary, coordinates, closest)
-        paired = closest.overhang <= np.where(continued, max(projection_tolerance, OVERHANG), projection_tolerance)
-        outside = paired & ~continued & (closest.overhang > LENGTH_ROUND_OFF)
+        at_smooth_end = _at_smooth_ends(primary, coordinates, closest)
+        paired = closest.overhang <= np.where(at_smooth_end, max(projection_tolerance, OVERHANG), projection_tolerance)
+        overhangs = paired & ~at_smooth_end & (closest.overhang > LENGTH_ROUND_OFF)
         pairing = Pairing(closest.facet, closest.xi, closest.normal, paired)
-        return _with_overhang(pairing, candidates, primary, coordinates, outside)
+        return _with_overhang(pairing, candidates, primary, coordinates, overhangs)
     at_nodes = at_nodes_of_facets(smooth_normals(primary, coordinates))
     if not isinstance(normals, str):
         at_nodes = np.broadcast_to(np.array(normals), at_nodes.shape).copy()
@@ -192,16 +192,16 @@ def pair(
     if normals == "facet":
         normal = _round_edges(primary, coordinates, facet, xi, normal)
     paired = overhang <= projection_tolerance
-    outside = paired & (overhang > LENGTH_ROUND_OFF)
-    return _with_overhang(Pairing(facet, xi, normal, paired), candidates, primary, coordinates, outside)
+    overhangs = paired & (overhang > LENGTH_ROUND_OFF)
+    return _with_overhang(Pairing(facet, xi, normal, paired), candidates, primary, coordinates, overhangs)
 
 
 def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array, mean: Array) -> Array:
     """Return normals (n, dim) of facets that vary continuously across edges.
 
     In equilibrium a node may lie on the edge between two facets, with a contact force in a direction between their normals.
-    With the normal of one of the facets, the pairing then alternates between both. On a rounded edge the direction of the
-    force follows from the position of the node.
+    With the normal of a single facet, the pairing would then alternate between the two facets. On a rounded edge the
+    direction of the force follows from the position of the node.
 
     Parameters
     ----------
@@ -217,23 +217,25 @@ def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array
         changes to the normal of the facet.
     """
     normals = at_nodes_of_facets([facet_normals(block, coordinates) for block in primary.blocks])[facet]
-    normals = interpolated(normals, places(primary, facet, xi))
+    normals = interpolate(normals, places(primary, facet, xi))
     on_triangle = np.column_stack([xi, 1.0 - xi.sum(axis=1)]).min(axis=1)
-    inside = np.where(primary.triangular[facet], on_triangle, 0.5 * (1.0 - np.abs(xi).max(axis=1)))
-    share = np.clip(1.0 - inside / ROUNDED, 0.0, 1.0)[:, None]
-    normal = share * mean + (1.0 - share) * normals
+    distance = np.where(primary.triangular[facet], on_triangle, 0.5 * (1.0 - np.abs(xi).max(axis=1)))
+    weight = np.clip(1.0 - distance / ROUNDED, 0.0, 1.0)[:, None]
+    normal = weight * mean + (1.0 - weight) * normals
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
-def _with_overhang(pairing: Pairing, candidates: Array, primary: Surface, coordinates: Array, outside: Mask) -> Pairing:
-    """Return the pairing with the overhang `Pairing.beyond` of the candidates marked in `outside` (n,)."""
-    rows = np.flatnonzero(outside)
+def _with_overhang(
+    pairing: Pairing, candidates: Array, primary: Surface, coordinates: Array, overhangs: Mask
+) -> Pairing:
+    """Return the pairing with the overhang, `Pairing.beyond`, of the candidates that the mask `overhangs` (n,) marks."""
+    rows = np.flatnonzero(overhangs)
     if not len(rows):
         return pairing
-    at = places(primary, pairing.facet[rows], pairing.xi[rows])
-    corners = coordinates[at.nodes]
-    offset = candidates[rows] - np.einsum("nk,nkd->nd", at.shape, corners)
-    axes = np.concatenate([np.einsum("nkj,nkd->ndj", at.gradient, corners), pairing.normal[rows][:, :, None]], axis=2)
+    feet = places(primary, pairing.facet[rows], pairing.xi[rows])
+    corners = coordinates[feet.nodes]
+    offset = candidates[rows] - np.einsum("nk,nkd->nd", feet.shape, corners)
+    axes = np.concatenate([np.einsum("nkj,nkd->ndj", feet.gradient, corners), pairing.normal[rows][:, :, None]], axis=2)
     beyond = np.zeros_like(pairing.xi)
     beyond[rows] = np.linalg.solve(axes, offset[:, :, None])[:, :-1, 0]
     return replace(pairing, beyond=beyond)
@@ -245,14 +247,14 @@ def _at_smooth_ends(primary: Surface, coordinates: Array, closest: Closest) -> M
     Near a node between two facets, points outside a convex or inside a concave line lie beyond the ends of both facets, but
     not beyond the end of the surface. In 3D the result is False for all candidates.
     """
-    out = closest.overhang > 0.0
-    if closest.position.shape[1] == 3 or not out.any():
-        return np.zeros(len(out), bool)
+    overhangs = closest.overhang > 0.0
+    if closest.position.shape[1] == 3 or not overhangs.any():
+        return np.zeros(len(overhangs), bool)
     smooth = smooth_ends(primary, at_nodes_of_facets(smooth_normals(primary, coordinates)))
-    return np.asarray(out & smooth[closest.facet, (closest.xi[:, 0] > 0.0).astype(np.intp)])
+    return np.asarray(overhangs & smooth[closest.facet, (closest.xi[:, 0] > 0.0).astype(np.intp)])
 
 
-def filled_up(arrays: Sequence[AnyArray]) -> AnyArray:
+def padded(arrays: Sequence[AnyArray]) -> AnyArray:
     """Return arrays (n_i, k_i) concatenated along the first axis, padded to the largest k_i.
 
     Integers are padded with the last entry of the row, floating-point numbers with zeros.
@@ -314,7 +316,7 @@ def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     scale = 1.0 + normal @ mean
     slope = np.divide(normal @ axis, scale, out=np.zeros(len(normal)), where=scale > LENGTH_ROUND_OFF)
     first = axis - slope[:, None] * (mean + normal)
-    # Make tangents perpendicular also where the normals are opposite except for round-off.
+    # Where the normal and the mean normal are opposite up to round-off, the tangent is not yet perpendicular to the normal.
     first -= np.einsum("nd,nd->n", first, normal)[:, None] * normal
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(normal, first)
@@ -346,8 +348,8 @@ def rows_along(
     rows = np.flatnonzero(pairing.paired)
     nodes, weights = candidates.nodes[rows], candidates.shape[rows]
     if not isinstance(primary, RigidSide):
-        facing = pairing.places(primary, rows)
-        nodes, weights = np.hstack([nodes, facing.nodes]), np.hstack([weights, -facing.shape])
+        feet = pairing.places(primary, rows)
+        nodes, weights = np.hstack([nodes, feet.nodes]), np.hstack([weights, -feet.shape])
     values = weights[:, :, None] * direction[rows][:, None, :]
     columns = nodes[:, :, None] * dim + np.arange(dim)
     start = np.concatenate([[0], np.cumsum(pairing.paired) * (nodes.shape[1] * dim)])
@@ -358,8 +360,8 @@ def rows_along(
 
 Normals: TypeAlias = str | Sequence[float]
 KINDS = ("facet", "averaged", "secondary")
-# Cosine of the angle of about 84 degrees beyond which two sides do not face each other, and length of the mean unit normal
-# below which a surface has no mean direction because it closes on itself.
+# Cosine of the angle, about 84 degrees, beyond which two sides do not face each other. It is also the length of the mean unit
+# normal below which a surface has no mean direction, because it is closed.
 FACING = 0.1
 
 
@@ -392,7 +394,7 @@ def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSid
     return result
 
 
-def opposed(pairing: Pairing, normals: Array) -> Pairing:
-    """Return the pairing with normals opposite to those (n, dim) of the secondary side, unpaired if these do not face it."""
-    facing = np.einsum("nd,nd->n", pairing.normal, normals) < -FACING
-    return replace(pairing, normal=np.where(facing[:, None], -normals, pairing.normal), paired=pairing.paired & facing)
+def with_secondary_normals(pairing: Pairing, normals: Array) -> Pairing:
+    """Return the pairing with the opposites of secondary `normals` (n, dim); candidates that face away become unpaired."""
+    valid = np.einsum("nd,nd->n", pairing.normal, normals) < -FACING
+    return replace(pairing, normal=np.where(valid[:, None], -normals, pairing.normal), paired=pairing.paired & valid)

@@ -38,7 +38,9 @@ BESIDE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Points of a surface that are given by facets and reference coordinates; k is the largest number of nodes of a facet.
+    """Points of a surface, given by their facets and reference coordinates.
+
+    k is the largest number of nodes of a facet.
 
     Attributes
     ----------
@@ -71,9 +73,9 @@ def places(side: Surface, facet: Indices, xi: Array) -> Places:
 
 
 def at_common_edges(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, Indices, Array]:
-    """Return all facets on which points of a side lie, which are several for points on an edge or at a corner.
+    """Return all facets that contain given points of a side; points on an edge or at a corner lie on several facets.
 
-    A projection finds one of them, depending on round-off.
+    A projection finds only one of these facets, depending on round-off.
 
     Parameters
     ----------
@@ -90,16 +92,16 @@ def at_common_edges(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, 
     xi : ndarray (p, dim - 1)
         Reference coordinates of the point in the facet [-].
     """
-    at = places(side, facet, xi)
-    row, k = np.nonzero(np.abs(at.shape) > LENGTH_ROUND_OFF)
-    around = csr_array((np.ones(len(row)), (row, at.local[row, k])), shape=(len(facet), len(side.points)))
-    common = coo_array(around @ side.incidence.T)
-    contains_all = common.data == np.diff(around.indptr)[common.row]
+    origin = places(side, facet, xi)
+    row, k = np.nonzero(np.abs(origin.shape) > LENGTH_ROUND_OFF)
+    nodes_of_points = csr_array((np.ones(len(row)), (row, origin.local[row, k])), shape=(len(facet), len(side.points)))
+    common = coo_array(nodes_of_points @ side.incidence.T)
+    contains_all = common.data == np.diff(nodes_of_points.indptr)[common.row]
     point, common_facet = common.row[contains_all].astype(np.intp), common.col[contains_all].astype(np.intp)
     coordinates = np.empty((len(point), xi.shape[1]))
     for block, (rows, number) in zip(side.blocks, by_block(common_facet, side.sizes), strict=True):
-        same = block.local[number][:, :, None] == at.local[point[rows]][:, None]
-        coordinates[rows] = np.einsum("pkj,pj->pk", same, at.shape[point[rows]]) @ elements.get(block.element).nodes
+        same = block.local[number][:, :, None] == origin.local[point[rows]][:, None]
+        coordinates[rows] = np.einsum("pkj,pj->pk", same, origin.shape[point[rows]]) @ elements.get(block.element).nodes
     return point, common_facet, coordinates
 
 
@@ -121,9 +123,9 @@ def _at_nodes(side: Surface, coordinates: Array) -> tuple[Indices, Array, Array]
 
 
 def _nodal_means(side: Surface, node: Indices, normal: Array, angle: Array) -> Array:
-    """Return the means (m, dim) of `nodal_normals`; the other arguments are the results of `_at_nodes`."""
-    weighted = (angle[:, None] * normal).T
-    total: Array = np.column_stack([np.bincount(node, component, len(side.points)) for component in weighted])
+    """Return unit nodal normals (m, dim) of a side, given the nodes, normals and angles that `_at_nodes` returns."""
+    weighted_normals = (angle[:, None] * normal).T
+    total: Array = np.column_stack([np.bincount(node, component, len(side.points)) for component in weighted_normals])
     side.add_across_ends(total)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.divide(total, length, out=np.zeros_like(total), where=length != 0.0)
@@ -132,8 +134,8 @@ def _nodal_means(side: Surface, node: Indices, normal: Array, angle: Array) -> A
 def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
     """Return averaged unit normals at the nodes of the facets, separately on both sides of corners.
 
-    They are those of `nodal_normals`, except at corners. There, the mean only includes the facets that continue the facet
-    smoothly, so that a punch is flat up to its corner although its flanks belong to the surface.
+    Except at corners, they are those of `nodal_normals`. At a corner, the mean for a facet includes only those facets that
+    continue it smoothly, so that a punch is flat up to its corner although its flanks belong to the surface.
 
     Returns
     -------
@@ -145,8 +147,8 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
     # A node is a corner if the normal of one of its facets deviates from the mean by more than half of CORNER.
     corners = np.unique(node[np.einsum("pd,pd->p", normal, smooth) < np.cos(np.radians(0.5 * CORNER))])
     by_node, start = np.argsort(node, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(node))])
-    for at in corners:
-        entries = by_node[start[at] : start[at + 1]]
+    for corner in corners:
+        entries = by_node[start[corner] : start[corner + 1]]
         similar = normal[entries] @ normal[entries].T > np.cos(np.radians(CORNER))
         total = (similar * angle[entries]) @ normal[entries]
         smooth[entries] = total / np.linalg.norm(total, axis=1, keepdims=True)
@@ -185,15 +187,15 @@ def facet_angles(element: elements.Element, nodes: Array) -> Array:
     from fastcontact.contact import projection_kernels
 
     angle, n = np.empty(nodes.shape[:2]), element.n_corners
-    around = np.arange(n)
-    others = np.column_stack([(around + 1) % n, (around - 1) % n])
-    parallel_map(lambda span: projection_kernels.angles(nodes, others, *span, angle), portions(*nodes.shape[:2]))
+    corners = np.arange(n)
+    adjacent = np.column_stack([(corners + 1) % n, (corners - 1) % n])
+    parallel_map(lambda span: projection_kernels.angles(nodes, adjacent, *span, angle), portions(*nodes.shape[:2]))
     return angle
 
 
-def interpolated(normals: Array, at: Places) -> Array:
+def interpolate(normals: Array, points: Places) -> Array:
     """Return unit normals (n, dim) at points, interpolated between the normals (n, k, dim) at the nodes of their facets."""
-    normal = np.einsum("nk,nkd->nd", at.shape, normals)
+    normal = np.einsum("nk,nkd->nd", points.shape, normals)
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
@@ -204,19 +206,19 @@ class Closest(NamedTuple):
     counter-clockwise.
     """
 
-    facet: Indices  # (n,): row of the facet, the first one of several at equal distance
+    facet: Indices  # (n,): row of the facet, the first of equally close ones
     xi: Array  # (n, dim - 1): reference coordinates of the projection [-]
     normal: Array  # (n, dim): unit normal of the facet there [-]
-    overhang: Array  # (n,): distance of the point beyond the end of its facet, in facet lengths; 0 within [-]
-    position: Array  # (n, dim): the projection [length]
-    distance: Array  # (n,): distance to it [length]
+    overhang: Array  # (n,): distance of the point beyond the end of its facet, in facet lengths; 0 inside [-]
+    position: Array  # (n, dim): position of the projection [length]
+    distance: Array  # (n,): distance of the point from its projection [length]
 
 
 def closest(points: Array, corners: Array) -> Closest:
-    """Project `points` (n, dim) [length] on the closest of many facets of one kind, or raise ContactError if that fails.
+    """Project `points` (n, dim) [length] onto the closest of many facets of one element type.
 
     `corners` (n_facets, n_nodes, dim) [length] are the nodes of the facets. In 2D they are lines of 2 or 3 nodes, in 3D
-    triangles of 3 or 6 nodes and quadrangles of 4, 8 or 9 nodes.
+    triangles of 3 or 6 nodes and quadrangles of 4, 8 or 9 nodes. Raises ContactError if the projection of a point fails.
     """
     points, corners = np.ascontiguousarray(points), np.ascontiguousarray(corners)
     n, dim = points.shape
@@ -229,19 +231,22 @@ def closest(points: Array, corners: Array) -> Closest:
         _on_faces(points, corners, result)
     wrong = np.flatnonzero(np.isnan(result.distance))
     if len(wrong):
-        _refuse(points[wrong], result.facet[wrong], corners)
+        _raise_failure(points[wrong], result.facet[wrong], corners)
     return result
 
 
 def closest_of_kinds(points: Array, kinds: Sequence[Array]) -> Closest:
-    """Project points on the closest facet of several arrays of corners, one per kind; facets are numbered through all."""
+    """Project points onto the closest of facets of several element types, each with an array of corners in `kinds`.
+
+    Facets are numbered through all types.
+    """
     if len(kinds) == 1:
         return closest(points, kinds[0])
     first = np.cumsum([0] + [len(corners) for corners in kinds])
     by_kind = [closest(points, corners) for corners in kinds]
     nearest = np.argmin([candidate.distance for candidate in by_kind], axis=0)
-    facet, *others = (np.stack(values)[nearest, np.arange(len(points))] for values in zip(*by_kind, strict=True))
-    return Closest(facet + first[nearest], *others)
+    facet, *other_fields = (np.stack(values)[nearest, np.arange(len(points))] for values in zip(*by_kind, strict=True))
+    return Closest(facet + first[nearest], *other_fields)
 
 
 def _on_lines(points: Array, corners: Array, closest: Closest) -> None:
@@ -280,7 +285,7 @@ def _on_faces(points: Array, corners: Array, closest: Closest) -> None:
     )
 
 
-def _refuse(points: Array, facet: Indices, corners: Array) -> None:
+def _raise_failure(points: Array, facet: Indices, corners: Array) -> None:
     """Raise ContactError for points whose projection failed."""
     if facet[0] < 0:
         raise ContactError(f"{len(points)} projected points are not finite (first: {points[0]}): the solution diverged")
@@ -372,7 +377,7 @@ def along_line_normals(
         np.ascontiguousarray(points), corners, at_nodes, counts, neighbour, facet, xi, overhang, *work
     )
     xi = xi[:, None]
-    return facet, xi, overhang, interpolated(normals[facet], places(side, facet, xi))
+    return facet, xi, overhang, interpolate(normals[facet], places(side, facet, xi))
 
 
 def smooth_ends(side: Surface, normals: Array) -> Mask:

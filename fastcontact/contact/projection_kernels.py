@@ -108,30 +108,30 @@ def inside(triangle, s, t):
     """Return reference coordinates moved into a facet, independently of the choice of its first corner."""
     if triangle:
         a, b, c = max(s, 0.0), max(t, 0.0), max(1.0 - s - t, 0.0)
-        whole = a + b + c if min(s, t, 1.0 - s - t) < 0.0 else 1.0
-        return a / whole, b / whole
+        total = a + b + c if min(s, t, 1.0 - s - t) < 0.0 else 1.0
+        return a / total, b / total
     return min(max(s, -1.0), 1.0), min(max(t, -1.0), 1.0)
 
 
 @innermost_kernel
 def _rank(terms, triangle, f, s, t, length):
-    """Return the distance of a projection on the extended facet `f` from the facet, by which neighbours are compared.
+    """Return the distance, relative to `length`, between facet `f` and a projection onto the extended facet.
 
-    It is relative to `length`. Overhangs are no measure of it, since they depend on the shapes of facets. If both facets are
-    closest at a common node, a small fraction of the sum of all overhangs breaks the tie.
+    Neighbours are compared by this distance, because overhangs depend on the shapes of facets. If two facets are closest at a
+    common node, a small fraction of the sum of all overhangs decides.
     """
     if triangle:
         total = max(-s, 0.0) + max(-t, 0.0) + max(s + t - 1.0, 0.0)
     else:
         total = 0.5 * (max(abs(s) - 1.0, 0.0) + max(abs(t) - 1.0, 0.0))
     a, b = inside(triangle, s, t)
-    apart = minus(_interpolated(terms, f, s, t)[0], _interpolated(terms, f, a, b)[0])
-    return np.sqrt(dot(apart, apart)) / length + 1e-3 * total
+    offset = minus(_interpolated(terms, f, s, t)[0], _interpolated(terms, f, a, b)[0])
+    return np.sqrt(dot(offset, offset)) / length + 1e-3 * total
 
 
 @innermost_kernel
 def _beside(point, terms, directions, triangular, neighbours, f, height, length):
-    """Return the facet next to `f` with the smallest `_rank` of the projection, (s, t), and this value or infinity."""
+    """Return the neighbour of facet `f` with the smallest `_rank` of the projection, (s, t), and the rank, or infinity."""
     start, numbers = neighbours
     best, best_s, best_t, least = f, 0.0, 0.0, np.inf
     for k in range(start[f], start[f + 1]):
@@ -139,7 +139,7 @@ def _beside(point, terms, directions, triangular, neighbours, f, height, length)
         middle = 1.0 / 3.0 if triangular[g] else 0.0
         s, t, converged = _newton(point, terms, directions, g, middle, middle, height)
         rank = _rank(terms, triangular[g], g, s, t, length) if converged else np.inf
-        # Of equivalent facets, the first one is taken.
+        # If facets are equivalent, the first one is chosen.
         if converged and max(rank, LENGTH_ROUND_OFF) < max(least, LENGTH_ROUND_OFF) - ROUND_OFF:
             best, best_s, best_t, least = g, s, t, rank
     return best, best_s, best_t, least

@@ -18,9 +18,9 @@ SAMPLE = 200
 
 
 def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, excluded: Mask | None = None) -> None:
-    """Raise ContactError for sides of contact `name` that share nodes or cannot face each other.
+    """Raise ContactError if the sides of contact `name` share nodes or cannot face each other.
 
-    Nodes that `excluded` (n_points,) marks, without contact, may be shared.
+    Nodes without contact, which the mask `excluded` (n_points,) marks, may be shared.
     """
     if secondary.group == primary.group:
         raise ContactError(
@@ -44,21 +44,21 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
     facing = normals @ opposite[1].T < 0
     ahead = (height > -0.1 * distance) | (distance < np.minimum.outer(sizes, opposite[2]))
     if not (facing & ahead).any():
-        behind = -height[facing]
-        inside = f", or do the bodies lie inside each other, by {behind.min():.4g} or more" if len(behind) else ""
+        depth = -height[facing]
+        hint = f", or do the bodies lie inside each other, by {depth.min():.4g} or more" if len(depth) else ""
         raise ContactError(
             f"no facet of '{secondary.group}' faces '{primary.group}': the outer sides of the two groups face away from "
-            f"each other; is one of them the wrong face of its body{inside}?"
+            f"each other; is one of them the wrong face of its body{hint}?"
         )
 
 
 def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSide) -> None:
-    """Raise ContactError for an obstacle of contact `name` that no facet of the secondary side faces."""
+    """Raise ContactError if no facet of the secondary side of contact `name` faces the obstacle."""
     _check_normals(mesh, name, secondary)
     centres, outward, _ = _facet_frames(mesh, secondary)
     _, normal, paired, _ = obstacle.facing(centres, Pose(np.zeros(mesh.dim)))
-    along = np.einsum("id,id->i", outward, normal)[paired]
-    if len(along) and (along >= 0).all():
+    cosine = np.einsum("id,id->i", outward, normal)[paired]
+    if len(cosine) and (cosine >= 0).all():
         raise ContactError(
             f"the rigid obstacle of contact '{name}' faces in the same direction as '{secondary.group}', so that they cannot "
             "touch: reverse its normal or its facets, or name another face of the body"
@@ -66,7 +66,7 @@ def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSid
 
 
 def _check_normals(mesh: Mesh, name: str, side: Surface) -> None:
-    """Raise ContactError for a side of contact `name` that has no normal at one of its nodes."""
+    """Raise ContactError if a side of contact `name` has no normal at one of its nodes."""
     undefined = np.flatnonzero(~nodal_normals(side, mesh.points).any(axis=1))
     if len(undefined):
         point = side.points[undefined[0]]

@@ -62,12 +62,12 @@ class Surface:
     periodic_ends: tuple[tuple[Indices, Indices, Array], ...] = ()
 
     def with_periodic_ends(self, ends: Iterable[tuple[Indices, Indices, Array]]) -> Surface:
-        """Return the surface with `periodic_ends`, where nodes are given by point numbers; nodes elsewhere are ignored."""
+        """Return the surface with `periodic_ends`, given by point numbers; nodes that are not on the surface are ignored."""
         order, on_surface = np.argsort(self.points), []
-        for first, second, turn in ends:
-            both = np.isin(first, self.points) & np.isin(second, self.points) & (first != second)
-            rows = (order[np.searchsorted(self.points, end[both], sorter=order)] for end in (first, second))
-            on_surface.append((*rows, turn))
+        for first, second, rotation in ends:
+            valid = np.isin(first, self.points) & np.isin(second, self.points) & (first != second)
+            rows = (order[np.searchsorted(self.points, end[valid], sorter=order)] for end in (first, second))
+            on_surface.append((*rows, rotation))
         return replace(self, periodic_ends=tuple(on_surface))
 
     def add_across_ends(self, vectors: Array) -> None:
@@ -75,9 +75,9 @@ class Surface:
 
         The vectors are sums over the facets of a node. At a periodic end these include the facets at the other end.
         """
-        for first, second, turn in self.periodic_ends:
-            vectors[first] += (vectors[second][:, None] @ turn)[:, 0]
-            vectors[second] = (vectors[first][:, None] @ np.swapaxes(turn, -1, -2))[:, 0]
+        for first, second, rotation in self.periodic_ends:
+            vectors[first] += (vectors[second][:, None] @ rotation)[:, 0]
+            vectors[second] = (vectors[first][:, None] @ np.swapaxes(rotation, -1, -2))[:, 0]
 
     @property
     def sizes(self) -> list[int]:
@@ -172,14 +172,14 @@ class Surface:
 
 
 def by_block(numbers: Indices, sizes: Iterable[int]) -> Iterator[tuple[Indices, Indices]]:
-    """Yield, for blocks of the given sizes, the positions of their items in `numbers` (n,), and their rows in the block.
+    """Distribute items, whose `numbers` (n,) count through all blocks, to blocks of the given sizes.
 
-    Items are numbered through all blocks.
+    Yields, for each block, the positions of its items in `numbers`, and their rows in the block.
     """
     first = 0
     for size in sizes:
-        inside = np.flatnonzero((numbers >= first) & (numbers < first + size))
-        yield inside, numbers[inside] - first
+        positions = np.flatnonzero((numbers >= first) & (numbers < first + size))
+        yield positions, numbers[positions] - first
         first += size
 
 

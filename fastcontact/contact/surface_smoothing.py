@@ -1,4 +1,4 @@
-r"""Geometric correction of contact surfaces: gaps between the smooth surfaces that straight facets approximate.
+r"""Geometric correction of contact surfaces: gaps between the smooth surfaces that facets approximate.
 
 Non-matching facets of curved sides leave gaps and overlaps of the size of their sag :math:`h`, and thus pressure errors of
 the order of :math:`E h / L` for facets of length L, independently of the interference. A surface of constant curvature and a
@@ -6,8 +6,8 @@ polynomial of twice the order of the facet are fitted to the nodes of the facet 
 fitting: Jiao and Zha, 2008). The height of this smooth surface P above the facet is its interpolation error on the facet,
 :math:`h = P - \sum_a N_a P(x_a)`. It vanishes at nodes, on flat sides, and where facets follow the surface.
 
-Only the curvature that both sides share is corrected, since a sphere pressed on a plane is flat within the contact, like its
-facets. With the curvature tensors :math:`K_s` and :math:`K_p` of facets that face each other, heights of one side are
+Only the curvature that both sides share is corrected: a sphere that is pressed on a plane is flat within the contact, like
+its facets. With the curvature tensors :math:`K_s` and :math:`K_p` of facets that face each other, heights of one side are
 multiplied by :math:`\min(\max(-K_s : K_p / K : K, 0), 1)`, with the tensor K of that side. Fits do not extend across
 corners. Where the curvature changes from one facet to the next, heights are multiplied by the limiter of van Albada, van
 Leer and Roberts (1982), :math:`2 K : K' / (K : K + K' : K')`, so that a plane beside a fillet stays plane.
@@ -30,7 +30,7 @@ from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Factor by which the columns of a least-squares fit decrease with each degree of the polynomial. Because the fit is damped,
-# terms of low degree are preferred where nodes leave terms undetermined, as on a strip one facet wide.
+# it prefers terms of low degree if the nodes do not determine all terms, as on a strip of a single row of facets.
 DEGREE_FACTOR = 0.1
 # Number of passes of a fit. The relative error for circles, spheres and cylinders is of the order (L / R)^(2 PASSES).
 PASSES = 3
@@ -64,11 +64,11 @@ class SmoothSide:
     def slope(self, facet: Indices, xi: Array) -> Array:
         """Return the derivatives (n, dim - 1) of the heights `at` with respect to the reference coordinates [length]."""
         k, m = self.heights.shape[1:]
-        derived = [
+        derivatives = [
             replace(self, heights=np.arange(1.0, k)[:, None] * self.heights[:, 1:]),
             replace(self, heights=np.arange(1.0, m) * self.heights[:, :, 1:]),
         ]
-        return np.stack([side.at(facet, xi) for side in derived[: xi.shape[1]]], axis=1)
+        return np.stack([side.at(facet, xi) for side in derivatives[: xi.shape[1]]], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,23 +150,23 @@ def _axes(block: FacetBlock, coordinates: Array, normal: Array) -> Array:
 
 def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
     """Return the smooth surface of a side at `points` (n_points, dim); None if its facets have no sag."""
-    away = points[side.points] - points[side.points].mean(axis=0)
-    if np.linalg.svd(away, compute_uv=False)[-1] <= LENGTH_ROUND_OFF * np.linalg.norm(away):  # in one plane
+    offset = points[side.points] - points[side.points].mean(axis=0)
+    if np.linalg.svd(offset, compute_uv=False)[-1] <= LENGTH_ROUND_OFF * np.linalg.norm(offset):  # in one plane
         return None
     near, nodes, valid = _neighbours(side, np.concatenate([_normals(block, points) for block in side.blocks]))
-    around, first, fits = points[side.points[nodes]], 0, []
-    away, inside = np.where(valid[:, :, None], around, 0.0), valid[:, :, None]
-    away = np.where(inside, away - (away.sum(axis=1) / valid.sum(axis=1)[:, None])[:, None], 0.0)
-    least = np.linalg.eigvalsh(away.transpose(0, 2, 1) @ away)[:, 0]
-    if (least <= (LENGTH_ROUND_OFF * np.linalg.norm(away, axis=(1, 2))) ** 2).all():  # around each facet
+    neighbourhood, start, fits = points[side.points[nodes]], 0, []
+    offset, inside = np.where(valid[:, :, None], neighbourhood, 0.0), valid[:, :, None]
+    offset = np.where(inside, offset - (offset.sum(axis=1) / valid.sum(axis=1)[:, None])[:, None], 0.0)
+    least = np.linalg.eigvalsh(offset.transpose(0, 2, 1) @ offset)[:, 0]
+    if (least <= (LENGTH_ROUND_OFF * np.linalg.norm(offset, axis=(1, 2))) ** 2).all():  # around each facet
         return None
     for block in side.blocks:
-        rows = slice(first, first + len(block.facets))
-        fit = _fit(block, points, around[rows], valid[rows], 2 * side.order)
-        reaching = fit.reaching(around[rows], valid[rows])
+        rows = slice(start, start + len(block.facets))
+        fit = _fit(block, points, neighbourhood[rows], valid[rows], 2 * side.order)
+        extends = fit.extends_to(neighbourhood[rows], valid[rows])
         heights, curvature, axes = _heights(block, points, fit)
-        fits.append((heights * reaching[:, None, None], curvature * reaching[:, None, None], axes))
-        first += len(block.facets)
+        fits.append((heights * extends[:, None, None], curvature * extends[:, None, None], axes))
+        start += len(block.facets)
     heights, curvature, axes = (np.concatenate(of_blocks) for of_blocks in zip(*fits, strict=True))
     if not heights.any():
         return None
@@ -174,28 +174,28 @@ def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
 
 
 def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]:
-    """Return which facets share a node without a corner between them, and for each facet the nodes of all these facets.
+    """Return the smooth neighbours of each facet, which share a node with it without a corner, and the nodes of these facets.
 
-    The results are a matrix (n_facets, n_facets), including the diagonal, positions (n_facets, most) in the points of the
-    side, and a mask of the entries of the latter that are filled.
+    The results are an adjacency matrix (n_facets, n_facets) with ones on the diagonal, the nodes (n_facets, k) as positions
+    in the points of the side, and a mask of the valid entries of the second array.
     """
     incidence = side.incidence.sorted_indices()  # with the order of nodes, round-off would depend on that of each facet
     i, j = (incidence @ incidence.T).tocoo().coords
     smooth = np.einsum("nd,nd->n", normal[i], normal[j]) > np.cos(np.radians(CORNER))
     near = csr_array((np.ones(smooth.sum()), (i[smooth], j[smooth])), shape=(side.n_facets, side.n_facets))
-    around = csr_array(near @ incidence)
-    valid = np.arange(np.diff(around.indptr).max()) < np.diff(around.indptr)[:, None]
-    padded = np.zeros(valid.shape, np.intp)
-    padded[valid] = around.indices
-    return near, padded, valid
+    neighbour_nodes = csr_array(near @ incidence)
+    valid = np.arange(np.diff(neighbour_nodes.indptr).max()) < np.diff(neighbour_nodes.indptr)[:, None]
+    nodes = np.zeros(valid.shape, np.intp)
+    nodes[valid] = neighbour_nodes.indices
+    return near, nodes, valid
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Surfaces over the planes of facets (n,), with a constant `curvature` (n, d, d) plus polynomials (n, n_terms).
+    """Smooth surfaces above the planes of n facets, the sum of a surface of constant `curvature` (n, d, d) and a polynomial.
 
     The planes contain the mean of the corners, `origin`, and have the `axes` (n, dim, dim), the last of which are normals.
-    Lengths are relative to the `size` (n,) of the facets.
+    `polynomial` (n, n_terms) are the coefficients. Lengths are relative to the `size` (n,) of the facets.
     """
 
     axes: Array
@@ -228,15 +228,15 @@ class _Fit:
         """Return the heights (n, m) over points (n, m, d) of the planes."""
         return _conic(self.curvature, plane) + np.einsum("nqt,nt->nq", _terms(plane, *self.powers), self.polynomial)
 
-    def reaching(self, points: Array, valid: Mask) -> Mask:
+    def extends_to(self, points: Array, valid: Mask) -> Mask:
         """Return which surfaces (n,) of constant curvature extend to all `points` (n, m, dim) that are `valid` (n, m).
 
-        Other surfaces, e.g. of three coarse facets in a row, are not determined by their nodes and amplify round-off.
+        The nodes do not determine other surfaces, for example those of three coarse facets in a row, which amplify round-off.
         """
         bent = np.einsum("nqd,nde->nqe", self.in_planes(points)[0], self.curvature)
         return np.asarray((((bent**2).sum(axis=2) < 1.0) | ~valid).all(axis=1))
 
-    def in_the_middle(self) -> tuple[Array, Array]:
+    def at_middle(self) -> tuple[Array, Array]:
         """Return slopes (n, d) and curvatures (n, d, d) in the middle of the facets."""
         term = {(int(a), int(b)): n for n, (a, b) in enumerate(zip(*self.powers, strict=True))}
         if self.curvature.shape[1] == 1:
@@ -247,7 +247,7 @@ class _Fit:
 
 
 def _fit(block: FacetBlock, points: Array, around: Array, valid: Mask, degree: int) -> _Fit:
-    """Fit surfaces to those of the points `around` (n, m, dim) the facets of a block that are `valid` (n, m).
+    """Fit surfaces to the `valid` (n, m) ones of the points `around` the facets of a block, (n, m, dim).
 
     In each pass, planes are rotated to the tangents of the surfaces, and the curvatures of the polynomials are moved to
     `curvature`.
@@ -259,7 +259,7 @@ def _fit(block: FacetBlock, points: Array, around: Array, valid: Mask, degree: i
     curvature = np.zeros((len(corners), *2 * (points.shape[1] - 1,)))
     fit = _Fit(_axes(block, points, normal), origin, size, curvature, powers, np.empty(0)).fitted(around, valid)
     for _ in range(1, PASSES):
-        slope, curvature = fit.in_the_middle()
+        slope, curvature = fit.at_middle()
         fit = replace(fit, axes=_tilted(fit.axes, slope), curvature=curvature).fitted(around, valid)
     return fit
 
@@ -269,8 +269,8 @@ def _tilted(axes: Array, slope: Array) -> Array:
     normal = axes[:, -1] - np.einsum("nj,njd->nd", slope, axes[:, :-1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     twice_mean = axes[:, -1] + normal
-    along = np.einsum("njd,nd->nj", axes[:, :-1], normal) / np.einsum("nd,nd->n", twice_mean, normal)[:, None]
-    return np.concatenate([axes[:, :-1] - along[:, :, None] * twice_mean[:, None], normal[:, None]], axis=1)
+    tilt = np.einsum("njd,nd->nj", axes[:, :-1], normal) / np.einsum("nd,nd->n", twice_mean, normal)[:, None]
+    return np.concatenate([axes[:, :-1] - tilt[:, :, None] * twice_mean[:, None], normal[:, None]], axis=1)
 
 
 def _heights(block: FacetBlock, points: Array, smooth: _Fit) -> tuple[Array, Array, Array]:
@@ -282,7 +282,7 @@ def _heights(block: FacetBlock, points: Array, smooth: _Fit) -> tuple[Array, Arr
     height = smooth.size[:, None] * np.where(np.abs(height) > LENGTH_ROUND_OFF, height, 0.0)
     heights = np.zeros((len(corners), k, k if element.dim == 2 else 1))
     heights[:, powers[0], powers[1]] = np.linalg.solve(_terms(xi, *powers), height.T).T
-    curvature = smooth.in_the_middle()[1]
+    curvature = smooth.at_middle()[1]
     curvature = np.where(np.abs(curvature) > LENGTH_ROUND_OFF, curvature, 0.0) / smooth.size[:, None, None]
     return heights, curvature, smooth.axes[:, :-1]
 
@@ -300,8 +300,8 @@ def _conic(curvature: Array, plane: Array) -> Array:
 def _powers(dim: int, degree: int) -> tuple[Indices, Indices]:
     """Return the exponents of the terms of a polynomial in one or two variables."""
     i, j = (exponents.ravel() for exponents in np.indices((degree + 1, degree + 1 if dim == 2 else 1)))
-    kept = i + j <= degree
-    return i[kept], j[kept]
+    in_range = i + j <= degree
+    return i[in_range], j[in_range]
 
 
 def _terms(x: Array, i: Indices, j: Indices) -> Array:
@@ -314,7 +314,7 @@ def _terms(x: Array, i: Indices, j: Indices) -> Array:
 
 
 def _lattice(element: elements.Element, k: int) -> tuple[Array, tuple[Indices, Indices]]:
-    """Return points of a reference facet, and the exponents of as many terms, which these points determine."""
+    """Return points of a reference facet, and the exponents of the polynomial terms that their values determine."""
     if element.n_corners == 3:
         i, j = _powers(2, k - 1)
         return np.column_stack([i, j]) / (k - 1.0), (i, j)

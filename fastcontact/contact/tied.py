@@ -3,15 +3,15 @@
 The sides are paired once, in the undeformed configuration. The relative displacement of points that face each other remains
 zero in every direction. The test functions are the multipliers of the formulation. If forces are nodal, there is one set of
 equations per node. If forces act at integration points, the equations are moments with the functions of the multiplier
-field, which is the mortar method (Bernardi, Maday and Patera, 1994), so that complementarity parameters have no influence.
+field, as in the mortar method (Bernardi, Maday and Patera, 1994), so that complementarity parameters have no influence.
 
-Where supports hold both sides at a node, the secondary side has fewer free displacements than multipliers, which are then not
-determined: multipliers that alternate from node to node and decay along the surface do no work. They are reduced as at
-the ends of mortar lines (Bernardi et al., section 3): in a direction that is held on both sides, the multiplier of a node is
-the mean of those of its neighbours, so that uniform tractions remain possible (`reduction`).
+If supports hold both sides at a node, the secondary side has fewer free displacements than multipliers. The multipliers are
+then not determined, because multipliers that alternate from node to node and decay along the surface do no work. Their number
+is reduced as at the ends of mortar lines (Bernardi et al., section 3): in a direction that is held on both sides, the
+multiplier of a node is the mean of those of its neighbours, so that uniform tractions remain possible (`reduction`).
 
-Equal displacements across a gap would resist rigid rotations: the forces of both sides would have different lines of action,
-and the moment of the shear would be lost. A rigid arm across the gap therefore rotates with the primary facet (`with_arms`).
+Equal displacements on both sides of a gap would resist rigid rotations, because the forces on the two sides would have
+different lines of action. Therefore a rigid arm spans the gap and rotates with the primary facet (`with_rigid_arms`).
 The relative displacement along a tangent t is ``t . (u_s - u_p) + g n . du_p/dt`` with the gap g, the normal n and the
 derivative along t on the primary facet. It vanishes in any small rotation of both sides.
 """
@@ -67,7 +67,7 @@ class TiedPair:
     reduction: csr_array | None = None
 
     def constraints(self) -> Constraints:
-        """Return the equations."""
+        """Return the equations as constraints."""
         B = csr_array(vstack(self.rows, format="csr"))
         n = B.shape[0]
         positions = np.tile(self.positions, (len(self.rows), 1))
@@ -82,14 +82,16 @@ class TiedPair:
         return components[0], np.column_stack(components[1:])
 
 
-def tied(constraints: Constraints, moments: csr_array, areas: Array | None, reduction: csr_array | None) -> TiedPair:
-    """Return the tying equations of `constraints`, which have tangents; see `moments_of` and `TiedPair`."""
+def tied_pair(
+    constraints: Constraints, moments: csr_array, areas: Array | None, reduction: csr_array | None
+) -> TiedPair:
+    """Return the equations of a tied pair, given `constraints` with tangents; see `moments_of` and `TiedPair`."""
     size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), TINY)
     positions = abs(moments) @ constraints.positions / size[:, None]
-    rows = [csr_array(moments @ along) for along in (constraints.B, *constraints.tangents)]
+    rows = [csr_array(moments @ row) for row in (constraints.B, *constraints.tangents)]
     if reduction is not None:
-        reduced, q = csr_array(reduction.T @ vstack(rows, format="csr")), len(size)
-        rows = [csr_array(reduced[first : first + q]) for first in range(0, reduced.shape[0], q)]
+        reduced_rows, q = csr_array(reduction.T @ vstack(rows, format="csr")), len(size)
+        rows = [csr_array(reduced_rows[first : first + q]) for first in range(0, reduced_rows.shape[0], q)]
     assert constraints.nodal is not None
     return TiedPair(
         moments, tuple(map(_cleaned, rows)), constraints.directions, positions, constraints.nodal, constraints.nodes, areas,
@@ -102,12 +104,12 @@ def moments_of(constraints: Constraints) -> tuple[csr_array, Array | None]:
     if not isinstance(constraints.compliance, Projection):
         return csr_array(eye_array(len(constraints.gap0), format="csr")), constraints.areas
     P, areas = constraints.compliance.P, constraints.compliance.areas
-    weighted = csr_array(P.T @ diags_array(areas))
-    scale = np.asarray(abs(weighted).sum(axis=1)).ravel()
+    weighted_P = csr_array(P.T @ diags_array(areas))
+    scale = np.asarray(abs(weighted_P).sum(axis=1)).ravel()
     on_axis = np.flatnonzero((areas == 0.0) & constraints.usable)
     single = csr_array((np.ones(len(on_axis)), (np.arange(len(on_axis)), on_axis)), shape=(len(on_axis), len(areas)))
     scales = np.concatenate([scale, np.zeros(len(on_axis))])
-    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, TINY)) @ weighted, single])), scales
+    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, TINY)) @ weighted_P, single])), scales
 
 
 def _cleaned(rows: csr_array) -> csr_array:
@@ -117,14 +119,16 @@ def _cleaned(rows: csr_array) -> csr_array:
 
 
 def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: csr_array) -> csr_array:
-    """Return the matrix (q dim, q dim) from the remaining to all multipliers; columns of removed multipliers are empty.
+    """Return the matrix (q dim, q dim) that maps the remaining multipliers to all multipliers.
+
+    The columns of removed multipliers are empty.
 
     Multipliers are forces, ordered by their components along the frames.
 
     Parameters
     ----------
     frames : ndarray (q, dim, dim)
-        Unit vectors along which the equations of the nodes hold, the normal and then tangents [-].
+        Unit vectors along which the equations of each node are formulated, first the normal and then the tangents [-].
     held : ndarray (q, dim, dim)
         Projectors on the directions in which supports hold both sides [-].
     nodes : ndarray of int (q,)
@@ -137,8 +141,8 @@ def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: 
     q, dim = held.shape[:2]
     n_held = np.trace(held, axis1=1, axis2=2).round().astype(np.intp)
     held_nodes, free = np.flatnonzero(n_held), np.eye(dim) - held
-    along = np.linalg.norm(np.einsum("qde,qke->qkd", held, frames), axis=2)
-    is_free = np.argsort(np.argsort(-along, axis=1, kind="stable"), axis=1) >= n_held[:, None]
+    held_part = np.linalg.norm(np.einsum("qde,qke->qkd", held, frames), axis=2)
+    is_free = np.argsort(np.argsort(-held_part, axis=1, kind="stable"), axis=1) >= n_held[:, None]
     freed = np.where(is_free[:, None], np.einsum("qde,qke->qdk", free, frames), 0.0)
     around = coo_array(csr_array(beside[nodes])[:, nodes][held_nodes])
     is_pair = (areas[around.col] > 0.0) & (areas[held_nodes[around.row]] > 0.0) & (held_nodes[around.row] != around.col)
@@ -153,12 +157,12 @@ def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: 
     blocks[np.abs(blocks) < ROUND_OFF] = 0.0
     row, column = (np.arange(dim) * q + nodes_of[:, None] for nodes_of in (rows, columns))
     row, column = np.broadcast_arrays(row[:, :, None], column[:, None, :])
-    reduced = csr_array((blocks.ravel(), (row.ravel(), column.ravel())), shape=(q * dim, q * dim))
-    reduced.eliminate_zeros()
-    return reduced
+    matrix = csr_array((blocks.ravel(), (row.ravel(), column.ravel())), shape=(q * dim, q * dim))
+    matrix.eliminate_zeros()
+    return matrix
 
 
-def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, points: Array) -> Constraints:
+def with_rigid_arms(constraints: Constraints, pairing: Pairing, primary: Surface, points: Array) -> Constraints:
     """Return constraints whose tangential rows vanish in small rigid rotations of both sides, also across a gap.
 
     Parameters
@@ -174,20 +178,20 @@ def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, poin
     size = float(np.ptp(constraints.positions, axis=0).max(initial=0.0))
     # At an edge the derivative is the mean over the facets that meet there, as the facet of the pairing depends on round-off.
     point, facet, xi = at_common_edges(primary, pairing.facet, pairing.xi)
-    normal, facing = normals(constraints.directions)[point], places(primary, facet, xi)
-    axes = np.einsum("pkj,pkd->pdj", facing.gradient, points[facing.nodes])
-    along = np.einsum("pkj,pjd->pkd", facing.gradient, np.linalg.pinv(axes))
+    normal, feet = normals(constraints.directions)[point], places(primary, facet, xi)
+    axes = np.einsum("pkj,pkd->pdj", feet.gradient, points[feet.nodes])
+    gradient = np.einsum("pkj,pjd->pkd", feet.gradient, np.linalg.pinv(axes))
     share = 1.0 / np.bincount(point)
     mean = csr_array((share[point], (point, np.arange(len(point)))))
-    slopes = [np.einsum("pkd,pd->pk", along, direction[point]) for direction in constraints.directions]
-    levers = [mean @ nodal_rows(facing.nodes, slope[:, :, None] * normal[:, None, :], points.size) for slope in slopes]
+    slopes = [np.einsum("pkd,pd->pk", gradient, direction[point]) for direction in constraints.directions]
+    levers = [mean @ nodal_rows(feet.nodes, slope[:, :, None] * normal[:, None, :], points.size) for slope in slopes]
     rotations, translations = _rotations(points), np.tile(np.eye(points.shape[1]), (len(points), 1))
     arms = np.stack([lever @ rotations for lever in levers], axis=1)
     spurious = np.stack([tangent @ rotations for tangent in constraints.tangents], axis=1)
-    moved = np.stack([np.abs(tangent @ translations).max(axis=1) for tangent in constraints.tangents], axis=1)
+    translates = np.stack([np.abs(tangent @ translations).max(axis=1) for tangent in constraints.tangents], axis=1)
     # Lengths of arms form a tensor. One length per tangent would depend on the choice of tangents if the gap is not normal.
     lengths = spurious @ np.linalg.pinv(arms)
-    lengths[(np.abs(lengths) <= LENGTH_ROUND_OFF * size) | (moved > LENGTH_ROUND_OFF)[:, :, None]] = 0.0
+    lengths[(np.abs(lengths) <= LENGTH_ROUND_OFF * size) | (translates > LENGTH_ROUND_OFF)[:, :, None]] = 0.0
     tangents = [
         csr_array(tangent - sum(diags_array(lengths[:, k, j]) @ lever for j, lever in enumerate(levers)))
         for k, tangent in enumerate(constraints.tangents)

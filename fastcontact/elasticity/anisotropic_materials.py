@@ -36,7 +36,7 @@ class Orthotropic(Material):
         function or an array, as described for E of `LinearElastic`.
     nu : (float, float, float)
         Poisson's ratios nu12, nu13, nu23 [-]. Under a uniaxial stress along axis 1, nu12 is minus the ratio of the strain
-        along axis 2 to the strain along axis 1; the other ratio is nu21 = nu12 E2 / E1.
+        along axis 2 to the strain along axis 1. The reciprocal ratio is nu21 = nu12 E2 / E1.
     G : (float, float, float)
         Shear moduli G12, G13, G23 [pressure].
     axes : sequence or callable, optional
@@ -165,9 +165,9 @@ class Orthotropic(Material):
         return S
 
     def admissible(self, constants: Any) -> Any:
-        """Return for each set of constants (n,) whether the strain energy is positive definite."""
-        given = constants.E, constants.nu, constants.G
-        E, nu, G = (np.broadcast_arrays(*map(np.atleast_1d, values)) for values in given)
+        """Return whether the strain energy is positive definite, for each set of constants (n,)."""
+        constant_groups = constants.E, constants.nu, constants.G
+        E, nu, G = (np.broadcast_arrays(*map(np.atleast_1d, values)) for values in constant_groups)
         in_range = np.all([(v >= 1.0 / LARGEST) & (v <= LARGEST) for v in np.broadcast_arrays(*E, *G)], axis=0)
         with np.errstate(all="ignore"):  # inadmissible moduli are detected above
             nu21, nu31, nu32 = nu[0] * E[1] / E[0], nu[1] * E[2] / E[0], nu[2] * E[2] / E[1]

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loop of bodies with nonlinear laws: tangent stiffness, internal forces, stress, energy and history.
+"""Element loop of nonlinear bodies: tangent stiffness, internal forces, stresses, energies and history.
 
 The formulation is total Lagrangian: nodal forces are integrals of P . dN/dX over the reference configuration, and the tangent
 consists of integrals of dN/dX . A . dN/dX (Bonet and Wood, 2008, chapter 9). At small strains, P is the Cauchy stress and J
@@ -33,7 +33,7 @@ INVERTED, NO_PLANE_STRESS = 1, 2
 
 @kernel
 def _tables(dN, columns, rows):
-    """Store dN (n_q, n_nodes, dim) in the columns of `columns` and in the rows of `rows`, those of point q from 3 q on."""
+    """Store dN (n_q, n_nodes, dim) in `columns` (n_nodes, ...) and `rows` (..., n_nodes), beginning at 3 q for point q."""
     n_q, n_nodes, dim = dN.shape
     columns[:], rows[:] = 0.0, 0.0
     for q in range(n_q):
@@ -382,7 +382,8 @@ def linearise(
     With ``geometric = 2``, the tangent is complete. With 1, the second derivative of J is omitted. With 0, the initial-stress
     stiffness and, in tension, the second derivative of J are omitted, so that the tangent is positive semidefinite. If `data`
     is empty, no tangent is computed. If `elastic` is true, `data` contains the elastic tangent of small strains, and the
-    difference is added at points with plastic flow. Returns a status code and the number of a cell; 0 and -1 on success.
+    difference between the tangents is added at points with plastic flow. Returns a status code and the number of the cell
+    that caused it, or 0 and -1.
     """
     n_cells, n_nodes = cells.shape
     n_q, dim, m, tangent = N.shape[0], points.shape[1], polynomials.shape[1], len(data) > 0
@@ -398,8 +399,8 @@ def linearise(
     left, right = np.empty((3 * n_q, width)), np.empty((n_pairs * (3 * n_q + 1), width))
     local = np.empty((n_pairs * width, width))
     mass, projected, slopes = np.empty((m, m)), np.empty((m, 1)), np.empty((4 * m if stiff else 0, width))
-    # Numba counts references to arrays by atomic operations where a view is made, and in functions that call others in
-    # branches. This would take as long as the law of the first invariant itself, which is therefore called directly here.
+    # Numba counts array references by atomic operations where it makes views, and in functions that call others in branches.
+    # This would take as long as the law of the first invariant itself, which is therefore called directly here.
     row, law, D, direct = -1, constants[0], moduli[0], False
     for c in range(n_cells):
         if not owned(cells, c, owner, part, inside):

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Constitutive laws at one quadrature point: first Piola-Kirchhoff stress, its tangent, history.
+"""Constitutive laws at one quadrature point: first Piola-Kirchhoff stress, its derivative, and the history.
 
 Shared arguments: ``F`` (3, 3) is the deformation gradient [-] and ``P`` (3, 3) the first Piola-Kirchhoff stress [pressure].
 The first nine rows and columns of ``A`` (18, 12) contain its derivative dP/dF, in which component iJ has the index 3 i + J;
@@ -251,13 +251,13 @@ def _logarithmic(constants, F, everywhere, old, new, P, A):
     without_strain[:6] = 0.0
     with_moduli = np.bool_(True)  # for a literal, Numba would compile the law once more
     energy = _plastic(constants, (axes * (0.5 * np.log(squared))) @ axes.T, with_moduli, without_strain, new, T, D)
-    slope, carried = np.empty((3, 3)), L @ axes
-    _flow(carried, axes, old, new)
+    slope, L_axes = np.empty((3, 3)), L @ axes
+    _flow(L_axes, axes, old, new)
     for a in range(3):
         for b in range(3):
             slope[a, b] = 2.0 * _first_difference(squared[a], squared[b])
     turn, T, factor = _turn(axes), axes.T @ T @ axes, slope.reshape(9)
-    S = carried @ (slope * T) @ carried.T
+    S = L_axes @ (slope * T) @ L_axes.T
     _first_piola_kirchhoff(F, S, P)
     if not everywhere:
         return energy
@@ -272,7 +272,7 @@ def _logarithmic(constants, F, everywhere, old, new, P, A):
                     for column in (3 * b + c, 3 * c + b):
                         moduli[row, column] += value
                         moduli[column, row] += value
-    turn = _turn(carried)
+    turn = _turn(L_axes)
     _push_forward(F, S, turn @ moduli @ turn.T, A)
     return energy
 
@@ -288,10 +288,10 @@ def _turn(axes):
 
 
 @kernel
-def _flow(carried, axes, old, new):
+def _flow(L_axes, axes, old, new):
     """Replace the increment of plastic strain in `new` by L - I at the end of the load step, see the header.
 
-    The columns of `axes` (3, 3) are the principal axes of the increment, and `carried` (3, 3) is the factor before the load
+    The columns of `axes` (3, 3) are the principal axes of the increment, and `L_axes` (3, 3) is the factor before the load
     step times `axes`.
     """
     if new[6] > old[6]:
@@ -299,7 +299,7 @@ def _flow(carried, axes, old, new):
         for i in range(3):
             for j in range(3):
                 increment[i, j] = new[voigt(i, j)]
-        metric = (carried * np.exp(-2.0 * np.diag(axes.T @ increment @ axes))) @ carried.T
+        metric = (L_axes * np.exp(-2.0 * np.diag(axes.T @ increment @ axes))) @ L_axes.T
         factor = np.linalg.cholesky(metric)
         for i in range(3):
             for j in range(i + 1):

@@ -2,8 +2,8 @@
 
 v are the unknowns. T is the identity except for the rows of displacements that multi-point constraints express in terms of
 others, and t contains the prescribed displacements and the effect of the right-hand sides of the constraints. The matrix of
-the solver is ``T.T K T``. It has the size and blocks of K: in the rows and columns of eliminated components only the diagonal
-remains.
+the solver is ``T.T K T``. It has the size and the blocks of K, but only the diagonal remains in the rows and columns of
+eliminated components.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import entry_rows, stacked_rows
 from fastcontact.round_off import ROUND_OFF
 
-# Relative tolerance of the conditions for consistent supports and constraints.
+# Relative tolerance of the conditions under which supports and constraints are consistent.
 CONFLICT = 1e-9
 
 
@@ -30,7 +30,7 @@ CONFLICT = 1e-9
 class Stiffness:
     """A stiffness matrix as the sum of the matrices `parts` (n, n) [force / length].
 
-    Without multi-point constraints there are two of them: the matrix of the linear solver, and the rows and columns of
+    Without multi-point constraints there are two parts: the matrix of the linear solver, and the rows and columns of
     supports that were removed from it.
     """
 
@@ -87,24 +87,24 @@ class ConstrainedMotion:
         ModelError
             If constraints and supports contradict each other.
         """
-        held: Array = np.where(self.fixed, prescribed, 0.0)
+        u_prescribed: Array = np.where(self.fixed, prescribed, 0.0)
         if not self.relations:
-            return held
+            return u_prescribed
         right_sides = [np.broadcast_to(relation.value, relation.rows.shape[0]) for relation in self.relations]
         values = np.concatenate([side * factor for side, factor in zip(right_sides, multipliers, strict=True)])
-        conditions, known = self._elimination.conditions, np.concatenate([held, values])
+        conditions, known = self._elimination.conditions, np.concatenate([u_prescribed, values])
         violation = np.abs(conditions @ known)
         # Coefficients may be round-off, such as the cosine of a right angle.
-        allowed = np.maximum(CONFLICT * (np.abs(conditions) @ np.abs(known)), ROUND_OFF * largest(known))
-        violated = np.flatnonzero(violation > allowed)
-        if len(violated):
-            row = self._elimination.origin[violated[0]]
+        tolerance = np.maximum(CONFLICT * (np.abs(conditions) @ np.abs(known)), ROUND_OFF * largest(known))
+        conflicts = np.flatnonzero(violation > tolerance)
+        if len(conflicts):
+            row = self._elimination.origin[conflicts[0]]
             ends = np.cumsum([relation.rows.shape[0] for relation in self.relations])
             raise ModelError(
                 f"{self.relations[int(np.searchsorted(ends, row, side='right'))].name} contradicts the supports, or "
-                f"constraints stated before it, by {violation[violated[0]]:.3g}: remove one of them"
+                f"constraints stated before it, by {violation[conflicts[0]]:.3g}: remove one of them"
             )
-        lift: Array = self._elimination.T @ held + self._elimination.S @ values
+        lift: Array = self._elimination.T @ u_prescribed + self._elimination.S @ values
         return lift
 
 
@@ -119,7 +119,7 @@ class System(ConstrainedMotion):
         Displacement components that are prescribed.
     relations : sequence of MultiPointConstraint
     without_stiffness : ndarray of bool (n,), optional
-        Components that are free although they have no stiffness, such as those of rigid obstacles; none by default.
+        Components that are unknowns although they have no stiffness, such as those of rigid obstacles; by default none.
 
     Attributes
     ----------
@@ -128,11 +128,11 @@ class System(ConstrainedMotion):
     matrix : bsr_array (n, n), or its replacement by the linear solver
         Matrix of the linear solver [force / length].
     fixed : ndarray of bool (n,)
-        Supported components, and those of points without stiffness or constraint, which stay at zero.
+        Supported components, and those of points without stiffness or constraint, whose displacements are zero.
     free : ndarray of bool (n,)
         The unknowns.
     weightless : ndarray of bool (n,)
-        Unknowns without stiffness: components of rigid obstacles, motions of bodies that constraints make rigid.
+        Unknowns without stiffness: those of rigid obstacles, and motions of bodies that constraints make rigid.
     """
 
     def __init__(
@@ -162,10 +162,10 @@ class System(ConstrainedMotion):
         return system
 
     def _set_stiffness(self, K: bsr_array, diagonal_of_K: Array) -> None:
-        """Set the stiffness K (n, n) and what follows from it, given its diagonal (n,)."""
+        """Set the stiffness K (n, n), given with its diagonal (n,), and the attributes that depend on it."""
         self.free = self._independent.copy()
         if self.T is None:
-            self.K = Stiffness((K, self._entries.removed_from(K)) if self._entries else supports_apart(K, self.fixed))
+            self.K = Stiffness((K, self._entries.remove_from(K)) if self._entries else supports_apart(K, self.fixed))
             self.matrix = self.K.parts[0]
             self.weightless: Mask = self.free & (diagonal_of_K == 0.0)
         else:
@@ -173,11 +173,11 @@ class System(ConstrainedMotion):
             transformed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
             transformed.sort_indices()
             diagonal = transformed.diagonal()
-            # The transformed diagonal without off-diagonal terms of K, which may cancel the others.
-            uncancelled = self.T.multiply(self.T).T @ diagonal_of_K
+            # The transformed diagonal without the contribution of off-diagonal terms of K, which may cancel the other terms.
+            magnitude = self.T.multiply(self.T).T @ diagonal_of_K
             # Points without stiffness that constraints couple only with each other are excluded from the unknowns.
-            self.free &= (uncancelled > 0.0) | self._without_stiffness
-            self.weightless = self.free & (diagonal <= ROUND_OFF * uncancelled)
+            self.free &= (magnitude > 0.0) | self._without_stiffness
+            self.weightless = self.free & (diagonal <= ROUND_OFF * magnitude)
             self.matrix = supports_apart(transformed, ~self.free)[0]
         self._no_unknowns = np.flatnonzero(~self.free)
 
@@ -194,9 +194,9 @@ class System(ConstrainedMotion):
 
     def reduced(self, force: Array) -> Array:
         """Return the forces (n,) on the unknowns that do the same work as `force` (n,) on all displacements [force]."""
-        reduced = force.copy() if self.T is None else self.T.T @ force
-        reduced[self._no_unknowns] = 0.0
-        return reduced
+        forces = force.copy() if self.T is None else self.T.T @ force
+        forces[self._no_unknowns] = 0.0
+        return forces
 
     def rows(self, rows: csr_array, offset: Array, t: Array) -> tuple[csr_array, Array]:
         """Return the affine function ``rows @ u + offset`` as rows (m, n) and offset (m,) for the unknowns v."""
@@ -249,7 +249,7 @@ def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
         The original K minus `matrix`.
     """
     K = _with_diagonal(K)
-    return K, _SupportedEntries(K, fixed).removed_from(K)
+    return K, _SupportedEntries(K, fixed).remove_from(K)
 
 
 class _SupportedEntries:
@@ -267,26 +267,26 @@ class _SupportedEntries:
         block, i, j = np.nonzero(supported[row][:, :, None] | supported[column][:, None])
         rows, columns = size * row[block] + i, size * column[block] + j
         order = np.argsort(rows, kind="stable")
-        self._places = ((affected[block] * size + i) * size + j)[order]
+        self._positions = ((affected[block] * size + i) * size + j)[order]
         self._columns = columns[order].astype(np.int32)
         self._start = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(fixed)))]).astype(np.int32)
         self._diagonal = np.flatnonzero((rows == columns)[order])
-        self._whole_diagonal = (size**2 * on_diagonal[:, None] + (size + 1) * np.arange(size)).ravel()
+        self._diagonal_entries = (size**2 * on_diagonal[:, None] + (size + 1) * np.arange(size)).ravel()
 
     def diagonal_of(self, K: bsr_array) -> Array:
         """Return the diagonal (n,) of K."""
-        return np.asarray(K.data.reshape(-1)[self._whole_diagonal])
+        return np.asarray(K.data.reshape(-1)[self._diagonal_entries])
 
-    def removed_from(self, K: bsr_array) -> csr_array:
-        """Set the entries of K to zero, but those on the diagonal to positive numbers, and return the difference."""
+    def remove_from(self, K: bsr_array) -> csr_array:
+        """Set the entries in K to zero, except for positive numbers on the diagonal, and return the removed part."""
         K.data = np.ascontiguousarray(K.data)
         numbers = K.data.reshape(-1)
-        removed = numbers[self._places]
+        removed = numbers[self._positions]
         diagonal = removed[self._diagonal]
         if not (stiff := diagonal > 0.0).all():
             diagonal[~stiff] = self.diagonal_of(K).max(initial=1.0)
-        numbers[self._places] = 0.0
-        numbers[self._places[self._diagonal]] = diagonal
+        numbers[self._positions] = 0.0
+        numbers[self._positions[self._diagonal]] = diagonal
         removed[self._diagonal] -= diagonal
         difference = csr_array((removed, self._columns, self._start), shape=K.shape, copy=True)
         difference.eliminate_zeros()

@@ -1,11 +1,11 @@
-"""Mean dilatation (B-bar): elements free of volumetric locking.
+"""Mean dilatation (B-bar method), which avoids volumetric locking.
 
 The dilatation, the trace of the strain, is projected onto polynomials of low degree in each cell: constants in linear
 elements (the B-bar method of Hughes, Int. J. Numer. Meth. Engng 15, 1980), and linear functions in quadratic ones. The
 deviatoric strain is unchanged. Quadratic triangles, tetrahedra, wedges and pyramids would lock even with a linear dilatation.
-In these, only the mean dilatation has the full bulk modulus. The remainder has at most the bulk modulus of a material with
-nu = 0.3 and the same shear modulus; without it, single cells in 3D and in axisymmetry would have mechanisms (conformal maps,
-whose deviatoric strain is zero).
+In these elements, only the mean dilatation has the full bulk modulus. The remainder has at most the bulk modulus of a
+material with nu = 0.3 and the same shear modulus. Without the remainder, single cells in 3D and in axisymmetry would have
+mechanisms (conformal maps, whose deviatoric strain is zero).
 
 The element loops use moduli without the bulk modulus, and the loops of `dilatation_kernels` add the contribution of the
 projected dilatation.
@@ -66,12 +66,12 @@ def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
     deviatoric = moduli.copy()
     deviatoric[:, :3, :3] -= bulk[:, None, None]
     complete = elements.get(name).dilatation == elements.get(name).order - 1
-    rest = bulk if complete else np.minimum(bulk, REMAINDER * moduli[:, 3, 3])
-    return Split(deviatoric, np.column_stack([bulk, rest]))
+    bulk_remainder = bulk if complete else np.minimum(bulk, REMAINDER * moduli[:, 3, 3])
+    return Split(deviatoric, np.column_stack([bulk, bulk_remainder]))
 
 
 def projected(name: str, corners: Array, values: Array, xi: Array, axisymmetric: bool) -> Array:
-    """Return the mean and the remainder (n_cells, 2, n) of a field that is projected like the dilatation [unit of the field].
+    """Return the mean and the remainder (n_cells, 2, n) of the projection of a field, as for dilatations [unit of the field].
 
     Parameters
     ----------

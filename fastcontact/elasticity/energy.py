@@ -25,7 +25,7 @@ def elastic_energy(stress: Array, compliance: Array) -> Array:
 
 
 def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Array:
-    """Return det J (n_cells, n_q) [length^dim], the ratio of volumes in a cell and in the reference cell at its points.
+    """Return det J (n_cells, n_q) [length^dim], the ratio of the volumes of a cell and of the reference cell at points.
 
     In axisymmetry, det J is multiplied by the circumference 2 pi r [length^3].
 
@@ -46,7 +46,7 @@ def gradients_at(corners: Array, dN: Array) -> tuple[Array, Array]:
     The arguments are the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], and the derivatives of the shape
     functions `dN` (n_q, n_nodes, dim) [-].
     """
-    inverse, determinant = _inverted(derivatives_at(corners, dN))
+    inverse, determinant = _inverses(derivatives_at(corners, dN))
     return np.einsum("qak,cqkd->cqad", dN, inverse, optimize=True), determinant
 
 
@@ -57,11 +57,11 @@ def slopes_at(displacement: Array, corners: Array, dN: Array) -> tuple[Array, Ar
     `corners` (n_cells, n_nodes, dim) [length] and `dN` (n_q, n_nodes, dim) [-]. The last index of the gradients is the
     direction of differentiation.
     """
-    inverse, determinant = _inverted(derivatives_at(corners, dN))
+    inverse, determinant = _inverses(derivatives_at(corners, dN))
     return np.asarray(derivatives_at(displacement, dN) @ inverse), determinant
 
 
-def _inverted(J: Array) -> tuple[Array, Array]:
+def _inverses(J: Array) -> tuple[Array, Array]:
     """Return the inverses (n_cells, n_q, dim, dim) and determinants (n_cells, n_q) of Jacobians (n_cells, n_q, dim, dim)."""
     if J.shape[-1] == 2:
         return np.asarray(np.linalg.inv(J)), np.asarray(np.linalg.det(J))

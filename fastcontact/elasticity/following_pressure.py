@@ -18,7 +18,7 @@ POINTS = 4
 
 
 class FollowingPressure:
-    """A pressure along the normals of deformed facets, with the values at the reference positions.
+    """A pressure along the normals of deformed facets, whose values are those at reference positions.
 
     Parameters
     ----------

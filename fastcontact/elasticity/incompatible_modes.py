@@ -1,12 +1,12 @@
-"""Incompatible modes: quadrangles and hexahedra free of shear and volumetric locking.
+"""Incompatible modes, which avoid shear locking and volumetric locking of quadrangles and hexahedra.
 
 Each linear cell has additional displacement modes 1 - xi^2 along each reference direction, with which its edges can curve.
 They are internal to the cell and eliminated by static condensation (Wilson, Taylor, Doherty and Ghaboussi, Numerical and
 computer methods in structural mechanics, 1973). Their gradients are computed with the Jacobian at the centre of the cell, so
 that their mean strain is zero and the patch test is passed (Taylor, Beresford and Wilson, Int. J. Numer. Meth. Engng 10,
-1976). Hexahedra have four additional enhanced dilatations, the products of two and of three reference coordinates, without
-which they lock from nu = 0.49 on (Simo, Armero and Taylor, Comput. Methods Appl. Mech. Engng 110, 1993). The loops over cells
-are in `incompatible_modes_kernels`.
+1976). Hexahedra have four additional enhanced dilatations, the products of two and of three reference coordinates. Without
+these, hexahedra lock if nu is 0.49 or more (Simo, Armero and Taylor, Comput. Methods Appl. Mech. Engng 110, 1993). The loops
+over cells are in `incompatible_modes_kernels`.
 """
 
 from __future__ import annotations
@@ -57,5 +57,5 @@ def with_modes(name: str, treatment: AnyArray | None) -> Mask | None:
     """Return which moduli (n_moduli,) have incompatible modes in the element `name`; None if there are none."""
     if treatment is None or name not in BENDING:
         return None
-    selected = (np.asarray(treatment).astype(np.uint8) & MODES) > 0
-    return selected if selected.any() else None
+    has_modes = (np.asarray(treatment).astype(np.uint8) & MODES) > 0
+    return has_modes if has_modes.any() else None

@@ -55,7 +55,7 @@ class InertiaLoad(VolumeLoad):
         mesh : Mesh
         kinematics : str
         density : DensityField, optional
-            Densities of the solid cells; without them, all cells count as cells without density.
+            Densities of the solid cells; if omitted, no cell has a density.
         """
         forces, missing = np.zeros((mesh.n_points, mesh.dim)), 0
         for element, rows in solid_rows(mesh, self.groups).items():
@@ -97,7 +97,7 @@ class Gravity(InertiaLoad):
 
 @dataclass(frozen=True)
 class Centrifugal(InertiaLoad):
-    """The centrifugal force of a rotation at constant speed.
+    """The centrifugal force due to a rotation at constant speed.
 
     Attributes
     ----------
@@ -137,9 +137,9 @@ class Centrifugal(InertiaLoad):
 
     def acceleration(self, x: Array, kinematics: str) -> Array:
         """Return speed^2 times the vector from the axis (..., dim) [length / time^2] at `x` (..., dim) [length]."""
-        arm = np.zeros((*x.shape[:-1], 3))
-        arm[..., : x.shape[-1]] = x
-        arm -= self.origin
-        along = np.array(self.direction) / np.linalg.norm(self.direction)
-        arm -= (arm @ along)[..., None] * along
-        return np.asarray(self.speed**2 * arm[..., : x.shape[-1]])
+        radius = np.zeros((*x.shape[:-1], 3))
+        radius[..., : x.shape[-1]] = x
+        radius -= self.origin
+        axis = np.array(self.direction) / np.linalg.norm(self.direction)
+        radius -= (radius @ axis)[..., None] * axis
+        return np.asarray(self.speed**2 * radius[..., : x.shape[-1]])

@@ -55,15 +55,15 @@ class InitialState:
         return f"the initial {self.kind} of {listed(self.groups)}"
 
     def values(self, name: str, rows: Indices, N: Array) -> Array:
-        """Return the components (n_rows, n, n_components) along x, y and z in cells of the element type `name`.
+        """Return the components (n_rows, n, n_components) in the axes x, y and z, in cells of the element type `name`.
 
-        They are stresses [pressure] or strains [-], and zero in cells of other groups. `rows` (n_rows,) of int contains the
-        numbers of the cells, and `N` (n, n_nodes) [-] the shape functions at n points of a cell. ModelError if a component
-        does not exist in the kinematics.
+        The components are stresses [pressure] or strains [-], and zero in cells of other groups. `rows` (n_rows,) of int
+        contains the numbers of the cells, and `N` (n, n_nodes) [-] the shape functions at n points of a cell. ModelError if a
+        component does not exist in the kinematics.
         """
         size = 6 if self.kinematics == "3d" else 4
-        inside = np.isin(rows, self.cells.rows.get(name, ()))
-        members = rows[inside]
+        is_member = np.isin(rows, self.cells.rows.get(name, ()))
+        members = rows[is_member]
         values = np.zeros((len(members) * len(N), 6))
         for component, value in self.components.items():
             values[:, component] = value.at(name, members, N) if isinstance(value, Varying) else value
@@ -73,15 +73,15 @@ class InitialState:
             if self.kind == "strain":  # engineering strains transform by the inverse transpose
                 rotation = np.asarray(np.linalg.inv(rotation).transpose(0, 2, 1))
             values = np.einsum("nij,nj->ni", rotation, values)
-        # In plane stress zz is out of plane as well: an initial strain zz is free, but there is no stress zz.
-        excluded = [*range(size, 6), *([2] if (self.kind, self.kinematics) == ("stress", "plane_stress") else [])]
-        if np.abs(values[:, excluded]).max(initial=0.0) > ROUND_OFF * np.abs(values).max(initial=0.0):
+        # In plane stress the component zz is also out of plane: an initial strain zz is admissible, but a stress zz is not.
+        out_of_plane = [*range(size, 6), *([2] if (self.kind, self.kinematics) == ("stress", "plane_stress") else [])]
+        if np.abs(values[:, out_of_plane]).max(initial=0.0) > ROUND_OFF * np.abs(values).max(initial=0.0):
             raise ModelError(
                 f"{self.name} has out-of-plane components, which {self.kinematics} does not have: change its axes"
             )
-        of_rows = np.zeros((len(rows), len(N), size))
-        of_rows[inside] = values[:, :size].reshape(len(members), len(N), size)
-        return of_rows
+        all_values = np.zeros((len(rows), len(N), size))
+        all_values[is_member] = values[:, :size].reshape(len(members), len(N), size)
+        return all_values
 
     def check(self) -> None:
         """Raise ModelError if a component is not admissible in one of the cells."""

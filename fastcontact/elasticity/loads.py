@@ -4,7 +4,7 @@ Each kind of load is a subclass of `Load`, with a method ``add_...`` of the mode
 integrals of the load times the shape functions. In axisymmetry, forces are those over the full circle.
 
 A `Value` is a number, or a function from positions (n, dim) [length] in the reference configuration to numbers (n,) [unit of
-the load]. `Components` are values by the number of their axis.
+the load]. `Components` map the numbers of axes to values.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ LARGEST = 1e60
 Components = Mapping[int, Value]
 
 # Numbers of points of the product rule in each direction, and in the Cartesian directions of squares, cubes and prisms. The
-# rules are exact to degree 7 at least, that is for a constant load on curved quadratic cells in axisymmetry and for a
-# quadratic load on straight facets.
+# rules are exact at least to degree 7, which suffices for constant loads on curved quadratic cells in axisymmetry and for
+# quadratic loads on straight facets.
 LOAD_POINTS = 5, 4
 
 
@@ -51,7 +51,10 @@ class DensityField(Protocol):
 
 
 class Load:
-    """Base class of the loads of a model; `ramp` contains points (instant, multiplier), None means that of the analysis."""
+    """Base class of the loads of a model.
+
+    `ramp` contains points (instant, multiplier); None means the ramp of the analysis.
+    """
 
     KIND: ClassVar[str]
     CONSTANT: ClassVar[bool] = False  # whether values must be numbers instead of functions of position
@@ -118,7 +121,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Pressure(Load):
-    """A pressure [pressure] on a group of outer facets, positive in compression; it acts against their outward normals."""
+    """A pressure [pressure] on a group of outer facets, which acts against their outward normals if it is positive."""
 
     KIND = "the pressure"
     group: str
@@ -137,9 +140,9 @@ class Pressure(Load):
 
 @dataclass(frozen=True)
 class Hydrostatic:
-    """The pressure of a liquid with the specific weight `weight` [force / length^3] and its surface at `level` [length].
+    """The pressure of a liquid of the specific weight `weight` [force / length^3], whose surface is at `level` [length].
 
-    The `level` is a coordinate along the axis `axis`, which points upwards.
+    The level is the coordinate of the surface along the axis with the number `axis`, which points upwards.
     """
 
     weight: float
@@ -266,14 +269,14 @@ def solid_points(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
 
 
 def check_solids(mesh: Mesh, groups: Sequence[str] | None, otherwise: str) -> None:
-    """Raise ModelError that ends with `otherwise` if one of the groups contains no solid cells."""
+    """Raise ModelError if one of the groups contains no solid cells; the message ends with `otherwise`."""
     for group in groups or ():
         if not mesh.cells_of(group, dim=mesh.dim):
             raise ModelError(f"group '{group}' contains no solid cells{otherwise}")
 
 
 def check_points(mesh: Mesh, group: str, otherwise: str) -> None:
-    """Raise ModelError that ends with `otherwise` if a group is empty."""
+    """Raise ModelError if a group is empty; the message ends with `otherwise`."""
     if not len(mesh.points_of(group)):
         raise ModelError(f"group '{group}' is empty: {otherwise}")
 
@@ -349,7 +352,7 @@ def check_value(name: str, value: Any) -> None:
 
 
 def axes_of(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, Any]:
-    """Return the components that are not None by the number of their axis, given by the names x, y and z.
+    """Return the components that are not None by axis number, given `components` by the axis names x, y and z.
 
     Raises ModelError, which begins with `caption`, if all components are None, or an axis does not exist in `dim` dimensions.
     """

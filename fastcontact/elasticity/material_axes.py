@@ -68,18 +68,18 @@ class CylindricalAxes:
         """Return the axes at `points` (n, dim) [length] as unit vectors in rows (n, 3, 3) [-]; ModelError on the line."""
         x = np.zeros((len(points), 3))
         x[:, : points.shape[1]] = points
-        along = np.array(self.direction) / np.linalg.norm(self.direction)
-        arm = x - self.origin
-        radial = arm - (arm @ along)[:, None] * along
+        axis = np.array(self.direction) / np.linalg.norm(self.direction)
+        offset = x - self.origin
+        radial = offset - (offset @ axis)[:, None] * axis
         radius = np.linalg.norm(radial, axis=1)
-        on_line = np.flatnonzero(radius <= LENGTH_ROUND_OFF * np.abs(arm).max(initial=0.0))
+        on_line = np.flatnonzero(radius <= LENGTH_ROUND_OFF * np.abs(offset).max(initial=0.0))
         if len(on_line):
             raise ModelError(
                 f"a point of a cell at {x[on_line[0]]} lies on the line of the cylindrical axes, where no direction is "
                 "radial: give the cells there a material with other axes, or move a node"
             )
         radial /= radius[:, None]
-        return np.stack([radial, np.cross(along, radial), np.broadcast_to(along, radial.shape)], axis=1)
+        return np.stack([radial, np.cross(axis, radial), np.broadcast_to(axis, radial.shape)], axis=1)
 
 
 def checked_axes(axes: Any) -> Axes:
@@ -129,12 +129,12 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
             f"{axes} are not about the axis of symmetry: in axisymmetry their origin is (0, 0, 0) and their direction "
             "(0, 1, 0)"
         )
-    returned = values_at(axes, points, "the axes of a material", ModelError)
+    values = values_at(axes, points, "the axes of a material", ModelError)
     caption = "the function of a material's axes returned"
     try:
-        frame = np.asarray(returned, complex if np.iscomplexobj(returned) else float)
+        frame = np.asarray(values, complex if np.iscomplexobj(values) else float)
     except (TypeError, ValueError):
-        raise ModelError(f"{caption} {returned!r:.80}, not numbers") from None
+        raise ModelError(f"{caption} {values!r:.80}, not numbers") from None
     if frame.shape != (len(points), 3, 3):
         raise ModelError(
             f"{caption} numbers of shape {frame.shape} for {len(points)} points: it must return three vectors in rows for "

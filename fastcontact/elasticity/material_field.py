@@ -58,8 +58,8 @@ class MaterialField:
         Number of the material of each cell, and its row in `moduli` (that of the cell centre if the material varies), by
         solid element type.
     inside : dict of str to ndarray of int (n_cells, n_q)
-        Row in `moduli` of each quadrature point, by solid element type; only for element types with materials that vary
-        within cells.
+        Row in `moduli` of each quadrature point, by solid element type. Only element types with materials that vary within
+        cells have an entry.
     """
 
     materials: Sequence[Material]
@@ -73,7 +73,7 @@ class MaterialField:
 
     @cached_property
     def loops(self) -> dict[str, Numbers]:
-        """Rows of moduli for the element loops, by element type: `inside` if there are any, otherwise `rows`."""
+        """Rows of moduli for the element loops, by element type: those of `inside` if present, otherwise those of `rows`."""
         return {**self.rows, **self.inside}
 
     @cached_property
@@ -103,8 +103,8 @@ class MaterialField:
         isotropic materials these eigenvalues are ``3 lambda + 2 mu`` and ``2 mu``, and the measure is ``nu / (1 - 2 nu)``.
         """
         normal = 2 if self.kinematics == "plane_stress" else 3
-        used = self.moduli[:, 0, 0] > 0.0  # unused rows of varying materials are zero
-        eigenvalues = np.linalg.eigvalsh(self.moduli[used, :normal, :normal])
+        is_used = self.moduli[:, 0, 0] > 0.0  # unused rows of varying materials are zero
+        eigenvalues = np.linalg.eigvalsh(self.moduli[is_used, :normal, :normal])
         return max(1.0, float(((eigenvalues[:, -1] / eigenvalues[:, 0]).max() - 1.0) / 3.0))
 
     @cached_property
@@ -123,9 +123,9 @@ class MaterialField:
         for number, material in enumerate(self.materials):
             if not material.varies:  # rows of varying materials are unused
                 values[number] = getattr(material, method)(arbitrary_point, self.kinematics)[0]
-        for at in self.evaluations:
-            evaluate = getattr(self.materials[at.material], method)
-            values[at.rows] = evaluate(at.points, self.kinematics, at.constants)
+        for evaluation in self.evaluations:
+            evaluate = getattr(self.materials[evaluation.material], method)
+            values[evaluation.rows] = evaluate(evaluation.points, self.kinematics, evaluation.constants)
         return values
 
     def offset(
@@ -148,23 +148,23 @@ class MaterialField:
         return StressOffset(at_nodes, np.nan_to_num(self.expansion), tuple(states))
 
     def without_expansion(self, mesh: Mesh, rise: Array) -> int:
-        """Return the number of cells with a temperature rise (n_points,) [temperature] and a material without expansion."""
-        without = np.isnan(self.expansion[:, 0])
+        """Return the number of cells of materials without expansion whose `rise` (n_points,) [temperature] is not zero."""
+        no_expansion = np.isnan(self.expansion[:, 0])
         return sum(
-            int(np.count_nonzero(without[self.rows[name]] & (rise[block] != 0.0).any(axis=1)))
+            int(np.count_nonzero(no_expansion[self.rows[name]] & (rise[block] != 0.0).any(axis=1)))
             for name, block in mesh.solids.items()
         )
 
     @cached_property
     def distinct(self) -> dict[str, Numbers]:
-        """Material numbers (n_cells,) by element type, where materials between which stress is continuous share a number.
+        """Material numbers (n_cells,) by element type, equal for materials between which the stress is continuous.
 
-        Such materials have the same moduli, axes and expansion.
+        These materials have the same moduli, axes and expansion.
         """
-        first: dict[object, int] = {}
+        first_number: dict[object, int] = {}
         laws = [_law(material, moduli) for material, moduli in zip(self.materials, self.moduli, strict=False)]
-        shared = np.array([first.setdefault(law, number) for number, law in enumerate(laws)], np.int32)
-        return {name: shared[values] for name, values in self.number.items()}
+        representative = np.array([first_number.setdefault(law, number) for number, law in enumerate(laws)], np.int32)
+        return {name: representative[values] for name, values in self.number.items()}
 
 
 def material_field(
@@ -186,7 +186,7 @@ def material_field(
     rows, inside = {name: values.copy() for name, values in number.items()}, dict[str, Numbers]()
     evaluations: list[EvaluationPoints] = []
 
-    def added(index: int, points: Array, constants: Any) -> Numbers:
+    def add(index: int, points: Array, constants: Any) -> Numbers:
         """Add the moduli of a material at `points`; return their rows."""
         first = sum(map(len, moduli))
         evaluations.append(EvaluationPoints(index, slice(first, first + len(points)), points, constants))
@@ -202,19 +202,19 @@ def material_field(
     for index, material, name, block, cells in of_materials:
         if material.varies:
             centres = mesh.points[block[cells]].mean(axis=1)
-            rows[name][cells] = added(index, centres, material.constants_at(name, cells, centre(name)))
+            rows[name][cells] = add(index, centres, material.constants_at(name, cells, centre(name)))
     for index, material, name, block, cells in of_materials:
         if material.varies_inside:
             N = elements.get(name).tables[0]
             inside.setdefault(name, np.repeat(rows[name][:, None], len(N), axis=1))
-            at_points = added(index, positions(mesh, block[cells], N), material.constants_at(name, cells, N))
+            at_points = add(index, positions(mesh, block[cells], N), material.constants_at(name, cells, N))
             inside[name][cells] = at_points.reshape(len(cells), len(N))
     all_moduli, owners = np.concatenate(moduli), np.concatenate(owner)
     return MaterialField(materials, kinematics, all_moduli, evaluations, owners, dict(number), rows, inside)
 
 
 def _law(material: Material, moduli: Array) -> tuple[object, ...]:
-    """Return a key that is equal for materials between which stress is continuous."""
+    """Return a key that is equal for two materials if the stress is continuous between them."""
     constants = tuple(getattr(material, name, None) for name in MODULI) if material.graded else None
     compliance = b"" if material.graded else material.local_compliance.tobytes()
     if not material.varies:

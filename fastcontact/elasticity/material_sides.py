@@ -1,4 +1,4 @@
-"""Slots for nodal stresses, of which a node at a material interface has one for each of its materials."""
+"""Slots for nodal stresses: a node at a material interface has one slot for each of its materials."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fastcontact.mesh.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class MaterialSides:
-    """Slots for nodal values: one for each node, and one more for each further material of a node at an interface.
+    """Slots for nodal values: one for each node, and one for each additional material of a node at an interface.
 
     Attributes
     ----------
@@ -38,25 +38,25 @@ def material_sides(mesh: Mesh, material: Mapping[str, Numbers]) -> MaterialSides
     n = mesh.n_points
     lowest, highest = np.full(n, np.iinfo(np.int32).max, np.int32), np.full(n, -1, np.int32)
     for number in np.unique(np.concatenate([np.empty(0, np.int32), *material.values()]))[::-1]:
-        inside = np.concatenate([block[material[name] == number].ravel() for name, block in mesh.solids.items()])
-        lowest[inside] = number
-        highest[inside] = np.maximum(highest[inside], number)
-    shared = lowest < highest
-    if not shared.any():
-        none = np.empty(0, np.int32)
-        return MaterialSides(dict(mesh.solids), np.arange(n, dtype=np.int32), none, none, none)
-    count = int(highest.max()) + 1
+        nodes = np.concatenate([block[material[name] == number].ravel() for name, block in mesh.solids.items()])
+        lowest[nodes] = number
+        highest[nodes] = np.maximum(highest[nodes], number)
+    on_interface = lowest < highest
+    if not on_interface.any():
+        empty = np.empty(0, np.int32)
+        return MaterialSides(dict(mesh.solids), np.arange(n, dtype=np.int32), empty, empty, empty)
+    n_materials = int(highest.max()) + 1
     keys = {  # of pairs of an interface node and a material
-        name: (block.astype(np.int64) * count + material[name][:, None])[shared[block]]
+        name: (block.astype(np.int64) * n_materials + material[name][:, None])[on_interface[block]]
         for name, block in mesh.solids.items()
     }
     pairs = np.unique(np.concatenate([*keys.values()]))
-    points, numbers = (pairs // count).astype(np.int32), (pairs % count).astype(np.int32)
+    points, numbers = (pairs // n_materials).astype(np.int32), (pairs % n_materials).astype(np.int32)
     additional = numbers != lowest[points]
     slot = points.copy()
     slot[additional] = n + np.arange(np.count_nonzero(additional), dtype=np.int32)
     cells = {name: block.copy() for name, block in mesh.solids.items()}
     for name, block in mesh.solids.items():
-        cells[name][shared[block]] = slot[np.searchsorted(pairs, keys[name])]
+        cells[name][on_interface[block]] = slot[np.searchsorted(pairs, keys[name])]
     node = np.concatenate([np.arange(n, dtype=np.int32), points[additional]])
     return MaterialSides(cells, node, points, numbers, slot)

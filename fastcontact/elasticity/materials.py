@@ -49,7 +49,7 @@ class Material:
         Material axes: unit vectors in rows (3, 3) [-], or a function of position, see `Orthotropic`; None means the
         axes of the mesh.
     averaged : bool
-        Whether elements that support a mean dilatation have it, except in plane stress.
+        Whether elements that support a mean dilatation use it, except in plane stress.
     incompatible_modes : bool
         Whether linear quadrangles and hexahedra have incompatible modes instead of a mean dilatation, except in axisymmetry.
     """
@@ -115,8 +115,8 @@ class Material:
     def check_thermal_and_density(self, most: int) -> None:
         """Raise ModelError if the density is negative or a thermal constant is inadmissible.
 
-        For thermal constants see `check_expansion` and `check_conductivity`.
-        `most` is 3 for materials with axes, otherwise 1. The method `bound` checks constants that vary.
+        For thermal constants see `check_expansion` and `check_conductivity`. A material may have one constant or `most` of
+        them, which is 3 for materials with axes and otherwise 1. Constants that vary are checked by `bound`.
         """
         density = self.density
         if not isinstance(density, Varying) and density is not None and not 0.0 <= _real(density) < math.inf:
@@ -134,8 +134,8 @@ class Material:
             return self
 
         def with_cells(name: str) -> Any:
-            given, label = getattr(self, name), f"the constant {name} of the material"
-            return mapped(given, lambda v: type(v)(v.given, cells, label) if isinstance(v, Varying) else v)
+            constant, label = getattr(self, name), f"the constant {name} of the material"
+            return mapped(constant, lambda v: type(v)(v.given, cells, label) if isinstance(v, Varying) else v)
 
         bound_material = copy.copy(self)
         for name in names:
@@ -145,7 +145,7 @@ class Material:
         return bound_material
 
     def constants_at(self, name: str, rows: Indices, N: Array) -> SimpleNamespace:
-        """Return the constants at n points of each of some cells of an element type, as attributes.
+        """Return the constants at n points in each of the given cells of an element type, as attributes.
 
         Varying constants are arrays (n_rows * n,) [unit of the constant], and the others numbers. `name` is the element type,
         `rows` (n_rows,) of int contains the numbers of the cells, and `N` (n, n_nodes) [-] the shape functions at the points.
@@ -161,7 +161,7 @@ class Material:
         raise NotImplementedError
 
     def admissible(self, constants: Any) -> Any:
-        """Return for each set of constants (n,) whether moduli are in range and the elastic energy is positive definite."""
+        """Return whether moduli are in range and the elastic energy is positive definite, for each set of constants (n,)."""
         raise NotImplementedError
 
     def _cells(self) -> Cells:
@@ -172,7 +172,7 @@ class Material:
         return varying_constants[0].cells
 
     def _check_at(self, names: Sequence[str], element: str, rows: Indices, N: Array) -> None:
-        """Raise ModelError with the position if constants are not admissible somewhere; `names` are those that vary."""
+        """Raise ModelError with the position if constants are inadmissible in a cell; `names` are those that vary."""
         constants, count = self.constants_at(element, rows, N), len(rows) * len(N)
         wrong = np.array(np.broadcast_to(~np.asarray(self.admissible(constants), bool), count))
         if constants.density is not None:
@@ -240,9 +240,9 @@ class Material:
         if self.expansion is None:
             return np.full((len(points), size), np.nan)
         expansion = (self if constants is None else constants).expansion
-        along, tensor = self._along_axes(expansion, points, kinematics, constants)
+        components, tensor = self._along_axes(expansion, points, kinematics, constants)
         strain = np.stack([tensor[:, i, j] * (1.0 if i == j else 2.0) for i, j in PAIRS], axis=1)
-        if np.abs(strain[:, size:]).max(initial=0.0) > ROUND_OFF * np.abs(along).max(initial=0.0):
+        if np.abs(strain[:, size:]).max(initial=0.0) > ROUND_OFF * np.abs(components).max(initial=0.0):
             raise ModelError(
                 f"the expansion of the material with {self.described} causes out-of-plane shear: align one axis with z, "
                 "or use a 3D mesh"
@@ -258,8 +258,8 @@ class Material:
         conductivity, dim = constants.conductivity, points.shape[1]
         if not isinstance(conductivity, tuple):
             return np.broadcast_to(conductivity, len(points))[:, None, None] * np.eye(dim)
-        along, tensor = self._along_axes(conductivity, points, kinematics, constants)
-        if np.abs(tensor[:, :dim, dim:]).max(initial=0.0) > ROUND_OFF * along.max(initial=0.0):
+        components, tensor = self._along_axes(conductivity, points, kinematics, constants)
+        if np.abs(tensor[:, :dim, dim:]).max(initial=0.0) > ROUND_OFF * components.max(initial=0.0):
             raise ModelError(
                 f"the conductivity of the material with {self.described} causes an out-of-plane heat flux: align one "
                 "axis with z, or use a 3D mesh"
@@ -271,10 +271,10 @@ class Material:
 
         Both have the unit of `values`; the tensors refer to the axes of the mesh.
         """
-        along, axes = np.empty((len(points), 3)), self._frames(points, kinematics, constants)
+        components, axes = np.empty((len(points), 3)), self._frames(points, kinematics, constants)
         for axis in range(3):
-            along[:, axis] = values[axis] if isinstance(values, tuple) else values
-        return along, np.einsum("nai,na,naj->nij", axes, along, axes)
+            components[:, axis] = values[axis] if isinstance(values, tuple) else values
+        return components, np.einsum("nai,na,naj->nij", axes, components, axes)
 
     def _frames(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the material axes (n, 3, 3) [-] at `points` (n, dim) [length]; `constants` contains axes given by cell."""
@@ -342,8 +342,8 @@ def check_conductivity(value: Any, most: int) -> None:
             check_positive("the conductivity", number)
 
 
-# A number, a function of position, or numbers for all cells or points. It is Any for type checkers, because a constant
-# given as a number is an attribute that holds a number, with which callers compute.
+# A number, a function of position, or numbers for all cells or points. For type checkers it is Any, because callers compute
+# with the attributes of materials whose constants are numbers.
 if TYPE_CHECKING:
     Constant = Any
 else:
@@ -453,7 +453,7 @@ class LinearElastic(Material):
         return S
 
     def admissible(self, constants: Any) -> Any:
-        """Return for each set of constants (n,) whether E is positive and in range, and nu lies between -1 and 0.5."""
+        """Return whether E is in range and nu lies between -1 and 0.5, for each set of constants (n,)."""
         E, nu = np.asarray(constants.E), np.asarray(constants.nu)
         return (E >= 1.0 / LARGEST) & (E <= LARGEST) & (nu > -1.0) & (nu < 0.5)
 

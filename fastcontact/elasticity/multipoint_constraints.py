@@ -54,8 +54,8 @@ class TemporaryConstraint(MultiPointConstraint):
     begins, ends : float
         The two instants, at ends of load steps [-].
     keeps : bool
-        Whether ``rows @ u`` keeps its values at the beginning, without regard to `value` and `ramp`; otherwise it changes
-        linearly from them to the next point of the ramp.
+        Whether ``rows @ u`` keeps its values at the beginning, irrespective of `value` and `ramp`. Otherwise it changes
+        linearly from these values to the next point of the ramp.
     """
 
     begins: float = -np.inf
@@ -67,9 +67,9 @@ class TemporaryConstraint(MultiPointConstraint):
         return self.begins <= begin < self.ends
 
     def after(self, reached: Array) -> list[MultiPointConstraint]:
-        """Return the constraints that continue from `reached` (m,) [length], the values of ``rows @ u`` at the beginning.
+        """Return the constraints that begin with the values `reached` (m,) of ``rows @ u`` at the instant `begins`.
 
-        If coefficients have a unit, that of `reached` is multiplied by it.
+        The unit of these values is [length] times the unit of the coefficients.
         """
         if self.keeps:
             return [MultiPointConstraint(self.name, self.rows, reached, ((0.0, 1.0),))]
@@ -94,7 +94,7 @@ class Elimination:
     S : csr_array (n, m)
         Derivatives of the pivots with respect to the right-hand sides [length / unit of r].
     conditions : csr_array (k, n + m)
-        Rows that only involve known components [unit of R] and right-hand sides [-]: solutions exist if
+        Rows that involve only known components [unit of R] and right-hand sides [-]. Solutions exist if
         ``conditions @ (w, r) = 0``.
     origin : ndarray of int (k,)
         Row of R from which each condition originates.
@@ -119,11 +119,11 @@ def eliminate(R: csr_array, known: Mask) -> Elimination:
     """
     m, n = R.shape
     n_uses = np.bincount(R.indices, minlength=n)
-    expressed: dict[int, Row] = {}
+    expressions: dict[int, Row] = {}
     users: dict[int, set[int]] = {}
     conditions: dict[int, Row] = {}
     for k in range(m):
-        row = _substituted(R, k, expressed)
+        row = _substitute(R, k, expressions)
         row[n + k] = row.get(n + k, 0.0) - 1.0
         largest = max((abs(c) for key, c in row.items() if key < n), default=0.0)
         unknown = [key for key, c in row.items() if key < n and not known[key] and abs(c) > 0.1 * largest]
@@ -131,44 +131,47 @@ def eliminate(R: csr_array, known: Mask) -> Elimination:
         if not unknown:
             conditions[k] = row
             continue
-        # The pivot is the component in the fewest constraints, so that few of them change by its elimination.
+        # The pivot is the component that occurs in the fewest constraints, so that its elimination changes few of them.
         pivot = min(unknown, key=lambda key: (n_uses[key], -abs(row[key]), key))
         coefficient = row.pop(pivot)
-        _express(pivot, {key: -c / coefficient for key, c in row.items()}, expressed, users)
-    pivots, origin = np.array([*expressed], np.intp), np.array([*conditions], np.intp)
-    kept = np.ones(n)
-    kept[pivots] = 0.0
-    of_pivots = _rows(expressed, (n, n + m))
-    T, S = csr_array(of_pivots[:, :n] + diags_array(kept)), csr_array(of_pivots[:, n:])
+        _express(pivot, {key: -c / coefficient for key, c in row.items()}, expressions, users)
+    pivots, origin = np.array([*expressions], np.intp), np.array([*conditions], np.intp)
+    not_pivot = np.ones(n)
+    not_pivot[pivots] = 0.0
+    pivot_rows = _rows(expressions, (n, n + m))
+    T, S = csr_array(pivot_rows[:, :n] + diags_array(not_pivot)), csr_array(pivot_rows[:, n:])
     return Elimination(pivots, T, S, _rows(dict(enumerate(conditions.values())), (len(conditions), n + m)), origin)
 
 
-def _substituted(R: csr_array, k: int, expressed: dict[int, Row]) -> Row:
+def _substitute(R: csr_array, k: int, expressions: dict[int, Row]) -> Row:
     """Return row `k` of R with pivots replaced by their expressions."""
     row: Row = {}
     entries = slice(R.indptr[k], R.indptr[k + 1])
     for key, c in zip(R.indices[entries].tolist(), R.data[entries].tolist(), strict=True):
-        for other, d in expressed.get(key, {key: 1.0}).items():
-            row[other] = row.get(other, 0.0) + c * d
+        for component, d in expressions.get(key, {key: 1.0}).items():
+            row[component] = row.get(component, 0.0) + c * d
     largest = np.abs(R.data[entries]).max(initial=0.0)
     return {key: c for key, c in row.items() if abs(c) > ZERO * largest}
 
 
-def _express(pivot: int, expression: Row, expressed: dict[int, Row], users: dict[int, set[int]]) -> None:
-    """Add a pivot, and replace it in the expressions of earlier pivots; `users` are the pivots that depend on a component."""
-    expressed[pivot] = expression
+def _express(pivot: int, expression: Row, expressions: dict[int, Row], users: dict[int, set[int]]) -> None:
+    """Add a pivot, and substitute its expression in those of earlier pivots.
+
+    `users` are the pivots whose expressions contain a component.
+    """
+    expressions[pivot] = expression
     for key in expression:
         users.setdefault(key, set()).add(pivot)
-    for other in users.pop(pivot, set()):
-        row = expressed[other]
+    for earlier in users.pop(pivot, set()):
+        row = expressions[earlier]
         c = row.pop(pivot)
         for key, d in expression.items():
             row[key] = row.get(key, 0.0) + c * d
-            users[key].add(other)
+            users[key].add(earlier)
 
 
 def _rows(rows: Mapping[int, Row], shape: tuple[int, int]) -> csr_array:
-    """Return the sparse matrix whose rows are given by dictionaries, by their number."""
+    """Return a sparse matrix, given the entries of its rows by row number and column."""
     row = np.array([number for number, entries in rows.items() for _ in entries], np.intp)
     column = np.array([key for entries in rows.values() for key in entries], np.intp)
     values = np.array([c for entries in rows.values() for c in entries.values()], np.float64)

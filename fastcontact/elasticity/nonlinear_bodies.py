@@ -1,4 +1,4 @@
-"""Bodies with nonlinear laws or finite strains: internal forces, consistent tangent, history."""
+"""Bodies with nonlinear laws or finite strains: internal forces, consistent tangent and history."""
 
 from __future__ import annotations
 
@@ -107,7 +107,10 @@ class NonlinearBodies:
 
     @property
     def flows_freely(self) -> bool:
-        """Whether `change_if_halved` applies: in plane stress, the strain across bends the path where yielding begins."""
+        """Whether `change_if_halved` applies to the materials.
+
+        It does not apply in plane stress, where the out-of-plane strain changes the strain path when yielding begins.
+        """
         return self.yields and self.kinematics != "plane_stress"
 
     @property
@@ -121,22 +124,23 @@ class NonlinearBodies:
         return {name: np.zeros((*numbers.shape, HISTORY)) for name, numbers in self._cells.items()}
 
     def _split(self, name: str) -> tuple[Array, Array]:
-        """Return the moduli without the bulk modulus where the dilatation is projected, and bulk moduli (n_moduli, 2).
+        """Return moduli for an element, and the bulk moduli (n_moduli, 2) of its dilatation.
 
-        The latter are those of the projected dilatation and of the remainder, as in `dilatation.Split`.
+        The bulk moduli are those of the projected dilatation and of the remainder, as in `dilatation.Split`. If the
+        dilatation is projected, the moduli do not contain the bulk modulus.
         """
         moduli, element = self._moduli.copy(), elements.get(name)
         bulk = np.zeros((len(moduli), 2))
         bulk[:, 1] = self._constants[:, 2]
-        of_hooke = np.isin(self._constants[:, 0], (LINEAR, SAINT_VENANT))
+        is_hookean = np.isin(self._constants[:, 0], (LINEAR, SAINT_VENANT))
         projected = self._averaged & (element.dilatation is not None) & (self._constants[:, 0] != SAINT_VENANT)
         bulk_moduli = moduli[:, :3, :3].sum(axis=(1, 2)) / 9.0
-        removed = np.where(projected & of_hooke, bulk_moduli, 0.0)
-        moduli[:, :3, :3] -= removed[:, None, None]
-        bulk[:, 1] += removed
-        shear = np.where(of_hooke, moduli[:, 3, 3], self._constants[:, 1])
-        rest = 0.0 if element.dilatation == element.order - 1 else np.minimum(bulk[:, 1], REMAINDER * shear)
-        bulk[projected] = np.column_stack([bulk[:, 1] - rest, np.broadcast_to(rest, len(bulk))])[projected]
+        subtracted_bulk = np.where(projected & is_hookean, bulk_moduli, 0.0)
+        moduli[:, :3, :3] -= subtracted_bulk[:, None, None]
+        bulk[:, 1] += subtracted_bulk
+        shear = np.where(is_hookean, moduli[:, 3, 3], self._constants[:, 1])
+        remainder = 0.0 if element.dilatation == element.order - 1 else np.minimum(bulk[:, 1], REMAINDER * shear)
+        bulk[projected] = np.column_stack([bulk[:, 1] - remainder, np.broadcast_to(remainder, len(bulk))])[projected]
         return moduli, bulk
 
     def at(
@@ -227,9 +231,10 @@ class NonlinearBodies:
     def change_if_halved(
         self, middle: Array, end: Array, before: Mapping[str, Array], bodies: DeformedBodies
     ) -> tuple[float, float]:
-        """Return the Euclidean norm of the stresses at points that yield in a step, and its change if the step were halved.
+        """Return the Euclidean norm of the stresses at points that yield in a step, and their change if the step is halved.
 
-        The radial return is exact if the direction of the plastic flow does not change in the step.
+        The change is an estimate of the error of the radial return, which is exact if the direction of the plastic flow does
+        not change in the step.
 
         Parameters
         ----------
@@ -245,19 +250,19 @@ class NonlinearBodies:
         size, change : float
             Both are zero if no point yields, or if a cell is inverted in the middle [pressure].
         """
-        yielding = {k: bodies.history[k][..., PLASTIC_STRAIN] > before[k][..., PLASTIC_STRAIN] for k in before}
-        if not any(points.any() for points in yielding.values()):
+        yields = {k: bodies.history[k][..., PLASTIC_STRAIN] > before[k][..., PLASTIC_STRAIN] for k in before}
+        if not any(points.any() for points in yields.values()):
             return 0.0, 0.0
         try:
-            halved = self.at(end, self.at(middle, before, tangent=False).history, tangent=False)
+            halved_bodies = self.at(end, self.at(middle, before, tangent=False).history, tangent=False)
         except ConvergenceError:
             return 0.0, 0.0
         twice_shear = np.sqrt([1.0, 1.0, 1.0, 2.0, 2.0, 2.0][: 2 * self.mesh.dim])  # in the norm of a tensor
-        stress, other = (
-            np.concatenate([(response.stress[name][points] * twice_shear).ravel() for name, points in yielding.items()])
-            for response in (bodies, halved)
+        stress, halved_stress = (
+            np.concatenate([(response.stress[name][points] * twice_shear).ravel() for name, points in yields.items()])
+            for response in (bodies, halved_bodies)
         )
-        return float(np.linalg.norm(stress)), float(np.linalg.norm(other - stress))
+        return float(np.linalg.norm(stress)), float(np.linalg.norm(halved_stress - stress))
 
     def _failure(self, status: int, name: str, cell: int, displacement: Array) -> str:
         """Return the message for a status other than zero of `body_kernels.linearise`."""
@@ -293,11 +298,11 @@ class NonlinearBodies:
         if self.finite:
             J, *fields = self._strains(name, bodies, displacement)
         if self.yields:
-            fields += self._yielding(name, bodies, J)
+            fields += self._plastic_fields(name, bodies, J)
         return fields
 
     def _strains(self, name: str, bodies: DeformedBodies, displacement: Array) -> list[Array]:
-        """Return J (n_cells, n_q), and the volume ratios and the logarithmic strains of largest magnitude (n_cells,)."""
+        """Return J (n_cells, n_q), the volume ratios (n_cells,), and the extreme logarithmic strains (n_cells,)."""
         (N, dN, weights), cells, results = elements.get(name).tables, self.mesh.cells[name], []
         for first in range(0, len(cells), AT_ONCE):
             rows = slice(first, first + AT_ONCE)
@@ -311,7 +316,7 @@ class NonlinearBodies:
             results.append((J, ratio, np.where(high >= -low, high, low)))
         return [np.concatenate(parts) for parts in zip(*results, strict=True)]
 
-    def _yielding(self, name: str, bodies: DeformedBodies, J: Array) -> list[Array]:
+    def _plastic_fields(self, name: str, bodies: DeformedBodies, J: Array) -> list[Array]:
         """Return the largest equivalent plastic strain and the largest ratio of stress to yield stress (n_cells,) in cells.
 
         The yield condition applies to the Kirchhoff stress, J (n_cells, n_q) times the Cauchy stress.
@@ -321,15 +326,15 @@ class NonlinearBodies:
         ratio = np.zeros(strain.shape)
         for index, law in enumerate(self._materials):
             if isinstance(law, ElasticPlastic):
-                of_law = owner == index
-                stress = J[of_law][:, None] * bodies.stress[name][of_law]
-                relative = stress - 2.0 / 3.0 * law.kinematic * history[of_law][:, : stress.shape[1]]
-                ratio[of_law] = von_mises(relative) / law.yield_at(strain[of_law])
+                rows = owner == index
+                stress = J[rows][:, None] * bodies.stress[name][rows]
+                relative = stress - 2.0 / 3.0 * law.kinematic * history[rows][:, : stress.shape[1]]
+                ratio[rows] = von_mises(relative) / law.yield_at(strain[rows])
         return [strain.max(axis=1), ratio.max(axis=1)]
 
 
 def field_names(materials: Sequence[Material], strain: str) -> tuple[str, ...]:
-    """Return the names of the cell fields of steps with these materials and strains; none for linear bodies."""
+    """Return the names of the cell fields for these materials and strains; none for linear bodies."""
     plastic = ("plastic_strain", "yield_ratio") if any(isinstance(law, ElasticPlastic) for law in materials) else ()
     return (*(("J", "logarithmic_strain") if strain == "finite" else ()), *plastic)
 
@@ -342,7 +347,7 @@ def nonlinear_bodies(mesh: Mesh, kinematics: str, strain: str, field: MaterialFi
 
 
 def check_law(law: Material, strain: str) -> None:
-    """Raise ModelError if a material does not support these strains."""
+    """Raise ModelError if a material does not support the kind of `strain`, ``"small"`` or ``"finite"``."""
     if isinstance(law, NonlinearElastic) and strain not in law.strains:
         raise ModelError(f"{type(law).__name__} requires finite strains: use Model(..., strain='finite')")
     if strain == "finite" and isinstance(law, ElasticPlastic) and law.kinematic:

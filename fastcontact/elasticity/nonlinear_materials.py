@@ -21,16 +21,17 @@ from fastcontact.elasticity.materials import NEARLY_INCOMPRESSIBLE, Constant, Li
 from fastcontact.errors import ModelError
 
 STRAINS = ("small", "finite")
-# Largest plastic strain in a cell for which linear kinematics cause no warning. Under a ball of a material without hardening,
-# the mean contact pressure is 2.6 times the yield stress if the largest plastic strain is 0.1, 2.3 if it is 0.5, and 2.1 if
-# it is 1.1. Compared with finite strains, it is 8 to 10 % lower and the force 4 to 7 % lower at 0.13 to 0.24.
+# Largest plastic strain in a cell for which linear kinematics cause no warning. Under a ball on a material without hardening,
+# the mean contact pressure is 2.6 times the yield stress if the largest plastic strain is 0.1, 2.3 times if it is 0.5, and
+# 2.1 times if it is 1.1. At plastic strains from 0.13 to 0.24, the pressure is 8 to 10 % lower and the force 4 to 7 % lower
+# than with finite strains.
 LARGEST_PLASTIC_STRAIN = 0.2
 
 
 class NonlinearElastic(LinearElastic):
-    """Base class of nonlinear laws; as `LinearElastic` they represent their elasticity at small strains."""
+    """Base class of nonlinear laws, which inherit from `LinearElastic` the isotropic elasticity at small strains."""
 
-    strains: tuple[str, ...] = STRAINS  # that the law supports
+    strains: tuple[str, ...] = STRAINS  # kinds of strain that the law supports
 
     def _check_numbers(self) -> None:
         """Raise ModelError if E or nu is not a number: constants of these laws do not vary."""
@@ -193,7 +194,7 @@ class NeoHookean(Hyperelastic):
 
 @dataclass(frozen=True)
 class OwnConstants(Hyperelastic):
-    """Base class of laws with constants from which E and nu follow.
+    """Base class of laws whose constants determine E and nu.
 
     Parameters
     ----------

@@ -42,8 +42,8 @@ def interpolation(name: str, xi: Array) -> Array:
     return np.asarray(element.shape(xi) @ element.extrapolation)
 
 
-def _times(moduli: Array, name: str, xi: Array, material: Numbers, strain: Array) -> Array:
-    """Return varying moduli, given at quadrature points by `material` (n_cells, n_q), times the strains at points `xi`."""
+def _varying_product(moduli: Array, name: str, xi: Array, material: Numbers, strain: Array) -> Array:
+    """Return the product of strains at points `xi` and moduli, given at quadrature points by `material` (n_cells, n_q)."""
     local = np.einsum("nq,cqij->cnij", interpolation(name, xi), moduli[material], optimize=True)
     return np.asarray(np.einsum("cnij,cnj->cni", local, strain))
 
@@ -105,10 +105,10 @@ class CellStress:
             else:
                 self._fill_varying((name, xi, N, dN), nodes, numbers, moduli, stress)
             if split is not None:
-                shared = of_cells(numbers), self._axisymmetric, self._displacement
+                options = of_cells(numbers), self._axisymmetric, self._displacement
                 bases = dilatation.basis(name, element.quadrature[0]), dilatation.basis(name, xi)
                 element_tables = *element.tables, bases[0], split.bulk
-                dilatation_kernels.add_pressure(points, nodes, *element_tables, *shared, bases[1], stress)
+                dilatation_kernels.add_pressure(points, nodes, *element_tables, *options, bases[1], stress)
             with_modes = incompatible_modes.with_modes(name, self._averaged)
             if with_modes is not None:
                 self._add_modes((name, xi, dN), with_modes, nodes, numbers, stress, rows[portion])
@@ -118,24 +118,24 @@ class CellStress:
             self._add_offset(self._offset, (name, xi, rows), cells, material, out)
 
     def _fill_varying(
-        self, at: tuple[str, Array, Array, Array], cells: Numbers, material: Numbers, moduli: Array,
+        self, location: tuple[str, Array, Array, Array], cells: Numbers, material: Numbers, moduli: Array,
         out: Array,
     ) -> None:  # fmt: skip
-        """Fill `out` if moduli vary within cells.
+        """Fill `out` with the stresses of cells within which the moduli vary.
 
-        The moduli are interpolated from the quadrature points, and the strains are the stresses of unit moduli.
+        The moduli are interpolated from the quadrature points. The strains are computed as stresses with unit moduli.
         """
-        name, xi, N, dN = at
+        name, xi, N, dN = location
         unit_moduli, row_of_moduli = np.eye(moduli.shape[1])[None], np.zeros(len(cells), np.int32)
-        strain, shared = np.empty_like(out), (self._axisymmetric, self._displacement)
-        LOOPS[self._mesh.dim].stress(self._mesh.points, cells, N, dN, unit_moduli, row_of_moduli, *shared, strain)
+        strain, options = np.empty_like(out), (self._axisymmetric, self._displacement)
+        LOOPS[self._mesh.dim].stress(self._mesh.points, cells, N, dN, unit_moduli, row_of_moduli, *options, strain)
         for first in range(0, len(cells), AT_ONCE):
             portion = slice(first, first + AT_ONCE)
-            out[portion] = _times(moduli, name, xi, material[portion], strain[portion])
+            out[portion] = _varying_product(moduli, name, xi, material[portion], strain[portion])
 
     def _add_modes(
         self,
-        at: tuple[str, Array, Array],
+        location: tuple[str, Array, Array],
         with_modes: Mask,
         cells: Numbers,
         material: Numbers,
@@ -143,23 +143,25 @@ class CellStress:
         rows: Indices,
     ) -> None:
         """Add the stresses of incompatible modes of the moduli `with_modes` (n_materials,)."""
-        name, xi, dN = at
-        numbers, subtracted = material.reshape(len(cells), -1), np.empty((0, 0, 0))
+        name, xi, dN = location
+        numbers, offset_stress = material.reshape(len(cells), -1), np.empty((0, 0, 0))
         if self._offset is not None:
             quadrature_points = name, elements.get(name).quadrature[0], rows
             strain = self._stress_free(self._offset, quadrature_points, cells, material)
-            subtracted = (self._moduli[numbers] @ strain[..., None])[..., 0]
+            offset_stress = (self._moduli[numbers] @ strain[..., None])[..., 0]
             stress = self._offset.initial("stress", name, rows, elements.get(name).tables[0])
-            subtracted = subtracted if stress is None else subtracted - stress
+            offset_stress = offset_stress if stress is None else offset_stress - stress
         incompatible_modes_kernels.add_stress(
             self._mesh.points, cells, *incompatible_modes.tables(name), self._moduli, with_modes, numbers,
-            self._displacement, subtracted, xi, dN, interpolation(name, xi), out,
+            self._displacement, offset_stress, xi, dN, interpolation(name, xi), out,
         )  # fmt: skip
 
     @staticmethod
-    def _stress_free(offset: StressOffset, at: tuple[str, Array, Indices], cells: Numbers, material: Numbers) -> Array:
+    def _stress_free(
+        offset: StressOffset, location: tuple[str, Array, Indices], cells: Numbers, material: Numbers
+    ) -> Array:
         """Return the sum of thermal and initial strains (n_cells, n, n_components) [-]."""
-        name, xi, rows = at
+        name, xi, rows = location
         N = elements.get(name).shape(xi)
         if material.ndim == 1:
             expansion = offset.expansion[material][:, None, :]
@@ -170,20 +172,20 @@ class CellStress:
         return strain if initial is None else strain + initial
 
     def _add_offset(
-        self, offset: StressOffset, at: tuple[str, Array, Indices], cells: Numbers, material: Numbers, out: Array
+        self, offset: StressOffset, location: tuple[str, Array, Indices], cells: Numbers, material: Numbers, out: Array
     ) -> None:
         """Add initial stresses, and subtract the moduli times the stress-free strains, with their dilatation projected."""
-        name, xi, rows = at
+        name, xi, rows = location
         stress = offset.initial("stress", name, rows, elements.get(name).shape(xi))
         if stress is not None:
             out += stress
-        strain = self._stress_free(offset, at, cells, material)
+        strain = self._stress_free(offset, location, cells, material)
         split = dilatation.split(name, self._moduli, self._averaged)
         moduli = self._moduli if split is None else split.moduli
         if material.ndim == 1:
             out -= strain @ moduli[material]  # moduli are symmetric
         else:
-            out -= _times(moduli, name, xi, material, strain)
+            out -= _varying_product(moduli, name, xi, material, strain)
         if split is None:
             return
         bulk = split.bulk[of_cells(material)]
@@ -191,8 +193,8 @@ class CellStress:
         at_points = name, elements.get(name).quadrature[0], rows[split_cells]
         strain = self._stress_free(offset, at_points, cells[split_cells], material[split_cells])
         corners = self._mesh.points[cells[split_cells]]
-        mean_and_rest = dilatation.projected(name, corners, strain[:, :, :3].sum(axis=2), xi, self._axisymmetric)
-        out[split_cells, :, :3] -= (bulk[split_cells][:, :, None] * mean_and_rest).sum(axis=1)[:, :, None]
+        dilatations = dilatation.projected(name, corners, strain[:, :, :3].sum(axis=2), xi, self._axisymmetric)
+        out[split_cells, :, :3] -= (bulk[split_cells][:, :, None] * dilatations).sum(axis=1)[:, :, None]
 
 
 @typed(ModelError)
@@ -246,8 +248,8 @@ def nodal_stress(
 ) -> Array:
     """Return the stress (n_points, n_components) [pressure] at the nodes: `nodal_average` of `stress_at_points`.
 
-    Other arguments are as for `stress_at_points`. Stresses at points are computed for a limited number of cells at a time,
-    which takes less memory. With `sides` the result has a row for each of its slots (n_slots, n_components): the mean at a
+    The other arguments are those of `stress_at_points`. To save memory, stresses at points are computed for a limited number
+    of cells at a time. With `sides` the result has a row for each of its slots (n_slots, n_components): the mean at a
     node over the cells of one material.
     """
     stress = CellStress(mesh, kinematics, moduli, displacement, averaged, offset)
@@ -267,7 +269,7 @@ def nodal_stress(
 
 
 class NodalAverage:
-    """Mean of the stresses of the adjacent cells at each node, all cells with the same weight."""
+    """Mean over the cells at each node of their stresses, with the same weight for all cells."""
 
     def __init__(self, count: int, components: int) -> None:
         self._total, self._count = np.zeros((count, components)), np.zeros(count)

@@ -1,7 +1,7 @@
 """Linear springs at nodes, which add the positive semidefinite matrix ``R.T diag(k) R`` to the stiffness.
 
 A spring with the stiffness k has the energy ``k (r u)^2 / 2``, where the row r of R yields its elongation from the
-displacements u. Springs along a line keep the reference direction of the line.
+displacements u. The direction of springs along a line is that of the undeformed line.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def spring_force(springs: Sequence[Springs], u: Array) -> Array:
 
 
 def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
-    """Return a warning for each spring that is so much stiffer than the bodies at its ends that results lose digits.
+    """Return a warning for each set of springs so stiff, compared with the bodies at their ends, that results lose digits.
 
     The sum of the stiffnesses of a body and a spring has the absolute accuracy of the larger one. Springs along an axis
     to the ground only add to the diagonal of K, like a penalty for a support, which does not impair the results.
@@ -176,7 +176,7 @@ def _stiffness_ratio(spring: Springs, diagonal: Array, dim: int) -> tuple[float,
     row, node = rows.coords[0], rows.coords[1] // dim
     ends, index = np.unique(np.stack([row, node]), axis=1, return_inverse=True)
     body = np.bincount(index.ravel(), weights=rows.data**2 * diagonal[rows.coords[1]])
-    # Springs that only add to the diagonal are left out, and so are points without a body.
+    # Springs that only add to the diagonal of K are ignored, as are points that belong to no body.
     relevant = (np.diff(spring.rows.indptr)[ends[0]] > 1) & (body > 0.0)
     if not relevant.any():
         return 0.0, 0.0

@@ -38,7 +38,7 @@ class Owners(NamedTuple):
     Attributes
     ----------
     owner : ndarray of uint8 (n_points,)
-        Part of each point, whose rows of the matrix it computes.
+        Number of the part that computes the rows of the matrix of each point.
     cells : list of (int, int)
         First cell of each part, and the cell after its last one.
     """
@@ -65,7 +65,7 @@ class Sparsity:
     _owners: dict[tuple[str, int], Owners] = field(default_factory=dict, init=False, repr=False)
 
     def owners(self, mesh: Mesh, name: str) -> Owners:
-        """Return the division of the assembly of an element type, which is computed once for each number of parts."""
+        """Return the division of the assembly of an element type; it is stored for each number of parts."""
         key = name, len(parallel.portions(*mesh.cells[name].shape))
         if key not in self._owners:
             self._owners[key] = owners(mesh.cells[name], mesh.n_points)
@@ -77,12 +77,12 @@ def sparsity(mesh: Mesh) -> Sparsity:
     blocks = mesh.solids
     nodes = np.concatenate([np.empty(0, np.int32), *(block.ravel() for block in blocks.values())])
     isolated = np.flatnonzero(np.bincount(nodes, minlength=mesh.n_points) == 0)
-    of_blocks = (np.full(len(block), block.shape[1]) for block in blocks.values())
-    sizes = np.concatenate([[0], *of_blocks, np.ones_like(isolated)])
+    cell_sizes = (np.full(len(block), block.shape[1]) for block in blocks.values())
+    sizes = np.concatenate([[0], *cell_sizes, np.ones_like(isolated)])
     # SciPy preserves the type of index arrays, so that the indices of all matrices are 32-bit integers like the nodes.
     nodes, first = np.concatenate([nodes, isolated.astype(np.int32)]), np.cumsum(sizes, dtype=np.int32)
-    of_cells = csr_array((np.ones(len(nodes), bool), nodes, first), shape=(len(sizes) - 1, mesh.n_points))
-    pattern = csr_array(of_cells.T @ of_cells)
+    incidence = csr_array((np.ones(len(nodes), bool), nodes, first), shape=(len(sizes) - 1, mesh.n_points))
+    pattern = csr_array(incidence.T @ incidence)
     pattern.sort_indices()
     indptr, indices = pattern.indptr, pattern.indices
     return Sparsity(indptr, indices, {name: _slots(block, indptr, indices) for name, block in blocks.items()})
@@ -177,9 +177,9 @@ def of_cells(material: Numbers) -> Numbers:
 
 
 def _passes(tables: Tables, material: Numbers) -> Iterator[tuple[Tables, Numbers]]:
-    """Yield quadrature tables and the material (n_cells,) at their points: of each point if it varies within cells.
+    """Yield quadrature tables, each with the material (n_cells,) at its points.
 
-    Otherwise there is one pass with all points.
+    If the material varies within cells, there is one table for each quadrature point, otherwise one table of all points.
     """
     if material.ndim == 1:
         yield tables, material
@@ -195,7 +195,7 @@ def _add_part(
 ) -> int:  # fmt: skip
     """Add the stiffness of one element type to `data` (n_blocks, dim, dim), in the rows of part `number` of `Owners`.
 
-    The tuple `moduli` contains the moduli, which of them are isotropic, their split, and which have incompatible modes.
+    The tuple `moduli` contains the moduli, a mask of the isotropic ones, their split, and a mask of those with modes.
     Returns the number of the first cell with a Jacobian that is not positive, or -1.
     """
     (D, isotropic, split, with_modes), tables = moduli, elements.get(name).tables

@@ -75,7 +75,7 @@ class Temperature:
             raise ModelError(f"{self.name} is not finite at point {int(np.flatnonzero(~np.isfinite(self.value))[0])}")
 
     def rise(self, mesh: Mesh) -> Array:
-        """Return the rise over the reference (n_points,) [temperature] at multiplier 1, zero at points of other cells."""
+        """Return the rise over the reference (n_points,) [temperature] at multiplier 1, zero at all other points."""
         points = solid_points(mesh, self.groups)
         rise = np.zeros(mesh.n_points)
         if isinstance(self.value, np.ndarray):

@@ -1,4 +1,4 @@
-"""Products of small matrices by tiles of 4 x 4 numbers, in vector instructions.
+"""Products of small matrices by tiles of 4 x 4 numbers, with vector instructions.
 
 The compiler does not vectorise loops over the few nodes of a cell. Here a row of a tile is one vector, and the tile stays in
 registers: the product ``A.T B`` of two matrices (24, 8) takes 0.10 us instead of 0.50 us in scalar instructions.

@@ -94,14 +94,17 @@ class Cells:
         return sum(map(len, self.rows.values()))
 
     def samples(self) -> Iterator[tuple[str, Indices, Array]]:
-        """Yield element type, cells and shape functions (n, n_nodes) [-]: first at centres, then at quadrature points."""
+        """Yield the element type, the cells and the shape functions (n, n_nodes) [-] at points of the cells.
+
+        The points are first the centres of the cells, then their quadrature points.
+        """
         for shapes in (centre, lambda name: elements.get(name).tables[0]):
             for name, rows in self.rows.items():
                 yield name, rows, shapes(name)
 
 
 def centre(name: str) -> Array:
-    """Return the weights (1, n_nodes) [-] of the nodes in the centre of a cell, the mean of its nodes."""
+    """Return the weights (1, n_nodes) [-] of the nodes of a cell in its centre, which is the mean of the nodes."""
     n = elements.get(name).n_nodes
     return np.full((1, n), 1.0 / n)
 
@@ -116,7 +119,7 @@ class Varying:
     given : callable or ndarray
         A function from positions (n, dim) [length] to numbers (n,), or an array with a number for each cell or point.
     cells : Cells, optional
-        Cells of the material, once it has been assigned to cells.
+        Cells of the material; None before the material is assigned to cells.
     name : str
         Name of the constant in messages.
     """
@@ -183,7 +186,7 @@ class Varying:
         return float(min(values.min() for values in samples)), float(max(values.max() for values in samples))
 
     def at(self, name: str, rows: Indices, N: Array) -> Array:
-        """Return the values (n_rows * n,) [unit of the constant] at n points of each of some cells, cell by cell.
+        """Return the values (n_rows * n,) [unit of the constant] at n points in each of the given cells, cell by cell.
 
         `name` is the element type of the cells, `rows` (n_rows,) of int contains their numbers, and `N` (n, n_nodes) [-] the
         shape functions at the points.

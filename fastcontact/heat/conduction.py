@@ -1,4 +1,4 @@
-"""Steady heat conduction in the solid cells: conduction matrix, heat flux, and bodies of undetermined temperature."""
+"""Steady heat conduction in the solid cells: conduction matrix, heat flux, and bodies with undetermined temperature."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ class Conduction:
 
     def check(self) -> None:
         """Raise ModelError if the material of a cell has no conductivity."""
-        lacking = np.array([material.conductivity is None for material in self.materials])
-        n_lacking = sum(int(lacking[numbers].sum()) for numbers in self.number.values())
-        if n_lacking:
+        without_conductivity = np.array([material.conductivity is None for material in self.materials])
+        n_cells = sum(int(without_conductivity[numbers].sum()) for numbers in self.number.values())
+        if n_cells:
             raise ModelError(
-                f"heat conduction is solved, but {n_lacking} solid cells have a material without conductivity: define it "
+                f"heat conduction is solved, but {n_cells} solid cells have a material without conductivity: define it "
                 "with conductivity=..."
             )
 
@@ -96,10 +96,10 @@ class Conduction:
         return gradient, k, volume
 
 
-def not_reached(body: AnyArray, held: Mask, joined: AnyArray) -> Indices:
+def not_reached(body: AnyArray, determined: Mask, connections: AnyArray) -> Indices:
     """Return the numbers (n,) of the bodies whose steady temperature is undetermined, in ascending order.
 
-    Such bodies have no thermal connection to a prescribed temperature or a film.
+    These bodies are not connected, directly or through other bodies, with a prescribed temperature or a film.
 
     Parameters
     ----------
@@ -110,8 +110,8 @@ def not_reached(body: AnyArray, held: Mask, joined: AnyArray) -> Indices:
     joined : ndarray of int (m, 2)
         Pairs of points between which heat flows.
     """
-    pairs = body[joined]
+    pairs = body[connections]
     pairs, count = pairs[(pairs >= 0).all(axis=1)], int(body.max()) + 1
     graph = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(count, count))
     component = connected_components(graph, directed=False)[1]
-    return np.flatnonzero(~np.isin(component, component[np.unique(body[held & (body >= 0)])]))
+    return np.flatnonzero(~np.isin(component, component[np.unique(body[determined & (body >= 0)])]))

@@ -1,7 +1,7 @@
 """Heat loads of solid cells: prescribed temperatures, fluxes, films, sources and nodal heat.
 
 Fluxes, films and sources are multiplied by the shape functions and integrated, in axisymmetry over the full circle and in the
-plane per unit thickness. Areas and volumes are those of the `deformed` mesh; values are functions of reference positions.
+plane per unit thickness. Areas and volumes are those of the `deformed` mesh, but values are evaluated at reference positions.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class TemporaryHeat(Load):
 
     @property
     def label(self) -> str:
-        """Label by which messages distinguish the load from others of the same kind and group."""
+        """Label that distinguishes the load from others of the same kind and group in messages."""
         return self.name if self.begins == -np.inf else f"{self.name} from {self.begins:g}"
 
     @property
@@ -82,7 +82,7 @@ class FixedTemperature(TemporaryHeat):
             )
 
     def history(self) -> tuple[Table | None, Table]:
-        """Return the ramps of the rise of `value` and of `reached`; the latter falls to zero at the next point of `ramp`."""
+        """Return the ramps of the rises of `value` and `reached`; the second ends with zero at the next point of `ramp`."""
         later = [point for point in self.ramp or () if point[0] > self.begins]
         if self.reached is None or not later:
             return self.ramp, ()
@@ -138,7 +138,7 @@ class NodalHeat(Heating):
         check_points(mesh, self.group, "nothing can heat it")
 
     def power(self, mesh: Mesh, kinematics: str, deformed: Mesh) -> Array:
-        """Return the powers, as for other heat loads."""
+        """Return the powers (n_points,) [power] at multiplier 1; see `Heating.power`."""
         total, nodes = np.zeros(mesh.n_points), mesh.points_of(self.group)
         total[nodes] = evaluated(self.value, mesh.points[nodes], self.name)
         return total
@@ -146,7 +146,7 @@ class NodalHeat(Heating):
 
 @dataclass(frozen=True)
 class Film(TemporaryHeat):
-    """Convection from a group of facets into surroundings: ``coefficient * (temperature - ambient)`` [power / area].
+    """Convection from a group of facets to the surroundings: ``coefficient * (temperature - ambient)`` [power / area].
 
     Attributes
     ----------

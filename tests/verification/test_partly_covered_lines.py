@@ -6,7 +6,7 @@ from models import elastic_model, supported, united
 
 import fastcontact as fc
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.formulations.mortar import DETERMINED, WholeFacets, determined
+from fastcontact.contact.formulations.mortar import DETERMINED, WholeFacets, independent_values
 from fastcontact.mesh.generate import block
 
 pytestmark = pytest.mark.each_value
@@ -75,7 +75,7 @@ def test_fields_are_as_rich_as_what_takes_part_determines(element, axisymmetric)
             N = fc.mesh.elements.get(side.element).shape(xi[:, None])
             dA = 0.5 * (high - low) * w * (2.0 * np.pi * at if axisymmetric else 1.0)
             mass[f] = (dA[:, None, None] * N[:, :, None] * N[:, None, :]).sum(axis=0)
-        nodes, independent = determined(side, whole, [mass], np.zeros(len(side.points), bool))
+        nodes, independent = independent_values(side, whole, [mass], np.zeros(len(side.points), bool))
         total, reference = np.zeros((2, len(side.points), len(side.points)))
         for one, full, local in zip(mass, whole[0].mass, side.local, strict=True):
             total[np.ix_(local, local)] += one

@@ -1,7 +1,7 @@
 """Segmentation of secondary faces by clipping with the primary faces, and integration over the segments (Puso, 2004).
 
 Both sides are projected along the normal of the secondary facet. Each segment then belongs to one facet on each side. Curved
-facets are clipped as the polygons of their corners, with an error of second order in the ratio of facet length to radius.
+facets are clipped as polygons of their corners, with an error of second order in the ratio of facet length to radius.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements, quadrature
 
-# Facets are clipped up to a distance of REACH times the sum of the distance of the closest primary facet and the radius of
-# the secondary facet.
+# Two facets are clipped if their distance is at most REACH times the sum of the radius of the secondary facet and its
+# distance from the closest primary facet.
 REACH = 3.0
-# Work per secondary facet relative to the unit of work in `parallel.portions`, for the choice of the number of threads.
+# Work per secondary facet in the units of `parallel.portions`, which choose the number of threads.
 EFFORT = 400
 
 
@@ -56,23 +56,23 @@ def face_overlap(
     centres = np.concatenate([polygons.origin for polygons in secondary_polygons])
     distance = closest_of_kinds(centres, primary.corners(deformed)).distance
     axes = None if smoothing is None else [frames(side, reference, deformed) for side in (secondary, primary)]
-    masses, couplings, depths, first = [], [], [], 0
+    masses, couplings, depths, offset = [], [], [], 0
     for of_secondary in secondary_polygons:
         size, nodes = of_secondary.block.facets.shape
-        reach = REACH * (distance[first : first + size] + of_secondary.radius)
-        mass, depth, first_other = np.zeros((size, nodes, nodes)), np.zeros((size, nodes)), 0
+        reach = REACH * (distance[offset : offset + size] + of_secondary.radius)
+        mass, depth, primary_offset = np.zeros((size, nodes, nodes)), np.zeros((size, nodes)), 0
         for of_primary in primary_polygons:
-            pairs = _facing(of_secondary, of_primary, reach)
-            rows = slice(first, first + size), slice(first_other, first_other + len(of_primary.nodes))
+            pairs = _overlap_candidates(of_secondary, of_primary, reach)
+            rows = slice(offset, offset + size), slice(primary_offset, primary_offset + len(of_primary.nodes))
             heights = _heights(smoothing, pairs, rows, axes)
-            coupling, area, pair_depth = _integrated(of_secondary, of_primary, pairs, reference, heights)
+            coupling, area, depth_of_pairs = _integrals(of_secondary, of_primary, pairs, reference, heights)
             couplings.append(coupling)
             mass += area
-            depth += pair_depth
-            first_other += len(of_primary.nodes)
+            depth += depth_of_pairs
+            primary_offset += len(of_primary.nodes)
         masses.append(mass)
         depths.append(depth[:, :, None] * -of_secondary.axes[:, None, 2])
-        first += size
+        offset += size
     return Overlap(masses, couplings, depths, [])
 
 
@@ -84,7 +84,7 @@ def _heights(
     Parameters
     ----------
     smoothing : Smoothing or None
-        Without smoothing, the heights are empty arrays.
+        The smooth surfaces; if None, the heights are empty arrays.
     pairs : ndarray of int (n_pairs, 2)
         Numbers of the secondary and the primary facet, each in its block.
     rows : (slice, slice)
@@ -100,8 +100,8 @@ def _heights(
         See `Smoothing.shared`.
     """
     if smoothing is None or axes is None:
-        none = np.zeros((0, 0, 0))
-        return none, none, np.zeros((len(pairs), 2))
+        no_heights = np.zeros((0, 0, 0))
+        return no_heights, no_heights, np.zeros((len(pairs), 2))
     secondary, primary = smoothing.secondary.of_facets(rows[0]), smoothing.primary.of_facets(rows[1])
     axes_of_facets = axes[0][rows[0]], axes[1][rows[1]]
     factors = Smoothing(secondary, primary).shared(pairs[:, 0], pairs[:, 1], axes_of_facets)
@@ -147,7 +147,7 @@ class _Polygons:
         return cls(block, nodes, count, origin, axes, radius, corners.min(axis=1), corners.max(axis=1))
 
 
-def _facing(secondary: _Polygons, primary: _Polygons, reach: Array) -> Indices:
+def _overlap_candidates(secondary: _Polygons, primary: _Polygons, reach: Array) -> Indices:
     """Return pairs (n, 2) of a secondary and a primary facet that may overlap, in ascending order.
 
     `reach` (n_secondary,) are the largest distances at which facets are paired [length].
@@ -166,10 +166,10 @@ def _facing(secondary: _Polygons, primary: _Polygons, reach: Array) -> Indices:
         capacity = count
 
 
-def _integrated(
+def _integrals(
     secondary: _Polygons, primary: _Polygons, pairs: Indices, reference: Array, heights: tuple[Array, Array, Array]
 ) -> tuple[Coupling, Array, Array]:
-    """Return the integrals over the overlap of pairs of facets.
+    """Return integrals of shape functions over the overlap of each pair of facets.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def _integrated(
     coupling : Coupling
     mass : ndarray (n, k, k)
         Integrals of products of two shape functions of the n secondary facets [area].
-    closer : ndarray (n, k)
+    gap_reduction : ndarray (n, k)
         Integrals of the shape functions times the distance by which the smooth surfaces are closer than the facets [volume].
 
     Raises
@@ -198,7 +198,7 @@ def _integrated(
     to_terms, primary_to_terms = tables(element.n_nodes).to_terms, tables(opposite.n_nodes).to_terms
     n, k = secondary.block.facets.shape
     mass, integrals = np.empty((len(pairs), k, k)), np.empty((len(pairs), k, opposite.n_nodes))
-    closer, start = np.empty((n, k)), np.searchsorted(pairs[:, 0], np.arange(n + 1))
+    gap_reduction, start = np.empty((n, k)), np.searchsorted(pairs[:, 0], np.arange(n + 1))
     degree = polynomial_degree(element.n_nodes) + polynomial_degree(max(element.n_nodes, opposite.n_nodes))
     # Between triangles the quadrature is exact, so that the result does not depend on the choice of a first corner.
     if element.n_nodes == opposite.n_nodes == 3:
@@ -207,7 +207,7 @@ def _integrated(
         start, secondary.nodes, secondary.count, secondary.origin, secondary.axes,
         to_terms @ secondary.nodes, to_terms @ reference[secondary.block.facets], to_terms, _middle(element),
         primary.nodes, primary.count, primary_to_terms @ primary.nodes, primary_to_terms, _middle(opposite),
-        pairs, *quadrature.triangle(min(degree + degree % 2, 8)), *heights, mass, integrals, closer,
+        pairs, *quadrature.triangle(min(degree + degree % 2, 8)), *heights, mass, integrals, gap_reduction,
     )  # fmt: skip
     failed = parallel.parallel_map(
         lambda portion: _cut_faces_kernels.integrate(*portion, *arguments), parallel.portions(n, EFFORT)
@@ -217,7 +217,7 @@ def _integrated(
         raise ContactError(f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there")
     of_facets = csr_array((np.ones(len(pairs)), np.arange(len(pairs)), start), shape=(n, len(pairs)))
     total = (of_facets @ mass.reshape(-1, k * k)).reshape(-1, k, k)
-    return Coupling(secondary.block, primary.block, pairs, integrals), total, closer
+    return Coupling(secondary.block, primary.block, pairs, integrals), total, gap_reduction
 
 
 def _middle(element: elements.Element) -> Array:

@@ -74,15 +74,15 @@ def _area(flat, count):
 @kernel
 def _centroid(flat, count):
     """Return the centre of area of a polygon."""
-    x, y, twice = 0.0, 0.0, 0.0
+    x, y, twice_area = 0.0, 0.0, 0.0
     for k in range(1, count - 1):
         ux, uy = flat[k, 0] - flat[0, 0], flat[k, 1] - flat[0, 1]
         vx, vy = flat[k + 1, 0] - flat[0, 0], flat[k + 1, 1] - flat[0, 1]
         area = ux * vy - uy * vx
         x += area * (ux + vx) / 3.0
         y += area * (uy + vy) / 3.0
-        twice += area
-    return flat[0, 0] + x / twice, flat[0, 1] + y / twice
+        twice_area += area
+    return flat[0, 0] + x / twice_area, flat[0, 1] + y / twice_area
 
 
 @kernel
@@ -91,20 +91,20 @@ def _clip(subject, count, window, n_window, spare):
     for w in range(n_window):
         ax, ay = window[w, 0], window[w, 1]
         bx, by = window[(w + 1) % n_window, 0], window[(w + 1) % n_window, 1]
-        kept = 0
+        n_kept = 0
         for k in range(count):
             m = (k + 1) % count
             this_side = (bx - ax) * (subject[k, 1] - ay) - (by - ay) * (subject[k, 0] - ax)
             next_side = (bx - ax) * (subject[m, 1] - ay) - (by - ay) * (subject[m, 0] - ax)
             if this_side >= 0.0:
-                spare[kept, 0], spare[kept, 1] = subject[k, 0], subject[k, 1]
-                kept += 1
+                spare[n_kept, 0], spare[n_kept, 1] = subject[k, 0], subject[k, 1]
+                n_kept += 1
             if (this_side > 0.0 and next_side < 0.0) or (this_side < 0.0 and next_side > 0.0):
                 t = this_side / (this_side - next_side)
-                spare[kept, 0] = subject[k, 0] + t * (subject[m, 0] - subject[k, 0])
-                spare[kept, 1] = subject[k, 1] + t * (subject[m, 1] - subject[k, 1])
-                kept += 1
-        count = kept
+                spare[n_kept, 0] = subject[k, 0] + t * (subject[m, 0] - subject[k, 0])
+                spare[n_kept, 1] = subject[k, 1] + t * (subject[m, 1] - subject[k, 1])
+                n_kept += 1
+        count = n_kept
         for k in range(count):
             subject[k, 0], subject[k, 1] = spare[k, 0], spare[k, 1]
         if count < 3:
@@ -113,7 +113,7 @@ def _clip(subject, count, window, n_window, spare):
 
 
 @kernel
-def _common(corners, count, others, n_others, origin, axes, subject, window, spare):
+def _overlap(corners, count, others, n_others, origin, axes, subject, window, spare):
     """Fill `subject` with the overlap of two polygons; return its number of corners, 0 for none."""
     _flatten(corners, count, count, origin, axes, subject)
     full_area = _area(subject, count)
@@ -128,14 +128,17 @@ def _common(corners, count, others, n_others, origin, axes, subject, window, spa
 
 @kernel
 def _meets(low, high, origin, normal, radius, reach):
-    """Return whether a box may meet the cylinder of a `radius` and length 2 `reach` around a normal; False if it is empty."""
+    """Return whether a box may intersect the cylinder of `radius` and length 2 `reach` around a normal.
+
+    The result is False for an empty box.
+    """
     if low[0] > high[0]:
         return False
     square, along, size = 0.0, 0.0, 0.0
     for d in range(3):
-        apart = 0.5 * (low[d] + high[d]) - origin[d]
-        along += apart * normal[d]
-        square += apart * apart
+        offset = 0.5 * (low[d] + high[d]) - origin[d]
+        along += offset * normal[d]
+        square += offset * offset
         size += 0.25 * ((high[d] - low[d]) * (high[d] - low[d]))
     size = np.sqrt(size)
     return abs(along) <= reach + size and square - along * along <= (radius + size) * (radius + size)
@@ -188,7 +191,7 @@ def facing_pairs(
                 continue
             p = numbers[box - leaves]
             cosine = normal[0] * other_normal[p, 0] + normal[1] * other_normal[p, 1] + normal[2] * other_normal[p, 2]
-            if cosine <= facing and _common(
+            if cosine <= facing and _overlap(
                 secondary[s], n_secondary, primary[p], n_primary, origin[s], axes[s], subject, window, spare
             ):
                 if count < pairs.shape[0]:
@@ -217,18 +220,18 @@ def _fill_terms(n_terms, s, t, terms):
 
 @innermost_kernel
 def _locate(flat, x, y, xi, terms):
-    """Move `xi` (2,) to the point of a facet above (x, y) and fill `terms` there; return its area per unit of xi.
+    """Move `xi` (2,) to the point of a facet above (x, y), and fill `terms` at this point.
 
-    Return zero if there is no such point.
+    Returns the area of the projected facet per unit of xi, or zero if there is no point above (x, y).
     """
     n_terms = flat.shape[0]
     for _ in range(MAX_ITERATIONS):
         _fill_terms(n_terms, xi[0], xi[1], terms)
-        off_x, off_y = x, y
+        residual_x, residual_y = x, y
         a, b, c, d = 0.0, 0.0, 0.0, 0.0
         for k in range(n_terms):
-            off_x -= flat[k, 0] * terms[k, 0]
-            off_y -= flat[k, 1] * terms[k, 0]
+            residual_x -= flat[k, 0] * terms[k, 0]
+            residual_y -= flat[k, 1] * terms[k, 0]
             a += flat[k, 0] * terms[k, 1]
             b += flat[k, 0] * terms[k, 2]
             c += flat[k, 1] * terms[k, 1]
@@ -236,7 +239,7 @@ def _locate(flat, x, y, xi, terms):
         area = a * d - b * c
         if area == 0.0:
             return 0.0
-        step_s, step_t = (d * off_x - b * off_y) / area, (a * off_y - c * off_x) / area
+        step_s, step_t = (d * residual_x - b * residual_y) / area, (a * residual_y - c * residual_x) / area
         xi[0] += step_s
         xi[1] += step_t
         if n_terms == 3 or (abs(step_s) < LENGTH_ROUND_OFF and abs(step_t) < LENGTH_ROUND_OFF):
@@ -247,7 +250,7 @@ def _locate(flat, x, y, xi, terms):
 
 @innermost_kernel
 def _stretch(facet, terms):
-    """Return the area of a facet per unit of xi."""
+    """Return the area of a facet per unit of xi at the point of `terms`."""
     area = 0.0
     for d in range(3):
         e, f = (d + 1) % 3, (d + 2) % 3
@@ -310,22 +313,45 @@ def integrate(
 ):  # fmt: skip
     """Integrate products of shape functions over the segments of the secondary facets `low` to ``high - 1``.
 
-    Both facets are projected along the normal of the secondary polygon; areas are those of the reference surface. Segments
-    are divided into triangles around their centres. The rule is exact between flat triangles. On other facets it has
-    an error, which does not depend on the choice of a first corner because of the centre, and does not jump where corners
+    Both facets are projected along the normal of the secondary polygon. Areas are those of the reference surface. Segments
+    are divided into triangles around their centres. The quadrature is exact between flat triangles. On other facets it has an
+    error. Because of the centres, this error does not depend on the choice of a first corner, and does not jump where corners
     appear or vanish.
 
-    Planes and polygons are those of `facing_pairs`, `pairs` (n_pairs, 2) its result, ascending in the secondary facet;
-    those of facet s begin at ``start[s]``.
-    `deformed` and `reference` (n_facets, n_terms, 3) are the terms of the secondary facets in both configurations,
-    `to_terms` (n_terms, n_nodes) computes them from nodal values, `middle` (2,) is the initial guess of the reference
-    coordinates; the same with `other` for the primary facets. `points` (n_q, 2) and `weights` (n_q,) are a rule on the
-    triangle. `heights` (n_facets, k, k) of both sides' smooth surfaces, k = 0 for none, are weighted by the `factor`
-    (n_pairs, 2) of the pair. Filled in place: `mass` (n_pairs, n_nodes, n_nodes), products of the secondary shape
-    functions over the segment, `coupling` (n_pairs, n_nodes, n_other_nodes), secondary times primary shape
-    functions, and `closer` (n_facets, n_nodes), the former times the sum of both heights.
+    Parameters
+    ----------
+    low, high : int
+    start : (n_facets + 1,)
+        First pair of each secondary facet.
+    secondary, n_secondary, origin, axes, primary, n_primary
+        Polygons and planes, as for `facing_pairs`.
+    deformed, reference : (n_facets, n_terms, 3)
+        Terms of the secondary facets in both configurations [length].
+    to_terms : (n_terms, n_nodes)
+        Matrix from nodal values to terms.
+    middle : (2,)
+        Initial guess of reference coordinates.
+    other_deformed, other_to_terms, other_middle
+        The same for the primary facets.
+    pairs : (n_pairs, 2)
+        Result of `facing_pairs`, in ascending order.
+    points, weights : (n_q, 2), (n_q,)
+        Quadrature rule on the triangle.
+    heights, other_heights : (n_facets, k, k)
+        Heights of the smooth surfaces of both sides; k is 0 without smoothing [length].
+    factor : (n_pairs, 2)
+        Factors of the heights of both sides.
+    mass : (n_pairs, n_nodes, n_nodes)
+        Filled with integrals of products of two secondary shape functions over each segment [area].
+    coupling : (n_pairs, n_nodes, n_other_nodes)
+        Filled with integrals of secondary times primary shape functions [area].
+    closer : (n_facets, n_nodes)
+        Filled with integrals of secondary shape functions times the sum of both heights [volume].
 
-    Return -1, or the number of a pair with a facet that is too distorted to be projected.
+    Returns
+    -------
+    int
+        -1, or the number of a pair with a facet that is too distorted to be projected.
     """
     capacity = n_secondary + 2 * n_primary  # each side of the window adds at most two corners
     subject, window, spare = np.empty((capacity, 2)), np.empty((capacity, 2)), np.empty((capacity, 2))
@@ -338,16 +364,16 @@ def integrate(
         s, p = pairs[i, 0], pairs[i, 1]
         _flatten(deformed[s], n, 1, origin[s], axes[s], flat)  # coefficients: only the first is a position
         _flatten(other_deformed[p], m, 1, origin[s], axes[s], other_flat)
-        count = _common(secondary[s], n_secondary, primary[p], n_primary, origin[s], axes[s], subject, window, spare)
+        count = _overlap(secondary[s], n_secondary, primary[p], n_primary, origin[s], axes[s], subject, window, spare)
         for d in range(2):
             xi[d], other_xi[d] = middle[d], other_middle[d]
         ox, oy = (subject[0, 0], subject[0, 1]) if exact else _centroid(subject, count)
         for k in range(1 if exact else 0, count - 1 if exact else count):
-            following = (k + 1) % count
+            successor = (k + 1) % count
             ux, uy = subject[k, 0] - ox, subject[k, 1] - oy
-            vx, vy = subject[following, 0] - ox, subject[following, 1] - oy
-            twice = ux * vy - uy * vx
-            if twice <= 0.0:
+            vx, vy = subject[successor, 0] - ox, subject[successor, 1] - oy
+            twice_area = ux * vy - uy * vx
+            if twice_area <= 0.0:
                 continue
             for q in range(points.shape[0]):
                 x = ox + points[q, 0] * ux + points[q, 1] * vx
@@ -357,7 +383,7 @@ def integrate(
                     return i
                 _fill_shape(to_terms, terms, shape)
                 _fill_shape(other_to_terms, other_terms, other_shape)
-                area = weights[q] * twice * _stretch(reference[s], terms) / projected_area
+                area = weights[q] * twice_area * _stretch(reference[s], terms) / projected_area
                 _add_products(area, shape, other_shape, mass, coupling, i)
                 if heights.shape[1] > 0:
                     rise = factor[i, 0] * _height(heights[s], xi)

@@ -1,8 +1,8 @@
 """Segmentation of secondary lines at the projected primary nodes, and integration over the segments.
 
-The gap between non-matching facets has a kink opposite every primary node and is smooth between two kinks (Popp, Gee and
-Wall, 2009). At an end of the primary side, secondary facets are cut along the normal there. Points beyond the cut do not face
-the side, and the projections of points must agree with this cut.
+The gap between non-matching facets has a kink opposite every primary node, and is smooth between two kinks (Popp, Gee and
+Wall, 2009). At an end of the primary side, secondary facets are cut along the normal at this end. Points beyond the cut do
+not face the primary side, and their projections must agree with this cut.
 """
 
 from __future__ import annotations
@@ -25,7 +25,19 @@ NO_BORDERS = np.empty(0, np.intp), np.empty(0)
 
 @dataclass(frozen=True, eq=False)
 class LinePoints:
-    """Integration points of all segments of a block: facet (n,), xi (n,), shape (n, k), reference area (n,)."""
+    """Integration points of all segments of a block.
+
+    Attributes
+    ----------
+    facet : ndarray of int (n,)
+        Facet of each point.
+    xi : ndarray (n,)
+        Reference coordinate of the point in its facet [-].
+    shape : ndarray (n, k)
+        Values of the k shape functions of the facet at the point [-].
+    area : ndarray (n,)
+        Integration weight in the reference configuration [area].
+    """
 
     facet: Indices
     xi: Array
@@ -37,10 +49,10 @@ def line_points(
     block: FacetBlock, primary: Surface, reference: Array, deformed: Array, axisymmetric: bool, n_gauss: int,
     tolerance: float, borders: tuple[Indices, Array] = NO_BORDERS,
 ) -> LinePoints:  # fmt: skip
-    """Cut the facets of a block on the deformed configuration and place Gauss points on every segment.
+    """Cut the facets of a block in the deformed configuration, and place Gauss points in every segment.
 
-    The primary side is extended by `tolerance` facet lengths at its ends. `borders` are further cuts: facets (n,) and xi
-    (n,).
+    The primary side is extended by `tolerance` facet lengths at its ends. `borders` are additional cuts, given by their
+    facets (n,) and reference coordinates (n,).
     """
     facet, begin, end = _cuts(block, primary, deformed, tolerance, borders)
     s, w = quadrature.gauss_line(n_gauss)
@@ -59,7 +71,7 @@ def line_points(
 def _cuts(
     block: FacetBlock, primary: Surface, deformed: Array, tolerance: float, borders: tuple[Indices, Array]
 ) -> tuple[Indices, Array, Array]:
-    """Return (facet, begin, end) of the segments of the facets of a block, in their reference coordinate."""
+    """Return the facet of each segment of a block, and the reference coordinates of the two ends of the segment."""
     n = len(block.facets)
     normals = nodal_normals(primary, deformed)
     facet_of_node, xi_of_node = _opposite_nodes(block, primary, deformed, normals)
@@ -80,73 +92,73 @@ def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Arr
 
 
 def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normals: Array) -> tuple[Indices, Array]:
-    """Return (facet, xi) of the points of a block that lie opposite the ends of primary facets.
+    """Return the points of a block opposite the ends of primary facets, as facets and reference coordinates.
 
     Where two primary facets meet, the opposite point lies on the bisector of the angle between them, at which the closest
-    facet changes. The closest point of the block is used only where the primary side ends, and at its corners, near
-    which points do not face the flank. It is unsuitable elsewhere, since opposite a concave corner of sides with a gap or an
+    facet changes. The closest point of the block is used only where the primary side ends, and at corners of the primary
+    side, near which points do not face the flank. It is unsuitable elsewhere: at a concave corner with a gap or an
     interference, the closest point jumps from one facet to the next as the bodies move.
     """
     ends, first = np.unique(np.concatenate([lines.local[:, :2].ravel() for lines in primary.blocks]), return_index=True)
     foot, normal = deformed[primary.points[ends]], normals[ends]
     opposite = closest(foot, deformed[block.facets])
-    along = opposite.xi[:, 0]
-    inner = primary.inner_ends.ravel()[first]
-    smooth = inner & ~_corners(primary, deformed, normals)[ends]
-    inside = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(along) < 1.0 - LENGTH_ROUND_OFF) & ~smooth)
-    rows = np.flatnonzero(inner)
+    xi_0 = opposite.xi[:, 0]
+    has_two_facets = primary.inner_ends.ravel()[first]
+    smooth = has_two_facets & ~_corners(primary, deformed, normals)[ends]
+    in_facet = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(xi_0) < 1.0 - LENGTH_ROUND_OFF) & ~smooth)
+    rows = np.flatnonzero(has_two_facets)
     facets = np.column_stack([opposite.facet[rows], line_neighbours(block.local)[opposite.facet[rows]]])
-    distance = _across(deformed[block.facets[facets]], foot[rows][:, None], normal[rows][:, None])
+    distance = _signed_distances(deformed[block.facets[facets]], foot[rows][:, None], normal[rows][:, None])
     distance[facets < 0] = 1.0
     row, xi = _zeros(distance.reshape(-1, block.facets.shape[1]))
-    return np.concatenate([opposite.facet[inside], facets.ravel()[row]]), np.concatenate([along[inside], xi])
+    return np.concatenate([opposite.facet[in_facet], facets.ravel()[row]]), np.concatenate([xi_0[in_facet], xi])
 
 
 def _corners(side: Surface, coordinates: Array, normals: Array) -> Mask:
-    """Return which nodes (m,) of a side are corners, where a facet is steeply inclined to the nodal `normals` (m, 2)."""
-    lean = np.ones(len(side.points))
+    """Return which nodes (m,) of a side are corners, where facet normals deviate strongly from the nodal `normals` (m, 2)."""
+    cosine = np.ones(len(side.points))
     for block in side.blocks:
         facet_normal = facet_normals(block, coordinates)
-        np.minimum.at(lean, block.local, np.einsum("fad,fad->fa", facet_normal, normals[block.local]))
-    return np.asarray(lean < np.cos(np.radians(0.5 * CORNER)))
+        np.minimum.at(cosine, block.local, np.einsum("fad,fad->fa", facet_normal, normals[block.local]))
+    return np.asarray(cosine < np.cos(np.radians(0.5 * CORNER)))
 
 
-def _across(points: Array, foot: Array, normal: Array) -> Array:
-    """Return the distances of `points` (..., k, 2) from the lines through `foot` along `normal` (..., 2), signed [length]."""
-    away = points - foot[..., None, :]
-    return np.asarray(away[..., 0] * normal[..., None, 1] - away[..., 1] * normal[..., None, 0])
+def _signed_distances(points: Array, foot: Array, normal: Array) -> Array:
+    """Return signed distances of `points` (..., k, 2) from lines through `foot` along `normal` (..., 2) [length]."""
+    offset = points - foot[..., None, :]
+    return np.asarray(offset[..., 0] * normal[..., None, 1] - offset[..., 1] * normal[..., None, 0])
 
 
 def _opposite_ends(
     block: FacetBlock, primary: Surface, deformed: Array, normals: Array, tolerance: float
 ) -> tuple[Indices, Array]:
-    """Return (facet, xi) of the points of a block that lie on the normals at the ends of the primary side."""
-    # A tolerance that is only for round-off does not extend the side: a cut there would leave a sliver of that width.
+    """Return the points of a block on the normals at the ends of the primary side, as facets and reference coordinates."""
+    # A tolerance of the order of round-off does not extend the side, because the cut would leave a sliver of this width.
     ends = (1.0, 1.0 + 2.0 * tolerance) if tolerance > SINGLE_PRECISION else (1.0,)
-    first, facets, coordinates = 0, [], []
+    offset, facets, coordinates = 0, [], []
     for primary_block in primary.blocks:
         shape = elements.get(primary_block.element).shape
-        for end, s in [(end, sign * beyond) for end, sign in ((0, -1.0), (1, 1.0)) for beyond in ends]:
-            free = np.flatnonzero(~primary.inner_ends[first : first + len(primary_block.facets), end])
+        for end, s in [(end, sign * position) for end, sign in ((0, -1.0), (1, 1.0)) for position in ends]:
+            free = np.flatnonzero(~primary.inner_ends[offset : offset + len(primary_block.facets), end])
             weights = shape(np.array([[s]]))[0]
             foot = np.einsum("k,fkd->fd", weights, deformed[primary_block.facets[free]])
             normal = np.einsum("k,fkd->fd", weights, normals[primary_block.local[free]])
-            distance = _across(deformed[block.facets][None], foot[:, None], normal[:, None])
+            distance = _signed_distances(deformed[block.facets][None], foot[:, None], normal[:, None])
             facet, xi = _zeros(distance.reshape(-1, block.facets.shape[1]))
             facets.append(facet % len(block.facets))
             coordinates.append(xi)
-        first += len(primary_block.facets)
+        offset += len(primary_block.facets)
     return np.concatenate(facets), np.concatenate(coordinates)
 
 
 def facets_at_ends(block: FacetBlock, primary: Surface, deformed: Array, tolerance: float) -> Indices:
-    """Return the facets of a block inside which the primary side, or the side of one of several bodies, ends."""
+    """Return the facets of a block inside which the primary side, or its part on one of several bodies, ends."""
     facet, xi = _opposite_ends(block, primary, deformed, nodal_normals(primary, deformed), tolerance)
     return facet[np.abs(xi) < 1.0 - SINGLE_PRECISION]
 
 
 def _zeros(values: Array) -> tuple[Indices, Array]:
-    """Return (row, xi) of the zeros inside lines of two or three nodes with nodal `values` (n, k)."""
+    """Return the zeros of fields inside lines of two or three nodes, as rows of the nodal `values` (n, k) and coordinates."""
     a, b = values[:, 0], values[:, 1]
     slope, middle = 0.5 * (b - a), 0.5 * (a + b) if values.shape[1] == 2 else values[:, 2]
     bend = 0.5 * (a + b) - middle
@@ -163,7 +175,9 @@ def line_overlap(
     secondary: Surface, primary: Surface, reference: Array, deformed: Array, axisymmetric: bool, tolerance: float,
     smoothing: Smoothing | None,
 ) -> Overlap:  # fmt: skip
-    """Cut and integrate the secondary facets on the deformed configuration; areas are those of the reference.
+    """Cut the secondary facets in the deformed configuration, and integrate over the segments.
+
+    Integrals use the areas of the undeformed configuration.
 
     Parameters
     ----------
@@ -173,42 +187,41 @@ def line_overlap(
     axisymmetric : bool
         Whether integrals run over the full circle.
     tolerance : float
-        Largest distance of a point beyond the end of the primary side at which it still faces the side, in facet lengths.
+        Largest distance beyond the end of the primary side at which a point still faces this side, in facet lengths.
     smoothing : Smoothing or None
-        The smooth surfaces that facets approximate, if they are taken into account.
+        The smooth surfaces that the facets approximate; None if gaps are measured between the facets.
     """
     first = np.cumsum([0] + [len(block.facets) for block in primary.blocks])
-    masses, couplings, closer, inside, number_of_first = [], [], [], [], 0
+    masses, couplings, gap_reductions, overlap_points, facet_offset = [], [], [], [], 0
     axes = None if smoothing is None else [frames(side, reference, deformed) for side in (secondary, primary)]
     for block in secondary.blocks:
         n, k = block.facets.shape
         points = line_points(block, primary, reference, deformed, axisymmetric, k + 2, tolerance)
         positions = Candidates(block.facets[points.facet], points.shape).positions(deformed)
-        facing = pair(positions, primary, deformed, tolerance)
-        # Near a corner, the flank may be closest without facing the point.
-        opposite = np.einsum("nd,nd->n", normals_at(block, deformed, points), facing.normal) < -FACING
-        # A segment faces the other side with all of its points or with none, since too few points would not determine a
-        # field.
-        is_facing = (facing.paired & opposite).reshape(-1, k + 2).mean(axis=1) > 0.5
+        pairing = pair(positions, primary, deformed, tolerance)
+        # Near a corner, the closest facet may be on a flank that does not face the point.
+        opposite = np.einsum("nd,nd->n", normals_at(block, deformed, points), pairing.normal) < -FACING
+        # Either all points of a segment face the other side or none, because too few points would not determine a field.
+        is_facing = (pairing.paired & opposite).reshape(-1, k + 2).mean(axis=1) > 0.5
         area = np.where(np.repeat(is_facing, k + 2), points.area, 0.0)
         mass = np.zeros((n, k, k))
         np.add.at(mass, points.facet, area[:, None, None] * points.shape[:, :, None] * points.shape[:, None, :])
         masses.append(mass)
-        inside.append(OverlapPoints(points.facet, points.shape, area))
+        overlap_points.append(OverlapPoints(points.facet, points.shape, area))
         heights = np.zeros((n, k, 2))
         if smoothing is not None and axes is not None:
-            on_secondary = number_of_first + points.facet, points.xi[:, None]
-            depth = area * smoothing.overlap(on_secondary, (facing.facet, facing.xi), axes)
-            np.add.at(heights, points.facet, points.shape[:, :, None] * (depth[:, None] * facing.normal)[:, None])
-        closer.append(heights)
-        number_of_first += n
+            on_secondary = facet_offset + points.facet, points.xi[:, None]
+            depth = area * smoothing.overlap(on_secondary, (pairing.facet, pairing.xi), axes)
+            np.add.at(heights, points.facet, points.shape[:, :, None] * (depth[:, None] * pairing.normal)[:, None])
+        gap_reductions.append(heights)
+        facet_offset += n
         for number, primary_block in enumerate(primary.blocks):
-            rows = np.flatnonzero((area > 0) & (facing.facet >= first[number]) & (facing.facet < first[number + 1]))
-            shape = elements.get(primary_block.element).shape(facing.xi[rows])
+            rows = np.flatnonzero((area > 0) & (pairing.facet >= first[number]) & (pairing.facet < first[number + 1]))
+            shape = elements.get(primary_block.element).shape(pairing.xi[rows])
             products = area[rows, None, None] * points.shape[rows, :, None] * shape[:, None, :]
-            ends = np.column_stack([points.facet[rows], facing.facet[rows] - first[number]])
-            pairs, pair_of_end = np.unique(ends, axis=0, return_inverse=True)
+            facets_of_points = np.column_stack([points.facet[rows], pairing.facet[rows] - first[number]])
+            pairs, pair_of_point = np.unique(facets_of_points, axis=0, return_inverse=True)
             integrals = np.zeros((len(pairs), *products.shape[1:]))
-            np.add.at(integrals, pair_of_end.ravel(), products)
+            np.add.at(integrals, pair_of_point.ravel(), products)
             couplings.append(Coupling(block, primary_block, pairs, integrals))
-    return Overlap(masses, couplings, closer, inside)
+    return Overlap(masses, couplings, gap_reductions, overlap_points)

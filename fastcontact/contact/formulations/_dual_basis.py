@@ -7,14 +7,14 @@ the facet and sum to one. The dual functions
 
 satisfy :math:`\int \psi_j \tilde N_k = w_j \delta_{jk}` and sum to one (Wohlmuth, 2000). The integrals are taken over the
 part of the facet that faces the other side, so that both properties hold on this part (Cichosz and Bischoff, 2011; Popp,
-Seitz, Gee and Wall, 2013). If the weight of a function on this part nearly vanishes, M is nearly singular. The function then
-has no dual function, and the dual functions of the others sum to one.
+Seitz, Gee and Wall, 2013). If the weight of a shape function on this part nearly vanishes, M is nearly singular. This shape
+function then has no dual function, and the dual functions of the others sum to one.
 
 The corner shape functions of quadratic facets are not positive. A fraction of the functions of the mid-side nodes is
-therefore moved to them (Popp, Wohlmuth, Gee and Wall, 2012), so that all functions are positive on the facet and no part of
-it has a negative weight. On lines, triangles and nine-node quadrangles the new functions are Bernstein polynomials. In the
-new basis, the coefficient of a corner is the displacement of the corner, and the coefficient of a mid-side node also depends
-on the displacements of the ends of its edge.
+therefore added to the corner functions (Popp, Wohlmuth, Gee and Wall, 2012). All functions are then positive on the facet, so
+that no part of the facet has a negative weight. On lines, triangles and nine-node quadrangles the new functions are Bernstein
+polynomials. In the new basis, the coefficient of a corner is the displacement of the corner, and the coefficient of a
+mid-side node also depends on the displacements of the ends of its edge.
 """
 
 from __future__ import annotations
@@ -75,12 +75,12 @@ def _bernstein_square(element: elements.Element) -> Array:
     return T[np.ix_(line_nodes[:, 0], line_nodes[:, 0])] * T[np.ix_(line_nodes[:, 1], line_nodes[:, 1])]
 
 
-def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Array]:
-    r"""Return the dual functions of facets of which an arbitrary part faces the other side.
+def dual_functions(mass: Array, admissible: Mask, fraction: Array) -> tuple[Array, Array]:
+    r"""Return the dual functions of facets of which only a part may face the other side.
 
-    While the dual functions of a facet are ill conditioned, dual functions are omitted in four stages: those of functions
-    with a small covered fraction; all except those with the largest fraction; those with small integrals; and all except
-    the first one with the largest fraction.
+    As long as the dual functions of a facet are ill conditioned, dual functions are omitted in four stages: those of shape
+    functions with a small covered fraction, then all except those with the largest fraction, then those with small
+    integrals, and finally all except the first one with the largest fraction.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Arr
     dual, D : ndarray (n_facets, k, k)
         Coefficients and integrals of the dual functions, described for `biorthogonal`.
     """
-    with_dual = kept & (fraction > 0.0)
+    with_dual = admissible & (fraction > 0.0)
     dual, D = biorthogonal(mass, with_dual)
     covered = np.where(with_dual, fraction, -1.0)
     # Nearly equal fractions are treated as equal, so that the choice does not change as facets deform.
@@ -137,7 +137,7 @@ def _sufficient(dual: Array, mass: Array) -> Mask:
 def biorthogonal(mass: Array, with_dual: Mask) -> tuple[Array, Array]:
     r"""Return the dual functions of facets, and their integrals with the positive shape functions.
 
-    Both are NaN for facets whose shape functions are linearly dependent to machine precision.
+    Both results are NaN for facets whose shape functions are linearly dependent to machine precision.
 
     Parameters
     ----------
@@ -155,17 +155,17 @@ def biorthogonal(mass: Array, with_dual: Mask) -> tuple[Array, Array]:
     """
     k = mass.shape[1]
     count = with_dual.sum(axis=1)[:, None, None]
-    # Functions without a dual function are distributed equally to the others, so that these still sum to one.
-    spanning = np.eye(k) * with_dual[:, :, None] + with_dual[:, :, None] * ~with_dual[:, None, :] / np.maximum(count, 1)
-    G = np.where(with_dual[:, :, None] & with_dual[:, None, :], spanning @ mass, np.eye(k))
+    # Shape functions without a dual function are distributed equally to the others, which therefore still sum to one.
+    basis = np.eye(k) * with_dual[:, :, None] + with_dual[:, :, None] * ~with_dual[:, None, :] / np.maximum(count, 1)
+    G = np.where(with_dual[:, :, None] & with_dual[:, None, :], basis @ mass, np.eye(k))
     weight = np.where(with_dual, mass.sum(axis=2), 0.0)
     # Rows and columns are scaled before the inversion, because the weights of cut facets may differ by orders of magnitude.
     scale = 1.0 / np.sqrt(np.einsum("fkk->fk", G))
-    scaled = G * scale[:, :, None] * scale[:, None, :]
-    regular: Mask = np.not_equal(np.linalg.det(scaled), 0.0)
-    scaled[~regular] = np.eye(k)
-    inverse = np.linalg.inv(scaled) * scale[:, :, None] * scale[:, None, :]
+    G_scaled = G * scale[:, :, None] * scale[:, None, :]
+    regular: Mask = np.not_equal(np.linalg.det(G_scaled), 0.0)
+    G_scaled[~regular] = np.eye(k)
+    inverse = np.linalg.inv(G_scaled) * scale[:, :, None] * scale[:, None, :]
     inverse[~regular] = np.nan
-    dual = weight[:, :, None] * inverse @ spanning
+    dual = weight[:, :, None] * inverse @ basis
     D = np.where(with_dual[:, None, :], weight[:, :, None] * np.eye(k), dual @ mass)
     return dual, D * with_dual[:, :, None]

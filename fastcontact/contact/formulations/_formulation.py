@@ -13,10 +13,10 @@ from scipy.sparse import csr_array
 
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
-from fastcontact.contact.cohesive_layer import bonded
+from fastcontact.contact.cohesive_layer import cohesive_rows
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints, Geometry, Linearised
-from fastcontact.contact.held_motions import SAME_DIRECTION, HeldMotions, alike, spanned, without
+from fastcontact.contact.held_motions import SAME_DIRECTION, HeldMotions, deflate, direction_fields, eigenspaces
 from fastcontact.contact.linearised_geometry import (
     Closing,
     InterpolatedNormals,
@@ -36,36 +36,36 @@ from fastcontact.contact.pairing import (
     checked_normals,
     gap_rows,
     normals,
-    opposed,
     pair,
     rows_along,
     tangents,
+    with_secondary_normals,
 )
 from fastcontact.contact.projection import (
     BESIDE,
     at_nodes_of_facets,
-    interpolated,
+    interpolate,
     nodal_normals,
     places,
     smooth_normals,
 )
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
-from fastcontact.contact.tied import TiedPair, moments_of, reduction, tied, with_arms
+from fastcontact.contact.tied import TiedPair, moments_of, reduction, tied_pair, with_rigid_arms
 from fastcontact.errors import ContactError, unknown
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 SLIPS = ("symmetric", "primary")
-# Sine of the angle between the normal of a surface and a plane of symmetry above which the surface has a corner at the plane.
-# Octagons, with an angle of 22.5 degrees, have corners there irrespective of round-off.
+# Sine of the largest angle between the normal of a surface and a plane of symmetry at which the surface of the full model has
+# no corner at the plane. Octagons, with an angle of 22.5 degrees, have corners there irrespective of round-off.
 LEANING = float(np.sin(np.radians(21.0)))
 
 
 @dataclass(eq=False)
 class Formulation(ABC):
-    """A contact formulation for one pair of surfaces; instances are immutable.
+    """A contact formulation for one pair of surfaces.
 
-    Subclasses are dataclasses. The fields that they add are options of the formulation.
+    Instances are immutable. Subclasses are dataclasses, and the fields that they add are options of the formulation.
 
     Parameters
     ----------
@@ -88,14 +88,14 @@ class Formulation(ABC):
 
         - ``"facet"``: normal of the primary facet at the projection. Default in 2D without `surface_smoothing`.
         - ``"averaged"``: normal interpolated between averaged nodal normals of the primary side. Default in all other cases,
-          because with discontinuous normals the pairing of a point opposite an edge may not converge.
+          because the pairing of a point opposite an edge may not converge with discontinuous normals.
         - ``"secondary"``: opposite of the averaged normal of the secondary side at the point.
         - A vector (dim,) of any length: a constant normal, which points out of the primary body. Points are projected along
-          it.
+          this vector.
     slip : str
-        ``"symmetric"``: a relative displacement that closes a gap along the mean of the normals of both sides is not slip.
-        ``"primary"``: all relative displacement along the tangents of the primary side is slip, also if the gap closes
-        obliquely, as in code_aster.
+        With ``"symmetric"``, a relative displacement that closes a gap along the mean of the normals of both sides is not
+        slip. With ``"primary"``, every relative displacement along the tangents of the primary side is slip, even if the gap
+        closes obliquely, as in code_aster.
     surface_smoothing : bool
         Whether to measure the gap between the smooth surfaces that the facets of curved sides approximate, see
         `surface_smoothing`. Mortar sets it by default.
@@ -122,7 +122,7 @@ class Formulation(ABC):
     name: ClassVar[str]
     # Whether the primary side may be a rigid obstacle.
     against_obstacles: ClassVar[bool] = True
-    # Whether each node has one gap, weighted over the facets around it.
+    # Whether each node has one gap, which is weighted over the adjacent facets.
     weighs_gaps: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
@@ -140,8 +140,8 @@ class Formulation(ABC):
         if self.surface_smoothing and not isinstance(self.primary, Surface):
             raise ContactError("surface_smoothing needs two meshed sides: leave it out at an obstacle")
         if self.friction:
-            self.secondary = self._mirrored(self.secondary)
-            self.primary = self._mirrored(self.primary) if isinstance(self.primary, Surface) else self.primary
+            self.secondary = self._reflected(self.secondary)
+            self.primary = self._reflected(self.primary) if isinstance(self.primary, Surface) else self.primary
 
     @cached_property
     def smoothing(self) -> Smoothing | None:
@@ -153,7 +153,7 @@ class Formulation(ABC):
         return Smoothing.of(self.secondary, self.primary, self.points)
 
     @property
-    def slides(self) -> bool:
+    def has_tangents(self) -> bool:
         """Whether the constraints need tangents, for friction, tying or cohesion."""
         cohesion = self.options.cohesion
         return bool(self.friction) or self.options.tied or not (cohesion is None or cohesion.reversible)
@@ -167,7 +167,7 @@ class Formulation(ABC):
         return True
 
     def alternates(self, constraints: Constraints) -> bool:
-        """Return whether pairings like `constraints` may alternate: points between two facets with different normals."""
+        """Return whether pairings like `constraints` may alternate, because points lie between facets with other normals."""
         return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
 
     @classmethod
@@ -176,23 +176,23 @@ class Formulation(ABC):
         return cls
 
     @abstractmethod
-    def unilateral(self, at: Configuration) -> Constraints:
+    def unilateral(self, config: Configuration) -> Constraints:
         """Pair the two sides, and return the constraints of unilateral contact without penalty or cohesion.
 
         Parameters
         ----------
-        at : Configuration
+        config : Configuration
             Positions of both sides at which they are paired.
         """
 
-    def constraints(self, at: Configuration) -> Constraints:
+    def constraints(self, config: Configuration) -> Constraints:
         """Pair the two sides, and return the constraints of the pair with all its options.
 
         Options are tied contact, penalties, cohesion, fluid pressure, and constraints that never open.
 
         Parameters
         ----------
-        at : Configuration
+        config : Configuration
             Positions of both sides at which they are paired.
 
         Raises
@@ -202,32 +202,33 @@ class Formulation(ABC):
         """
         if self.tied is not None:
             return self.tied.constraints()
-        constraints = self.unilateral(at)
+        constraints = self.unilateral(config)
         if self.options.cohesion is None:
-            constraints = self._softened(constraints, at)
-        if at.elastic_slip is not None and constraints.tangents:
-            previous_slip = _values_at(at.elastic_slip, constraints.positions)
+            constraints = self._with_penalties(constraints, config)
+        if config.elastic_slip is not None and constraints.tangents:
+            previous_slip = _values_at(config.elastic_slip, constraints.positions)
             elastic_slip = np.stack([-np.einsum("md,md->m", t, previous_slip) for t in constraints.directions])
             constraints = replace(constraints, elastic_slip=elastic_slip)
         if self.options.gap_only:
             return constraints.without(np.ones(len(constraints), bool))
         if self.options.search_distance is not None:
-            # A constraint is ignored only if the sides are also far apart at the beginning of the step. Otherwise a large
-            # penetration in an intermediate iterate would be ignored.
-            distance = np.minimum(np.abs(constraints.gaps(at.displacement)), np.abs(constraints.gaps(at.start)))
+            # A constraint is ignored only if the sides are also far apart at the beginning of the step. Otherwise,
+            # constraints with a large penetration in an intermediate iterate would be ignored.
+            distance = np.minimum(np.abs(constraints.gaps(config.displacement)), np.abs(constraints.gaps(config.start)))
             constraints = constraints.without(distance > self.options.search_distance)
         if self.options.cohesion is not None:
-            return bonded(self.options.cohesion, constraints, at, _values_at(self._initial_gaps, constraints.positions))
-        equality = self.never_opening(constraints.positions, at)
-        constraints = replace(constraints, equality=equality, friction=at.friction_factor * constraints.friction)
+            initial_gap = _values_at(self._initial_gaps, constraints.positions)
+            return cohesive_rows(self.options.cohesion, constraints, config, initial_gap)
+        equality = self.never_opening(constraints.positions, config)
+        constraints = replace(constraints, equality=equality, friction=config.friction_factor * constraints.friction)
         if self.options.source is None:
             return constraints
-        from fastcontact.contact.fluid_pressure import AreaVectors, wetted
+        from fastcontact.contact.fluid_pressure import AreaVectors, with_fluid_pressure
 
         areas = AreaVectors(self.secondary, self.points, self.axisymmetric)
-        return wetted(constraints, at, areas, self.options.source[self.secondary.points])
+        return with_fluid_pressure(constraints, config, areas, self.options.source[self.secondary.points])
 
-    def _softened(self, constraints: Constraints, at: Configuration) -> Constraints:
+    def _with_penalties(self, constraints: Constraints, config: Configuration) -> Constraints:
         """Return the constraints with the compliances of normal and tangential penalties, if the pair has any."""
         normal, tangential, areas = self.options.penalty, self.options.tangential_penalty, constraints.areas
         if normal is None and tangential is None:
@@ -235,7 +236,7 @@ class Formulation(ABC):
         if areas is None:
             raise ContactError(f"formulation '{self.name}' supports no penalty: leave out the option")
         if isinstance(normal, OverclosureLaw):
-            slope, zero = normal.line(-constraints.gaps(at.displacement))
+            slope, zero = normal.line(-constraints.gaps(config.displacement))
             constraints = replace(constraints, gap0=constraints.gap0 + zero, softness=1.0 / (slope * areas), law=normal)
         elif normal is not None:
             constraints = replace(constraints, softness=np.asarray(1.0 / (normal * areas)))
@@ -258,19 +259,19 @@ class Formulation(ABC):
         if isinstance(self.primary, Surface) and constraints.tangents:
             # Near a concave edge two facets may be equally close. The projection along averaged normals is unique.
             pairing = pair(constraints.positions, self.primary, self.points, np.inf, "averaged")
-            constraints = with_arms(constraints, pairing, self.primary, self.points)
+            constraints = with_rigid_arms(constraints, pairing, self.primary, self.points)
         moments, areas = moments_of(constraints)
-        return tied(constraints, moments, areas, self._tied_at_supports(constraints, moments, areas))
+        return tied_pair(constraints, moments, areas, self._tied_at_supports(constraints, moments, areas))
 
     def _tied_at_supports(self, constraints: Constraints, moments: csr_array, areas: Array | None) -> csr_array | None:
         """Return the `reduction` of the multipliers of a tied pair; None if no node is held by supports on both sides."""
         # Directions in which all nodes of a facet are held are ignored.
-        held = _without_whole_facets(self._both_held(Configuration.undeformed(self.points)), self.secondary)
+        held = _without_complete_facets(self._held_on_both_sides(Configuration.undeformed(self.points)), self.secondary)
         if not (held.any() and constraints.tangents):
             return None
         nodes = self.nodes_of(constraints, moments)
         frames = [moments @ direction for direction in (normals(constraints.directions), *constraints.directions)]
-        # The nearest orthonormal axes to the means do not depend on the choice of the tangents.
+        # The orthonormal axes nearest to the means do not depend on the choice of the tangents.
         left, lengths, right = np.linalg.svd(np.stack(frames, axis=1))
         axes = (left * (lengths > 0.0)[:, None]) @ right
         sizes = np.ones(len(nodes)) if areas is None else np.where(np.isfinite(areas), areas, 0.0)
@@ -285,26 +286,26 @@ class Formulation(ABC):
         order = np.argsort(points)
         return np.asarray(order[np.searchsorted(points, constraints.nodes[: moments.shape[0]], sorter=order)])
 
-    def never_opening(self, positions: Array, at: Configuration) -> Mask:
+    def never_opening(self, positions: Array, config: Configuration) -> Mask:
         """Return which constraints (m,) cannot open, given their reference positions (m, dim) [length]."""
-        if self.options.always_closed or at.never_opening is None:
+        if self.options.always_closed or config.never_opening is None:
             return np.full(len(positions), self.options.always_closed)
-        return np.asarray(_values_at(at.never_opening, positions))
+        return np.asarray(_values_at(config.never_opening, positions))
 
-    def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
-        """Return the pairing of candidates on the deformed configuration, with the options of the formulation.
+    def facing(self, candidates: Candidates, config: Configuration, tolerance: float | None = None) -> Pairing:
+        """Return the pairing of candidates in the deformed configuration, with the options of the formulation.
 
         If `tolerance` is given, it replaces `projection_tolerance`.
         """
-        deformed = self.points + at.displacement
-        beyond = self.projection_tolerance if tolerance is None else tolerance
+        deformed = self.points + config.displacement
+        largest_overhang = self.projection_tolerance if tolerance is None else tolerance
         assert self.normals is not None
-        assert beyond is not None
+        assert largest_overhang is not None
         positions = candidates.positions(deformed)
-        pairing = pair(positions, self.primary, deformed, beyond, self.normals, at.pose, at.rounded)
+        pairing = pair(positions, self.primary, deformed, largest_overhang, self.normals, config.pose, config.rounded)
         if self.normals != "secondary":
             return pairing
-        return opposed(pairing, self._secondary_normals(candidates, deformed))
+        return with_secondary_normals(pairing, self._secondary_normals(candidates, deformed))
 
     def _secondary_normals(self, candidates: Candidates, deformed: Array) -> Array:
         """Return averaged unit normals (n, dim) of the secondary side at candidates."""
@@ -315,25 +316,25 @@ class Formulation(ABC):
         return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), TINY))
 
     def assembled(
-        self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None, at: Configuration
+        self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None, config: Configuration
     ) -> Constraints:
-        """Return the constraints of paired candidates, including tangents if `slides`.
+        """Return the constraints of paired candidates, including tangents if `has_tangents`.
 
         `compliance` couples the constraints, see `Constraints.compliance`.
         """
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
-        gap0 += self.added_gap(candidates, pairing, at) - self.overlap_of_smooth(candidates, pairing, at)
+        gap0 += self.added_gap(candidates, pairing, config) - self.smoothing_overlap(candidates, pairing, config)
         positions = candidates.positions(self.points)
-        if not self.slides:
-            geometry = self._geometry(candidates, pairing, at)
+        if not self.has_tangents:
+            geometry = self._linearised_geometry(candidates, pairing, config)
             return Constraints(B, gap0, positions, compliance, geometry=geometry)
-        axes = tangents(pairing.normal, self._held_at(candidates))
-        friction, directions, rubbing = self.options.rubbing(self.friction, axes, candidates)
-        along, slip0 = self.slips(candidates, pairing, rubbing, at)
-        geometry = self._geometry(candidates, pairing, at, directions)
-        return Constraints(B, gap0, positions, compliance, along, directions, friction, slip0, geometry=geometry)
+        axes = tangents(pairing.normal, self._held_directions(candidates))
+        friction, directions, slip_axes = self.options.friction_axes(self.friction, axes, candidates)
+        slip_rows, slip0 = self.slips(candidates, pairing, slip_axes, config)
+        geometry = self._linearised_geometry(candidates, pairing, config, directions)
+        return Constraints(B, gap0, positions, compliance, slip_rows, directions, friction, slip0, geometry=geometry)
 
-    def _held_at(self, candidates: Candidates) -> Array | None:
+    def _held_directions(self, candidates: Candidates) -> Array | None:
         """Return projectors (n, dim, dim) onto the directions in which all nodes of a candidate are held.
 
         None without friction, or if no node is held.
@@ -341,10 +342,10 @@ class Formulation(ABC):
         if self.held is None or not len(self.held.nodes) or not self.friction:
             return None
         held = np.einsum("nk,nkde->nde", candidates.shape, self.held.at(candidates.nodes))
-        return spanned(held, 1.0 - LENGTH_ROUND_OFF)
+        return eigenspaces(held, 1.0 - LENGTH_ROUND_OFF)
 
-    def _geometry(
-        self, candidates: Candidates, pairing: Pairing, at: Configuration, directions: Sequence[Array] = ()
+    def _linearised_geometry(
+        self, candidates: Candidates, pairing: Pairing, config: Configuration, directions: Sequence[Array] = ()
     ) -> Geometry | None:
         """Return the derivatives of the gaps of paired candidates, and of their slips along k tangents (n, dim).
 
@@ -352,18 +353,18 @@ class Formulation(ABC):
         """
         if self.normals == "secondary":
             return None
-        coordinates = self.points + at.displacement
+        coordinates = self.points + config.displacement
 
         def linearised(multiplier: Array, tangential: Array, displacement: Array) -> Linearised:
             rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
-            rise = self.rise(candidates, pairing, rows, coordinates)
-            points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, at.pose, rise=rise)
+            rise = self.smoothing_slope(candidates, pairing, rows, coordinates)
+            points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, config.pose, rise=rise)
             at_rows = rows, len(multiplier)
             forces = LinearisedPoints(self.secondary, points, None, points.normal, multiplier[rows], place=at_rows)
             if not directions:
                 return forces
-            moved = replace(at, displacement=displacement)
-            slips = self._sliding(points.motion, np.stack(directions)[:, rows], tangential[rows], moved)
+            moved = replace(config, displacement=displacement)
+            slips = self._load_step_slips(points.motion, np.stack(directions)[:, rows], tangential[rows], moved)
             if not isinstance(self.primary, Surface) or self.slip != "symmetric":
                 return replace(forces, slips=slips)
             averaged, smooth = points.averaged, None
@@ -381,25 +382,25 @@ class Formulation(ABC):
 
         return linearised
 
-    def _sliding(self, mean: csr_array, directions: Array, tangential: Array, at: Configuration) -> Slips:
+    def _load_step_slips(self, mean: csr_array, directions: Array, tangential: Array, config: Configuration) -> Slips:
         """Return the slips of the load step along tangents (k, m, dim).
 
         `mean` (m, n_points) maps displacements of points to displacements relative to the primary side. The motion of a rigid
         obstacle in the step is subtracted. `tangential` (m, k) are the tangential forces [force].
         """
-        moved, turning = at.displacement - at.start, None
-        total = mean @ moved
+        increment, rotation_gradient = config.displacement - config.start, None
+        total = mean @ increment
         if isinstance(self.primary, RigidSide):
-            current, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-            total -= self.primary.carried(current, before, at.pose, at.pose_start)
-            if at.pose.angle != at.pose_start.angle:  # The motion is an affine function of the positions.
+            current, initial = (mean @ (self.points + u) for u in (config.displacement, config.start))
+            total -= self.primary.rigid_motion(current, initial, config.pose, config.pose_start)
+            if config.pose.angle != config.pose_start.angle:  # The motion is an affine function of the positions.
                 ends = np.vstack([np.zeros(current.shape[1]), np.eye(current.shape[1])])
-                varied = self.primary.carried(ends, ends[:1], at.pose, at.pose_start)
-                turning = varied[1:] - varied[0]
-        return Slips(directions, tangential, total, moved, self.points + at.start, turning=turning)
+                unit_motions = self.primary.rigid_motion(ends, ends[:1], config.pose, config.pose_start)
+                rotation_gradient = unit_motions[1:] - unit_motions[0]
+        return Slips(directions, tangential, total, increment, self.points + config.start, turning=rotation_gradient)
 
     def slips(
-        self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
+        self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], config: Configuration
     ) -> tuple[tuple[csr_array, ...], Array]:
         """Return the slips of candidates in the load step, as an affine function of the displacements.
 
@@ -409,7 +410,7 @@ class Formulation(ABC):
         pairing : Pairing
         directions : sequence of k ndarray (n, dim)
             Unit tangents.
-        at : Configuration
+        config : Configuration
 
         Returns
         -------
@@ -419,42 +420,45 @@ class Formulation(ABC):
             Minus the motion of a rigid primary side in the step; between two bodies, minus the tangential displacement that
             closes the gap, if `slip` is ``"symmetric"`` [length].
         """
-        along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
-        slip0 = np.zeros((len(along), len(pairing.paired)))
+        rows = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
+        slip0 = np.zeros((len(rows), len(pairing.paired)))
         if isinstance(self.primary, RigidSide):
-            moved = self.carried(candidates, at)
-            slip0 = -np.stack([np.einsum("nd,nd->n", t, moved) for t in directions])
+            obstacle_motion = self.rigid_motion(candidates, config)
+            slip0 = -np.stack([np.einsum("nd,nd->n", t, obstacle_motion) for t in directions])
         elif self.slip == "symmetric":
-            slip0 = self._closing_slip(candidates, pairing, directions, at)
-        return along, slip0
+            slip0 = self._closing_slip(candidates, pairing, directions, config)
+        return rows, slip0
 
-    def added_gap(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
+    def added_gap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
         """Return the contribution (n,) of clearances and wear to the gaps of candidates; zero if unpaired [length]."""
-        added = self.options.added_gap(candidates, pairing, self.primary, self.points, at.clearance_factor)
-        if at.worn is None:
-            return added
-        return added + np.where(pairing.paired, np.einsum("nk,nk->n", candidates.shape, at.worn[candidates.nodes]), 0.0)
+        clearance = self.options.added_gap(candidates, pairing, self.primary, self.points, config.clearance_factor)
+        if config.worn is None:
+            return clearance
+        return clearance + np.where(
+            pairing.paired, np.einsum("nk,nk->n", candidates.shape, config.worn[candidates.nodes]), 0.0
+        )
 
-    def overlap_of_smooth(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
-        """Return by how much the smooth surfaces outside of the facets reduce the gaps (n,) of candidates [length]."""
-        closer, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
+    def smoothing_overlap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
+        """Return the lengths (n,) by which smooth surfaces reduce the gaps of candidates, compared with facets [length]."""
+        overlap, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
         if (
             self.smoothing is None
             or candidates.facet is None
             or candidates.xi is None
             or not isinstance(self.primary, Surface)
         ):
-            return closer
-        deformed = self.points + at.displacement
+            return overlap
+        deformed = self.points + config.displacement
         axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
         on_secondary = candidates.facet[rows], candidates.xi[rows]
-        closer[rows] = self.smoothing.overlap(on_secondary, (pairing.facet[rows], pairing.xi[rows]), axes)
-        return closer
+        overlap[rows] = self.smoothing.overlap(on_secondary, (pairing.facet[rows], pairing.xi[rows]), axes)
+        return overlap
 
-    def rise(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
-        """Return the derivatives (n, dim - 1) of `overlap_of_smooth` along primary facets [length]; None without smoothing.
+    def smoothing_slope(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
+        """Return the derivatives (n, dim - 1) of `smoothing_overlap` along primary facets [length]; None without smoothing.
 
-        `rows` (n,) are candidates, `deformed` (n_points, dim) are current coordinates. Facets have straight extensions.
+        `rows` (n,) are numbers of candidates, and `deformed` (n_points, dim) the current coordinates. The derivatives are
+        zero on the straight extensions of facets.
         """
         if self.smoothing is None or candidates.facet is None or not isinstance(self.primary, Surface):
             return None
@@ -463,63 +467,64 @@ class Formulation(ABC):
         slope = factor * self.smoothing.primary.slope(pairing.facet[rows], pairing.xi[rows])
         return slope if pairing.beyond is None else np.where(pairing.beyond[rows] == 0.0, slope, 0.0)
 
-    def carried(self, candidates: Candidates, at: Configuration) -> Array:
-        """Return the displacements (n, dim) of the points of an obstacle opposite to candidates in the step [length]."""
+    def rigid_motion(self, candidates: Candidates, config: Configuration) -> Array:
+        """Return the displacements (n, dim) in the step of the obstacle points opposite to candidates [length]."""
         assert isinstance(self.primary, RigidSide)
-        current, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
-        return self.primary.carried(current, before, at.pose, at.pose_start)
+        current, initial = (candidates.positions(self.points + u) for u in (config.displacement, config.start))
+        return self.primary.rigid_motion(current, initial, config.pose, config.pose_start)
 
     @cached_property
     def _held_nodes(self) -> Indices:
         """The secondary nodes that supports hold, numbered on the side."""
         return np.flatnonzero(np.isin(self.secondary.points, () if self.held is None else self.held.nodes))
 
-    def _opposite_held(self, nodes: Indices, at: Configuration) -> tuple[Pairing, Array]:
+    def _held_projections(self, nodes: Indices, config: Configuration) -> tuple[Pairing, Array]:
         """Return the pairing of secondary `nodes` (n,), and the directions in which their projections are held.
 
         The directions are given by projectors (n, dim, dim), interpolated between the nodes of the opposite facets.
         """
         assert self.held is not None
         candidates = Candidates(self.secondary.points[nodes][:, None], np.ones((len(nodes), 1)))
-        pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, BESIDE))
+        pairing = self.facing(candidates, config, max(self.projection_tolerance or 0.0, BESIDE))
         held_primary = np.zeros((len(nodes), *2 * self.points.shape[1:]))
         if isinstance(self.primary, Surface):
             rows = np.flatnonzero(pairing.paired)
-            facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
-            held_primary[rows] = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
+            feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
+            held_primary[rows] = np.einsum("nk,nkde->nde", feet.shape, self.held.at(feet.nodes))
         return pairing, held_primary
 
-    def _both_held(self, at: Configuration) -> Array:
+    def _held_on_both_sides(self, config: Configuration) -> Array:
         """Return projectors (n_nodes, dim, dim) onto directions in which both sides are held."""
         held, nodes = np.zeros((len(self.secondary.points), *2 * self.points.shape[1:])), self._held_nodes
         if len(nodes) and self.held is not None:
-            P, (_, Q) = self.held.at(self.secondary.points[nodes]), self._opposite_held(nodes, at)
-            held[nodes] = spanned(P @ Q @ P, 0.5)
+            P, (_, Q) = self.held.at(self.secondary.points[nodes]), self._held_projections(nodes, config)
+            held[nodes] = eigenspaces(P @ Q @ P, 0.5)
         return held
 
-    def undetermined(self, at: Configuration) -> Mask:
+    def undetermined(self, config: Configuration) -> Mask:
         """Return which nodes (n_nodes,) belong to facets whose traction is undetermined.
 
-        Supports hold all nodes of such a facet and the other side in one direction. If supports hold the whole side along the
-        contact, as in a slice in plane strain, the traction in this direction vanishes and is not undetermined.
+        This is the case if supports hold all nodes of a facet, and the other side, in one direction. If supports hold the
+        complete side in a direction along the contact, as in a slice in plane strain, the traction in this direction vanishes
+        and is not undetermined.
         """
-        both = self._both_held(at)
-        if not both.any():
-            return np.zeros(len(both), bool)
-        along = without(both, nodal_normals(self.secondary, self.points + at.displacement), np.sqrt(0.5))
-        across = both - along
+        held_both = self._held_on_both_sides(config)
+        if not held_both.any():
+            return np.zeros(len(held_both), bool)
+        along = deflate(held_both, nodal_normals(self.secondary, self.points + config.displacement), np.sqrt(0.5))
+        across = held_both - along
         if not self.options.tied:
-            since_begin = replace(at, start=np.zeros_like(at.displacement))
-            along = self._without_motion(since_begin) if self.friction else np.zeros_like(both)
-        elsewhere = np.eye(both.shape[1]) - spanned(along.mean(axis=0)[None], 1.0 - LENGTH_ROUND_OFF)[0]
-        across, along = (held - _without_whole_facets(held, self.secondary) for held in (across, along))
+            since_begin = replace(config, start=np.zeros_like(config.displacement))
+            along = self._held_without_motion(since_begin) if self.friction else np.zeros_like(held_both)
+        elsewhere = np.eye(held_both.shape[1]) - eigenspaces(along.mean(axis=0)[None], 1.0 - LENGTH_ROUND_OFF)[0]
+        across, along = (held - _without_complete_facets(held, self.secondary) for held in (across, along))
         return np.asarray(np.trace(across + elsewhere @ along @ elsewhere, axis1=1, axis2=2) > 0.5)
 
-    def without_slip(self, at: Configuration) -> list[tuple[Array, Mask]]:
+    def without_slip(self, config: Configuration) -> list[tuple[Array, Mask]]:
         """Return directions in which supports hold both sides without relative motion.
 
         In a plane of symmetry or on an axis, slip in these directions is zero for every traction, so that the traction is
-        undetermined. If one side is free, or is moved relative to the other, friction acts and determines it. Directions in
+        undetermined. If one side is free, or moves relative to the other, friction determines the traction. Directions in
         which all nodes of a facet are held are ignored.
 
         Returns
@@ -527,48 +532,49 @@ class Formulation(ABC):
         list of (ndarray (n_nodes, dim), ndarray of bool (n_nodes,))
             Unit vectors, each with the secondary nodes that are held in this direction.
         """
-        held = _without_whole_facets(self._without_motion(at), self.secondary)
-        return alike(held, self.points[self.secondary.points])
+        held = _without_complete_facets(self._held_without_motion(config), self.secondary)
+        return direction_fields(held, self.points[self.secondary.points])
 
-    def _without_motion(self, at: Configuration) -> Array:
-        """Return projectors (n_nodes, dim, dim) onto the directions of `without_slip`, also those of whole facets."""
+    def _held_without_motion(self, config: Configuration) -> Array:
+        """Return projectors (n_nodes, dim, dim) onto the directions of `without_slip`, including those of complete facets."""
         held, nodes = np.zeros((len(self.secondary.points), *2 * self.points.shape[1:])), self._held_nodes
         if not len(nodes) or self.held is None:
             return held
-        pairing, held_opposite = self._opposite_held(nodes, at)
+        pairing, held_opposite = self._held_projections(nodes, config)
         points = self.secondary.points[nodes]
-        both, moved = self.held.at(points), (at.displacement - at.start)[points]
+        common, slip = self.held.at(points), (config.displacement - config.start)[points]
         if isinstance(self.primary, RigidSide):
-            moved = moved - self.carried(Candidates(points[:, None], np.ones((len(nodes), 1))), at)
+            slip = slip - self.rigid_motion(Candidates(points[:, None], np.ones((len(nodes), 1))), config)
         else:
             rows = np.flatnonzero(pairing.paired)
-            facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
-            held_primary, motion = self.held.at(facing.nodes), (at.displacement - at.start)[facing.nodes]
-            mean = np.einsum("nk,nkd->nd", facing.shape, motion)
-            # If an inclined normal meets the primary side slightly beside a held node, the motion of the other nodes of that
-            # facet is ignored.
-            excess = np.einsum("nk,nkde,nkd->ne", facing.shape, held_primary, motion - mean[:, None])
-            moved[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(held_opposite[rows], hermitian=True), excess)
-            both = spanned(both @ held_opposite @ both, 0.5)
-        along = np.einsum("nde,ne->nd", both, pairing.normal)
-        both = without(both, pairing.normal, np.sqrt(0.5))
+            feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
+            held_primary, motion = self.held.at(feet.nodes), (config.displacement - config.start)[feet.nodes]
+            mean = np.einsum("nk,nkd->nd", feet.shape, motion)
+            # If an inclined normal intersects the primary side slightly beside a held node, the motion of the other nodes of
+            # this facet is ignored.
+            excess = np.einsum("nk,nkde,nkd->ne", feet.shape, held_primary, motion - mean[:, None])
+            slip[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(held_opposite[rows], hermitian=True), excess)
+            common = eigenspaces(common @ held_opposite @ common, 0.5)
+        normal_part = np.einsum("nde,ne->nd", common, pairing.normal)
+        common = deflate(common, pairing.normal, np.sqrt(0.5))
         # Where the normal is held, a motion along it closes the gap and is not slip. Elsewhere the normal may be inclined to
         # the held directions, such as at the edge of a plane of symmetry.
-        closing = np.einsum("nd,nd->n", moved, pairing.normal)
-        closing = np.where(np.linalg.norm(along, axis=1) > np.sqrt(0.5), closing, 0.0)
-        moved -= closing[:, None] * pairing.normal
-        both = without(both, moved, LENGTH_ROUND_OFF * max(np.abs(at.displacement).max(), np.abs(at.start).max()))
-        held[nodes] = both
+        closing = np.einsum("nd,nd->n", slip, pairing.normal)
+        closing = np.where(np.linalg.norm(normal_part, axis=1) > np.sqrt(0.5), closing, 0.0)
+        slip -= closing[:, None] * pairing.normal
+        tolerance = LENGTH_ROUND_OFF * max(np.abs(config.displacement).max(), np.abs(config.start).max())
+        common = deflate(common, slip, tolerance)
+        held[nodes] = common
         return held
 
-    def _mirrored(self, side: Surface) -> Surface:
+    def _reflected(self, side: Surface) -> Surface:
         """Return a side whose averaged normals at planes of symmetry are those of the full model.
 
         A plane of symmetry is recognised by supports along its normal at the edge of the side.
         """
         if self.held is None or not np.isin(side.points, self.held.nodes).any():
             return side
-        held = _without_whole_facets(self.held.at(side.points), side)
+        held = _without_complete_facets(self.held.at(side.points), side)
         normal = nodal_normals(side, self.points)
         across = np.linalg.norm(np.einsum("nde,ne->nd", held, normal), axis=1)
         nodes = np.flatnonzero(held.any(axis=(1, 2)) & (across < LEANING))
@@ -576,7 +582,7 @@ class Formulation(ABC):
         return replace(side, periodic_ends=(*side.periodic_ends, (nodes, nodes, reflections)))
 
     def _closing_slip(
-        self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
+        self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], config: Configuration
     ) -> Array:
         """Return the correction (k, n) of slips by the motion that closes gaps [length].
 
@@ -585,48 +591,48 @@ class Formulation(ABC):
         the gap closes along the mean of the normals of both sides, which is exact for two bodies that are mirror images.
         """
         assert isinstance(self.primary, Surface)
-        deformed, start = self.points + at.displacement, self.points + at.start
+        deformed, start = self.points + config.displacement, self.points + config.start
         slip0 = np.zeros((len(directions), len(pairing.paired)))
         rows = np.flatnonzero(pairing.paired)
-        facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
+        feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
         primary_normals = at_nodes_of_facets(smooth_normals(self.primary, deformed))[pairing.facet[rows]]
-        primary_normals = interpolated(primary_normals, facing)
+        primary_normals = interpolate(primary_normals, feet)
         mean = primary_normals - self._secondary_normals(Candidates(nodes, shape), deformed)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > LENGTH_ROUND_OFF)
         offset = np.einsum("nk,nkd->nd", shape, start[nodes])
-        offset -= np.einsum("nk,nkd->nd", facing.shape, start[facing.nodes])
+        offset -= np.einsum("nk,nkd->nd", feet.shape, start[feet.nodes])
         opening = np.einsum("nd,nd->n", mean, offset)
-        for k, along in enumerate(directions):
-            slip0[k, rows] = np.einsum("nd,nd->n", along[rows], mean) * opening
+        for k, tangent in enumerate(directions):
+            slip0[k, rows] = np.einsum("nd,nd->n", tangent[rows], mean) * opening
         return slip0
 
-    def first_contact(self, at: Configuration) -> tuple[Array, Array]:
+    def first_contact(self, config: Configuration) -> tuple[Array, Array]:
         """Return the point of first contact (dim,) [length], and the unit normal (dim,) of the primary side there [-].
 
         The point is the secondary node with the smallest gap to the undeformed primary side. If several gaps are equal, it is
         the node nearest to the origin.
         """
         positions = self.points[self.secondary.points]
-        gap, normal = self.nodal_gap(replace(at, displacement=np.zeros_like(self.points)))
+        gap, normal = self.nodal_gap(replace(config, displacement=np.zeros_like(self.points)))
         nearest_nodes = np.flatnonzero(gap <= gap.min() + LENGTH_ROUND_OFF * np.ptp(positions, axis=0).max())
         first = nearest_nodes[np.argmin(np.linalg.norm(positions[nearest_nodes], axis=1))]
         return positions[first], normal[first]
 
     def nodal_gap(
-        self, at: Configuration, with_clearance: bool = True, displacement: Array | None = None
+        self, config: Configuration, with_clearance: bool = True, displacement: Array | None = None
     ) -> tuple[Array, Array]:
         """Return the gaps of the secondary nodes, and the opposite normals.
 
         Parameters
         ----------
-        at : Configuration
+        config : Configuration
             Positions of both sides at which the nodes are paired.
         with_clearance : bool
             Whether the gaps include clearances and wear.
         displacement : ndarray (n_points, dim), optional
-            Displacements for which the gaps are evaluated; by default those of `at` [length].
+            Displacements for which the gaps are evaluated; by default those of `config` [length].
 
         Returns
         -------
@@ -636,48 +642,48 @@ class Formulation(ABC):
             Unit normals of the primary side [-].
         """
         nodes = Candidates.nodes_of(self.secondary)
-        pairing = self.facing(nodes, at, max(self.projection_tolerance or 0.0, BESIDE))
+        pairing = self.facing(nodes, config, max(self.projection_tolerance or 0.0, BESIDE))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
-        gap0 -= self.overlap_of_smooth(nodes, pairing, at)
+        gap0 -= self.smoothing_overlap(nodes, pairing, config)
         if with_clearance:
-            gap0 += self.added_gap(nodes, pairing, at)
-        u = at.displacement if displacement is None else displacement
+            gap0 += self.added_gap(nodes, pairing, config)
+        u = config.displacement if displacement is None else displacement
         return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
 
-    def nodal_slip(self, at: Configuration) -> Array:
+    def nodal_slip(self, config: Configuration) -> Array:
         """Return the slip increment (m, dim) of the secondary nodes [length].
 
-        Nodes beyond the end of the other side may also carry pressure, through parts of their facets.
+        It includes nodes beyond the end of the other side, which may carry pressure because parts of their facets face it.
         """
         nodes = Candidates.nodes_of(self.secondary)
-        pairing = self.facing(nodes, at, np.inf)
+        pairing = self.facing(nodes, config, np.inf)
         directions = tangents(pairing.normal)
-        rows, slip0 = self.slips(nodes, pairing, directions, at)
-        along = np.stack([row @ (at.displacement - at.start).ravel() for row in rows])
-        along += slip0
-        slip = np.einsum("kn,knd->nd", along, np.stack(directions))
+        rows, slip0 = self.slips(nodes, pairing, directions, config)
+        components = np.stack([row @ (config.displacement - config.start).ravel() for row in rows])
+        components += slip0
+        slip = np.einsum("kn,knd->nd", components, np.stack(directions))
         return np.where(pairing.paired[:, None], slip, 0.0)
 
 
-def _without_whole_facets(held: Array, side: Surface) -> Array:
+def _without_complete_facets(held: Array, side: Surface) -> Array:
     """Return projectors (n_nodes, dim, dim) without directions in which all nodes of a facet are held.
 
     `held` (n_nodes, dim, dim) are the projectors onto the directions in which the nodes of `side` are held.
     """
     span = np.zeros_like(held)
     for block in side.blocks:
-        around = held[block.local]
-        vectors = np.linalg.eigh(around.mean(axis=1))[1]
-        is_common = np.einsum("fdk,fnde,fek->fnk", vectors, around, vectors).min(axis=1) >= SAME_DIRECTION**2
+        of_nodes = held[block.local]
+        vectors = np.linalg.eigh(of_nodes.mean(axis=1))[1]
+        is_common = np.einsum("fdk,fnde,fek->fnk", vectors, of_nodes, vectors).min(axis=1) >= SAME_DIRECTION**2
         vectors = np.where(is_common[:, None], vectors, 0.0)
         np.add.at(span, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
-    return spanned(held - held @ spanned(span, 0.5) @ held, 0.5)
+    return eigenspaces(held - held @ eigenspaces(span, 0.5) @ held, 0.5)
 
 
 def _values_at(points_and_values: tuple[Array, AnyArray], positions: Array) -> AnyArray:
-    """Return, for each of `positions` (m, dim), the value at the nearest point with a known value.
+    """Return the values (m, ...) at the known points nearest to `positions` (m, dim).
 
-    `points_and_values` are the k points (k, dim) with known values [length], and the values (k, ...).
+    `points_and_values` are the k known points (k, dim) [length], and their values (k, ...).
     """
     points, values = points_and_values
     return np.asarray(values[nearest(points, positions)[1]])

@@ -1,7 +1,7 @@
 """Mortar integrals: integrals of products of shape functions over the overlap of two surfaces.
 
-`_cut_lines` and `_cut_faces` compute them for two meshed sides, whose facets are intersected. If the primary side is a rigid
-obstacle, Gauss quadrature over complete facets suffices, see `obstacle_overlap`.
+For two meshed sides, `_cut_lines` and `_cut_faces` intersect the facets and compute these integrals. If the primary side is a
+rigid obstacle, Gauss quadrature over complete facets suffices, see `obstacle_overlap`.
 """
 
 from __future__ import annotations
@@ -65,9 +65,9 @@ class Overlap:
         faces the primary side [area].
     couplings : list of Coupling
     closer : list of ndarray (n_facets, n_nodes, dim)
-        For each block, integrals of its shape functions times the distance by which the smooth surfaces are closer to each
-        other than the facets, see `surface_smoothing`, along the normals of the primary side [volume]. Against an obstacle,
-        which has no points in the mesh, these are integrals of the shape functions times the opposite positions.
+        For each block, integrals of its shape functions times vectors along the normals of the primary side. Their lengths
+        are the distances by which the smooth surfaces are closer to each other than the facets, see `surface_smoothing`
+        [volume]. Against an obstacle, which has no points in the mesh, the vectors are the opposite positions.
     points : list of OverlapPoints
         For each block, the integration points; empty in 3D, where the mortar segments are divided into triangles.
     """
@@ -81,7 +81,7 @@ class Overlap:
 def obstacle_overlap(
     secondary: Surface, obstacle: RigidSide, points: tuple[Array, Array], axisymmetric: bool, pose: Pose
 ) -> Overlap:
-    """Integrate over the parts of the secondary facets that face a rigid obstacle; areas are undeformed.
+    """Integrate over the parts of the secondary facets that face a rigid obstacle, with undeformed areas.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def obstacle_overlap(
     pose : Pose
         Position and rotation of the obstacle.
     """
-    mass, positions_faced, inside = [], [], []
+    mass, opposite_positions, samples = [], [], []
     for block in secondary.blocks:
         N, full_area = areas_of_rule(block, points[0], axisymmetric)
         positions = np.einsum("qk,fkd->fqd", N, points[1][block.facets])
@@ -101,6 +101,6 @@ def obstacle_overlap(
         foot = positions - (np.where(paired, gap, 0.0)[:, None] * normal).reshape(positions.shape)
         area = np.where(paired.reshape(full_area.shape), full_area, 0.0)
         mass.append(np.einsum("fq,qa,qb->fab", area, N, N))
-        positions_faced.append(np.einsum("fq,qa,fqd->fad", area, N, foot))
-        inside.append(OverlapPoints(np.repeat(np.arange(len(area)), len(N)), np.tile(N, (len(area), 1)), area.ravel()))
-    return Overlap(mass, [], positions_faced, inside)
+        opposite_positions.append(np.einsum("fq,qa,fqd->fad", area, N, foot))
+        samples.append(OverlapPoints(np.repeat(np.arange(len(area)), len(N)), np.tile(N, (len(area), 1)), area.ravel()))
+    return Overlap(mass, [], opposite_positions, samples)

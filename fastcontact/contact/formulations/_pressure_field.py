@@ -1,4 +1,6 @@
-r"""Base class of formulations with a pressure field: contact status at integration points, pressures at nodes.
+r"""Base class of formulations with a pressure field, which is interpolated between nodes.
+
+The contact status is determined at integration points.
 
 The multiplier field :math:`\lambda_h` is interpolated with the shape functions :math:`N_j` of the secondary facets. With
 the gap g and a constant :math:`\rho > 0`, the pressure at an integration point is
@@ -7,8 +9,8 @@ the gap g and a constant :math:`\rho > 0`, the pressure at an integration point 
 
 and the field is the projection of p, :math:`\int (\lambda_h - p) N_j = 0` for every node j (Alart and Curnier, 1991; with
 integration points, Ben Dhia and Zarroug, 2002; code_aster, R5.03.52). Both equations are the stationarity conditions of an
-augmented Lagrangian. Let w be the areas of the integration points. With the point forces :math:`y = w p` as unknowns, the
-conditions become a linear complementarity problem
+augmented Lagrangian. Let w be the areas of the integration points, and let the point forces :math:`y = w p` be the unknowns.
+The conditions then form a linear complementarity problem
 
 .. math:: y \ge 0, \quad g + C y \ge 0, \quad y^T (g + C y) = 0, \quad
           C = \tfrac{1}{\rho} \left( W^{-1} - P (P^T W P)^{-1} P^T \right)
@@ -43,8 +45,9 @@ from fastcontact.errors import ContactError
 from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Largest ratio of the component of a pressure along a support to the limit of friction; see `_undetermined`. With a ratio of
-# one, facets at 22 degrees to a plane of symmetry penetrate by 0.5 % of the displacement for a coefficient of 0.3.
+# Largest ratio of the component of a pressure along a support to the limit of friction; see `_tractions_at_supports`. With a
+# ratio of one and a coefficient of friction of 0.3, facets at 22 degrees to a plane of symmetry penetrate by 0.5 % of the
+# displacement.
 PART_OF_CONE = 0.5
 
 
@@ -69,7 +72,7 @@ class PressureField(NodalField):
     nodal_areas : ndarray (n_nodes,)
         Integrals of the shape functions over the complete secondary side, by quadrature at the integration points [area].
     covered_areas : ndarray (n_nodes,)
-        The same integrals over the points that can carry forces [area].
+        The same integrals with only those points that can carry forces [area].
     axes : (ndarray (m, dim, dim), ndarray (n_nodes, dim, dim)), optional
         Axes at points and at nodes, as columns, along which the components of a vector field are interpolated; by default
         the axes of the mesh.
@@ -149,9 +152,9 @@ class PressureField(NodalField):
         weight = np.where(usable, self.projection.areas, 0.0)[:, None] * self.shape
         total = np.bincount(self.around.ravel(), weight.ravel(), n)
         sums = np.bincount(self.around.ravel(), (weight * np.where(usable, gaps, 0.0)[:, None]).ravel(), n)
-        kept = total > NO_AREA * total.max(initial=0.0)
-        near = np.where(kept[self.around], self.shape, -np.inf).argmax(axis=1)
-        return np.divide(sums, total, out=np.full(n, np.inf), where=kept), self.around[np.arange(len(gaps)), near]
+        valid = total > NO_AREA * total.max(initial=0.0)
+        largest = np.where(valid[self.around], self.shape, -np.inf).argmax(axis=1)
+        return np.divide(sums, total, out=np.full(n, np.inf), where=valid), self.around[np.arange(len(gaps)), largest]
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
         """Return the nodes in contact; see `NodalField`.
@@ -159,7 +162,7 @@ class PressureField(NodalField):
         A node is in contact if its pressure is positive and if it is the nearest node of an active point, with these
         additions:
 
-        - Corners of some quadratic facets have no area and carry no force. The nearest node with an area is closed as well.
+        - Corners of some quadratic facets have no area and carry no force. The nearest node with an area is then also closed.
         - A node that is not nearest to any point with an area, such as on an axis or beyond the end of the primary side, is
           closed if its facet has an active point.
         - If no node of a facet with an active point would be closed, all its nodes with a positive pressure are closed.
@@ -168,18 +171,21 @@ class PressureField(NodalField):
         """
         with_area = self.nodal_areas > NO_AREA * self.nodal_areas.max(initial=0.0)
         around, shape, n = self.around[active], self.shape[active], len(gap)
-        near = _nearest(around, shape, n) | _nearest(around, np.where(with_area[around], shape, -np.inf), n)
-        usable, touched = self.projection.areas > 0, np.zeros(len(gap), bool)
-        touched[around] = True
-        near |= touched & ~_nearest(self.around[usable], self.shape[usable], len(gap))
-        near &= pressure > 0
+        closed = _nearest(around, shape, n) | _nearest(around, np.where(with_area[around], shape, -np.inf), n)
+        usable, of_active_facet = self.projection.areas > 0, np.zeros(len(gap), bool)
+        of_active_facet[around] = True
+        closed |= of_active_facet & ~_nearest(self.around[usable], self.shape[usable], len(gap))
+        closed &= pressure > 0
         # Forces at one end of a facet, opposite an edge, may cause a negative pressure at the nearest node.
-        isolated = self.around[active][~near[self.around[active]].any(axis=1)]
-        near[isolated[pressure[isolated] > 0]] = True
-        return near
+        nodes_of_open_facets = self.around[active][~closed[self.around[active]].any(axis=1)]
+        closed[nodes_of_open_facets[pressure[nodes_of_open_facets] > 0]] = True
+        return closed
 
     def initially_active(self, gap: Array, pressure: Array, last: Mask) -> Mask:
-        """Return the points (m,) where the field exceeds rho times the gap; `last` if all pairings have the same points."""
+        """Return the points (m,) at which the field exceeds rho times the gap, as an initial active set.
+
+        If all pairings have the same points, the result is `last`.
+        """
         if not self.renewed:
             return last
         field = self.projection.P @ pressure[self.independent]
@@ -224,10 +230,10 @@ class PressureFieldFormulation(Formulation):
             raise ContactError(f"augmentation = {self.augmentation} must be positive; 1 suits most problems")
 
     def repeated(self, field: tuple[csr_array, Indices]) -> tuple[csr_array, Indices]:
-        """Return a field in which coincident nodes have a common value.
+        """Return a pressure field in which coincident nodes have a common value.
 
-        `field`, and the value returned, are the map (n_nodes, k) from independent to nodal values, and the nodes (k,) of the
-        independent values.
+        Both `field` and the result consist of the map (n_nodes, k) from independent to nodal values, and the nodes (k,) of
+        the independent values.
         """
         same, (values, nodes) = self.options.same_place, field
         if same is None:
@@ -240,8 +246,8 @@ class PressureFieldFormulation(Formulation):
     def nodes_of(self, constraints: Constraints, moments: csr_array) -> Indices:
         """Return the node (q,) of each row of `moments`; see `Formulation`.
 
-        Rows belong to the independent nodes of the field, and then to single points on an axis, for which the nearest node is
-        returned.
+        The first rows belong to the independent nodes of the field. The others belong to single points on an axis, for which
+        the nearest node is returned.
         """
         field = constraints.nodal
         assert isinstance(field, PressureField)
@@ -249,44 +255,44 @@ class PressureFieldFormulation(Formulation):
         return np.concatenate([field.independent, field.around[single, field.shape[single].argmax(axis=1)]])
 
     def of_points(
-        self, candidates: Candidates, pairing: Pairing, field: PressureField, at: Configuration
+        self, candidates: Candidates, pairing: Pairing, field: PressureField, config: Configuration
     ) -> Constraints:
         """Return the constraints of paired integration points, with the compliance C of the pressure field."""
         projection = replace(field.projection, eliminable=self.eliminable, quadratic=self.secondary.order > 1)
-        constraints = self.assembled(candidates, pairing, projection, at)
-        along, turning = constraints.directions, self.options.turning
+        constraints = self.assembled(candidates, pairing, projection, config)
+        directions, turning = constraints.directions, self.options.turning
         if constraints.tangents and turning is not None:
             axes = turning.axes(constraints.positions), turning.axes(self.points[self.secondary.points])
             field = replace(field, axes=axes)
-            along = tuple(np.einsum("mde,md->me", axes[0], t) for t in along)
+            directions = tuple(np.einsum("mde,md->me", axes[0], t) for t in directions)
         if constraints.tangents and constraints.geometry is not None:
-            constraints = replace(constraints, geometry=partial(_coupled, constraints.geometry, projection, field.axes))
-        undetermined = self._undetermined(field, constraints, along, at) if self.friction else np.empty(0)
+            constraints = replace(constraints, geometry=partial(_elastic, constraints.geometry, projection, field.axes))
+        Z = self._tractions_at_supports(field, constraints, directions, config) if self.friction else np.empty(0)
         return replace(
-            constraints, low_rank_compliance=undetermined, areas=field.areas, nodal=field, coupled_directions=along
+            constraints, low_rank_compliance=Z, areas=field.areas, nodal=field, coupled_directions=directions
         )  # fmt: skip
 
-    def _undetermined(
-        self, field: PressureField, constraints: Constraints, directions: tuple[Array, ...], at: Configuration
+    def _tractions_at_supports(
+        self, field: PressureField, constraints: Constraints, directions: tuple[Array, ...], config: Configuration
     ) -> Array:
         """Return the factor of a compliance that determines tangential tractions at nodes where both sides are held.
 
-        Supports prevent slip there, so that these tractions do no work, and no equation determines them. The compliance
-        makes them vanish, together with the components of pressures that are slightly inclined to the support. If the
-        component of an inclined pressure is a large part of the limit of friction, as on facets that meet a plane of
-        symmetry at an angle, the support carries it. The compliance must then not act on the pressure, because bodies would
-        penetrate. `directions` are the tangents (m, dim) in the axes of the field. See `Constraints.low_rank_compliance`;
-        empty if no such node exists.
+        Supports prevent slip at these nodes, so that the tractions do no work, and no equation determines them. The
+        compliance makes the tractions vanish, together with the tangential components of pressures that are slightly
+        inclined to the support. If such a component is a large part of the limit of friction, as on facets that meet a plane
+        of symmetry at an angle, the support carries it. The compliance must then not act on the pressure, because the bodies
+        would penetrate. `directions` are the tangents (m, dim) in the axes of the field. The result is a
+        `Constraints.low_rank_compliance`, or an empty array if no such node exists.
         """
         factors = []
-        for held, nodes in self.without_slip(at):
+        for held, nodes in self.without_slip(config):
             columns = np.flatnonzero(nodes[field.independent])
             if len(columns):
                 Z = field.projection.compliance_factor(columns)
                 in_axes = held if field.axes is None else np.einsum("nde,nd->ne", field.axes[1], held)
                 at_points = field.projection.P @ in_axes[field.independent]
                 axes = normals(directions), *directions
-                components = np.stack([np.einsum("nd,nd->n", along, at_points) for along in axes])
+                components = np.stack([np.einsum("nd,nd->n", direction, at_points) for direction in axes])
                 factor = components[:, :, None] * Z
                 pressure, shear = (np.linalg.norm(values, axis=(0, 1)) for values in (factor[:1], factor[1:]))
                 factor[0, :, pressure > PART_OF_CONE * constraints.friction.max() * shear] = 0.0
@@ -294,13 +300,13 @@ class PressureFieldFormulation(Formulation):
         return np.concatenate(factors, axis=2) if factors else np.empty(0)
 
 
-def _coupled(
+def _elastic(
     geometry: Geometry, projection: Projection, axes: tuple[Array, Array] | None, multiplier: Array, tangential: Array,
     displacement: Array,
 ) -> Linearised:  # fmt: skip
-    """Return the linearised geometry of constraints whose forces a multiplier field couples as vectors.
+    """Return the linearised geometry of constraints whose force vectors are coupled by the compliance of a multiplier field.
 
-    The first three arguments are the geometry without compliance, the multiplier field, and its `PressureField.axes`.
+    `geometry` is the geometry without compliance, `projection` the multiplier field, and `axes` its `PressureField.axes`.
     """
     linearised = geometry(multiplier, tangential, displacement)
     assert isinstance(linearised, LinearisedPoints)
@@ -310,7 +316,7 @@ def _coupled(
     def elastic(force: Array) -> Array:
         forces = np.zeros((count, force.shape[1]))
         forces[rows] = force if axes is None else np.einsum("mde,md->me", axes[0][rows], force)
-        moved = np.column_stack([projection.apply(component) for component in forces.T])[rows]
-        return moved if axes is None else np.einsum("mde,me->md", axes[0][rows], moved)
+        displacements = np.column_stack([projection.apply(component) for component in forces.T])[rows]
+        return displacements if axes is None else np.einsum("mde,me->md", axes[0][rows], displacements)
 
     return replace(linearised, compliance=elastic)

@@ -1,16 +1,16 @@
 r"""Mortar contact with one weighted gap per node: :math:`\int \psi_j\, (x_s - x_p) \cdot n_j \ge 0`.
 
-The integrals run over the mortar segments of the two sides (Puso, 2004; Popp, Gitterle, Gee and Wall, 2010). A gap is divided
-by the weight of its :math:`\psi_j`, so that it is a length and its multiplier is the nodal force; the normal is the mean of
-the normals of the primary side around the node.
+The integrals extend over the mortar segments of the two sides (Puso, 2004; Popp, Gitterle, Gee and Wall, 2010). A gap is
+divided by the weight of its :math:`\psi_j`, so that it is a length and its multiplier is the nodal force. The normal is the
+mean of the normals of the primary side around the node.
 
-``"dual"`` functions are biorthogonal to the displacement of the secondary side, see `_dual_basis`: a gap involves one
-node of that side, and for a mid node also the ends of its edge. Constraints can therefore be eliminated one by one, the
-corners first, and the matrix stays sparse and positive definite. ``"standard"`` functions are linear between the corners,
-also on quadratic facets; only corners have gaps.
+``"dual"`` functions are biorthogonal to the shape functions of the secondary side, see `_dual_basis`. Each gap then involves
+only one node of that side, or a mid-side node and the ends of its edge. Constraints can therefore be eliminated one by one,
+those of corners first, and the matrix remains sparse and positive definite. ``"standard"`` functions are linear between the
+corners, also on quadratic facets, and only corners have gaps.
 
-Against a rigid obstacle the integrals use Gauss points of whole facets, and :math:`x_p` is the point of the obstacle closest
-to each.
+Against a rigid obstacle the integrals use Gauss points of complete facets, and :math:`x_p` is the point of the obstacle that
+is closest to each Gauss point.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.integration import NO_AREA, areas_of_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import Closing, Differences, LinearisedPoints, NodalNormals, Points, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import FACING, Candidates, Normals, filled_up, pair, tangents
+from fastcontact.contact.pairing import FACING, Candidates, Normals, padded, pair, tangents
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.contact.search.limits import BEYOND
 from fastcontact.contact.surface import Surface
@@ -55,32 +55,33 @@ class Coverage(NamedTuple):
     overlap : Overlap
     weights : list of ndarray (n_facets, k)
         Integrals over the overlap of the k test functions of the facets of each block [area].
-    kept : ndarray of bool (m,)
-        Whether a secondary node has a gap.
+    with_gap : ndarray of bool (m,)
+        Secondary nodes that have a gap.
     functions : list of (ndarray (n_facets, k, k), ndarray (n_facets, k, k))
-        For each block, the coefficients of psi in its shape functions [-], and the integrals of psi with these [area].
+        For each block, the coefficients of the functions psi in terms of the shape functions [-], and the integrals of
+        products of both [area].
     """
 
     overlap: Overlap
     weights: list[Array]
-    kept: Mask
+    with_gap: Mask
     functions: list[tuple[Array, Array]]
 
 
 class Means(NamedTuple):
-    """Mean relative motions of the nodes.
+    """Mean relative motions of the secondary nodes, and their weights.
 
     Attributes
     ----------
     coverage : Coverage
     rows, across : csr_array (m, n_points)
-        Integrals of psi with secondary and with primary shape functions [area].
+        Integrals of psi times the secondary and times the primary shape functions [area].
     weight : ndarray (m,)
         Integrals of psi; infinite for nodes without gaps [area].
     motion : csr_array (m, n_points)
         Map from displacements to mean displacements relative to the primary side [-].
     closer : ndarray (m, dim)
-        Mean vectors by which smooth surfaces are closer than facets [length].
+        Mean vectors by which the smooth surfaces are closer to each other than the facets [length].
     normal : ndarray (m, dim)
         Unit normals [-].
     """
@@ -135,7 +136,7 @@ class WeightedMortar(Formulation):
 
     @property
     def eliminable(self) -> bool:
-        """See `Formulation`; standard multipliers couple the corners of quadratic facets through their mid nodes."""
+        """See `Formulation`; standard multipliers couple the corners of quadratic facets through the mid-side nodes."""
         return self.multipliers == "dual" or self.secondary.order == 1
 
     def _overlap(self, deformed: Array, pose: Pose) -> Overlap:
@@ -154,150 +155,145 @@ class WeightedMortar(Formulation):
         )
         return small or super().alternates(constraints)
 
-    def unilateral(self, at: Configuration) -> Constraints:
+    def unilateral(self, config: Configuration) -> Constraints:
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
-        means = self._means(self.points + at.displacement, at)
-        # Ties have separate equations in the directions in which both sides are held.
-        held = self.without_slip(at) if self.slides and not self.options.tied else []
-        constraints, slipping = self._weighted_gaps(at, means, held)
-        return replace(constraints, geometry=partial(self._linearised, at, means, held, constraints, slipping))
+        means = self._means(self.points + config.displacement, config)
+        # Tied pairs have separate equations for the directions in which both sides are held.
+        held = self.without_slip(config) if self.has_tangents and not self.options.tied else []
+        constraints, slip_data = self._weighted_gaps(config, means, held)
+        return replace(constraints, geometry=partial(self._linearised, config, means, held, constraints, slip_data))
 
     def _weighted_gaps(
-        self, at: Configuration, means: Means, held: list[tuple[Array, Mask]]
+        self, config: Configuration, means: Means, held: list[tuple[Array, Mask]]
     ) -> tuple[Constraints, tuple[Array, Array] | None]:
-        """Return the constraints without their derivatives, the tangents (k, m, dim), and the lengths (m,) of closing gaps.
+        """Return the constraints without their derivatives, and the data of their slips.
 
-        `held` are the directions `without_slip`. The second result is None without tangents.
+        `held` are the directions `without_slip`. The data are the tangents (k, m, dim) and the lengths (m,) by which gaps
+        close, or None without tangents.
         """
         coverage, rows, across, weight, mean, closer, normal = means
         B = rows_of(mean, normal)
-        gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(rows, across, weight)
+        gap0 = B @ self.points.ravel() + config.clearance_factor * self._clearance(rows, across, weight)
         gap0 -= np.einsum("nd,nd->n", closer, normal)
-        if at.worn is not None:
-            gap0 += rows @ at.worn / weight
+        if config.worn is not None:
+            gap0 += rows @ config.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
-        constraints = Constraints(
-            B,
-            gap0,
-            self.points[points],
-            areas=weight,
-            nodes=nodes,
-            nodal=WeightedPressures(weight, *self._whole_side),
-        )
-        if not self.slides:
+        pressures = WeightedPressures(weight, *self._whole_side)
+        constraints = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=pressures)
+        if not self.has_tangents:
             return constraints, None
         candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
         projectors = np.zeros((*normal.shape, normal.shape[1]))
-        for along, nodes_held in held:
-            projectors[nodes_held] += along[nodes_held, :, None] * along[nodes_held, None, :]
-        friction, directions, rubbing = self.options.rubbing(self.friction, tangents(normal, projectors), candidates)
-        slips, additional = self._slips(rubbing, held, coverage, mean, rows, weight)
-        length, closing_direction = self._closing(constraints, normal, at)
+        for axis, nodes_held in held:
+            projectors[nodes_held] += axis[nodes_held, :, None] * axis[nodes_held, None, :]
+        mu, directions, slip_axes = self.options.friction_axes(self.friction, tangents(normal, projectors), candidates)
+        slips, additional = self._slips(slip_axes, held, coverage, mean, rows, weight)
+        length, closing_direction = self._closing_motion(constraints, normal, config)
         closing = length[:, None] * closing_direction
-        # Slip is also due to the motion of a rigid obstacle, and is corrected for motions that close gaps.
+        # Part of the relative motion that is not slip: that of a rigid obstacle, or minus the motion that closes the gap.
         if not isinstance(self.primary, RigidSide):
-            moved = -closing if self.slip == "symmetric" else np.zeros_like(closing)
+            non_slip = -closing if self.slip == "symmetric" else np.zeros_like(closing)
         else:
-            current, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-            moved = self.primary.carried(current, before, at.pose, at.pose_start)
-        slip0 = -np.stack([np.einsum("nd,nd->n", t, moved) for t in rubbing])
-        for along, is_held, motion in additional:
-            remaining = closing - np.where(is_held, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
-            apparent_slip = np.einsum("md,md->m", motion @ remaining, along)
-            slip0 += np.stack([np.einsum("md,md->m", t, along) * apparent_slip for t in rubbing])
-        constraints = replace(constraints, tangents=slips, directions=directions, friction=friction, slip0=slip0)
-        return constraints, (np.stack(rubbing), length)
+            current, before = (mean @ (self.points + u) for u in (config.displacement, config.start))
+            non_slip = self.primary.rigid_motion(current, before, config.pose, config.pose_start)
+        slip0 = -np.stack([np.einsum("nd,nd->n", t, non_slip) for t in slip_axes])
+        for axis, is_held, motion in additional:
+            transverse = closing - np.where(is_held, np.einsum("md,md->m", closing, axis), 0.0)[:, None] * axis
+            apparent_slip = np.einsum("md,md->m", motion @ transverse, axis)
+            slip0 += np.stack([np.einsum("md,md->m", t, axis) * apparent_slip for t in slip_axes])
+        constraints = replace(constraints, tangents=slips, directions=directions, friction=mu, slip0=slip0)
+        return constraints, (np.stack(slip_axes), length)
 
-    def _means(self, deformed: Array, at: Configuration, kept: Mask | None = None) -> Means:
+    def _means(self, deformed: Array, config: Configuration, with_gap: Mask | None = None) -> Means:
         """Return the mean relative motions of nodes at the coordinates `deformed` (n_points, dim) [length].
 
-        `kept` (m,) are the nodes with gaps; by default, they result from the overlap.
+        `with_gap` (m,) are the nodes with gaps; by default, they result from the overlap.
         """
-        overlap = self._overlap(deformed, at.pose)
+        overlap = self._overlap(deformed, config.pose)
         weights = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
-        if kept is None:
-            kept = self._nodes_with_gaps(weights, LEAST if at.rounded else COVERED)
-        coverage = self._coverage(overlap, weights, kept)
-        rows, across, closer = self._weighted(coverage)
-        # Only the gap of an excluded node is omitted. The functions of its neighbours are not extended over its area.
+        if with_gap is None:
+            with_gap = self._nodes_with_gaps(weights, LEAST if config.rounded else COVERED)
+        coverage = self._coverage(overlap, weights, with_gap)
+        rows, across, closer = self._weighted_integrals(coverage)
+        # The gap of an excluded node is omitted, but the functions of its neighbours are not extended over its area.
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         mean = scaled(csr_array(rows - across), 1.0 / weight)
-        normal = self._mean_normals(overlap, deformed, at.pose)
+        normal = self._mean_normals(overlap, deformed, config.pose)
         return Means(coverage, rows, across, weight, mean, closer / weight[:, None], normal)
 
     def _linearised(
-        self, at: Configuration, means: Means, held: list[tuple[Array, Mask]], constraints: Constraints,
-        slipping: tuple[Array, Array] | None, multiplier: Array, tangential: Array, displacement: Array,
+        self, config: Configuration, means: Means, held: list[tuple[Array, Mask]], constraints: Constraints,
+        slip_data: tuple[Array, Array] | None, multiplier: Array, tangential: Array, displacement: Array,
     ) -> Linearised:  # fmt: skip
         """Return the linearisation of contact forces, mean gaps and slips; see `linearised_geometry`.
 
-        `constraints` and `slipping` are the results of `_weighted_gaps` for the other arguments.
+        `constraints` and `slip_data` are the results of `_weighted_gaps` for the other arguments.
         """
-        kept = means.coverage.kept
-        if isinstance(self.primary, Surface) and (self.points.shape[1] == 3 or self._ends_within(at, multiplier)):
+        nodes = means.coverage.with_gap
+        if isinstance(self.primary, Surface) and (self.points.shape[1] == 3 or self._ends_within(config, multiplier)):
 
-            def moved(motion: Array) -> Constraints:
-                here = replace(at, displacement=at.displacement + motion)
-                return self._weighted_gaps(here, self._means(self.points + here.displacement, at, kept), held)[0]
+            def constraints_after(motion: Array) -> Constraints:
+                moved = replace(config, displacement=config.displacement + motion)
+                return self._weighted_gaps(moved, self._means(self.points + moved.displacement, config, nodes), held)[0]
 
             sides = np.concatenate([self.secondary.points, self.primary.points])
-            motions = displacement, displacement - at.start, displacement - at.displacement
+            motions = displacement, displacement - config.start, displacement - config.displacement
             step = DIFFERENCES**1.5 * float(np.ptp(self.points[sides], axis=0).max())
-            return Differences(constraints, moved, (multiplier, tangential), motions, sides, step)
-        at, deformed = replace(at, displacement=displacement), self.points + displacement
-        linearised = self._at_points(at, means, multiplier)
-        if slipping is None:
+            return Differences(constraints, constraints_after, (multiplier, tangential), motions, sides, step)
+        config, deformed = replace(config, displacement=displacement), self.points + displacement
+        linearised = self._at_points(config, means, multiplier)
+        if slip_data is None:
             return linearised
-        directions, length = slipping
-        slips = self._sliding(means.motion, directions, tangential, at)
+        directions, length = slip_data
+        slips = self._load_step_slips(means.motion, directions, tangential, config)
         if not isinstance(self.primary, RigidSide) and self.slip == "symmetric":
             opening = means.motion @ slips.start - means.closer
             closing = Closing.of(means.normal, NodalNormals(self.secondary, deformed), opening, length)
             slips = replace(slips, total=slips.total + closing.vector, closing=closing)
         return replace(linearised, slips=slips)
 
-    def _ends_within(self, at: Configuration, multiplier: Array) -> bool:
+    def _ends_within(self, config: Configuration, multiplier: Array) -> bool:
         """Return whether the primary side, or that of one of its bodies, ends within facets that carry forces."""
         assert isinstance(self.primary, Surface)
-        deformed, tolerance = self.points + at.displacement, self.projection_tolerance or 0.0
+        deformed, tolerance = self.points + config.displacement, self.projection_tolerance or 0.0
         ends = ((b.local, facets_at_ends(b, self.primary, deformed, tolerance)) for b in self.secondary.blocks)
         return any(multiplier[local[facets]].any() for local, facets in ends)
 
-    def _at_points(self, at: Configuration, means: Means, multiplier: Array) -> LinearisedPoints:
-        """Return the linearisation of contact forces and mean gaps by the projections of the integration points.
+    def _at_points(self, config: Configuration, means: Means, multiplier: Array) -> LinearisedPoints:
+        """Return the linearisation of contact forces and mean gaps, with the projections of the integration points.
 
-        Segments are constant, because the variation of the cuts has no effect if the integrand is continuous across them, as
-        it is except at ends of the primary side.
+        The segments are kept constant. The variation of a cut has no effect if the integrand is continuous across it, which
+        is the case except at ends of the primary side.
         """
-        deformed, is_loaded, overlap = self.points + at.displacement, multiplier != 0.0, means.coverage.overlap
-        functions, tests, first, first_facet = list[Blocks](), list[Blocks](), 0, 0
+        deformed, is_loaded, overlap = self.points + config.displacement, multiplier != 0.0, means.coverage.overlap
+        functions, tests, n_points, facet_offset = list[Blocks](), list[Blocks](), 0, 0
         nodes, shapes, facets = [], [], []
         of_blocks = zip(self.secondary.blocks, self._test, means.coverage.functions, overlap.points, strict=True)
-        for block, T, (psi, _), inside in of_blocks:
-            kept = is_loaded[block.local].any(axis=1)[inside.facet]
-            facet, shape, area = (values[kept] for values in inside)
-            columns = first + np.arange(len(facet))[:, None]
+        for block, T, (psi, _), quadrature_points in of_blocks:
+            selected = is_loaded[block.local].any(axis=1)[quadrature_points.facet]
+            facet, shape, area = (values[selected] for values in quadrature_points)
+            columns = n_points + np.arange(len(facet))[:, None]
             local, psi_at = block.local[facet], np.einsum("qak,qk,q->qa", psi[facet], shape, area)
             functions.append((local, columns, psi_at[:, :, None]))
             tests.append((local, columns, (area[:, None] * (shape @ T.T))[:, :, None]))
             nodes.append(block.facets[facet])
             shapes.append(shape)
-            facets.append(first_facet + facet)
-            first, first_facet = first + len(facet), first_facet + len(block.facets)
-        candidates = Candidates(filled_up(nodes), filled_up(shapes), np.concatenate(facets))
-        pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", at.pose)
-        rows, size = np.flatnonzero(pairing.paired), (len(multiplier), first)
-        along = "facet" if self.normals == "secondary" else self.normals
-        rise = self.rise(candidates, pairing, rows, deformed)
-        points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, True, rise)
+            facets.append(facet_offset + facet)
+            n_points, facet_offset = n_points + len(facet), facet_offset + len(block.facets)
+        candidates = Candidates(padded(nodes), padded(shapes), np.concatenate(facets))
+        pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", config.pose)
+        rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
+        normals = "facet" if self.normals == "secondary" else self.normals
+        rise = self.smoothing_slope(candidates, pairing, rows, deformed)
+        points = faced(candidates, pairing, rows, self.primary, deformed, normals, config.pose, True, rise)
         weighted = scaled(csr_array(assembled(functions, size)[:, rows]), 1.0 / means.weight)
         mean = csr_array(assembled(tests, size)[:, rows])
         separate_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
             column = self.secondary.points[:, None]
             at_nodes, all_nodes = Candidates(column, np.ones(column.shape)), np.arange(len(column))
-            separate_normals = faced(at_nodes, pairing, all_nodes, self.primary, deformed, self.normals, at.pose)
+            separate_normals = faced(at_nodes, pairing, all_nodes, self.primary, deformed, self.normals, config.pose)
         elif self.normals == "secondary":
             separate_normals = NodalNormals(self.secondary, deformed)
         return LinearisedPoints(self.secondary, points, weighted, means.normal, multiplier, mean, separate_normals)
@@ -306,18 +302,18 @@ class WeightedMortar(Formulation):
     def _whole_side(self) -> tuple[Array, Array, list[Any], Mask]:
         """The attributes of `WeightedPressures` that are the same in all pairings."""
         full_area, quadratic = nodal_areas(self.secondary, self.points, self.axisymmetric), []
-        tested, held = np.zeros_like(full_area), np.zeros(len(full_area), bool)
+        full_areas, held = np.zeros_like(full_area), np.zeros(len(full_area), bool)
         for block, T, full in zip(self.secondary.blocks, self._test, self._whole, strict=True):
-            np.add.at(tested, block.local, full)
+            np.add.at(full_areas, block.local, full)
             element = elements.get(block.element)
             if element.order == 2:
                 quadratic.append((element.n_corners, T, block.local))
         if self.held is not None:
             projectors = self.held.at(self.secondary.points)
             held = np.trace(projectors, axis1=1, axis2=2) > self.points.shape[1] - 0.5
-        return tested, full_area, quadratic, held
+        return full_areas, full_area, quadratic, held
 
-    def _closing(self, constraints: Constraints, normal: Array, at: Configuration) -> tuple[Array, Array]:
+    def _closing_motion(self, constraints: Constraints, normal: Array, config: Configuration) -> tuple[Array, Array]:
         """Return the lengths (m,) by which gaps close in the step [length], and the directions (m, dim) of this motion.
 
         This motion is not slip. As in `Formulation`, the directions are those of the means of the normals of both sides, or
@@ -325,48 +321,48 @@ class WeightedMortar(Formulation):
         """
         direction = normal
         if not isinstance(self.primary, RigidSide):
-            direction = normal - nodal_normals(self.secondary, self.points + at.displacement)
+            direction = normal - nodal_normals(self.secondary, self.points + config.displacement)
             direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), TINY)  # zero at unpaired nodes
         lean = np.einsum("nd,nd->n", normal, direction)
-        gap = np.where(constraints.usable & (lean > 0.0), constraints.gaps(at.start), 0.0)
+        gap = np.where(constraints.usable & (lean > 0.0), constraints.gaps(config.start), 0.0)
         return gap / np.where(lean > 0.0, lean, 1.0), direction
 
     def _slips(
         self, directions: Sequence[Array], without_slip: list[tuple[Array, Mask]], coverage: Coverage, mean: csr_array,
         base: csr_array, weight: Array,
     ) -> tuple[tuple[csr_array, ...], list[tuple[Array, Mask, csr_array]]]:  # fmt: skip
-        """Return rows (m, n_dofs) of the slips along tangents (m, dim).
+        """Return the rows (m, n_dofs) of the slips along tangents (m, dim), and additional motions in held directions.
 
-        Usually these are the rows of the `mean` relative motion. In a direction in which both sides are held at a node, as
-        in a plane of symmetry, the mean would contain only the motion of the other side near the plane. The functions of
-        neighbouring nodes then replace that of the node (`Formulation.without_slip`). For each such direction (m, dim) the
-        matrix (m, m) of the additional motion of secondary nodes in these functions is also returned, because on curved
-        sides these nodes close their gaps along other normals.
+        Usually the rows are those of the `mean` relative motion. If both sides are held at a node in a direction, as in a
+        plane of symmetry, the mean in this direction would contain only the motion of the other side near the plane. The
+        functions of neighbouring nodes then replace that of the node, see `Formulation.without_slip`. On curved sides, these
+        neighbours close their gaps along other normals. Therefore, the second result contains the matrix (m, m) of the
+        additional motion of the secondary nodes for each of these directions (m, dim).
         """
         rows, additional = [rows_of(mean, direction) for direction in directions], []
         held = np.zeros((len(weight), *2 * self.points.shape[1:]))
-        for along, nodes in without_slip:
-            if not (nodes & coverage.kept).any():
+        for axis, nodes in without_slip:
+            if not (nodes & coverage.with_gap).any():
                 continue
-            replaced, across, _ = self._weighted(self._coverage(*coverage[:2], coverage.kept & ~nodes))
-            difference = csr_array(scaled(csr_array(replaced - across), 1.0 / weight) - mean)
+            substitute, across, _ = self._weighted_integrals(self._coverage(*coverage[:2], coverage.with_gap & ~nodes))
+            difference = csr_array(scaled(csr_array(substitute - across), 1.0 / weight) - mean)
             difference.eliminate_zeros()
             for k, direction in enumerate(directions):
-                slip = np.einsum("md,md->m", direction, along)
-                rows[k] = csr_array(rows[k] + rows_of(difference, slip[:, None] * along))
+                slip = np.einsum("md,md->m", direction, axis)
+                rows[k] = csr_array(rows[k] + rows_of(difference, slip[:, None] * axis))
             additional.append(
-                (along, nodes, csr_array(scaled(csr_array(replaced - base), 1.0 / weight)[:, self.secondary.points]))
+                (axis, nodes, csr_array(scaled(csr_array(substitute - base), 1.0 / weight)[:, self.secondary.points]))
             )
-            held[nodes] += np.einsum("md,me->mde", along[nodes], along[nodes])
+            held[nodes] += np.einsum("md,me->mde", axis[nodes], axis[nodes])
         # Slip is computed along tangents whose component that supports do not hold is longer than FACING.
         free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FACING**2 for t in directions]
         return tuple(scaled(row, np.where(slips, 1.0, 0.0)) for row, slips in zip(rows, free, strict=True)), additional
 
-    def _weighted(self, coverage: Coverage) -> tuple[csr_array, csr_array, Array]:
-        """Return the integrals of psi with secondary and with primary shape functions, both (m, n_points) [area].
+    def _weighted_integrals(self, coverage: Coverage) -> tuple[csr_array, csr_array, Array]:
+        """Return the integrals of psi times the secondary and times the primary shape functions, (m, n_points) each [area].
 
-        The third result contains the integrals (m, dim) of psi with the vectors by which smooth surfaces are closer than
-        facets [volume].
+        The third result contains the integrals (m, dim) of psi times the vectors by which the smooth surfaces are closer to
+        each other than the facets [volume].
         """
         overlap = coverage.overlap
         size = (len(self.secondary.points), len(self.points))
@@ -383,43 +379,43 @@ class WeightedMortar(Formulation):
             across.append((coupling.secondary.local[secondary_facet], coupling.primary.facets[primary_facet], values))
         return assembled(rows, size), assembled(across, size), closer
 
-    def _coverage(self, overlap: Overlap, weights: list[Array], kept: Mask) -> Coverage:
-        """Return the coverage with the functions psi of the nodes `kept` (m,)."""
+    def _coverage(self, overlap: Overlap, weights: list[Array], with_gap: Mask) -> Coverage:
+        """Return the coverage with the functions psi of the nodes `with_gap` (m,)."""
         functions, of_blocks = [], zip(self._test, overlap.mass, weights, self._whole, strict=True)
         for block, (T, mass, covered, full) in zip(self.secondary.blocks, of_blocks, strict=True):
-            of_facets = kept[block.local]
+            with_psi = with_gap[block.local]
             if self.multipliers == "standard":
-                psi = np.where(of_facets[:, :, None], T, 0.0)
+                psi = np.where(with_psi[:, :, None], T, 0.0)
                 functions.append((psi, psi @ mass))
-            else:  # depending on the fractions of the weights that face the other side
+            else:  # dual functions depend on the covered fractions of the weights
                 fraction = np.divide(covered, full, out=np.zeros_like(covered), where=full > 0.0)
-                psi, D = dual_functions(T @ mass @ T.T, of_facets, fraction)
+                psi, D = dual_functions(T @ mass @ T.T, with_psi, fraction)
                 functions.append((psi @ T, D @ np.linalg.inv(T).T))
-        return Coverage(overlap, weights, kept, functions)
+        return Coverage(overlap, weights, with_gap, functions)
 
     def _nodes_with_gaps(self, covered: list[Array], least: float) -> Mask:
-        """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions.
+        """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions over the overlap.
 
-        Dual functions have gaps where a larger fraction than `least` of their weights faces the other side.
+        With dual functions, a node has a gap if its weight is more than the fraction `least` of that over complete facets.
         """
         m = len(self.secondary.points)
-        total, full_total, added = np.zeros(m), np.zeros(m), np.zeros(m, bool)
+        total, full_total, additional = np.zeros(m), np.zeros(m), np.zeros(m, bool)
         for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
             np.add.at(total, block.local, weights)
             np.add.at(full_total, block.local, full)
         sufficient = total > (least if self.multipliers == "dual" else NO_AREA) * full_total
         for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
-            # If no node of a facet has sufficient weight, that with the largest weight has a gap, so that no overlap is
-            # omitted.
+            # If no node of a facet has a sufficient weight, the node with the largest weight has a gap, so that no overlap
+            # is omitted.
             without_gap = ~sufficient[block.local].any(axis=1) & (weights.sum(axis=1) > NO_AREA * full.sum(axis=1))
             largest = np.argmax(total[block.local[without_gap]], axis=1)
-            added[block.local[without_gap][np.arange(len(largest)), largest]] = True
-        return (sufficient | added) & (full_total > 0.0)
+            additional[block.local[without_gap][np.arange(len(largest)), largest]] = True
+        return (sufficient | additional) & (full_total > 0.0)
 
     def _mean_normals(self, overlap: Overlap, deformed: Array, pose: Pose) -> Array:
         """Return unit means (m, dim) of the opposite primary normals; at unpaired nodes, the mean over all nodes.
 
-        Against an obstacle these are the normals at the nodes themselves, which lie in planes of symmetry.
+        Against an obstacle they are the normals at the nodes themselves, which lie in planes of symmetry of the model.
         """
         if isinstance(self.primary, RigidSide):
             _, normal, paired, _ = self.primary.facing(deformed[self.secondary.points], pose)
@@ -436,26 +432,26 @@ class WeightedMortar(Formulation):
         tests = dict(zip((block.element for block in self.secondary.blocks), self._test, strict=True))
         for coupling in overlap.couplings:
             secondary_facet, primary_facet = coupling.pairs.T
-            faced = coupling.integrals @ normals_of[coupling.primary.element][primary_facet]
-            np.add.at(mean, coupling.secondary.local[secondary_facet], tests[coupling.secondary.element] @ faced)
+            integral = coupling.integrals @ normals_of[coupling.primary.element][primary_facet]
+            np.add.at(mean, coupling.secondary.local[secondary_facet], tests[coupling.secondary.element] @ integral)
         self.secondary.add_across_ends(mean)
-        length, others = np.linalg.norm(mean, axis=1, keepdims=True), mean.sum(axis=0)
-        if np.linalg.norm(others) <= LENGTH_ROUND_OFF * length.sum():
-            others = np.eye(len(others))[-1]
-        mean = np.where(length > 0.0, mean, others)
+        length, overall = np.linalg.norm(mean, axis=1, keepdims=True), mean.sum(axis=0)
+        if np.linalg.norm(overall) <= LENGTH_ROUND_OFF * length.sum():
+            overall = np.eye(len(overall))[-1]
+        mean = np.where(length > 0.0, mean, overall)
         return mean / np.linalg.norm(mean, axis=1, keepdims=True)
 
     def _clearance(self, rows: csr_array, across: csr_array, weight: Array) -> Array:
         """Return the contribution of nodal clearances on both sides to the weighted gaps (m,) [length]."""
-        added = np.zeros(rows.shape[0])
+        contribution = np.zeros(rows.shape[0])
         for matrix, side, clearance in (
             (rows, self.secondary, self.options.clearance), (across, self.primary, self.options.clearance_primary)
         ):  # fmt: skip
             if clearance is not None:
                 values = np.zeros(len(self.points))
                 values[side.points] = clearance(self.points[side.points])
-                added += matrix @ values / weight
-        return added
+                contribution += matrix @ values / weight
+        return contribution
 
 
 @dataclass(frozen=True, eq=False)
@@ -466,47 +462,48 @@ class WeightedPressures(NodalField):
     ----------
     weight : ndarray (m,)
         Area of each gap, infinite where there is no gap [area].
-    tested : ndarray (m,)
-        Integrals of the positive functions over the whole secondary side [area].
+    full_areas : ndarray (m,)
+        Integrals of the positive functions over the complete secondary side [area].
     nodal_areas : ndarray (m,)
-        Integrals of the shape functions over the whole secondary side [area].
+        Integrals of the shape functions over the complete secondary side [area].
     quadratic : list of (int, ndarray (n_nodes, n_nodes), ndarray of int (n_facets, n_nodes))
-        Kinds of quadratic facets: number of corners, coefficients of positive functions in shape functions, nodes.
+        For each block of quadratic facets, the number of corners, the coefficients of the positive functions in terms of the
+        shape functions, and the nodes of the facets.
     held : ndarray of bool (m,)
-        Nodes prescribed in all directions, whose forces act between supports, independently of their neighbours.
+        Nodes that are prescribed in all directions. Their forces act between supports, independently of their neighbours.
     """
 
     weight: Array
-    tested: Array
+    full_areas: Array
     nodal_areas: Array
     quadratic: list[tuple[int, Array, NDArray[np.signedinteger]]]
     held: Mask
 
     def pressure(self, force: Array) -> Array:
-        """Return the forces divided by the areas of their gaps or, at mid nodes without a gap, the mean of their corners."""
+        """Return forces divided by areas; at mid-side nodes without a gap, means of the pressures at the corners."""
         return self._at_nodes(force / self.weight, only_without_gap=True)
 
     @property
     def covered(self) -> Array:
-        """Covered part of the nodal areas; at mid nodes without a gap, the mean of their corners."""
+        """Covered fraction of the nodal areas; at mid-side nodes without a gap, the mean of the corners."""
         usable = np.isfinite(self.weight)
-        faced = usable & (self.tested > 0.0)
-        fraction = np.divide(self.weight, self.tested, out=np.zeros_like(self.weight), where=faced)
+        has_area = usable & (self.full_areas > 0.0)
+        fraction = np.divide(self.weight, self.full_areas, out=np.zeros_like(self.weight), where=has_area)
         return self._at_nodes(fraction, only_without_gap=True)
 
     def over_whole_side(self, force: Array) -> Array:
         """Return the forces divided by the complete areas of the positive functions; see `_at_nodes`.
 
-        The part of the area of a node that faces the other side may be arbitrarily small, and the force vanishes with it. The
-        ratio of both is sensitive to round-off, unlike the force divided by the complete area.
+        The covered part of the area of a node may be arbitrarily small, and the force vanishes with it. The ratio of the
+        force and the covered area is sensitive to round-off, unlike the force divided by the complete area.
         """
-        return self._at_nodes(np.divide(force, self.tested, out=np.zeros_like(force), where=self.tested > 0.0))
+        return self._at_nodes(np.divide(force, self.full_areas, out=np.zeros_like(force), where=self.full_areas > 0.0))
 
     def _at_nodes(self, coefficients: Array, only_without_gap: bool = False) -> Array:
         """Return the nodal values (m,) of a field with `coefficients` (m,) of the positive functions.
 
-        They are the coefficients themselves, except at mid nodes of quadratic facets, where the functions of the corners do
-        not vanish.
+        They are the coefficients themselves, except at mid-side nodes of quadratic facets, where the functions of the corners
+        do not vanish.
         """
         values = coefficients.copy()
         for corners, T, local in self.quadratic:
@@ -523,5 +520,5 @@ class WeightedPressures(NodalField):
         return values
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
-        """Return the active nodes, and mid nodes without a multiplier that have a pressure."""
+        """Return the active nodes, and mid-side nodes without a multiplier that have a pressure."""
         return active | (pressure > 0)

@@ -24,8 +24,8 @@ from fastcontact.contact.integration import (
     fine_rule,
     gauss_rule,
 )
-from fastcontact.contact.pair_options import spread
-from fastcontact.contact.pairing import Candidates, Normals, filled_up
+from fastcontact.contact.pair_options import nodal_map
+from fastcontact.contact.pairing import Candidates, Normals, padded
 from fastcontact.contact.surface import FacetBlock
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import shapes_at
@@ -80,11 +80,11 @@ class Continuous(PressureFieldFormulation):
         self._candidates = Candidates.inside(self.secondary, rules)
         rho = self.augmentation * self.modulus / shortest
         all_areas = np.concatenate(areas)
-        areas_of_points = np.where(self.options.out(self._candidates), 0.0, all_areas)
-        around = filled_up(local)
-        P = shapes_at(self._candidates.shape, around, len(self.secondary.points))
-        field = self.repeated(self._determined(P, areas_of_points))
-        points = around, self._candidates.shape
+        areas_of_points = np.where(self.options.excludes(self._candidates), 0.0, all_areas)
+        nodes = padded(local)
+        P = shapes_at(self._candidates.shape, nodes, len(self.secondary.points))
+        field = self.repeated(self._independent_values(P, areas_of_points))
+        points = nodes, self._candidates.shape
         self._field = PressureField.of_points(points, (areas_of_points, all_areas), float(rho), field, renewed=False)
 
     def _rule(self, element: str) -> quadrature.Rule:
@@ -126,12 +126,12 @@ class Continuous(PressureFieldFormulation):
             areas[np.abs(areas) < 1e-3 * areas[:, 2:]] = 0.0
         return areas.ravel()
 
-    def _determined(self, P: csr_array, areas: Array) -> tuple[csr_array, Indices]:
+    def _independent_values(self, P: csr_array, areas: Array) -> tuple[csr_array, Indices]:
         """Return the matrix (n_nodes, k) from the independent values of the field to all nodal values, and their nodes (k,).
 
         All nodal values are independent, except at nodes without area, at excluded nodes, and with friction at ends of
-        quadratic lines on the axis, see `integration.even_at_axis`. Without friction, the field there is independent
-        as in code_aster, and deviates by a few percent from its even continuation.
+        quadratic lines on the axis, see `integration.even_at_axis`. Without friction, the value on the axis is independent,
+        as in code_aster, and deviates by a few percent from the even continuation of the field.
         """
         size = P.shape[1]
         weight = np.asarray((P.T @ diags_array(areas) @ P).diagonal())
@@ -141,16 +141,16 @@ class Continuous(PressureFieldFormulation):
             has_weight = (weight != 0.0).astype(float)
             even = csr_array(diags_array(has_weight) + diags_array(1.0 - has_weight) @ even)
         values = csr_array(diags_array((~excluded).astype(float)) @ even + diags_array(excluded.astype(float)))
-        kept = np.flatnonzero((weight != 0.0) & ~excluded & (even.diagonal() != 0.0))
-        return csr_array((values @ spread(self.secondary, excluded, kept))[:, kept]), kept
+        independent = np.flatnonzero((weight != 0.0) & ~excluded & (even.diagonal() != 0.0))
+        return csr_array((values @ nodal_map(self.secondary, excluded, independent))[:, independent]), independent
 
-    def unilateral(self, at: Configuration) -> Constraints:
+    def unilateral(self, config: Configuration) -> Constraints:
         """Pair the integration points on the deformed configuration, and return one constraint per point."""
-        pairing = self.facing(self._candidates, at)
+        pairing = self.facing(self._candidates, config)
         areas = self._field.projection.areas
         at_axis = self._at_axis
         pairing.paired[~(areas > ROUND_OFF * areas.max()) & ~at_axis] = False
-        constraints = self.of_points(self._candidates, pairing, self._field, at)
+        constraints = self.of_points(self._candidates, pairing, self._field, config)
         if at_axis.any():  # There is no slip on the axis.
             constraints = replace(constraints, friction=np.where(at_axis, 0.0, constraints.friction))
         return constraints
@@ -165,7 +165,7 @@ class Continuous(PressureFieldFormulation):
         areas = self._field.projection.areas
         if self.integration != "node" or not self.axisymmetric or self.options.penalty is not None:
             return np.zeros(len(areas), bool)
-        return (areas == 0.0) & ~self.options.out(self._candidates)
+        return (areas == 0.0) & ~self.options.excludes(self._candidates)
 
 
 def _simpson(element: str) -> quadrature.Rule:

@@ -1,9 +1,10 @@
 r"""Mortar contact: gaps are integrated over the segments in which two facets overlap.
 
-There are two methods of this name. In 3D, or with dual multipliers, each secondary node has one weighted gap, see
-`_weighted_mortar`. In 2D with standard multipliers, the contact status is determined at integration points.
+There are two mortar methods. In 3D, or with dual multipliers, each secondary node has one weighted gap, see
+`_weighted_mortar`. In 2D with standard multipliers, the contact status is determined at integration points. This module
+contains the second method.
 
-This file contains the latter. In each pairing the secondary facets are divided into segments, see `_cut_lines`, and each
+In each pairing the secondary facets are divided into segments, see `_cut_lines`, and each
 segment has Gauss points (Puso and Laursen, 2004). The integrals are thus exact, and a uniform pressure is transmitted
 exactly between non-matching meshes. Neither node-to-segment contact nor quadrature over complete facets achieves this.
 
@@ -12,11 +13,11 @@ primary surface ends within a secondary facet, the pressure ends at this point. 
 complementarity conditions are those of `_pressure_field`.
 
 If only a strip of a facet faces the other side, the integration points in this strip hardly determine a field over the
-complete facet: on a strip of the fraction :math:`\theta` at one end of a line, the value of a polynomial of degree k at the
-other end has a weight proportional to :math:`\theta^{2k+1}`. This is measured by the smallest generalised eigenvalue of two
-mass matrices of the facet, with integrals over the covered part and over the complete facet. If it is too small, the field
-is simplified. It becomes linear between the corners of a quadratic facet, or the mean of the values at nodes that other
-facets determine. Constant fields remain representable, so that a uniform pressure is transmitted.
+complete facet. On a strip of the fraction :math:`\theta` at one end of a line, the value of a polynomial of degree k at the
+other end has a weight proportional to :math:`\theta^{2k+1}`. The criterion is the smallest generalised eigenvalue of two mass
+matrices of the facet, one integrated over the covered part and one over the complete facet. If this eigenvalue is too small,
+the field is simplified: it becomes linear between the corners of a quadratic facet, or the mean of the values at nodes that
+other facets determine. Constant fields remain representable, so that a uniform pressure is transmitted.
 """
 
 from __future__ import annotations
@@ -36,15 +37,15 @@ from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.formulations._weighted_mortar import WeightedMortar
 from fastcontact.contact.integration import NO_AREA, areas_of_rule, facet_measure
-from fastcontact.contact.pair_options import spread
+from fastcontact.contact.pair_options import nodal_map
 from fastcontact.contact.pairing import Candidates, Normals
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import SINGLE_PRECISION
 
-# Smallest generalised eigenvalue at which a field counts as determined. A linear field needs about a seventh of the length
-# of a line, a quadratic one two fifths. Errors of the values at the other end are amplified by at most 30.
+# Smallest generalised eigenvalue at which a field counts as determined. For a linear field about a seventh of the length of
+# a line must be covered, for a quadratic field two fifths. Errors at the other end are then amplified by at most 30.
 DETERMINED = 1e-3
 
 
@@ -85,18 +86,18 @@ class WholeFacets:
         size = np.einsum("fkk->f", self.mass)
         partly = np.flatnonzero((degrees == 2) & (np.abs(mass - self.mass).max(axis=(1, 2)) > SINGLE_PRECISION * size))
         full, partial, T = self.mass[partly], mass[partly], self.to_corners
-        linear = _smallest(T @ full @ T.T, T @ partial @ T.T) > DETERMINED
-        degrees[partly] = np.where(_smallest(full, partial) > DETERMINED, 2, np.where(linear, 1, 0))
+        linear = _smallest_eigenvalues(T @ full @ T.T, T @ partial @ T.T) > DETERMINED
+        degrees[partly] = np.where(_smallest_eigenvalues(full, partial) > DETERMINED, 2, np.where(linear, 1, 0))
         return degrees
 
 
-def _smallest(full: Array, mass: Array) -> Array:
+def _smallest_eigenvalues(full: Array, mass: Array) -> Array:
     """Return the smallest eigenvalue (n_facets,) of ``mass x = eigenvalue * full x`` for each pair of mass matrices [-]."""
     inverse = np.linalg.inv(np.linalg.cholesky(full))
     return np.asarray(np.linalg.eigvalsh(inverse @ mass @ inverse.transpose(0, 2, 1))[:, 0])
 
 
-def determined(
+def independent_values(
     side: Surface, fields: list[WholeFacets], masses: list[Array], excluded: Mask
 ) -> tuple[csr_array, Indices]:
     """Return the map from the independent values of the field to all nodal values, and the nodes of the independent values.
@@ -120,25 +121,25 @@ def determined(
         Node of each independent value.
     """
     degrees = [field.degrees(mass) for field, mass in zip(fields, masses, strict=True)]
-    kept = np.zeros(len(side.points), bool)
+    chosen = np.zeros(len(side.points), bool)
     for field, degree in zip(fields, degrees, strict=True):
-        kept[field.block.local[degree == 2]] = True
-        kept[field.block.local[degree == 1][:, : len(field.to_corners)]] = True
-    kept &= ~excluded
+        chosen[field.block.local[degree == 2]] = True
+        chosen[field.block.local[degree == 1][:, : len(field.to_corners)]] = True
+    chosen &= ~excluded
     for field, degree, mass in zip(fields, degrees, masses, strict=True):
         # In a facet without an independent node, the node with the largest covered area becomes independent.
-        for facet in np.flatnonzero((degree >= 0) & ~kept[field.block.local].any(axis=1)):
+        for facet in np.flatnonzero((degree >= 0) & ~chosen[field.block.local].any(axis=1)):
             nodes = field.block.local[facet]
-            if not (kept[nodes].any() or excluded[nodes].all()):
-                kept[nodes[np.argmax(np.where(excluded[nodes], -np.inf, mass[facet].sum(axis=1)))]] = True
-    independent = np.flatnonzero(kept)
-    values = spread(side, excluded, independent) if excluded.any() else csr_array(diags_array(kept.astype(float)))
+            if not (chosen[nodes].any() or excluded[nodes].all()):
+                chosen[nodes[np.argmax(np.where(excluded[nodes], -np.inf, mass[facet].sum(axis=1)))]] = True
+    independent = np.flatnonzero(chosen)
+    values = nodal_map(side, excluded, independent) if excluded.any() else csr_array(diags_array(chosen.astype(float)))
     if any((degree[degree >= 0] < 2).any() for degree in degrees):
-        values = _interpolated(csr_array(values), fields, degrees, kept, excluded)
+        values = _with_interpolated_rows(csr_array(values), fields, degrees, chosen, excluded)
     return csr_array(csr_array(values)[:, independent]), independent
 
 
-def _interpolated(
+def _with_interpolated_rows(
     values: csr_array, fields: list[WholeFacets], degrees: list[Indices], with_value: Mask, excluded: Mask
 ) -> csr_array:
     """Return the map `values` (m, m) with rows added for nodes that are neither independent nor excluded.
@@ -152,8 +153,8 @@ def _interpolated(
         local = field.block.local[degree >= 0]
         corners = local[:, : len(field.to_corners)]
         row, column = np.repeat(corners, local.shape[1], axis=1).ravel(), np.tile(local, corners.shape[1]).ravel()
-        kept = ~with_value[row] & ~excluded[row] & with_value[column]
-        pairs.append(np.column_stack([row[kept], column[kept]]))
+        selected = ~with_value[row] & ~excluded[row] & with_value[column]
+        pairs.append(np.column_stack([row[selected], column[selected]]))
     row, column = np.unique(np.concatenate(pairs), axis=0).T
     count = np.bincount(row, minlength=m)
     values = csr_array(diags_array((with_value | excluded).astype(float)) @ values)
@@ -161,12 +162,12 @@ def _interpolated(
     return csr_array(values + _between_corners(fields, degrees, with_value | excluded) @ values)
 
 
-def _between_corners(fields: list[WholeFacets], degrees: list[Indices], done: Mask) -> csr_array:
-    """Return rows (m, m) that interpolate linearly between corners, for mid nodes that are not marked in `done` (m,)."""
-    between = lil_array((len(done), len(done)))
+def _between_corners(fields: list[WholeFacets], degrees: list[Indices], has_value: Mask) -> csr_array:
+    """Return rows (m, m) that interpolate linearly between corners, for mid-side nodes that do not yet have a value."""
+    between = lil_array((len(has_value), len(has_value)))
     for field, degree in zip(fields, degrees, strict=True):
         corners = len(field.to_corners)
-        facet, k = np.nonzero(~done[field.block.local[:, corners:]] & (degree >= 0)[:, None])
+        facet, k = np.nonzero(~has_value[field.block.local[:, corners:]] & (degree >= 0)[:, None])
         for nodes, node in zip(field.block.local[facet], k + corners, strict=True):
             # The facets on both sides of an edge have the same row.
             between[nodes[node], nodes[:corners]] = field.to_corners[:, node]
@@ -210,9 +211,9 @@ class SegmentMortar(PressureFieldFormulation):
         weighted = dim == 3 or str(options.get("multipliers", "standard")) != "standard"
         return WeightedMortar if weighted else SegmentMortar
 
-    def unilateral(self, at: Configuration) -> Constraints:
+    def unilateral(self, config: Configuration) -> Constraints:
         """Intersect the facets on the deformed configuration, and return one constraint per integration point."""
-        deformed = self.points + at.displacement
+        deformed = self.points + config.displacement
         assert isinstance(self.primary, Surface)
         block, borders = self.secondary.blocks[0], self.options.borders(self.secondary)
         n_gauss = block.facets.shape[1] + 1 if self.n_gauss is None else self.n_gauss
@@ -220,19 +221,19 @@ class SegmentMortar(PressureFieldFormulation):
         points = line_points(block, self.primary, self.points, deformed, *options)
         facet, shape, area = points.facet, points.shape, points.area
         candidates = Candidates(self.secondary.facets[facet], shape, facet, points.xi[:, None])
-        faced = self.facing(candidates, at)
-        paired = np.repeat(faced.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
+        pairing_of_points = self.facing(candidates, config)
+        paired = np.repeat(pairing_of_points.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
         covered = np.bincount(facet, weights=np.where(paired, area, 0.0))
-        kept = paired & (covered > NO_AREA * total)[facet] & (area > 0) & ~self.options.out(candidates)
-        pairing = replace(faced, paired=kept)
-        covering, (n, k) = np.where(kept, area, 0.0), self.secondary.facets.shape
+        usable = paired & (covered > NO_AREA * total)[facet] & (area > 0) & ~self.options.excludes(candidates)
+        pairing = replace(pairing_of_points, paired=usable)
+        usable_area, (n, k) = np.where(usable, area, 0.0), self.secondary.facets.shape
         mass = np.zeros((n, k, k))
-        np.add.at(mass, facet, covering[:, None, None] * shape[:, :, None] * shape[:, None, :])
-        values = determined(self.secondary, self._whole, [mass], self.options.excluded_nodes(self.secondary))
-        around = self.secondary.local[facet], shape
-        field = PressureField.of_points(around, (covering, area), self._rho, self.repeated(values), renewed=True)
-        return self.of_points(candidates, pairing, field, at)
+        np.add.at(mass, facet, usable_area[:, None, None] * shape[:, :, None] * shape[:, None, :])
+        values = independent_values(self.secondary, self._whole, [mass], self.options.excluded_nodes(self.secondary))
+        samples = self.secondary.local[facet], shape
+        field = PressureField.of_points(samples, (usable_area, area), self._rho, self.repeated(values), renewed=True)
+        return self.of_points(candidates, pairing, field, config)
 
 
 FORMULATION = SegmentMortar

@@ -41,8 +41,8 @@ class NodeToSegment(Formulation):
     Parameters
     ----------
     opposite : str
-        ``"facet"`` to measure the gap to the opposite primary facet, ``"node"`` to measure it to the nearest primary node,
-        for matching meshes with little sliding (APPARIEMENT='NODAL' of code_aster).
+        ``"facet"`` to measure the gap to the opposite primary facet, or ``"node"`` to measure it to the nearest primary node.
+        The latter suits matching meshes with little sliding (APPARIEMENT='NODAL' of code_aster).
     """
 
     opposite: str = "facet"
@@ -67,13 +67,13 @@ class NodeToSegment(Formulation):
                 )
         self._candidates = Candidates.nodes_of(self.secondary)
 
-    def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
-        """Return the pairing of candidates with facets or, by the option `opposite`, with the nearest primary nodes."""
-        pairing = super().facing(candidates, at, tolerance)
+    def facing(self, candidates: Candidates, config: Configuration, tolerance: float | None = None) -> Pairing:
+        """Return the pairing of candidates with facets or, if `opposite` is ``"node"``, with the nearest primary nodes."""
+        pairing = super().facing(candidates, config, tolerance)
         if self.opposite == "facet":
             return pairing
         assert isinstance(self.primary, Surface)
-        deformed, nodes = self.points + at.displacement, Candidates.nodes_of(self.primary)
+        deformed, nodes = self.points + config.displacement, Candidates.nodes_of(self.primary)
         rows = nearest(deformed[self.primary.points], candidates.positions(deformed))[1]
         normal = pairing.normal
         if self.normals in ("facet", "averaged"):  # The normal at a node is the mean over its facets.
@@ -82,13 +82,13 @@ class NodeToSegment(Formulation):
         assert nodes.xi is not None
         return replace(pairing, facet=nodes.facet[rows], xi=nodes.xi[rows], normal=normal, beyond=None)
 
-    def unilateral(self, at: Configuration) -> Constraints:
+    def unilateral(self, config: Configuration) -> Constraints:
         """Pair the nodes on the deformed configuration, and return one constraint per secondary node."""
-        pairing = self.facing(self._candidates, at)
-        pairing.paired[self.options.out(self._candidates)] = False
+        pairing = self.facing(self._candidates, config)
+        pairing.paired[self.options.excludes(self._candidates)] = False
         areas = self._nodal.nodal_areas
         usable = np.where(areas > ROUND_OFF * areas.max(), areas, np.inf)
-        constraints = self.assembled(self._candidates, pairing, None, at)
+        constraints = self.assembled(self._candidates, pairing, None, config)
         if self.opposite == "node":
             constraints = replace(constraints, geometry=None)
         return replace(constraints, areas=usable, nodes=self.secondary.points.astype(np.intp), nodal=self._nodal)
@@ -114,12 +114,13 @@ class NodalForces(NodalField):
     nodal_areas : ndarray (n_nodes,)
         Integrals of the shape functions of the nodes [area].
     values : csr_array (n_nodes, k), optional
-        Map from the values at the nodes of quadratic facets to those at all nodes; see `integration.even_at_axis`.
+        For quadratic facets, map from the k independent nodal pressures to all nodal pressures; see
+        `integration.even_at_axis`.
     independent : ndarray of int (k,), optional
-        Nodes of these values.
+        Nodes of the independent pressures.
     mass : SuperLU, optional
-        Factors of the mass matrix (k, k) of these values [area]. They are used for quadratic facets, where forces
-        divided by nodal areas are not the nodal values of a field.
+        Factors of the mass matrix (k, k) of the independent pressures [area]. On quadratic facets, forces divided by nodal
+        areas are not the nodal values of a field.
     """
 
     nodal_areas: Array

@@ -1,7 +1,7 @@
 """Facets of a rigid surface: orientation, adjacency and averaged normals.
 
-Facets are numbered through blocks of one element type each. Ridges are shared by two facets. They are the ends of lines in
-2D, and the edges of faces in 3D.
+Facets are numbered through blocks of one element type each. A ridge is the common boundary of two facets: the end of a
+line in 2D, and the edge of a face in 3D.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Block:
     corners: Array  # (n, k, dim): positions of the nodes [length]
 
     def ridges(self) -> tuple[Indices, Indices]:
-        """Return the nodes at the beginning and at the end (n, r) of each ridge, which are equal for the ends of lines."""
+        """Return the first and the last node (n, r) of each ridge, which are the same node in 2D."""
         if self.element.dim == 1:
             return self.nodes[:, :2], self.nodes[:, :2]
         edges = np.array(self.element.edges)
@@ -50,10 +50,10 @@ class Block:
 class SurfaceFacets(NamedTuple):
     """The facets of a rigid surface, their neighbours and their normals.
 
-    The smooth normal of a facet at a node is the mean over the facets there whose angle to this facet is at most the crease
-    angle. The normal of a point is the mean over all facets there, not normalised. It determines on which side of the
-    surface positions near the point lie (Baerentzen and Aanaes, 2005). Both are weighted by the angles of the facets
-    (Thuermer and Wuethrich, 1998).
+    The smooth normal of a facet at a node is the mean over the facets at this node whose angle to the facet is at most the
+    crease angle. The normal of a point is the mean over all facets at this point, not normalised. It determines on which side
+    of the surface positions near the point lie (Baerentzen and Aanaes, 2005). Both means are weighted by the angles of the
+    facets (Thuermer and Wuethrich, 1998).
     """
 
     blocks: list[Block]
@@ -65,9 +65,10 @@ class SurfaceFacets(NamedTuple):
 
 
 def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> SurfaceFacets:
-    """Return the facets of a group, which form a smooth surface where they meet at the angle `crease` [degrees] or less.
+    """Return the facets of a group, their neighbours and their normals.
 
-    Raises ContactError if they do not form an orientable surface.
+    Facets that meet at the angle `crease` [degrees] or less form a smooth surface. Raises ContactError if the facets do not
+    form an orientable surface.
     """
     blocks = _oriented_blocks(mesh, group, flip)
     beyond = _neighbours(blocks, group)
@@ -108,13 +109,13 @@ def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
         degenerate = np.flatnonzero(lengths.min(axis=1) == 0.0)
         if len(degenerate):
             raise ContactError(
-                f"{_described(blocks[-1:], int(degenerate[0]))} of the rigid surface '{group}' has no area, or none at "
+                f"{_description(blocks[-1:], int(degenerate[0]))} of the rigid surface '{group}' has no area, or none at "
                 "one of its nodes: remove it or repair the mesh there"
             )
     return blocks
 
 
-def _described(blocks: list[Block], facet: int) -> str:
+def _description(blocks: list[Block], facet: int) -> str:
     """Return a description of a facet with its number, element type and position."""
     for block in blocks:
         if facet < len(block.nodes):
@@ -138,7 +139,7 @@ def _neighbours(blocks: list[Block], group: str) -> Indices:
     if (count > 2).any():
         branch = facet[first[np.argmax(count > 2)]]
         raise ContactError(
-            f"{_described(blocks, branch)} of the rigid surface '{group}' shares an edge with more than one other facet: a "
+            f"{_description(blocks, branch)} of the rigid surface '{group}' shares an edge with more than one other facet: a "
             "surface must not branch, so split it into several groups"
         )
     shared = first[count == 2]
@@ -150,7 +151,7 @@ def _neighbours(blocks: list[Block], group: str) -> Indices:
 
 
 def _ridge_table(blocks: list[Block]) -> tuple[Indices, Indices, Indices, Indices]:
-    """Return the facet, the number, a key of the nodes and the orientation in the facet, for all ridges."""
+    """Return, for all ridges, the facet, the number in the facet, a key of the nodes, and the orientation in the facet."""
     facets, ridges, keys, signs, start = [], [], [], [], 0
     size = 1 + max(int(block.nodes.max()) for block in blocks)
     for block in blocks:
@@ -164,7 +165,7 @@ def _ridge_table(blocks: list[Block]) -> tuple[Indices, Indices, Indices, Indice
 
 
 def _check_orientation(blocks: list[Block], group: str, first: Indices, second: Indices, consistent: Mask) -> None:
-    """Raise ContactError for neighbours of opposite orientation, which names a facet of the smaller part."""
+    """Raise ContactError if neighbours have opposite orientations; the message names a facet of the smaller part."""
     if consistent.all():
         return
     n = sum(len(block.nodes) for block in blocks)
@@ -175,7 +176,7 @@ def _check_orientation(blocks: list[Block], group: str, first: Indices, second: 
     pair = sorted((int(first[wrong]), int(second[wrong])), key=lambda facet: (size[component[facet]], facet))
     numbers = np.concatenate([block.numbers for block in blocks])
     raise ContactError(
-        f"{_described(blocks, pair[0])} of the rigid surface '{group}' has the opposite orientation to its neighbour facet "
+        f"{_description(blocks, pair[0])} of the rigid surface '{group}' has the opposite orientation to its neighbour facet "
         f"{numbers[pair[1]]}: reverse it, so that all normals point out of the obstacle"
     )
 

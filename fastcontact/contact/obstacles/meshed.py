@@ -95,22 +95,22 @@ class MeshedSurface:
         offset = points - closest.position
         extents = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._facets.blocks]
         size = np.concatenate(extents)[closest.facet]
-        # At touching points the direction between both points is dominated by round-off; the normal of the facet is used.
-        touching = closest.distance <= SINGLE_PRECISION * size
+        # At touching points, the direction from the closest point is dominated by round-off, and the facet normal is used.
+        is_touching = closest.distance <= SINGLE_PRECISION * size
         outside = np.einsum("nd,nd->n", offset, pseudonormal) >= 0
         distance = np.where(outside, closest.distance, -closest.distance)
         normal = smooth if self.crease else np.where(on_edge[:, None], smooth, closest.normal)
         pseudonormal /= np.linalg.norm(pseudonormal, axis=1, keepdims=True)
         # Next to a sharp edge the normal lies between the point and its closest point, not along the normal of either facet.
         sharp = np.einsum("nd,nd->n", pseudonormal, smooth) < np.cos(np.radians(0.5 * self.crease)) - LENGTH_ROUND_OFF
-        corrected = on_edge & sharp & ~touching
-        normal[corrected] = offset[corrected] / distance[corrected, None]
+        is_corrected = on_edge & sharp & ~is_touching
+        normal[is_corrected] = offset[is_corrected] / distance[is_corrected, None]
         height = np.abs(np.einsum("nd,nd->n", offset, pseudonormal))
         overhang = np.sqrt(np.maximum(closest.distance**2 - height**2, 0.0))
-        # At a plane of symmetry, facets of a smooth surface are inclined by up to half the crease angle; their borders stay
-        # in contact.
-        leaning = np.tan(np.radians(0.5 * MeshedSurface.crease))
-        beyond_border = on_border & (overhang > BESIDE * size) & (overhang > leaning * height)
+        # At a plane of symmetry, facets of a smooth surface are inclined by up to half the crease angle, and points slightly
+        # beyond their borders remain in contact.
+        slope = np.tan(np.radians(0.5 * MeshedSurface.crease))
+        beyond_border = on_border & (overhang > BESIDE * size) & (overhang > slope * height)
         return np.where(beyond_border, np.inf, distance), normal
 
     def _frames(self, closest: Closest) -> tuple[Array, Array, Mask, Mask]:
@@ -128,25 +128,25 @@ class MeshedSurface:
             mean = np.einsum("nk,nkd->nd", block.element.shape(xi), normals[rows])
             smooth[in_block] = mean / np.linalg.norm(mean, axis=1, keepdims=True)
             corner, edge = _corners_and_edges(block, xi)
-            at = np.flatnonzero(corner >= 0)
-            node = block.nodes[rows[at], corner[at]]
-            pseudonormal[in_block[at]], on_border[in_block[at]] = facets.at_points[node], facets.on_border[node]
-            at = np.flatnonzero(edge >= 0)
-            beyond = facets.beyond[closest.facet[in_block[at]], edge[at]]
-            pseudonormal[in_block[at]] += self._across(block, rows[at], edge[at], beyond, xi[at])
-            on_border[in_block[at]] = beyond < 0
+            on = np.flatnonzero(corner >= 0)
+            node = block.nodes[rows[on], corner[on]]
+            pseudonormal[in_block[on]], on_border[in_block[on]] = facets.at_points[node], facets.on_border[node]
+            on = np.flatnonzero(edge >= 0)
+            beyond = facets.beyond[closest.facet[in_block[on]], edge[on]]
+            pseudonormal[in_block[on]] += self._beyond_edges(block, rows[on], edge[on], beyond, xi[on])
+            on_border[in_block[on]] = beyond < 0
             on_edge[in_block] = (corner >= 0) | (edge >= 0)
         return pseudonormal, smooth, on_edge, on_border
 
-    def _across(self, block: Block, rows: Indices, edge: Indices, beyond: Indices, xi: Array) -> Array:
+    def _beyond_edges(self, block: Block, rows: Indices, edge: Indices, beyond: Indices, xi: Array) -> Array:
         """Return the normals (n, 3) of the facets `beyond` edges, at the same points; zero where there is none."""
         ends = np.array(block.element.edges)[edge]
         a, b = block.element.nodes[ends[:, 0]], block.element.nodes[ends[:, 1]]
-        along = np.linalg.norm(xi - a, axis=1) / np.linalg.norm(b - a, axis=1)
+        fraction = np.linalg.norm(xi - a, axis=1) / np.linalg.norm(b - a, axis=1)
         directions = np.zeros((len(rows), self.mesh.dim))
         facets, of_blocks = self._facets, by_block(beyond, [len(block.nodes) for block in self._facets.blocks])
         for block_beyond, normals, (in_block, facet) in zip(facets.blocks, facets.normals, of_blocks, strict=True):
-            for weight, end in ((1.0 - along, ends[:, 0]), (along, ends[:, 1])):
+            for weight, end in ((1.0 - fraction, ends[:, 0]), (fraction, ends[:, 1])):
                 node = block.nodes[rows[in_block], end[in_block]]
                 local = np.argmax(block_beyond.nodes[facet] == node[:, None], axis=1)
                 directions[in_block] += weight[in_block, None] * normals[facet, local]

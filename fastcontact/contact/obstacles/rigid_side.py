@@ -43,16 +43,16 @@ class RigidSide:
         """The nodes of the side, an empty array."""
         return np.empty(0, np.int32)
 
-    def facing(self, positions: Array, at: Pose) -> tuple[Array, Array, Mask, Array]:
-        """Return (gap, normal, paired, offset) of points at `positions` (n, dim) [length].
+    def facing(self, positions: Array, pose: Pose) -> tuple[Array, Array, Mask, Array]:
+        """Return gaps (n,), normals (n, dim), a mask (n,) of paired points and offsets (n,) at `positions` (n, dim) [length].
 
         To first order, the gap at a position x nearby is ``offset + normal . x``.
         """
-        local = positions - at.displacement
-        if self.rotation is None or at.angle == 0.0:
+        local = positions - pose.displacement
+        if self.rotation is None or pose.angle == 0.0:
             gap, normal = self._distance(local)
         else:
-            rotation, centre = self.rotation.matrix(at.angle), np.array(self.rotation.centre)
+            rotation, centre = self.rotation.matrix(pose.angle), np.array(self.rotation.centre)
             gap, normal = self._distance((local - centre) @ rotation + centre)
             normal = normal @ rotation.T
         paired = np.isfinite(gap)
@@ -68,7 +68,7 @@ class RigidSide:
             raise ContactError("the distance from a rigid obstacle must be real numbers, not complex ones")
         return distance_and_normal
 
-    def carried(self, positions: Array, before: Array, pose: Pose, pose0: Pose) -> Array:
+    def rigid_motion(self, positions: Array, before: Array, pose: Pose, pose0: Pose) -> Array:
         """Return the displacements (n, dim) of points on the surface of the obstacle due to its motion [length].
 
         The slip of a point that moves from `before` to `positions` (n, dim) [length] is its displacement minus this result.
@@ -76,24 +76,24 @@ class RigidSide:
         scaled from the chord to the arc. It vanishes where a point sticks, and is tangential to the circle for a point at
         rest.
         """
-        angle, moved = pose.angle - pose0.angle, np.tile(pose.displacement - pose0.displacement, (len(positions), 1))
+        angle, shift = pose.angle - pose0.angle, np.tile(pose.displacement - pose0.displacement, (len(positions), 1))
         if self.rotation is None or angle == 0.0:
-            return moved
-        half, centre = self.rotation.matrix(0.5 * angle), np.array(self.rotation.centre)
+            return shift
+        half_rotation, centre = self.rotation.matrix(0.5 * angle), np.array(self.rotation.centre)
         end, start = positions - centre - pose.displacement, before - centre - pose0.displacement
-        slip = (end @ half - start @ half.T) * (0.5 * angle / math.sin(0.5 * angle))
-        return np.asarray(moved + ((end - start) - slip))
+        slip = (end @ half_rotation - start @ half_rotation.T) * (0.5 * angle / math.sin(0.5 * angle))
+        return np.asarray(shift + ((end - start) - slip))
 
-    def torque(self, positions: Array, forces: Array, at: Pose) -> float | None:
+    def torque(self, positions: Array, forces: Array, pose: Pose) -> float | None:
         """Return the moment about the axis of the obstacle of `forces` (n, dim) [force] at `positions` [length]."""
         if self.rotation is None:
             return None
-        return self.rotation.torque(positions - at.displacement - np.array(self.rotation.centre), forces)
+        return self.rotation.torque(positions - pose.displacement - np.array(self.rotation.centre), forces)
 
 
 @dataclass(frozen=True)
 class Rotation:
-    """A rotation by any angle about an axis that moves along with the obstacle.
+    """A rotation by any angle about an axis that translates with the obstacle.
 
     Attributes
     ----------
@@ -132,14 +132,14 @@ class Rotation:
         On the axis itself, where the radial direction is undefined, the choice is arbitrary.
         """
         dim = positions.shape[1]
-        arm, along = np.zeros((len(positions), 3)), self.direction
-        arm[:, :dim] = positions - self.centre
-        radial = arm - (arm @ along)[:, None] * along
+        offset, axis = np.zeros((len(positions), 3)), self.direction
+        offset[:, :dim] = positions - self.centre
+        radial = offset - (offset @ axis)[:, None] * axis
         length = np.linalg.norm(radial, axis=1, keepdims=True)
-        arbitrary = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+        arbitrary = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
         on_axis = length <= LENGTH_ROUND_OFF * length.max(initial=0.0)
         radial = np.where(on_axis, arbitrary / np.linalg.norm(arbitrary), radial / np.where(on_axis, 1.0, length))
-        axes = np.stack([radial, np.cross(along, radial), np.broadcast_to(along, radial.shape)], axis=2)
+        axes = np.stack([radial, np.cross(axis, radial), np.broadcast_to(axis, radial.shape)], axis=2)
         return axes[:, :dim, :dim]
 
     def torque(self, arms: Array, forces: Array) -> float:

@@ -1,4 +1,4 @@
-"""Rigid shapes: half-space, sphere, cylinder, heights over the other coordinates, and flat punch."""
+"""Rigid shapes: half-space, sphere, cylinder, flat punch, and surfaces given by their height."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _direction(side: str) -> float:
 @typed(ContactError)
 @dataclass(frozen=True)
 class HalfSpace:
-    """The half-space behind a plane.
+    """A half-space bounded by a plane.
 
     Parameters
     ----------
@@ -277,7 +277,7 @@ def cone(slope: float, tip: float = 0.0, side: str = "above") -> Height:
 @typed(ContactError)
 @dataclass(frozen=True)
 class FlatPunch:
-    """A flat punch of a given radius (half-width in plane problems), without sides.
+    """A flat punch of a given radius (half-width in plane models) without flanks.
 
     Parameters
     ----------
@@ -286,7 +286,7 @@ class FlatPunch:
     height : float
         Height of the face above the origin [length].
     side : str
-        ``"above"`` or ``"below"`` the body.
+        Position of the punch: ``"above"`` or ``"below"`` the body.
 
     Examples
     --------

@@ -1,1 +1,1 @@
-"""The closest facet to each of many points, by a tree of boxes."""
+"""Search for the closest facet to each of many points, with a tree of bounding boxes."""

@@ -1,9 +1,9 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""A binary tree of bounding boxes over facets in 2D or 3D, which selects the few facets that may be closest.
+"""A binary tree of the bounding boxes of facets in 2D or 3D, which selects the few facets that may be closest to a point.
 
-Facets are first sorted so that neighbours in space follow each other (`tree_order`). Box 1 is the root, the children of box
-k are 2 k and 2 k + 1, and the last half of the boxes are those of the facets in this order. Their number is rounded up to a
-power of two by empty boxes, which are infinitely far from every point.
+Facets are first sorted so that neighbours in space follow each other (`tree_order`). Box 1 is the root, and the children of
+box k are the boxes 2 k and 2 k + 1. The second half of the boxes are those of single facets, in the sorted order. Empty
+boxes, which are infinitely far from every point, increase the number of leaves to a power of two.
 """
 
 from typing import NamedTuple
@@ -30,8 +30,8 @@ class Tree(NamedTuple):
 def tree_order(points, leaf_size):
     """Return the permutation (n,) that sorts points (n, dim) by recursive bisection along the longest side.
 
-    The number of points in the left half is a power of two, so that the facets below a box of the tree form one of these
-    parts. Parts of at most `leaf_size` points are not sorted, which suffices to process neighbours one after the other.
+    The number of points in the left half is a power of two, so that the facets below each box of the tree form one of these
+    parts. Parts of at most `leaf_size` points are not sorted, because it suffices that neighbours are processed in sequence.
     """
     n = points.shape[0]
     sorted_, order, size = points.copy(), np.arange(n), 1
@@ -47,7 +47,10 @@ def tree_order(points, leaf_size):
 
 @kernel
 def _halve(points, order, begin, middle, end):
-    """Permute rows `begin` to `end` so that none before `middle` exceeds one after in one coordinate (Hoare, 1961)."""
+    """Partition the rows `begin` to ``end - 1`` at `middle` along the longest side of their box (Hoare, 1961).
+
+    In this coordinate, no row before `middle` exceeds a row after it.
+    """
     axis, longest = 0, -1.0
     for d in range(points.shape[1]):
         low, high = np.inf, -np.inf
@@ -108,7 +111,7 @@ def square_to_box(tree, box, point):
 
 @inlined_kernel
 def open_box(tree, box, point, stack, squares, top):
-    """Put the children of a box on a stack of boxes and squared distances, the nearer on top; return its new height."""
+    """Push the children of a box onto a stack of boxes and squared distances, the nearer one last; return the new height."""
     near, far = 2 * box, 2 * box + 1
     to_near, to_far = square_to_box(tree, near, point), square_to_box(tree, far, point)
     if to_far < to_near:

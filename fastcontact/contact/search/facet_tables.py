@@ -1,7 +1,7 @@
-"""Constants of each kind of facet in 3D: sides, polynomials, flat triangles, and bounds on the curvature.
+"""Constants of the element types of facets in 3D: sides, polynomials, flat triangles, and bounds on the curvature.
 
-A facet of m nodes is a polynomial of the first m terms 1, s, t, st, s^2, t^2, s^2 t, s t^2, s^2 t^2 of its reference
-coordinates.
+A facet of m nodes is a polynomial of its reference coordinates s and t, with the first m of the terms 1, s, t, st, s^2, t^2,
+s^2 t, s t^2, s^2 t^2.
 """
 
 from __future__ import annotations
@@ -35,9 +35,10 @@ _FLAT = {
 
 
 class Tables(NamedTuple):
-    """Constants of facets of m nodes, all [-]; `weights` bound the contribution of a term of unit size.
+    """Constants of facets with m nodes, all [-].
 
-    The rows of `weights` bound the distance from the flat triangles, the change of the tangents, and the second derivative.
+    The rows of `weights` are bounds on the contributions of terms of unit size: to the distance from the flat triangles, to
+    the change of the tangents, and to the second derivative.
     """
 
     nodes: Array  # (m, 2): reference coordinates

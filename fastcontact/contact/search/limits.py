@@ -3,5 +3,5 @@
 # Step in reference coordinates below which a projection has converged, and the largest number of iterations.
 STEP = 1e-13
 MAX_ITERATIONS = 100
-# A projection that ends farther beyond its facet than this, in facet lengths, is not trusted.
+# Largest overhang of a projection beyond its facet, in facet lengths, at which the projection is accepted.
 BEYOND = 1.0

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Closest point of one facet in 3D, flat or curved, near or far: the distance is minimised from several starting points.
+"""Closest point of a flat or curved facet in 3D, by minimisation of the distance from several starting points.
 
 A facet is a polynomial with coefficients ``terms`` (n_facets, m, 3) of the terms in `facet_tables`, on a polygon of
 ``sides`` (n_sides, 3), rows (a, b, c) for a s + b t <= c.
@@ -17,11 +17,11 @@ from fastcontact.round_off import ROUND_OFF
 
 
 class Facets(NamedTuple):
-    """Facets of one kind, relative to their centre, since round-off far from the origin would exceed STEP.
+    """Facets of one element type, relative to their centre, because round-off far from the origin would exceed STEP.
 
-    `convex` bounds the distance up to which a local minimum is unique: with four nodes by
-    `straight_3d_kernels.uniqueness_bound`, with more nodes by the square of a distance below which half the squared distance
-    is convex.
+    `convex` is a bound up to which a local minimum of the distance is unique. For four nodes it is that of
+    `straight_3d_kernels.uniqueness_bound`. For more nodes it is the square of a distance, below which half the squared
+    distance is a convex function.
     """
 
     nodes: Array  # (n_facets, m, 3), relative to the origin [length]
@@ -106,7 +106,7 @@ def _expansion(terms, f, s, t, point):
 
 @kernel
 def _allowed(sides, s, t, ps, pt, size):
-    """Return whether a step (ps, pt) from (s, t) leaves the domain through none of the sides that (s, t) lies on."""
+    """Return whether a step (ps, pt) from (s, t) stays in the domain at all sides on which (s, t) lies."""
     for k in range(sides.shape[0]):
         on_side = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t <= ROUND_OFF
         if on_side and sides[k, 0] * ps + sides[k, 1] * pt > 1e-14 * size:
@@ -189,7 +189,7 @@ def descend(terms, f, s, t, sides, point):
     """Return the local minimum (s, t) of the distance from `point` to facet `f`, and whether the iteration converged.
 
     Newton's method minimises the squared distance over the polygon of the reference domain. It is an active-set method that
-    continues along the sides it reaches and never increases the distance.
+    continues along a side once it has reached this side, and that never increases the distance.
     """
     for _ in range(MAX_ITERATIONS):
         value, gs, gt, hss, hst, htt = _expansion(terms, f, s, t, point)
@@ -221,8 +221,8 @@ def project(facets, f, domain, point, reach):
     """Return (s, t) of the point of facet `f` closest to `point`, half the squared distance, and whether it converged.
 
     The facet deviates from the flat triangles between its nodes by at most `bend`. The descent starts from the closest
-    triangle. With more than four nodes, a minimum within `convex` is unique. Otherwise the descent is restarted wherever a
-    closer point is possible. The returned distance is infinite if its square exceeds `reach`.
+    triangle. With more than four nodes, a minimum within `convex` is unique. Otherwise the descent is restarted on every
+    triangle that may contain a closer point. The returned distance is infinite if its square exceeds `reach`.
     """
     terms, bend = facets.terms, facets.bend[f]
     nodes, triangles, sides = domain

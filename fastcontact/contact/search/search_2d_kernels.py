@@ -64,26 +64,26 @@ def _project(nodes, f, x, y):
 
 @inlined_kernel
 def _precedes(nodes, f, s, g, r, numbers):
-    """Return whether of two equally close facets, `f` at s and `g` at r, `f` is taken.
+    """Return whether facet `f` at s is preferred to the equally close facet `g` at r.
 
-    If a line continues smoothly beyond a common node, the facet that ends there is taken, independently of the numbering. At
-    corners of more than 45 degrees and in all other cases, it is the facet with the lowest number.
+    If a line continues smoothly beyond a common node, the facet that ends there is preferred, independently of the numbering.
+    At corners of more than 45 degrees and in all other cases, it is the facet with the lower number.
     """
     _, _, px, py, _, _ = _curve(nodes, f, s)
     _, _, qx, qy, _, _ = _curve(nodes, g, r)
-    both = px * qx + py * qy
-    if s != r and both > 0.0 and 2.0 * both * both > (px * px + py * py) * (qx * qx + qy * qy):
+    product = px * qx + py * qy
+    if s != r and product > 0.0 and 2.0 * product * product > (px * px + py * py) * (qx * qx + qy * qy):
         return s > r
     return numbers[f] < numbers[g]
 
 
 @interpretable_kernel
 def closest_facets(points, order, begin, end, nodes, numbers, tree, result):
-    """Project points (n, 2) on their closest facets; see `_precedes` for equally close ones.
+    """Project points (n, 2) onto their closest facets; `_precedes` chooses between equally close ones.
 
-    Points are those from `begin` to ``end - 1`` in an `order` (n,) in which neighbours in space follow each other. Facets are
-    in the order of the tree, and `numbers` (n_facets,) are their numbers before sorting. `result` is filled in place, with
-    facet -1 and distance NaN if a point is not finite.
+    The points are those from `begin` to ``end - 1`` in an `order` (n,) in which neighbours in space follow each other. Facets
+    are in the order of the tree, and `numbers` (n_facets,) are their numbers before sorting. `result` is filled in place,
+    with facet -1 and distance NaN if a point is not finite.
     """
     stack, squares, leaves = np.empty(DEPTH, np.int64), np.empty(DEPTH), len(tree.low) // 2
     for k in range(begin, end):
@@ -194,7 +194,7 @@ def along_normals(points, corners, normals, counts, neighbour, facet, xi, overha
         Working space.
     """
     for i in range(points.shape[0]):
-        f, s, before = facet[i], xi[i], -1
+        f, s, previous = facet[i], xi[i], -1
         for _ in range(MAX_ITERATIONS):
             s, converged = _newton(points[i, 0], points[i, 1], corners, normals, f, counts[f], s, values, slopes)
             if not converged or 0.5 * (abs(s) - 1.0) > BEYOND:
@@ -207,7 +207,7 @@ def along_normals(points, corners, normals, counts, neighbour, facet, xi, overha
             if beyond < 0:
                 facet[i], xi[i], overhang[i] = f, 2.0 * end - 1.0, 0.5 * (abs(s) - 1.0)
                 break
-            if beyond == before:  # at the node between both facets
+            if beyond == previous:  # at the node between both facets
                 facet[i], xi[i], overhang[i] = f, 2.0 * end - 1.0, 0.0
                 break
-            before, f, s = f, beyond, 1.0 - 2.0 * end
+            previous, f, s = f, beyond, 1.0 - 2.0 * end

@@ -12,18 +12,18 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 @interpretable_kernel
 def closest_facets(points, order, begin, end, facets, domain, numbers, tree, closest_facet):
-    """Project points (n, 3) on their closest facets.
+    """Project points (n, 3) onto their closest facets.
 
-    Of facets that meet in the closest point, the one with the lowest number is taken. Arguments are as for
-    `search_2d_kernels.closest_facets`. Where a projection fails, the distance is NaN; where a point is not finite, the facet
-    is also -1.
+    If several facets meet at the closest point, the one with the lowest number is chosen. The arguments are those of
+    `search_2d_kernels.closest_facets`. If a projection fails, the distance is NaN. If a point is not finite, the facet is -1
+    as well.
     """
     stack, squares, leaves = np.empty(DEPTH, np.int64), np.empty(DEPTH), len(tree.low) // 2
     centre = facets.centre[0], facets.centre[1], facets.centre[2]
     for k in range(begin, end):
         i = order[k]
         point = minus((points[i, 0], points[i, 1], points[i, 2]), centre)
-        closest, best, same, certain, converged = -1, np.inf, 0.0, False, True
+        closest, best, tolerance, certain, converged = -1, np.inf, 0.0, False, True
         best_s, best_t, foot, reach, top = 0.0, 0.0, point, FAR, 0
         if np.isfinite(point[0] + point[1] + point[2]):
             stack[0], squares[0], top = 1, square_to_box(tree, 1, point), 1
@@ -41,13 +41,13 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, clo
                 continue
             gap = minus(trial, foot)
             # Facets whose closest points coincide meet there and are equally close.
-            tied = closest >= 0 and (dot(gap, gap) <= same * same or square == best)
-            if (numbers[f] < numbers[closest]) if tied else (square < best):
+            coincide = closest >= 0 and (dot(gap, gap) <= tolerance * tolerance or square == best)
+            if (numbers[f] < numbers[closest]) if coincide else (square < best):
                 closest, best_s, best_t, foot, certain, converged = f, s, t, trial, inside, success
-                same = LENGTH_ROUND_OFF * _size(tree.low, tree.high, box)
+                tolerance = LENGTH_ROUND_OFF * _size(tree.low, tree.high, box)
             if square < best:
                 best = square
-                reach = np.sqrt(best) + same
+                reach = np.sqrt(best) + tolerance
                 reach = (1.0 + ROUND_OFF) * (reach * reach)
         closest_facet.facet[i], closest_facet.distance[i] = -1, np.nan
         if closest >= 0:
@@ -80,9 +80,9 @@ def _twist(terms, f):
 
 @inlined_kernel
 def _projected(facets, f, domain, point, reach):
-    """Return (s, t) of the closest point of facet `f`, the point, and its squared distance; infinite if out of reach.
+    """Return (s, t) of the closest point of facet `f`, the point, and its squared distance, infinite if out of reach.
 
-    Also whether the projection converged, and whether it certainly lies within the facet.
+    Two flags follow: whether the projection converged, and whether it certainly lies inside the facet.
     """
     terms = facets.terms
     if terms.shape[1] <= 4:

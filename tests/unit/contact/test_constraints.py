@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
 from fastcontact.contact.constraints import Constraints, stacked
-from fastcontact.contact.held_motions import alike, spanned, without
+from fastcontact.contact.held_motions import deflate, direction_fields, eigenspaces
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, rows_along
 from fastcontact.contact.projection import places
 from fastcontact.contact.surface import surface
@@ -156,7 +156,7 @@ Q = Rotation.from_rotvec([0.4, 1.2, -0.5]).as_matrix()
 
 def on(*directions):
     """The projector (3, 3) on some directions."""
-    return spanned(sum(np.outer(d, d) for d in np.array(directions, float))[None], 1e-6)[0]
+    return eigenspaces(sum(np.outer(d, d) for d in np.array(directions, float))[None], 1e-6)[0]
 
 
 def quadrant(n=5):
@@ -191,16 +191,16 @@ def said(groups):
 def test_turned_and_renumbered_nodes_are_held_alike(made):
     held, places = made()
     order = np.random.default_rng(3).permutation(len(places))
-    groups = alike(held, places)
-    again = alike((Q @ held @ Q.T)[order], (places @ Q.T)[order])
+    groups = direction_fields(held, places)
+    again = direction_fields((Q @ held @ Q.T)[order], (places @ Q.T)[order])
     assert len(groups) == len(again)
     assert (Q @ said(groups) @ Q.T)[order] == pytest.approx(said(again), abs=1e-12)
-    assert spanned(said(groups), 0.5) == pytest.approx(held, abs=1e-12)
+    assert eigenspaces(said(groups), 0.5) == pytest.approx(held, abs=1e-12)
 
 
 def test_a_node_on_two_walls_belongs_to_both():
     held, places = quadrant()
-    (first, at_first), (second, at_second) = alike(held, places)
+    (first, at_first), (second, at_second) = direction_fields(held, places)
     assert abs(first[0] @ second[0]) < 1e-12
     assert np.flatnonzero(at_first & at_second).tolist() == [0]
     assert at_first.sum() == at_second.sum() == 5
@@ -208,7 +208,7 @@ def test_a_node_on_two_walls_belongs_to_both():
 
 def test_beside_a_rim_the_direction_is_that_of_the_rim_nearby():
     held, places = rim()
-    ((along, nodes),) = alike(held, places)
+    ((along, nodes),) = direction_fields(held, places)
     assert nodes.sum() == 24
     radial = places / np.linalg.norm(places, axis=1, keepdims=True)
     outward = np.einsum("nd,nd->n", along, radial)
@@ -217,7 +217,7 @@ def test_beside_a_rim_the_direction_is_that_of_the_rim_nearby():
 
 def test_what_nodes_move_apart_along_is_not_held():
     moved = np.array([[0.3, 0.3, 0.0], [0.0, 0.0, 0.0], [1e-12, 0.0, 0.0]])
-    left = without(np.array([np.eye(3)] * 3), moved, 1e-9)
+    left = deflate(np.array([np.eye(3)] * 3), moved, 1e-9)
     assert left[0] == pytest.approx(on([1, -1, 0], [0, 0, 1]), abs=1e-12)
     assert left[1:] == pytest.approx(np.array([np.eye(3)] * 2), abs=1e-12)
 

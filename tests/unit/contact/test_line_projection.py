@@ -14,7 +14,7 @@ from fastcontact.contact.projection import (
     at_nodes_of_facets,
     closest_of_kinds,
     facet_normals,
-    interpolated,
+    interpolate,
     nodal_normals,
     places,
     smooth_normals,
@@ -176,7 +176,7 @@ def test_points_lie_along_the_normal_of_their_projection_of_projection_kernels(e
     points, candidates = points + shift, above(200, beside=-0.1) + shift
     normals, _, (facet, xi, overhang, normal) = projected(candidates, side, points)
     assert (overhang == 0.0).all()
-    assert normal == pytest.approx(interpolated(normals[facet], places(side, facet, xi)), abs=1e-13)
+    assert normal == pytest.approx(interpolate(normals[facet], places(side, facet, xi)), abs=1e-13)
     assert np.abs(np.cross(candidates - feet(side, points, facet, xi), normal)).max() < 1e-12 * max(1.0, shift)
 
 

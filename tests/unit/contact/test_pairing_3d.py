@@ -10,7 +10,7 @@ from fastcontact.contact.formulations.continuous import Continuous
 from fastcontact.contact.formulations.node_to_segment import NodeToSegment
 from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule, mass_matrix, nodal_areas
 from fastcontact.contact.pairing import Candidates, gap_rows, pair
-from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
+from fastcontact.contact.projection import at_nodes_of_facets, interpolate, nodal_normals, places, smooth_normals
 from fastcontact.contact.surface import surface
 from fastcontact.mesh import quadrature
 from fastcontact.mesh.generate import box, merge_points, sphere_octant, union
@@ -39,7 +39,7 @@ def test_areas_and_normals_of_a_sphere(element):
     inner &= (mesh.points[side.points][:, [0, 2]] > 1e-9).all(axis=1)  # nodes with facets all around
     assert np.abs(normals - outward)[inner].max() < (5e-3 if quadratic else 3e-2)
     middle = np.tile([[0.25, 0.25]], (len(facet), 1))
-    assert np.abs(np.linalg.norm(interpolated(smooth, places(side, facet, middle)), axis=1) - 1).max() < 1e-14
+    assert np.abs(np.linalg.norm(interpolate(smooth, places(side, facet, middle)), axis=1) - 1).max() < 1e-14
     # Solid angle of the face of a cube seen from its centre, a quarter of it: 4 pi / 6 / 4 of the sphere.
     area = 4.0 * np.pi / 6.0
     tolerance = 1e-4 if quadratic else 2e-2
