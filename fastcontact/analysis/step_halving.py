@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -16,9 +17,9 @@ from fastcontact.analysis.convergence_messages import friction_used, limit_load
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.load_step import load_step, prepare_start
 from fastcontact.analysis.newton import newton
-from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
-from fastcontact.arrays import largest
+from fastcontact.arrays import Array, largest
 from fastcontact.errors import ConvergenceError
 from fastcontact.model.checks import facet_lengths
 from fastcontact.results.step import StepResult
@@ -37,13 +38,34 @@ def advance(problem: Problem, state: State, index: int, begin: float, end: float
     numbers of iterations, the slip and the dissipation of all substeps. If there are several, ``iterations["substeps"]``
     lists the instants of their ends.
 
+    With friction, loads that act at the beginning of the first step already are applied before it, in a substep of no
+    duration, unless there is no equilibrium under them.
+
     Raises
     ------
     ConvergenceError
         If a substep does not converge after `Criteria.max_halvings` halvings, or halving cannot help.
     """
+    initial: list[StepResult] = []
+    if index == 1 and _begins_loaded(problem, begin, end):
+        with suppress(ConvergenceError):
+            state, initial = _substeps(problem, state, index, (begin, begin), 0)
     state, substeps = _substeps(problem, state, index, (begin, end), 0)
-    return state, _summed(substeps)
+    return state, _summed(initial + substeps)
+
+
+def _begins_loaded(problem: Problem, begin: float, end: float) -> bool:
+    """Return whether loads act at the beginning of the first step that change in it, and friction depends on their order."""
+    if not any(pair.friction and not pair.options.tied for pair in problem.pairs.values()):
+        return False
+    before, after = (_values(problem.load_at(instant)) for instant in (begin, end))
+    return bool(before.any()) and not np.array_equal(before, after)
+
+
+def _values(load: StepLoad) -> Array:
+    """Return the values of all loads in one array, some of displacements and some of forces."""
+    others = [*load.obstacles.values(), [*load.angles.values()], [*load.fluids.values()], load.following]
+    return np.concatenate([load.lift, load.force, *others, *([] if load.rise is None else [load.rise])])
 
 
 def _substeps(
