@@ -212,7 +212,7 @@ DOUBTS = [
             "motion = { y = -0.2 }\nrotation = { angle = 0.1, centre = [0.0, 5.0] }\nwear = 1.0\n",
         ),
         (
-            r"contact 'drum' wears off \S+, \S+ times the size of the model, in steps \S+ times as long as pressures can follow: is its wear Archard's coefficient divided by the hardness, in the unit of one over pressure\?",
+            r"contact 'drum' wears off \S+, \S+ times the size of the model, in steps \S+ times as long as pressures can follow: check that its wear coefficient is Archard's coefficient divided by the hardness, in the unit of one over pressure",
         ),
     ),
     Doubt(
