@@ -64,7 +64,7 @@ class ActiveDofs:
     _largest_condensed: float
 
     def for_step(self, u: Array, lift: Array) -> ActiveDofs:
-        """Return the object for a load step that begins at displacements `u`."""
+        """Return a copy for a load step that begins at displacements `u`, with the size of its condensed unknowns."""
         step = copy.copy(self)
         condensed = self._system.unknowns(u, lift)
         condensed[self._unknowns] = 0.0

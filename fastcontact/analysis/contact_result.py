@@ -85,13 +85,15 @@ def contact_result(
     active = active if constraints.wetted is None else active & ~constraints.wetted.rows
     gap, normal = pair.nodal_gap(configuration, displacement=displacement)
     active_gaps = active[: len(constraints.normal_forces(multiplier))]
-    closed, pressure, nodal_multiplier, scale = _closed(pair, constraints, multiplier, active_gaps, gap, configuration)
+    closed, pressure, nodal_multiplier, scale = _closed_nodes(
+        pair, constraints, multiplier, active_gaps, gap, configuration
+    )
     if pair.options.tied:  # normals of the undeformed configuration
         normal = pair.nodal_gap(replace(configuration, displacement=np.zeros_like(configuration.displacement)))[1]
     shear, sticking, tangential = _tangential_results(constraints, solution, rows, normal, closed, scale)
     if pair.axisymmetric:  # The radial traction is an odd function of the radius.
         shear[coordinates[:, 0] <= LENGTH_ROUND_OFF * np.ptp(coordinates)] = 0.0
-    forces, total, primary_points, primary_forces = _forces(pair, constraints, multiplier, tangential)
+    forces, total, primary_points, primary_forces = _nodal_forces(pair, constraints, multiplier, tangential)
     finite_normal = np.where(np.isfinite(normal), normal, 0.0)
     middle = contact_middle(pair, finite_normal, np.einsum("nd,nd->n", forces, finite_normal), closed, gap)
     place, along = middle.places(constraints.positions), middle.tangent
@@ -122,7 +124,7 @@ def contact_result(
         normal=normal,
         active=closed,
         force=total,
-        radius=_radius(pair, middle, (place, across), active, closed),
+        radius=_contact_radius(pair, middle, (place, across), active, closed),
         shear=shear,
         sticking=closed & sticking,
         middle=middle.position,
@@ -135,7 +137,7 @@ def contact_result(
     )
 
 
-def _radius(
+def _contact_radius(
     pair: Formulation, middle: ContactMiddle, distances: tuple[Array, Array], active: Mask, closed: Mask
 ) -> tuple[float, float]:
     """Return `ContactResult.radius` from `distances` of the constraints from the middle, and the closed nodes (n_nodes,).
@@ -152,10 +154,13 @@ def _radius(
     return low, high
 
 
-def _forces(
+def _nodal_forces(
     pair: Formulation, constraints: Constraints, multiplier: Array, tangential: Array | None
 ) -> tuple[Array, Array, Numbers, Array]:
-    """Return forces on secondary nodes, their sum, and primary nodes with their forces if nodes carry them there [force]."""
+    """Return the forces on secondary nodes, their sum, the primary nodes, and the forces on these [force].
+
+    There are no primary nodes if the other side is a rigid obstacle.
+    """
     nodal_forces = constraints.force(multiplier, tangential).reshape(-1, pair.points.shape[1])
     opposite = pair.primary.points if isinstance(pair.primary, Surface) else np.empty(0, np.int32)
     forces = np.where(np.isin(pair.secondary.points, opposite)[:, None], 0.0, nodal_forces[pair.secondary.points])
@@ -185,7 +190,7 @@ def _tangential_results(
     return shear * scale[:, None], sticking, tangential
 
 
-def _closed(
+def _closed_nodes(
     pair: Formulation, constraints: Constraints, multiplier: Array, active: Mask, gap: Array,
     configuration: Configuration,
 ) -> tuple[Mask, Array, Array, Array]:  # fmt: skip
@@ -216,14 +221,14 @@ def _closed(
         closed = field.closed_nodes(active, gap, pressing)
         never_opening = pair.never_opening(pair.points[pair.secondary.points], configuration)
         closed = closed | (never_opening & np.isfinite(gap))
-    closed, pressure = carried(constraints, forces, closed & ~excluded, pair.secondary)
+    closed, pressure = closed_node_pressures(constraints, forces, closed & ~excluded, pair.secondary)
     raw_pressure = field.pressure(forces) * covered  # averaged at each node like the frictional tractions
     ratio = np.divide(pressure, raw_pressure, out=np.ones_like(pressure), where=raw_pressure > 0.0)
     scale = np.where(closed, np.minimum(ratio, 1.0) if raw_pressure.min() < 0.0 else ratio, 0.0)
     return closed, pressure, np.where(excluded, 0.0, side_pressure), scale
 
 
-def carried(constraints: Constraints, forces: Array, closed: Mask, side: Surface) -> tuple[Mask, Array]:
+def closed_node_pressures(constraints: Constraints, forces: Array, closed: Mask, side: Surface) -> tuple[Mask, Array]:
     r"""Return the closed nodes (n,) without tension, and pressures (n,) at these nodes that carry the contact force.
 
     A pressure field :math:`p_h` with the nodal values :math:`p_j`, which is obtained by projection, is not zero beyond the
@@ -256,32 +261,34 @@ def carried(constraints: Constraints, forces: Array, closed: Mask, side: Surface
                 single_node = np.arange(len(areas)) == largest
                 return single_node, np.where(single_node, shares.sum() / areas[largest], 0.0)
         receivers = closed & with_area
-        moved = np.where(closed, shares - nodal * areas, shares)
-        moved[receivers | (np.abs(moved) <= SUM_ROUND_OFF * np.abs(shares).max(initial=0.0))] = 0.0
-        pressure = nodal + (_received(receivers, moved, areas, side) if moved.any() else np.zeros_like(moved))
+        excess = np.where(closed, shares - nodal * areas, shares)
+        excess[receivers | (np.abs(excess) <= SUM_ROUND_OFF * np.abs(shares).max(initial=0.0))] = 0.0
+        pressure = nodal + (
+            _received_pressures(receivers, excess, areas, side) if excess.any() else np.zeros_like(excess)
+        )
         tension = closed & (pressure < 0.0)
         if may_pull or not tension.any():
             return closed, np.where(closed, pressure, 0.0)
         closed = closed & ~tension
 
 
-def _received(receivers: Mask, moved: Array, areas: Array, side: Surface) -> Array:
-    """Return the changes (n,) of pressures at the `receivers` (n,) due to the shares `moved` (n,) of other nodes [pressure].
+def _received_pressures(receivers: Mask, excess: Array, areas: Array, side: Surface) -> Array:
+    """Return the changes (n,) of pressures at the `receivers` (n,) due to the shares `excess` (n,) of other nodes [pressure].
 
     Shares move from ring to ring of neighbours towards the receiving nodes, beginning with the ring that is farthest away.
     """
-    rings, reached = [receivers], receivers.copy()
-    while (moved[~reached] != 0.0).any():
-        ring = (side.near @ rings[-1].astype(np.float64) > 0.0) & ~reached
+    rings, visited = [receivers], receivers.copy()
+    while (excess[~visited] != 0.0).any():
+        ring = (side.near @ rings[-1].astype(np.float64) > 0.0) & ~visited
         if not ring.any():
             break
         rings.append(ring)
-        reached |= ring
+        visited |= ring
     for inner, outer in zip(rings[-2::-1], rings[:0:-1], strict=True):
         weights = np.where(inner, areas if inner is receivers else 1.0, 0.0)
-        per_weight = np.divide(moved, side.near @ weights, out=np.zeros_like(moved), where=outer)
-        moved = np.where(outer, 0.0, moved) + weights * (side.near @ per_weight)
-    return np.divide(moved, areas, out=np.zeros_like(moved), where=receivers)
+        per_weight = np.divide(excess, side.near @ weights, out=np.zeros_like(excess), where=outer)
+        excess = np.where(outer, 0.0, excess) + weights * (side.near @ per_weight)
+    return np.divide(excess, areas, out=np.zeros_like(excess), where=receivers)
 
 
 def _nodal_shear(
@@ -302,16 +309,19 @@ def _nodal_shear(
     return traction - np.einsum("nd,nd->n", traction, normal)[:, None] * normal
 
 
-def approach(constraints: Constraints, solution: Solution, rows: slice, contact: ContactResult) -> Array:
-    """Return the parts (n_nodes, dim) of nodal slips from before nodes closed, weighted by contact forces [length].
+def mean_slip_before_closing(
+    constraints: Constraints, solution: Solution, rows: slice, contact: ContactResult
+) -> Array:
+    """Return the part (n_nodes, dim) of the nodal slips in this step that precedes the closing of the nodes [length].
 
-    They are zero unless the step was solved in increments. For parameters see `contact_result`.
+    It is a mean over the constraints near each node, weighted by their contact forces, and zero unless the step was solved
+    in increments. For parameters see `contact_result`.
     """
-    if solution.approach is None or not constraints.tangents:
+    if solution.slip_before_closing is None or not constraints.tangents:
         return np.zeros_like(contact.coordinates)
     assert constraints.nodal is not None
     forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
-    slips = np.einsum("mk,kmd->md", solution.approach[rows], np.stack(constraints.directions))
+    slips = np.einsum("mk,kmd->md", solution.slip_before_closing[rows], np.stack(constraints.directions))
     pressure, mean = constraints.nodal.pressure(forces)[:, None], np.zeros_like(contact.coordinates)
     np.divide(constraints.nodal.traction(forces[:, None] * slips), pressure, out=mean, where=pressure > 0.0)
     # The nodal values of a field may exceed the values from which it is computed.
@@ -336,9 +346,10 @@ def sliding_load(
     side : Surface
         The secondary side.
     """
-    # In a step solved at once, slip of sticking constraints is elastic. In increments, constraints may slide and then stick.
+    # If the step is solved at once, slips of sticking constraints are elastic. If it is solved in increments, a constraint
+    # that sticks at the end may have slid before.
     slides = over_slip if solution.work is not None else np.where(solution.sticking[rows], 0.0, over_slip)
-    return np.maximum(carried(constraints, constraints.normal_forces(slides), closed, side)[1], 0.0)
+    return np.maximum(closed_node_pressures(constraints, constraints.normal_forces(slides), closed, side)[1], 0.0)
 
 
 def _on_deformed_surface(pair: Formulation, contact: ContactResult, displacement: Array) -> ContactResult:
@@ -387,25 +398,25 @@ def _stretch(contact: ContactResult, displacement: Array, before: Array, after: 
 
 def _with_periodic_nodes(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
     """Return contact results in which both nodes of a periodic pair have the same traction, and close together."""
-    results_of_pairs = dict(results)
+    merged_results = dict(results)
     for name, contact in results.items():
         pair = problem.pairs[name]
         areas = lumped_areas(pair.secondary, pair.points, pair.axisymmetric)
         pressure, shear, active = contact.pressure.copy(), contact.shear.copy(), contact.active.copy()
         for interface in problem.model.periodic_interfaces:
-            a, b = _rows(problem, contact, interface)
+            a, b = _common_rows(problem, contact, interface)
             weight = areas[a] / (areas[a] + areas[b])
             rotation = np.eye(shear.shape[1]) if interface.turn is None else interface.turn
             pressure[a] = pressure[b] = weight * pressure[a] + (1.0 - weight) * pressure[b]
             shear[a] = weight[:, None] * shear[a] + (1.0 - weight[:, None]) * (shear[b] @ rotation)
             shear[b] = shear[a] @ rotation.T
             active[a] = active[b] = active[a] | active[b]
-        results_of_pairs[name] = replace(contact, pressure=pressure, shear=shear, active=active)
-    return results_of_pairs
+        merged_results[name] = replace(contact, pressure=pressure, shear=shear, active=active)
+    return merged_results
 
 
-def _rows(problem: Problem, contact: ContactResult, interface: PeriodicInterface) -> tuple[Indices, Indices]:
-    """Return the rows, in a contact result, of first and second nodes of a periodic interface that both are its nodes."""
+def _common_rows(problem: Problem, contact: ContactResult, interface: PeriodicInterface) -> tuple[Indices, Indices]:
+    """Return the rows, in a contact result, of the node pairs of a periodic interface that both belong to the contact."""
     row_of_node = np.full(problem.model.mesh.n_points, -1, np.intp)
     row_of_node[contact.points] = np.arange(len(contact.points))
     on_side = (row_of_node[interface.first] >= 0) & (row_of_node[interface.second] >= 0)

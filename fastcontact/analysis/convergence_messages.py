@@ -22,7 +22,7 @@ from fastcontact.model.rigid_motions import grouped, least_held
 from fastcontact.round_off import SINGLE_PRECISION
 
 Nodes = dict[str, list[int]]
-# Fraction of the friction of all pairs that floating bodies use when they are about to slide.
+# Fraction of the frictional capacity above which floating bodies are reported as about to slide.
 NEARLY_SLIDING = 0.9
 
 
@@ -103,18 +103,26 @@ def friction_exceeded(factor: float, bodies: list[str], coefficients: Array) -> 
 
 
 def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, friction: bool, gaps: Array) -> str:
-    """Return the message for floating bodies whose springs still carry force under a generalised `load` [force].
+    """Return the message for floating bodies whose springs still carry forces.
 
-    The load is zero if only obstacles, prescribed displacements or fluid pressures in contacts act. `friction` is whether
-    contact has friction. `gaps` (m, k) are the changes of the gaps in each free motion, from which a motion that contact
-    hardly resists is identified.
+    Parameters
+    ----------
+    bodies : FloatingBodies
+    rigid : RigidPosition
+        The last position of the bodies.
+    load : float
+        Generalised load; zero if only obstacles, prescribed displacements or fluid pressures in contacts act [force].
+    friction : bool
+        Whether contact has friction.
+    gaps : ndarray (m, k)
+        Changes of the gaps in each free motion, which show whether contact hardly resists one of the motions [-].
     """
     if len(bodies.names) > 1:
         (weakest,), ratio = least_held(bodies.motions, gaps)
         if ratio < NOTABLE:
             return (
-                f"contact hardly resists one motion, {weakest}, which changes the gaps {ratio:.1g} times as much as others "
-                "do: fix or prescribe a displacement component that stops it"
+                f"contact hardly resists one motion, {weakest}, which changes the gaps {ratio:.1g} times as much as other "
+                "motions: fix or prescribe a displacement component that stops it"
             )
     remedy = "Add a support or more friction, for which the loads may be too large" if friction else "Add a support"
     return (
@@ -125,7 +133,7 @@ def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, fric
 
 
 def limit_load(problem: Problem, state: State) -> str:
-    """Return an addition to the message of a failed load step after `state` if bodies yield; otherwise empty."""
+    """Return the end of the message of a load step that fails after `state` if bodies yield, otherwise an empty string."""
     strain = max((largest(values[..., PLASTIC_STRAIN]) for values in state.history.values()), default=0.0)
     if not strain:
         return ""
@@ -136,13 +144,13 @@ def limit_load(problem: Problem, state: State) -> str:
         else ""
     )
     return (
-        f"; before it the largest plastic strain is {strain:.2g}{validity}. Bodies that yield may not carry larger forces: "
-        "prescribe displacements in their place to find the largest"
+        f"; at its beginning, the largest plastic strain is {strain:.2g}{validity}. Bodies that yield may not carry larger "
+        "forces: prescribe displacements instead of forces to find the limit load"
     )
 
 
 def friction_used(problem: Problem, state: State) -> str:
-    """Return an addition to the message of a failed load step after `state` if floating bodies nearly slide."""
+    """Return the end of the message of a load step that fails after `state` if floating bodies nearly slide."""
     if problem.floating_bodies is None:
         return ""
     ratios = []
@@ -152,7 +160,7 @@ def friction_used(problem: Problem, state: State) -> str:
     if not ratios or min(ratios) < NEARLY_SLIDING:
         return ""
     return (
-        f"; before it {min(ratios):.0%} of the friction that contact can carry is used, and more may not hold "
+        f"; at its beginning, contact uses {min(ratios):.0%} of its frictional capacity, and larger loads may move "
         f"{', '.join(problem.floating_bodies.motions.by_body())}. Add a support, or prescribe displacements instead of forces"
     )
 

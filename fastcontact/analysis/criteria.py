@@ -11,8 +11,8 @@ from fastcontact.errors import ModelError
 # Relative error of displacements or forces above which a warning is given. It is also the largest admissible value of
 # criteria, because with larger ones the result need not be close to the solution.
 NOTABLE = 1e-2
-# Largest number of times that a step of an iteration is shortened: of displacements, of positions of floating bodies, and of
-# forces of friction.
+# Largest number of times that the step of an iteration is halved: the iterations for displacements, for positions of floating
+# bodies, and for friction forces.
 HALVINGS = 6
 # Steps are halved until they reduce a norm by this fraction of the expected reduction (Nocedal and Wright, 2006, equation
 # 3.4).
@@ -88,7 +88,7 @@ class Criteria:
             if not 0 < getattr(self, name) <= NOTABLE:
                 raise ModelError(
                     f"the convergence criterion {name} = {getattr(self, name)} must be positive and at most {NOTABLE}: "
-                    "beyond that nothing has converged"
+                    "with a larger value the result need not be close to the solution"
                 )
         updates = self.geometry_updates
         if updates is not None and (updates < 0 or int(updates) != updates):

@@ -56,7 +56,7 @@ class Term(Protocol):
     def commit(self, u: Array, state: State) -> State:
         """Return `state` with the history variables of the term at u, the end of the load step.
 
-        By default a term has no history variables, and the state is returned as it is.
+        By default a term has no history variables, and the state is returned unchanged.
         """
         return state
 
@@ -90,7 +90,7 @@ class Bodies(Term):
     def at(self, u: Array, *, tangent: bool = True) -> DeformedBodies:
         """Return forces, energies, history variables and tangent of the bodies at u (n_dofs,) [length].
 
-        With ``tangent=False`` the tangent is not computed until it is needed, which saves time if it never is.
+        With ``tangent=False`` the tangent is only computed when it is needed.
 
         Raises
         ------
@@ -131,9 +131,9 @@ class SpringForces(Term):
 
     def residual(self, u: Array) -> tuple[Array, Energies]:
         """See `Term`."""
-        force, of_points = np.zeros_like(u), u[: self._n]
-        force[: self._n] = spring_force(self._springs, of_points)
-        return force, (0.5 * float(force[: self._n] @ of_points), 0.0)
+        force, mesh_displacement = np.zeros_like(u), u[: self._n]
+        force[: self._n] = spring_force(self._springs, mesh_displacement)
+        return force, (0.5 * float(force[: self._n] @ mesh_displacement), 0.0)
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
         """See `Term`."""
@@ -238,7 +238,7 @@ class Balance:
     largest : float
         Largest force of all steps so far [force].
     residual : float
-        Largest residual force. If it exceeds the criterion, the round-off of each row is subtracted before [force].
+        Largest residual force. If it exceeds the criterion, the round-off of each row has been subtracted [force].
     bound : float
         Largest admissible residual force [force].
     relative : float
@@ -263,12 +263,12 @@ class Balance:
         return self.residual / self.bound if self.bound else float(np.inf if self.residual else 0.0)
 
     @property
-    def wanting(self) -> float:
+    def accuracy_factor(self) -> float:
         """Factor by which the accuracy of linear solutions should increase [-].
 
-        If the residual exceeds the level of round-off, and this level exceeds the bound, it is unknown whether there are
-        any significant forces at all, for example after bodies have separated. The factor then only brings the residual to
-        the level of round-off, which needs far less accuracy than the bound.
+        If the residual exceeds the level of round-off, and this level exceeds the bound, all forces may be round-off, for
+        example after bodies have separated. The factor then only reduces the residual to the level of round-off, which
+        requires a much lower accuracy than the bound.
         """
         return self.residual / self.noise if self.residual > self.noise > self.bound else self.excess
 

@@ -60,28 +60,28 @@ class Extrapolation:
 
         `u` (n,) are its displacements [length], and `contact` the gaps and multipliers of each pair. If `curve` is
         true, enough steps are stored for polynomials of more than the first degree. The degree is increased from 0 while the
-        polynomial of the next degree would have predicted this step clearly better, by the factor DECLINE. If all possible
-        degrees did so, the degree is higher by one. It is at least 1.
+        polynomial of the next degree would have predicted this step better by the factor DECLINE. If this holds up to the
+        highest possible degree, the degree is one higher. It is at least 1.
         """
-        degree, highest = 0, self._highest
-        distances = [largest(u - self._continued(k)) for k in range(highest + 1)] if curve else []
+        degree, highest = 0, self._highest_degree
+        distances = [largest(u - self._polynomial_at_load(k)) for k in range(highest + 1)] if curve else []
         while degree < len(distances) - 1 and distances[degree + 1] < DECLINE * distances[degree]:
-            degree += 1  # if any improvement sufficed, indentations past yield would take 5 % more iterations
+            degree += 1  # without the factor DECLINE, indentations past yield take 5 % more iterations
         degree = max(1, degree + (degree == highest))
         return replace(self, degree=degree, states=(*self.states[-DEGREE if curve else -1 :], (u.copy(), contact)))
 
     def displacement(self, u: Array) -> Array:
         """Return linearly extrapolated initial displacements (n,) of a step [length]; without extrapolation `u` (n,)."""
-        return self._continued(1) if self.ratio else u
+        return self._polynomial_at_load(1) if self.ratio else u
 
     def predicted(self, u: Array) -> Array:
         """Return initial displacements (n,) as `displacement` does, but by the polynomial of the chosen degree."""
-        return self._continued(min(self.degree, self._highest)) if self.ratio else u
+        return self._polynomial_at_load(min(self.degree, self._highest_degree)) if self.ratio else u
 
     def midway(self, begin: Array, u: Array) -> Array:
         """Return displacements (n,) in the middle of the step from `begin` (n,) to u (n,) [length].
 
-        They lie on the parabola through both and the state before, and on a line if steps are not extrapolated.
+        They lie on the parabola through both states and the one before, or on a line if steps are not extrapolated.
         """
         middle, ratio = 0.5 * (begin + u), self.ratio
         if not ratio:
@@ -90,12 +90,12 @@ class Extrapolation:
         return middle - 0.25 * ratio**2 * curvature
 
     @property
-    def _highest(self) -> int:
+    def _highest_degree(self) -> int:
         """Highest possible degree, negative without states: the number of last increments that are all extrapolated."""
-        unbroken = next((k for k, ratio in enumerate(self.ratios[::-1]) if not ratio), len(self.ratios))
-        return min(unbroken, len(self.states) - 1)
+        n_extrapolated = next((k for k, ratio in enumerate(self.ratios[::-1]) if not ratio), len(self.ratios))
+        return min(n_extrapolated, len(self.states) - 1)
 
-    def _continued(self, degree: int) -> Array:
+    def _polynomial_at_load(self, degree: int) -> Array:
         """Return the displacements (n,) of the polynomial through the last ``degree + 1`` states, at the current load."""
         states, extrapolated = [u for u, _ in self.states[-degree - 1 :][::-1]], self.states[-1][0]
         increments = 1.0 / np.cumprod([1.0, *self.ratios[len(self.ratios) - degree : -1][::-1]])

@@ -28,9 +28,10 @@ from fastcontact.results.step import ContactResult, StepResult
 # Estimated error over the mean pressure above which a warning is given, by the order of facets. On rings the errors of nodal
 # pressures were 0.2 to 3.2 of the estimate on linear facets, except where contact opens due to the error, and up to 3 on
 # quadratic ones; against rigid shapes, where the value for linear facets applies to all, 1.1 to 1.3.
-DOUBTFUL = {1: 0.2, 2: 0.1}
-# Ratio of the estimate to E d / L if the gaps are means: the inverse of the mass matrix amplifies alternating gaps.
-OF_MEANS = 2.0
+RELATIVE_ERROR_LIMIT = {1: 0.2, 2: 0.1}
+# Ratio of the estimate to E d / L if the gaps are weighted means: the inverse mass matrix amplifies gaps that alternate from
+# node to node.
+MEAN_GAP_FACTOR = 2.0
 
 
 def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, str]:
@@ -52,16 +53,16 @@ def _warning(pair: Formulation, spread: float, slope: float, contact: ContactRes
     """Return a warning about the pressure error due to the sag, see `_sag`; an empty string if it is small."""
     side, order = pair.secondary, pair.secondary.order
     length = _facet_length(pair)
-    doubtful, power = DOUBTFUL[order], 2 * order - 1
+    limit, power = RELATIVE_ERROR_LIMIT[order], 2 * order - 1
     remedy = "surface_smoothing=True measures the gap between the arcs"
     if isinstance(pair.primary, RigidSide):
-        doubtful, power = DOUBTFUL[1], 2 * order
+        limit, power = RELATIVE_ERROR_LIMIT[1], 2 * order
         remedy = "formulation 'node_to_segment' measures the gap at nodes, which lie on the arc"
     mean = float(contact.pressure[contact.pressure > 0.0].mean())
     error = pair.modulus * slope
-    if error <= doubtful * mean:
+    if error <= limit * mean:
         return ""
-    finer = f"facets of length {length * (doubtful * mean / error) ** (1.0 / power):.2g} instead of {length:.2g}"
+    finer = f"facets of length {length * (limit * mean / error) ** (1.0 / power):.2g} instead of {length:.2g}"
     return (
         f"facets of '{side.group}' and of the other side deviate from their arcs by up to {spread:.3g}, which may change "
         f"pressures by about {error:.3g}, compared with a mean of {mean:.3g}: {remedy}; "
@@ -91,18 +92,20 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
         nodes, pose = points.nodes[rows], configuration.pose
         node_gaps = pair.primary.facing(deformed[nodes].reshape(-1, deformed.shape[1]), pose)[0].reshape(nodes.shape)
         point_gaps = pair.primary.facing(points.positions(deformed)[rows], pose)[0]
-        faced = np.isfinite(node_gaps).all(axis=1) & np.isfinite(point_gaps)  # infinite beyond the edge of a punch
-        sag = np.einsum("nk,nk->n", points.shape[rows[faced]], node_gaps[faced]) - point_gaps[faced]
+        facing = np.isfinite(node_gaps).all(axis=1) & np.isfinite(
+            point_gaps
+        )  # gaps are infinite beyond the edge of a punch
+        sag = np.einsum("nk,nk->n", points.shape[rows[facing]], node_gaps[facing]) - point_gaps[facing]
         spread = float(np.ptp(sag)) if len(sag) else 0.0
         return spread, spread / extent
-    smoothing, facing = Smoothing.of(pair.secondary, pair.primary, pair.points), pair.facing(points, configuration)
-    rows = np.flatnonzero(facing.paired)
+    smoothing, pairing = Smoothing.of(pair.secondary, pair.primary, pair.points), pair.facing(points, configuration)
+    rows = np.flatnonzero(pairing.paired)
     in_contact = closed[points.nodes[rows]].any(axis=1)
     if smoothing is None or points.facet is None or points.xi is None or not in_contact.any():
         return 0.0, 0.0
     axes = [frames(side, pair.points, deformed) for side in (pair.secondary, pair.primary)]
     sag = np.full(len(points.nodes), np.nan)
-    sag[rows] = smoothing.overlap((points.facet[rows], points.xi[rows]), (facing.facet[rows], facing.xi[rows]), axes)
+    sag[rows] = smoothing.overlap((points.facet[rows], points.xi[rows]), (pairing.facet[rows], pairing.xi[rows]), axes)
     sag_in_contact = sag[rows[in_contact]]
     spread, offset = float(np.ptp(sag_in_contact)), abs(float(sag_in_contact.mean())) / extent
     ratio = spread / _facet_length(pair) if pair.secondary.order == 2 else max(offset, _slope(pair, rules, sag, closed))
@@ -113,7 +116,8 @@ def _slope(pair: Formulation, rules: list[quadrature.Rule], sag: Array, closed: 
     """Return the largest difference of the sags of the nodes of a closed linear facet, divided by its length [-].
 
     `sag` (n,) is the sag at the points of the `rules` of all facets, NaN where there is no opposite facet [length]. The sag
-    of a node is the mean weighted by its function, multiplied by OF_MEANS, or with points at the nodes the value there.
+    of a node is the mean weighted by its shape function, multiplied by MEAN_GAP_FACTOR. With node-to-segment contact, whose
+    points are the nodes, it is the value at the node.
     """
     sums, weights, first, largest = np.zeros(len(pair.points)), np.zeros(len(pair.points)), 0, 0.0
     for block, (xi, w) in zip(pair.secondary.blocks, rules, strict=True):
@@ -128,13 +132,13 @@ def _slope(pair: Formulation, rules: list[quadrature.Rule], sag: Array, closed: 
     for block in pair.secondary.blocks:
         slopes = np.ptp(mean[block.facets], axis=1) / _lengths(pair, block)
         largest = max(largest, float(np.nan_to_num(slopes[closed[block.facets].any(axis=1)]).max(initial=0.0)))
-    return largest * (1.0 if pair.name == "node_to_segment" else OF_MEANS)
+    return largest * (1.0 if pair.name == "node_to_segment" else MEAN_GAP_FACTOR)
 
 
 def _rule(pair: Formulation, element: str) -> quadrature.Rule:
-    """Return the points of a facet where the gap is evaluated, with their weights: its nodes alone, or points inside."""
+    """Return the points where the gap of a facet is evaluated, and their weights: its nodes for node-to-segment contact."""
     if pair.name == "node_to_segment":
         nodes = elements.get(element).nodes
         return nodes, np.ones(len(nodes))
-    exact = pair.weighs_gaps and not isinstance(pair.primary, RigidSide)  # approximates integrals over segments
-    return gauss_rule(element, 5) if exact else fine_rule(element)
+    integrates_segments = pair.weighs_gaps and not isinstance(pair.primary, RigidSide)
+    return gauss_rule(element, 5) if integrates_segments else fine_rule(element)

@@ -75,54 +75,54 @@ class RigidPosition:
 
 
 @dataclass(frozen=True)
-class Freed:
-    """Linear response of the solution of a contact problem, with fixed contact state, to positions of the springs.
+class PositionResponse:
+    """Linear response of a contact solution with fixed contact state to the positions at which the springs are anchored.
 
     Attributes
     ----------
-    held : callable
-        The `Response` with springs at a fixed position.
-    moved : ndarray (n, k)
-        Change of the unknowns, including the rigid-body motion, for each position [-].
-    stretched : ndarray (k, k)
-        Change of the elongations of the springs for each position [-].
+    anchored : callable
+        The `Response` for springs anchored at a fixed position.
+    unknown_rates : ndarray (n, k)
+        Derivatives of the unknowns, which include the rigid-body motion, with respect to the positions [-].
+    elongation_rates : ndarray (k, k)
+        Derivatives of the elongations of the springs with respect to the positions [-].
     springs : ndarray of int (k,)
         Numbers of the unknowns at springs.
-    relative : ndarray (1 + d, m, k)
-        Change of the gaps of all m constraints, and of their slips along d tangents, in the rigid-body motion of each
-        position [-].
+    gap_rates : ndarray (1 + d, m, k)
+        Derivatives of the gaps of all m constraints, and of their slips along d tangents, with respect to the positions, for
+        rigid-body motions [-].
     stiffness : float
         Stiffness of each spring [force / length].
     """
 
-    held: Response
-    moved: Array
-    stretched: Array
+    anchored: Response
+    unknown_rates: Array
+    elongation_rates: Array
     springs: Indices
-    relative: Array
+    gap_rates: Array
     stiffness: float
 
-    def slackened(self, elongation: Array, solution: Solution) -> tuple[Array, float]:
+    def slack_position_change(self, elongation: Array, solution: Solution) -> tuple[Array, float]:
         """Return the change (k,) of the positions that makes springs with an `elongation` (k,) slack [length].
 
-        In motions that contact hardly restrains, bodies slide until friction balances the springs, if that is farther than
-        the elongations. In motions that it does not restrain at all, they otherwise move by the elongations, and further
-        until the first gap of the `solution` closes. The largest elongation that the linear response leaves is returned as
-        well; it is infinite if bodies slide, which the linear response does not describe.
+        In motions that contact hardly restrains, bodies slide until friction balances the springs, if this change exceeds
+        the elongations. Otherwise they move by the elongations in motions that contact does not restrain at all, and then
+        further until the first gap of the `solution` closes. The largest elongation that remains according to the linear
+        response is returned as well; it is infinite if bodies slide, because the linear response does not include sliding.
         """
-        relaxed, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
-        remaining = largest(elongation - self.stretched @ relaxed)
-        U, s, V = np.linalg.svd(self.stretched)
+        resolved, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
+        remaining = largest(elongation - self.elongation_rates @ resolved)
+        U, s, V = np.linalg.svd(self.elongation_rates)
         # Singular values are about 1 for motions that contact restrains. Smaller ones hardly restrain a motion, for example
         # only because the friction force turns with the slip direction (a box that rides on a driven one in 3D).
         firm = s > NOTABLE
         slide = self._slide(V[~firm].T, elongation, solution, sliding)
         if largest(slide) > largest(elongation):
             return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), np.inf
-        change = -relaxed
+        change = -resolved
         if remaining > SINGLE_PRECISION * largest(elongation):
-            motion = elongation - self._inverse @ (self.stretched @ elongation)
-            approach, threshold = -self.relative[0] @ motion, LENGTH_ROUND_OFF * remaining
+            motion = elongation - self._inverse @ (self.elongation_rates @ elongation)
+            approach, threshold = -self.gap_rates[0] @ motion, LENGTH_ROUND_OFF * remaining
             closing = (solution.gap > 0.0) & (approach > threshold)
             if closing.any():
                 change += motion * np.min(solution.gap[closing] / approach[closing])
@@ -135,34 +135,34 @@ class Freed:
         The change, a combination of `motions` (k, z) of rigid bodies, minimises the work of friction under constant normal
         forces, less that of the loads. It is zero if friction cannot balance the springs.
         """
-        along, slip, friction = self.relative[1:, sliding], solution.slip[sliding].T, solution.tangential[sliding].T
+        along, slip, friction = self.gap_rates[1:, sliding], solution.slip[sliding].T, solution.tangential[sliding].T
         rates, limit, spring_force = along @ motions, np.hypot.reduce(friction), self.stiffness * elongation
         size, force = largest(np.hypot.reduce(slip)), limit.sum()
         if largest(rates) <= LENGTH_ROUND_OFF or not size or largest(limit) <= ROUND_OFF * largest(spring_force):
             return np.zeros_like(elongation)
         load = motions.T @ spring_force - np.einsum("dmz,dm", rates, friction)
-        tangent = -self.stiffness * size / force * (motions.T @ self.stretched @ motions)
+        tangent = -self.stiffness * size / force * (motions.T @ self.elongation_rates @ motions)
         amplitudes, unbalanced = _least_work(rates, slip / size, limit / force, load / force, tangent)
         return motions @ amplitudes * (size * (unbalanced <= SINGLE_PRECISION))
 
     def respond(self, force: Array, gaps: Array) -> Array:
         """Return the `Response` with springs that stay slack."""
-        u = self.held(force, gaps)
-        return np.asarray(u - self.moved @ (self._inverse @ u[self.springs]))
+        u = self.anchored(force, gaps)
+        return np.asarray(u - self.unknown_rates @ (self._inverse @ u[self.springs]))
 
     @cached_property
     def _inverse(self) -> Array:
-        """Pseudoinverse (k, k) of `stretched`, whose singular values are about 1, or 0 in motions without restraint."""
-        U, s, V = np.linalg.svd(self.stretched)
+        """Pseudoinverse (k, k) of `elongation_rates`, whose singular values are about 1, or 0 without restraint."""
+        U, s, V = np.linalg.svd(self.elongation_rates)
         return np.asarray((V.T * np.divide(1.0, s, out=np.zeros_like(s), where=s > LENGTH_ROUND_OFF)) @ U.T)
 
 
 def _least_work(rates: Array, slip: Array, limit: Array, load: Array, tangent: Array) -> tuple[Array, float]:
     """Return amplitudes a (z,) that minimise the sum of ``limit |slip + rates a|``, minus ``load a``, plus elastic energy.
 
-    The lengths of the slips are smoothed, ever less, and Newton's method with a trust region minimises the sum. All data are
-    dimensionless, with magnitudes of about 1. The largest component of the gradient is returned as well; it is not small if
-    there is no minimum.
+    The lengths of the slips are smoothed by a parameter that decreases in steps. For each value of the parameter, Newton's
+    method with a trust region minimises the sum. All data are dimensionless, with magnitudes of about 1. The largest
+    component of the gradient is returned as well; it is not small if there is no minimum.
 
     Parameters
     ----------
@@ -178,9 +178,9 @@ def _least_work(rates: Array, slip: Array, limit: Array, load: Array, tangent: A
     from scipy.optimize import minimize
 
     def lengths(a: Array) -> tuple[Array, Array]:
-        left = slip + rates @ a
-        length = np.sqrt((left**2).sum(axis=0) + smoothing**2)
-        return length, np.einsum("dm,dmz->mz", left / length, rates)
+        total = slip + rates @ a
+        length = np.sqrt((total**2).sum(axis=0) + smoothing**2)
+        return length, np.einsum("dm,dmz->mz", total / length, rates)
 
     def work(a: Array) -> float:
         return float(limit @ lengths(a)[0] + (0.5 * elastic @ a - load) @ a)
@@ -213,9 +213,9 @@ class FloatingBodies:
         The free rigid-body modes.
     system : System
     soft : bool
-        Whether the springs have SOFT times the stiffness of the softest body; otherwise they are as stiff as it.
-    held_by : sequence of Springs
-        The springs of the model. Those of floating bodies are no stiffer than these.
+        Whether the stiffness of the springs is SOFT times that of the softest body; otherwise it is equal to it.
+    model_springs : sequence of Springs
+        The springs of the model. Springs of floating bodies are not stiffer than those of the model at the same bodies.
 
     Attributes
     ----------
@@ -229,7 +229,7 @@ class FloatingBodies:
         Stiffness of each spring [force / length].
     """
 
-    def __init__(self, motions: FreeMotions, system: System, soft: bool, held_by: Sequence[Springs]) -> None:
+    def __init__(self, motions: FreeMotions, system: System, soft: bool, model_springs: Sequence[Springs]) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
         # The smallest median of the diagonal over the unknowns that each mode moves, and over those that no mode moves.
         solid, moving = system.free & ~weightless, motions.displacement != 0.0
@@ -243,14 +243,17 @@ class FloatingBodies:
         modes = system.unknowns_of(motions.displacement)
         _, _, order = qr((modes * weights[:, None]).T, mode="economic", pivoting=True)
         self.dofs = np.sort(order[: modes.shape[1]]).astype(np.intp)
-        self._places = [f"{'xyz'[k % self._dim]} of {self._owner(motions, k, weightless)}" for k in self.dofs.tolist()]
-        self._at_springs = motions.displacement[self.dofs]
-        self.motions = motions.combined(np.asarray(np.linalg.inv(self._at_springs), np.float64))
-        # Stiffer springs would jam a body that slides on an incline, since springs of the model yield in other directions.
+        self._spring_labels = [
+            f"{'xyz'[k % self._dim]} of {self._owner(motions, k, weightless)}" for k in self.dofs.tolist()
+        ]
+        self._values_at_springs = motions.displacement[self.dofs]
+        self.motions = motions.combined(np.asarray(np.linalg.inv(self._values_at_springs), np.float64))
+        # A body on soft springs of the model that slides on an incline moves in all directions, which stiffer springs would
+        # prevent.
         moving_points = moving.any(axis=1).reshape(-1, self._dim).any(axis=1)
-        beside = [s.stiffness.sum() for s in held_by if moving_points[s.rows.indices // self._dim].any()]
+        spring_sums = [s.stiffness.sum() for s in model_springs if moving_points[s.rows.indices // self._dim].any()]
         self.stiffness = min(
-            SOFT * typical if soft else typical, max(SINGLE_PRECISION * typical, min(beside, default=np.inf))
+            SOFT * typical if soft else typical, max(SINGLE_PRECISION * typical, min(spring_sums, default=np.inf))
         )
 
     def with_springs(self, matrix: bsr_array) -> bsr_array:
@@ -271,7 +274,7 @@ class FloatingBodies:
         """Return displacements u (n_dofs,) less the rigid-body motion of the springs [length]."""
         return u - self.rigid(u[self.dofs])
 
-    def freed(self, constraints: Constraints, dofs: ActiveDofs, respond: Response) -> Freed:
+    def position_response(self, constraints: Constraints, dofs: ActiveDofs, respond: Response) -> PositionResponse:
         """Return the linear response to positions of the springs, given `respond` for springs at a fixed position."""
         modes, springs = self.motions.displacement, dofs.numbers(self.dofs)
         changes = np.stack([rows @ modes for rows in (constraints.B, *constraints.tangents)])
@@ -279,7 +282,7 @@ class FloatingBodies:
         rigid = np.stack([dofs.unknowns(mode, zero_lift) for mode in modes.T], axis=1)
         unloaded = np.zeros(len(rigid))
         strained = np.stack([respond(unloaded, gaps) for gaps in np.moveaxis(changes, -1, 0)], axis=1)
-        return Freed(respond, rigid + strained, strained[springs], springs, changes, self.stiffness)
+        return PositionResponse(respond, rigid + strained, strained[springs], springs, changes, self.stiffness)
 
     def report(self, rigid: RigidPosition, load: float) -> dict[str, Any]:
         """Return a report of the regularisation, as a dict of numbers and strings.
@@ -292,7 +295,7 @@ class FloatingBodies:
         remaining = np.abs(rigid.spring_force)
         return {
             "motions": self.names,
-            "springs": self._places,
+            "springs": self._spring_labels,
             "spring_stiffness": self.stiffness,
             "force_left": remaining.tolist(),
             "relative_to_load": float(remaining.max() / load) if load else 0.0,
@@ -340,12 +343,12 @@ class FloatingBodies:
 
     def moving(self, rigid: RigidPosition) -> list[str]:
         """Return the names of the free rigid-body modes with the largest generalised forces of the springs."""
-        work = np.abs(self._at_springs.T @ rigid.spring_force)
+        work = np.abs(self._values_at_springs.T @ rigid.spring_force)
         return [name for name, w in zip(self.names, work, strict=True) if w > 0.1 * work.max()]
 
     def settle(
-        self, solve_at: Callable[[Array], Solution], freed: Callable[[Response], Freed] | None, springs: Indices,
-        start: Array, load: float, noise: float, round_off: float,
+        self, solve_at: Callable[[Array], Solution], position_response: Callable[[Response], PositionResponse] | None,
+        springs: Indices, start: Array, load: float, noise: float, round_off: float,
     ) -> RigidPosition:  # fmt: skip
         """Solve the contact problem and anchor the springs at the new position, repeatedly, until they are slack.
 
@@ -353,9 +356,9 @@ class FloatingBodies:
         ----------
         solve_at : callable
             Function that returns the `Solution` of the contact problem with the springs anchored at a position (k,) [length].
-        freed : callable, optional
-            Function that returns the response `Freed` to positions, given the response of a solution with springs at a
-            fixed position; see the method `freed`. By default Newton's method is not used.
+        position_response : callable, optional
+            Function that returns the `PositionResponse`, given the response of a solution with springs at a fixed position;
+            see the method `position_response`. By default Newton's method is not used.
         springs : ndarray of int (k,)
             Indices of the displacement components `dofs` among the unknowns of the solution.
         start : ndarray (k,)
@@ -401,9 +404,9 @@ class FloatingBodies:
             step, length = None, 1.0
             if stretch > last_stretch:
                 mixing.restart()
-            elif freed is not None and state.response is not None:
+            elif position_response is not None and state.response is not None:
                 with suppress(LinAlgError):  # the constraints are linearly dependent
-                    step = freed(state.response()).slackened(elongation, state)
+                    step = position_response(state.response()).slack_position_change(elongation, state)
             # Without Newton's method positions are accelerated, because parts much softer than the springs, such as a
             # peeling layer, approach equilibrium slowly.
             anchor = mixing.mixed(anchor, anchor + elongation) if step is None else anchor + step[0]

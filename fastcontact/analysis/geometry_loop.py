@@ -28,7 +28,7 @@ from fastcontact.analysis.inequalities import Iterate, StepContext, initially_ac
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
-from fastcontact.analysis.tolerances import Scatter, Tolerances, Watch
+from fastcontact.analysis.tolerances import Scatter, ScatterWindow, Tolerances
 from fastcontact.analysis.touching import Touching
 from fastcontact.arrays import Array, largest
 from fastcontact.contact.constraints import Linearised, StackedConstraints
@@ -106,7 +106,9 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
         raise
     if settled.nodes is None:
         return settled
-    return replace(settled, solution=settled.nodes.shared(settled.solution, settled.constraints, iterate.u))
+    return replace(
+        settled, solution=settled.nodes.with_distributed_forces(settled.solution, settled.constraints, iterate.u)
+    )
 
 
 def _linearises(problem: Problem) -> bool:
@@ -125,7 +127,7 @@ def _settle(
     # From a converged iterate, the loop continues without extrapolation and with accurate solutions.
     extrapolates = problem.until_settled and problem.solver.iterative and not iterate.history
     tolerances = Tolerances(problem.solver, criteria, extrapolates, step.state.gap_round_off, step.expected)
-    mixing, watch = _Mixing(step), Watch()
+    mixing, window = _Mixing(step), ScatterWindow()
     if extrapolates:
         iterate.u = step.extrapolation.displacement(iterate.u)
     for update in range(limit + 1):
@@ -148,10 +150,10 @@ def _settle(
         if touching.unfinished:
             if not solution.settled:
                 raise ConvergenceError("an increment does not converge", iterate.history)
-            step = replace(step, path=solution.slid)
+            step = replace(step, path=solution.slip_so_far)
             mixing = _Mixing(step)
-            watch.forget()
-        moved = _move(step, iterate, constraints, solution, displacement)
+            window.forget()
+        last_update = _store_solution(step, iterate, constraints, solution, displacement)
         if not (solution.settled or accuracy.inexact):
             nodes_that_change = nearest_nodes(problem, constraints, np.flatnonzero(solution.active != solution.wanted))
             iterate.history[-1]["nodes"] = nodes_that_change
@@ -160,42 +162,44 @@ def _settle(
         if not problem.until_settled:
             continue
         if not tolerances.inexact:
-            excess = moved.change - tolerances.enough(moved.size)
-            touching.check(step, constraints, solution, excess, moved.size, iterate.u)
-        paired_at = moved.before[step.dofs.compared]
+            excess = last_update.change - tolerances.enough(last_update.size)
+            touching.check(step, constraints, solution, excess, last_update.size, iterate.u)
+        paired_at = last_update.before[step.dofs.compared]
         settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=paired_at)
         if not solution.settled or tolerances.inexact:
-            watch.forget()
-        elif moved.change <= tolerances.enough(moved.size) and not (touching.due or touching.unfinished):
+            window.forget()
+        elif last_update.change <= tolerances.enough(last_update.size) and not (touching.due or touching.unfinished):
             return settled
-        elif scatter := watch.seen(displacement, settled.force, moved.change, moved.size, mixing.contraction):
+        elif scatter := window.add(
+            displacement, settled.force, last_update.change, last_update.size, mixing.contraction
+        ):
             log.info(
                 "the contact geometry settled as far as round-off allows: displacements scatter by %.1e of the largest one, "
                 "contact forces by %.1e (Criteria.geometry = %g)", *astuple(scatter), problem.criteria.geometry,
             )  # fmt: skip
             return replace(settled, scatter=scatter)
-        next_pairing = mixing.next(settled, moved, displacement, tolerances)
+        next_pairing = mixing.next(settled, last_update, displacement, tolerances)
         iterate.u = iterate.u if next_pairing is None else step.dofs.put(iterate.u, next_pairing)
-        tolerances.tighten(moved.relative, solution.residual)
+        tolerances.tighten(last_update.relative, solution.residual)
         late = update >= max(limit // 2, PATIENT_UPDATES) and not iterate.rounded
         if late and any(pair.alternates(constraints.parts[name]) for name, pair in problem.pairs.items()):
             log.info("pairings alternate: from now on edges of facets are rounded, and small overlaps have no gap")
             iterate.rounded = True
             mixing.restart()
-            watch.forget()
+            window.forget()
     if problem.until_settled:
-        change = step.dofs.put(np.zeros_like(iterate.u), displacement - moved.before)
+        change = step.dofs.put(np.zeros_like(iterate.u), displacement - last_update.before)
         raise ConvergenceError(geometry_moves(problem, iterate.history, change, limit), iterate.history)
     touching.check(step, constraints, solution, 0.0, 0.0, iterate.u)
     if touching.due or touching.unfinished:
         del iterate.history[-limit - 1 :]
         return _settle(step, iterate, touching)
     fixed = limit and not criteria.keep_pairing
-    return SettledContact(constraints, solution, iterate, (limit, moved.relative) if fixed else None, nodes=nodes)
+    return SettledContact(constraints, solution, iterate, (limit, last_update.relative) if fixed else None, nodes=nodes)
 
 
 @dataclass(frozen=True, eq=False)
-class _Moved:
+class _Update:
     """Change of the displacements in one geometry update, in the components of `StepContext.dofs`.
 
     Attributes
@@ -216,9 +220,9 @@ class _Moved:
     relative: float
 
 
-def _move(
+def _store_solution(
     step: StepContext, iterate: Iterate, constraints: StackedConstraints, solution: Solution, displacement: Array
-) -> _Moved:
+) -> _Update:
     """Store a solution, and its displacements (k,) of the components of `step.dofs` [length], in the iterate."""
     before = step.dofs.of(iterate.u)
     iterate.u = step.dofs.put(iterate.u, displacement)
@@ -226,12 +230,12 @@ def _move(
     size = max(step.dofs.size(solution.u), largest(step.load.lift))
     change = largest(displacement - before)
     significant = size and change > step.state.gap_round_off
-    moved = _Moved(before, change, size, change / size if significant else 0.0)
+    last_update = _Update(before, change, size, change / size if significant else 0.0)
     iterate.remember(constraints, solution)
-    entry = {"displacement_change": moved.relative, "active": int(solution.active.sum())}
+    entry = {"displacement_change": last_update.relative, "active": int(solution.active.sum())}
     entry |= {"active_set_iterations": solution.iterations, "settled": solution.settled}
     iterate.history.append(entry | ({"rounded": True} if iterate.rounded else {}))
-    return moved
+    return last_update
 
 
 class _Mixing:
@@ -261,33 +265,35 @@ class _Mixing:
         """Discard the earlier iterates."""
         self._accelerated = None
 
-    def next(self, settled: SettledContact, moved: _Moved, displacement: Array, tolerances: Tolerances) -> Array | None:
+    def next(
+        self, settled: SettledContact, last_update: _Update, displacement: Array, tolerances: Tolerances
+    ) -> Array | None:
         """Return the displacements (k,) for the next pairing, of the components of `StepContext.dofs` [length].
 
         None means the displacements of the solution, `displacement` (k,). Newton's method is abandoned once changes increase,
         because it does not converge if nodes alternate between facets. It is also omitted if the next solution alone is
         expected to converge, because a solution without a Newton step is cheaper.
         """
-        solution, enough = settled.solution, tolerances.enough(moved.size)
-        self._newton, self._change = self._newton and moved.change <= self._change, moved.change
-        if self._newton and solution.settled and SAFETY * self.contraction * moved.change > enough:
-            arguments = self._step, settled.constraints, solution, moved.before, displacement
-            stepped = newton_step(*arguments, enough / moved.change, settled.nodes)
-            if stepped is not None:
-                next_pairing, self.contraction = stepped
+        solution, enough = settled.solution, tolerances.enough(last_update.size)
+        self._newton, self._change = self._newton and last_update.change <= self._change, last_update.change
+        if self._newton and solution.settled and SAFETY * self.contraction * last_update.change > enough:
+            arguments = self._step, settled.constraints, solution, last_update.before, displacement
+            newton_result = newton_step(*arguments, enough / last_update.change, settled.nodes)
+            if newton_result is not None:
+                next_pairing, self.contraction = newton_result
                 return next_pairing
         state = settled.constraints.state(solution.active).tobytes()
-        same = self._last_state == state
-        self._cycles |= not (same or self._newton) and state in self._earlier_states
+        same_state = self._last_state == state
+        self._cycles |= not (same_state or self._newton) and state in self._earlier_states
         self._last_state = state if solution.settled else b""
         self._earlier_states.add(self._last_state)
-        if tolerances.inexact or not (same or self._cycles or settled.iterate.rounded):
+        if tolerances.inexact or not (same_state or self._cycles or settled.iterate.rounded):
             self.restart()
         if tolerances.inexact:
             return None
         if self._accelerated is None:
             self._accelerated = Anderson(DEPTH, self._step.dofs.compared, self._step.problem.solver.iterative)
-        return self._accelerated.mixed(moved.before, displacement)
+        return self._accelerated.mixed(last_update.before, displacement)
 
 
 def newton_step(
@@ -314,7 +320,7 @@ def newton_step(
     u = step.dofs.put(step.state.u.copy(), image)
     displacement = step.problem.displacement(u)
     if nodes is not None:
-        solution = nodes.shared(solution, constraints, u)
+        solution = nodes.with_distributed_forces(solution, constraints, u)
     if solution.response is None or not (parts := _linearised(constraints, solution, displacement)):
         return None
     try:
@@ -324,8 +330,8 @@ def newton_step(
     n_dofs, where = len(step.load.lift), step.dofs.compared
     gaps = np.zeros((1 + len(constraints.tangents), len(constraints)))
 
-    def varied(v: Array) -> Array:
-        """Return the active components (k,) of ``S'(u) v``."""
+    def response_along(v: Array) -> Array:
+        """Return the active components (k,) of ``S'(u) v`` for the components v on which contact depends."""
         active = np.zeros_like(image)
         active[where] = v
         u = step.dofs.put(np.zeros(n_dofs), active)
@@ -338,7 +344,7 @@ def newton_step(
         return step.dofs.varied(respond(step.dofs.reduced(force), merged))
 
     changed = (image - before)[where]
-    system = LinearOperator((len(changed),) * 2, matvec=lambda v: v - varied(v)[where], dtype=float)
+    system = LinearOperator((len(changed),) * 2, matvec=lambda v: v - response_along(v)[where], dtype=float)
     largest_change = largest(changed) or 1.0
     # With the tolerance `accuracy` itself, load steps of plastic bodies take 10 % more pairings.
     v, _ = gmres(system, changed / largest_change, rtol=max(SINGLE_PRECISION, NOTABLE * accuracy), atol=0.0, maxiter=1)
@@ -348,7 +354,7 @@ def newton_step(
         return None
     next_pairing, determined = image.copy(), step.dofs.determined
     if len(determined) > len(where):  # there are springs of floating bodies
-        next_pairing[determined] += largest_change * varied(v)[determined]
+        next_pairing[determined] += largest_change * response_along(v)[determined]
     else:
         next_pairing[where] = before[where] + largest_change * v
     return next_pairing, response_size / (largest_change * largest(v) or 1.0)

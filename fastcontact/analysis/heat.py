@@ -52,7 +52,8 @@ class ThermalLoads:
     films : csr_array (n_points, n_points)
         Matrix of all films [power / temperature].
     powers, ambient : dict of ramp table to ndarray (n_points,)
-        By ramp table, at multiplier 1: nodal powers of loads, and of films due to the rise of their surroundings [power].
+        For each ramp table, at multiplier 1: nodal powers of loads, and those of films due to the temperature rise of their
+        surroundings [power].
     """
 
     films: csr_array
@@ -61,7 +62,7 @@ class ThermalLoads:
 
 
 def thermal_loads(model: Model, displacement: Array | None = None) -> ThermalLoads:
-    """Return the heat exchange of a model, over areas and volumes at a displacement (n_points, dim) [length]."""
+    """Return the heat exchange of a model, with the areas and volumes at a displacement (n_points, dim) [length]."""
     mesh, films = model.mesh, csr_array((model.mesh.n_points,) * 2)
     deformed = mesh if displacement is None else mesh.replace(points=mesh.points + displacement)
     geometry = mesh, model.kinematics, deformed
@@ -98,7 +99,7 @@ class Heat:
     fixed : ndarray of bool (n_points,)
         Merged nodes with a prescribed temperature.
     prescribed : dict of ramp table to ndarray (n_points,)
-        By ramp table, at multiplier 1: prescribed temperature rises [temperature].
+        For each ramp table, prescribed temperature rises at multiplier 1 [temperature].
     linear_solver : str
     linear_tolerance : float
     """
@@ -158,8 +159,8 @@ class Heat:
         conductivity, exchange = self.matrix, self.loads
         if displacement is not None and self.finite:
             conductivity, exchange = self.conductors(displacement).matrix(), thermal_loads(self.model, displacement)
-        given = self.prescribed, exchange.powers, exchange.ambient
-        rise, loads, ambient = (combined(by_ramp, self.ramp, instant, n) for by_ramp in given)
+        histories = self.prescribed, exchange.powers, exchange.ambient
+        rise, loads, ambient = (combined(by_ramp, self.ramp, instant, n) for by_ramp in histories)
         friction_power = np.zeros(n) if friction is None else friction
         conductivity = conductivity if contact is None else csr_array(conductivity + contact)
         films = exchange.films
@@ -175,7 +176,8 @@ class Heat:
         if len(free):
             dim, free_A = self.model.mesh.dim, csr_array(A[free][:, free])
             solver = choice.make(self.linear_solver, dim=dim, n_dofs=len(free), tolerance=self.linear_tolerance)
-            # Sums of sparse matrices drop entries that cancel, also on one side of the diagonal only. Factors need both.
+            # Sums of sparse matrices drop entries that cancel, possibly on one side of the diagonal only. The factorisation
+            # requires a symmetric pattern.
             free_A = csr_array(0.5 * (free_A + free_A.T))
             free_A.sort_indices()
             blocks = bsr_array((free_A.data[:, None, None], free_A.indices, free_A.indptr), shape=free_A.shape)
@@ -200,7 +202,7 @@ class Heat:
         return Temperatures(rise, reaction, {**{k: float(v.sum()) for k, v in sums.items()}, "imbalance": residual})
 
     def _check_reached(self, contact: csr_array | None, films: csr_array) -> None:
-        """Raise ConvergenceError if the temperature of a body is undetermined."""
+        """Raise a ConvergenceError if the temperature of a body is undetermined."""
         determined = self.merged @ self.fixed + films.diagonal() > 0.0
         pairs = coo_array(self.merged if contact is None else self.merged + contact)
         joined = np.stack([pairs.row, pairs.col], axis=1)[pairs.data != 0.0]

@@ -18,7 +18,7 @@ from fastcontact.analysis.convergence_messages import friction_exceeded, not_bal
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.solution import Accuracy, Path, Slid, Solution, completed, shifted
+from fastcontact.analysis.solution import Accuracy, Path, SlipSoFar, Solution, in_last_increment, over_whole_step
 from fastcontact.analysis.state import State
 from fastcontact.arrays import AnyArray, Array, Mask, largest
 from fastcontact.contact.constraints import Constraints, StackedConstraints, stacked
@@ -82,7 +82,7 @@ class Iterate:
 
 
 def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Iterate) -> StackedConstraints:
-    """Pair both sides of every contact pair on the deformed configuration, with `keep_pairing` on the undeformed one."""
+    """Return the constraints of all pairs, from the deformed or, with `keep_pairing`, from the undeformed configuration."""
     displacement, u = problem.displacement(iterate.u).copy(), iterate.u  # a copy, since iterations reuse the array
     if problem.force_driven.pairs:
         u = np.where(problem.system.fixed, load.lift, u)
@@ -117,8 +117,9 @@ def initially_active(constraints: StackedConstraints, iterate: Iterate, extrapol
             active = part.equality | (part.gap0 + part.B @ iterate.u < 0.0)
         else:
             assert part.nodal is not None
-            last = iterate.active[name] if extrapolation is None else extrapolation.active(name, iterate.active[name])
-            active = part.nodal.initially_active(part.gap0 + part.B @ iterate.u, iterate.pressure[name], last)
+            last_active = iterate.active[name]
+            last_active = last_active if extrapolation is None else extrapolation.active(name, last_active)
+            active = part.nodal.initially_active(part.gap0 + part.B @ iterate.u, iterate.pressure[name], last_active)
         sets.append(active)
     return np.concatenate(sets)
 
@@ -143,7 +144,7 @@ class StepContext:
         Scale of the displacements in the first step, if only forces act [length].
     index : int
         Number of the step.
-    path : Path or Slid, optional
+    path : Path or SlipSoFar, optional
         Load path of the step, if friction is solved along it in increments; or the data at the beginning of its last
         increment, if only this increment is solved again.
     """
@@ -156,7 +157,7 @@ class StepContext:
     extrapolation: Extrapolation = field(default_factory=Extrapolation)
     expected: float = 0.0
     index: int = 0
-    path: Path | Slid | None = None
+    path: Path | SlipSoFar | None = None
 
     @cached_property
     def prescribed_motion(self) -> Array:
@@ -224,7 +225,7 @@ def solve_inequalities(
 def _solve(
     step: StepContext, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy, lift: Array, guess: Array
 ) -> Solution:  # fmt: skip
-    """Solve in the unknowns that remain after supports and multi-point constraints are eliminated.
+    """Return the contact solution in the unknowns that remain after supports and multi-point constraints are eliminated.
 
     `lift` (n_dofs,) are the displacements that supports and multi-point constraints prescribe if all unknowns are zero, and
     `guess` (n_dofs,) are initial displacements [length].
@@ -236,11 +237,11 @@ def _solve(
     from fastcontact.analysis.friction import solve as friction
 
     condensed = replace(condensed, driven=step.driven(constraints))
-    slid = step.path if isinstance(step.path, Slid) and len(step.path.slip) == len(constraints) else None
+    slip_so_far = step.path if isinstance(step.path, SlipSoFar) and len(step.path.slip) == len(constraints) else None
     path = step.path if isinstance(step.path, Path) else None
-    condensed = condensed if slid is None else shifted(condensed, slid)
+    condensed = condensed if slip_so_far is None else in_last_increment(condensed, slip_so_far)
     solution = friction.solve(step.loaded, condensed, active, accuracy, u, iterate.frictional, path)
-    iterate.frictional = solution if slid is None else completed(solution, slid)
+    iterate.frictional = solution if slip_so_far is None else over_whole_step(solution, slip_so_far)
     return iterate.frictional
 
 
@@ -248,7 +249,7 @@ def _with_floating_bodies(
     step: StepContext, bodies: FloatingBodies, constraints: Constraints, iterate: Iterate, active: Mask,
     accuracy: Accuracy,
 ) -> tuple[Solution, Array]:  # fmt: skip
-    """Solve if contact alone restrains some bodies; return the same as `solve_inequalities`.
+    """Return the result of `solve_inequalities` if contact alone restrains some bodies.
 
     Springs that are anchored at a rigid position of these bodies hold them. `FloatingBodies.settle` iterates the position
     until the springs carry no force.
@@ -274,7 +275,7 @@ def _with_floating_bodies(
     force = step.load.force
     if (u := problem.linearised_at) is not None:  # residual forces, since a loaded tangent resists rigid-body rotations
         force = force - problem.system.K @ bodies.strained(u)
-    # Work of the loads on each free rigid-body motion, and the size of the model.
+    # Work of the loads in each free rigid-body motion, and the size of the model.
     loads = generalised(bodies.motions, force, state.largest_rigid_force), model_size
     if not iterate.history:
         rows, gap0 = resisting(constraints)
@@ -290,14 +291,14 @@ def _with_floating_bodies(
             last_active = active | constraints.usable & (gap <= SINGLE_PRECISION * model_size)
     relative_accuracy = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
     # The response requires many linear solutions, which are cheap only if the matrix is factorised.
-    freed = None if problem.solver.iterative else partial(bodies.freed, constraints, dofs)
+    position_response = None if problem.solver.iterative else partial(bodies.position_response, constraints, dofs)
     springs, load = dofs.numbers(bodies.dofs), state.largest_rigid_force
-    rigid = bodies.settle(solve_at, freed, springs, start, load, relative_accuracy, state.gap_round_off)
+    rigid = bodies.settle(solve_at, position_response, springs, start, load, relative_accuracy, state.gap_round_off)
     if rigid.state.settled and not rigid.slack:
         gaps = gaps_at_rest(problem.model, bodies.motions)
         raise failure(not_balanced(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))
     iterate.rigid = rigid
     solution, respond = rigid.state, rigid.state.response
-    if freed is not None and respond is not None:
-        solution = replace(solution, response=lambda: freed(respond()).respond)
+    if position_response is not None and respond is not None:
+        solution = replace(solution, response=lambda: position_response(respond()).respond)
     return solution, dofs.displacement(solution.u, lift + bodies.rigid(rigid.anchor))

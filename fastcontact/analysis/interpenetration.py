@@ -1,4 +1,4 @@
-"""Warnings about bodies that interpenetrate at the end of an analysis, without or outside the defined contacts."""
+"""Warnings about bodies that interpenetrate at the end of an analysis, without a contact pair or beside its facets."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 
 Indices = NDArray[np.signedinteger]
 # Numbers of two bodies, outer nodes of the first (n,), and the depths of these nodes in the second (n,) [length].
-Inside = tuple[int, int, Indices, Array]
+Overlap = tuple[int, int, Indices, Array]
 Contacts = Mapping[str, ContactResult]
 # Number, displacements (n_points, dim) and contact results of a step.
 Peak = tuple[int, Array, Contacts]
-# Depth beside the facets of a contact above which a warning is given, relative to the largest depth of nodes in contact.
-HELD = 2.0
+# Depth of nodes beside the facets of a contact above which a warning is given, relative to the largest depth of its nodes.
+DEPTH_RATIO = 2.0
 
 
 def interpenetration(problem: Problem, displacement: Array, contact: Contacts, peaks: Sequence[Peak] = ()) -> list[str]:
@@ -41,27 +41,23 @@ def interpenetration(problem: Problem, displacement: Array, contact: Contacts, p
     peaks : list of (int, ndarray (n_points, dim), dict of str to ContactResult)
         Numbers, displacements and contact results of earlier steps in which the forces of contact pairs are largest.
     """
-    mesh, between = problem.model.mesh, _pairs_between(problem)
+    mesh, pairs_between = problem.model.mesh, _pairs_between(problem)
 
-    def lacking(u: Array, contact: Contacts, overlaps: Sequence[Inside]) -> list[str]:
-        beside = _beside_contact(problem, u, contact, between, overlaps)
+    def lacking(u: Array, contact: Contacts, overlaps: Sequence[Overlap]) -> list[str]:
+        beside = _beside_contact(problem, u, contact, pairs_between, overlaps)
         return [*beside, *_through_obstacles(problem, u, contact)]
 
     overlaps = list(depths(mesh, problem.model.kinematics, mesh.points + displacement))
     texts = lacking(displacement, contact, overlaps)
-    if not texts:
-        at_peaks = (
-            (index, lacking(u, there, list(depths(mesh, problem.model.kinematics, mesh.points + u))))
-            for index, u, there in peaks
-        )
-        texts = [
-            f"in load step {index}, where its force is largest, {text}" for index, found in at_peaks for text in found
-        ]
-    return [*_without_contact(problem, between, overlaps), *texts]
+    for index, u, contact_at_peak in peaks if not texts else ():
+        overlaps_at_peak = list(depths(mesh, problem.model.kinematics, mesh.points + u))
+        warnings = lacking(u, contact_at_peak, overlaps_at_peak)
+        texts += [f"in load step {index}, where its force is largest, {text}" for text in warnings]
+    return [*_without_contact(problem, pairs_between, overlaps), *texts]
 
 
 def _pairs_between(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
-    """Return the contact pairs between each two bodies; an empty list for the two sides of a pretension section."""
+    """Return the names of the contact pairs between each two bodies; empty for the two sides of a pretension section."""
     body = bodies(problem.model.mesh)[1]
     groups: dict[frozenset[int], list[str]] = {}
     for name, pair in problem.pairs.items():
@@ -75,7 +71,7 @@ def _pairs_between(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
 
 
 def _without_contact(
-    problem: Problem, between: Mapping[frozenset[int], Sequence[str]], overlaps: Sequence[Inside]
+    problem: Problem, pairs_between: Mapping[frozenset[int], Sequence[str]], overlaps: Sequence[Overlap]
 ) -> list[str]:
     """Return a warning for each two overlapping bodies without a contact pair between them, the deepest overlap first."""
     mesh, texts = problem.model.mesh, dict[frozenset[int], str]()
@@ -83,7 +79,7 @@ def _without_contact(
     for first, second, points, depth in sorted(overlaps, key=lambda entry: -float(entry[3].max())):
         body_pair, row = frozenset((first, second)), int(np.argmax(depth))
         notable = depth[row] > LENGTH_ROUND_OFF * np.ptp(mesh.points, axis=0).max()
-        if notable and body_pair not in between and body_pair not in texts:
+        if notable and body_pair not in pairs_between and body_pair not in texts:
             where = mesh.points[points[row]]
             texts[body_pair] = (
                 f"bodies {body_name(mesh, body, first)} and {body_name(mesh, body, second)} interpenetrate by "
@@ -94,23 +90,23 @@ def _without_contact(
 
 
 def _beside_contact(
-    problem: Problem, displacement: Array, contact: Contacts, between: Mapping[frozenset[int], Sequence[str]],
-    overlaps: Sequence[Inside],
+    problem: Problem, displacement: Array, contact: Contacts, pairs_between: Mapping[frozenset[int], Sequence[str]],
+    overlaps: Sequence[Overlap],
 ) -> list[str]:  # fmt: skip
     """Return warnings about bodies that pass through each other where the groups of their contact pairs lack facets."""
     mesh, texts = problem.model.mesh, []
     _, body = bodies(mesh)
-    for body_pair, names in between.items():
+    for body_pair, names in pairs_between.items():
         entries = [entry for entry in overlaps if names and {*entry[:2]} == body_pair]
         if not entries or any(problem.pairs[name].options.wear for name in names):  # worn material is still in the mesh
             continue
         points, depth = np.concatenate([entry[2] for entry in entries]), np.concatenate([entry[3] for entry in entries])
         secondary, primary = (mask[points] for mask in _points_of_sides(problem, contact, names))
         deformed = max(float(np.ptp(displacement[body == number], axis=0).max()) for number in body_pair)
-        limit = max(NOTABLE * deformed, HELD * float(depth[secondary].max(initial=0.0)))
+        limit = max(NOTABLE * deformed, DEPTH_RATIO * float(depth[secondary].max(initial=0.0)))
         depth[secondary | primary] = 0.0
         row = int(np.argmax(depth))
-        if depth[row] > limit and depth[row] - _at_rest(problem, entries, int(points[row])) > limit:
+        if depth[row] > limit and depth[row] - _depth_at_rest(problem, entries, int(points[row])) > limit:
             label = " and ".join(body_name(mesh, body, number) for number in sorted(body_pair))
             subject = f"bodies {label} pass through each other"
             texts.append(_lacking_facets(problem, names[0], subject, depth[row], points[row]))
@@ -128,7 +124,7 @@ def _points_of_sides(problem: Problem, contact: Contacts, names: Sequence[str]) 
     return secondary, primary
 
 
-def _at_rest(problem: Problem, overlaps: Sequence[Inside], point: int) -> float:
+def _depth_at_rest(problem: Problem, overlaps: Sequence[Overlap], point: int) -> float:
     """Return the depth of a point of one of two bodies in the other before any load [length]."""
     mesh = problem.model.mesh
     for first, second, points, depth in depths(mesh, problem.model.kinematics, mesh.points):
@@ -155,7 +151,7 @@ def _through_obstacles(problem: Problem, displacement: Array, contact: Contacts)
         gap = pair.primary.facing(mesh.points[points] + u[points], pose)[0]
         contact_gap = contact[name].gap
         contact_depth = -float(np.min(contact_gap, initial=0.0, where=np.isfinite(contact_gap)))
-        limit = max(NOTABLE * float(np.ptp(u, axis=0).max()), HELD * contact_depth)
+        limit = max(NOTABLE * float(np.ptp(u, axis=0).max()), DEPTH_RATIO * contact_depth)
         row = int(np.argmin(np.where(at_rest >= 0.0, gap, np.inf)))
         if at_rest[row] >= 0.0 and -gap[row] > limit:
             texts.append(_lacking_facets(problem, name, "the body passes through the obstacle", -gap[row], points[row]))

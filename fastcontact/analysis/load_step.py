@@ -15,14 +15,20 @@ from typing import Any
 import numpy as np
 
 from fastcontact._jit import parallel
-from fastcontact.analysis.contact_result import approach, contact_results, sliding_load
+from fastcontact.analysis.contact_result import contact_results, mean_slip_before_closing, sliding_load
 from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
-from fastcontact.analysis.thermal_coupling import Heated, expanded, expansion_as_force, first_rise, settle_heat
+from fastcontact.analysis.thermal_coupling import (
+    HeatSolution,
+    expansion_as_force,
+    first_rise,
+    settle_heat,
+    thermal_load,
+)
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import contact_work
 from fastcontact.arrays import Array, largest
@@ -58,20 +64,22 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     load = cold = problem.load_at(instant)
     if problem.heat is not None:
         rise = first_rise(problem, problem.heat, state, instant)
-        load = expanded(problem, cold, rise)
+        load = thermal_load(problem, cold, rise)
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
     begin = prepare_start(problem, state, index, load)
-    heated, solution = None, newton(begin, load)
+    heat_solution, solution = None, newton(begin, load)
     if problem.heat is not None:
-        heated, solution = settle_heat(problem, begin.state, cold, instant, rise, solution, partial(newton, begin))
+        heat_solution, solution = settle_heat(
+            problem, begin.state, cold, instant, rise, solution, partial(newton, begin)
+        )
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
-    return _end_of_step(problem, begin.state, load, solution, iterations, (index, instant), heated)
+    return _end_of_step(problem, begin.state, load, solution, iterations, (index, instant), heat_solution)
 
 
 def _end_of_step(
     problem: Problem, start: State, load: StepLoad, solution: StepEquilibrium, iterations: dict[str, Any],
-    instant: tuple[int, float], heated: Heated | None,
+    instant: tuple[int, float], heat_solution: HeatSolution | None,
 ) -> tuple[State, StepResult]:  # fmt: skip
     """Return the state and the result at the end of a load step.
 
@@ -87,13 +95,13 @@ def _end_of_step(
         Numbers of iterations, for `StepResult.iterations`; it is modified.
     instant : (int, float)
         Number of the step, and pseudo-time at its end.
-    heated : Heated, optional
+    heat_solution : HeatSolution, optional
         The converged temperatures, in models with conduction of heat.
     """
     settled, u, balance = solution.settled, solution.u, solution.balance
     end = replace(
         start, u=u, largest_force=balance.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
-        instant=instant[1], rise=None if heated is None else heated.rise,
+        instant=instant[1], rise=None if heat_solution is None else heat_solution.rise,
     )  # fmt: skip
     end = solution.terms.commit(u, end)
     bodies = None if solution.terms.bodies is None else solution.terms.bodies.at(u)
@@ -124,13 +132,13 @@ def _end_of_step(
             iterations["regularised"]["undetermined"] = free
     end = replace(end, solver=problem.solver.snapshot())
     result = recover(problem, end, contact, balance.reaction, iterations, instant, bodies)
-    return end, result if heated is None else heated.completed(problem, result)
+    return end, result if heat_solution is None else heat_solution.with_heat_results(problem, result)
 
 
 def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) -> StepContext:
-    """Return the beginning of a load step.
+    """Return the data at the beginning of a load step.
 
-    Its state is the `state` at the end of the previous step, with the bounds of round-off and of forces for the new `load`.
+    They include the `state` at the end of the previous step, with the bounds of round-off and of forces for the new `load`.
     If only forces act in the first step, no prescribed displacement provides a scale. The largest displacement of the
     solution without contact is then used, see `StepContext.expected`.
     """
@@ -153,8 +161,8 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         largest_force=max(state.largest_force, largest(load_as_force.force)),
     )  # fmt: skip
     if problem.extrapolates:
-        # Displacements of nonlinear bodies are extrapolated in the motions of rigid obstacles as well as in the loads. The
-        # state at rest is the first of the extrapolated states.
+        # For nonlinear bodies, the motions of rigid obstacles determine the extrapolation as well as the loads. The state at
+        # rest is the first of the extrapolated states.
         quantities = [load.lift, load_as_force.force, *(() if problem.bodies is None else load.obstacles.values())]
         extrapolation = state.extrapolation
         if problem.bodies is not None and not (extrapolation.loads or state.u.any()):
@@ -220,7 +228,9 @@ def accumulate_results(
         slip = np.zeros_like(contact.coordinates)
         if contact.active.any() and not pair.options.tied:
             rigid_stick = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
-            slip = pair.nodal_slip(configuration) - approach(constraints, settled.solution, rows, contact)
+            slip = pair.nodal_slip(configuration) - mean_slip_before_closing(
+                constraints, settled.solution, rows, contact
+            )
             slip = np.where((contact.active & ~rigid_stick)[:, None], slip, 0.0)
         slipped[name] = slip + start.slipped.get(name, 0.0)
         results_so_far[name] = replace(contact, slip=slip, slip_total=slipped[name])
@@ -274,7 +284,7 @@ def recover(
     mesh, u = problem.model.mesh, problem.displacement(end.u)
     sections, reaction = problem.model.pretensions, reaction.reshape(-1, mesh.dim)
     histories = problem.model.temperatures, problem.model.initial_states, sections
-    temperature, initial, pretension = (problem.factors(each, instant[1]) for each in histories)
+    temperature, initial, pretension = (problem.factors(parts, instant[1]) for parts in histories)
     pressures = [multiplier(table, problem.ramp, instant[1]) for _, table in problem.following]
     factors = {"temperature_factors": temperature, "initial_factors": initial, "pressure_factors": pressures}
     iterations = {**iterations, **{key: multipliers for key, multipliers in factors.items() if multipliers}}

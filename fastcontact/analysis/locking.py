@@ -39,12 +39,13 @@ from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
-# Poisson's ratio above which the mean stress is examined, and scatter of it, or of nodal pressures, above which a warning is
-# given. Under a sphere it scatters by 14 to 23 % at nu = 0.3, where the pressure is accurate, by 38 to 47 % at 0.45 and by 66
-# to 75 % at 0.48, where the error of the pressure at the pole is 15 to 27 % and 27 to 43 %.
+# Poisson's ratio above which the mean stress is examined, and relative scatter of the mean stress, or of nodal pressures,
+# above which a warning is given. Under a sphere the mean stress scatters by 14 to 23 % at nu = 0.3, where the pressure is
+# accurate, by 38 to 47 % at 0.45 and by 66 to 75 % at 0.48, where the errors of the pressure at the pole are 15 to 27 % and
+# 27 to 43 %.
 SUSPICIOUS, ALTERNATING = 0.45, 0.25
-# Error in the energy norm above which a warning is given. It is 25 % under the same sphere on coarse triangles, and 52 to
-# 67 % in thin parts that carry a third of the exact load in bending.
+# Estimated error in the energy norm above which a warning is given. It is 25 % under the same sphere on coarse triangles, and
+# 52 to 67 % in thin parts that carry a third of the exact load in bending.
 BENDING = 0.45
 # Elements that are over-constrained by one dilatation per cell.
 SIMPLICES = ("tri3", "tet4")
@@ -164,7 +165,9 @@ def scatter_warnings(problem: Problem, step: StepResult) -> list[str]:
             "averages at the nodes, and contact pressures with it; use quadrangles or hexahedra, or quadratic elements "
             "(generate.to_quadratic)"
         ]
-    if measure.energy > BENDING and problem.model.kinematics != "axisymmetric":  # cells at the axis scatter anyway
+    if (
+        measure.energy > BENDING and problem.model.kinematics != "axisymmetric"
+    ):  # stresses at the axis scatter in any case
         return [
             f"{names} cells are too stiff, as in thin parts that bend: the error of their stress is {measure.energy:.0%} "
             "(energy norm of the difference from stress recovered at the nodes); use hexahedra or quadrangles with "

@@ -112,13 +112,15 @@ def modes(
         vibration.warn_of_slides(values, vectors)
         return _modes(vibration, values, vectors)
     waves = [Wave(sectors, d) for d in diameters]
-    return _of_ring(vibration, sectors, [(wave, *vibration.of_wave(wave, n, linear_solver)) for wave in waves])
+    return _ring_modes(
+        vibration, sectors, [(wave, *vibration.wave_eigenpairs(wave, n, linear_solver)) for wave in waves]
+    )
 
 
 def _diameters(
     model: Model, sectors: Sectors | None, nodal_diameters: int | str | Sequence[int] | None
 ) -> list[int] | None:
-    """Return the requested nodal diameters; ModelError for a model without any."""
+    """Return the requested nodal diameters; None if none are requested. ModelError for a model that has none."""
     if nodal_diameters is None:
         if sectors is not None:
             warn(
@@ -184,16 +186,22 @@ class _Vibration:
             )
 
     def lowest(self, n: int, linear_solver: str, wave: Wave | None = None) -> tuple[Array, Array]:
-        """Return the n lowest eigenvalues (n,) and displacements (n_dofs, n), in the real form of a wave."""
+        """Return the n lowest eigenvalues (n,) and displacements (n_dofs, n); for a wave, those of its real form."""
         model, driven = self.model, self.model.force_driven
-        locks = [bolt.locked(model.mesh.points.size, 0.0) for bolt in model.pretensions]  # at their current length
-        relations = [*model.relations, *locks]
-        K, M, near = driven.stiffness(self.K), driven.stiffness(self.M), driven.near_nullspace(near_nullspace(model))
+        locked_lengths = [
+            bolt.locked(model.mesh.points.size, 0.0) for bolt in model.pretensions
+        ]  # at their current length
+        relations = [*model.relations, *locked_lengths]
+        K, M, nullspace = (
+            driven.stiffness(self.K),
+            driven.stiffness(self.M),
+            driven.near_nullspace(near_nullspace(model)),
+        )
         supported, massless = driven.supported(self.supported).ravel(), driven.without_stiffness
         if wave is not None:
             K, M, relations = wave.real_blocks(K), wave.real_blocks(M), wave.relations(model, relations)
             supported, massless = wave.repeated(supported), wave.repeated(massless)
-            near = near if wave.single else np.asarray(np.kron(np.eye(2), near), float)
+            nullspace = nullspace if wave.single else np.asarray(np.kron(np.eye(2), nullspace), float)
         relations = driven.relations(relations)
         contact = joined(self.contact, K.shape[0]) if wave is None else joined(self.contact, K.shape[0], wave.on_ring)
         K = contact.stiffened(K)
@@ -203,11 +211,11 @@ class _Vibration:
             raise ModelError(f"n = {n} modes of {int(reduced.free.sum())} free displacements: request fewer")
         solver = choice.make(linear_solver, dim=model.mesh.dim, n_dofs=K.shape[0], columns=True)
         solver.contrast = self.field.contrast
-        free_nullspace = np.where(reduced.free[:, None], near, 0.0)
+        free_nullspace = np.where(reduced.free[:, None], nullspace, 0.0)
         values, vectors = lowest(solver, (reduced.K, reduced.M), free_nullspace, reduced.free, n, self.shift)
         return values, reduced.displacement(vectors)
 
-    def of_wave(self, wave: Wave, n: int, linear_solver: str) -> tuple[Array, AnyArray]:
+    def wave_eigenpairs(self, wave: Wave, n: int, linear_solver: str) -> tuple[Array, AnyArray]:
         """Return the n lowest eigenvalues (n,) and complex displacements (n_dofs, n) of a wave, of unit modal mass."""
         values, vectors = self.lowest(n if wave.single else 2 * n, linear_solver, wave)
         if wave.single:
@@ -260,7 +268,7 @@ def _modes(vibration: _Vibration, values: Array, vectors: Array) -> Modes:
     )  # fmt: skip
 
 
-def _of_ring(vibration: _Vibration, sectors: Sectors, waves: list[tuple[Wave, Array, AnyArray]]) -> Modes:
+def _ring_modes(vibration: _Vibration, sectors: Sectors, waves: list[tuple[Wave, Array, AnyArray]]) -> Modes:
     """Return the modes of the whole ring from eigenvalues (n,) and displacements (n_dofs, n) of each wave."""
     momentum, number = _momentum(vibration), sectors.number
     rotations = [np.linalg.matrix_power(sectors.turn, k) for k in range(number)]

@@ -42,7 +42,7 @@ log = logging.getLogger("fastcontact")
 # Stiffness of springs along closed gaps, over the largest stiffness of the bodies. Stiff springs slow down motions that
 # contact does not constrain, such as gaps between the nodes of a pressure field. An O-ring takes 5 iterations with 5e-5 and
 # 7 with 2e-4. An O-ring under fluid pressure takes 13 with 2e-4, and 5e-5 is too soft for it.
-HELD = 2e-4
+GAP_STIFFNESS = 2e-4
 
 
 def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = None) -> StepEquilibrium:
@@ -66,11 +66,11 @@ def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = 
     if begin.problem.bodies is not None and (before is not None or start.extrapolation.ratio):
         origin = start.extrapolation.predicted(start.u) if before is None else before.u
         try:
-            return _Newton(begin, load).iterated(origin)
+            return _Newton(begin, load).equilibrium_from(origin)
         except ConvergenceError as error:
             log.info("the step restarts from the previous displacement instead of a predicted one: %s", error)
             before = None
-    return _Newton(begin, load, before).iterated(start.u)
+    return _Newton(begin, load, before).equilibrium_from(start.u)
 
 
 @dataclass(frozen=True)
@@ -80,24 +80,24 @@ class Regularisation:
     Attributes
     ----------
     geometric : int
-        Part of the geometric stiffness that is included, see `NonlinearBodies.at`.
-    held : float
+        Which part of the geometric stiffness is included, see `NonlinearBodies.at`.
+    gap_stiffness : float
         Stiffness of springs along closed gaps, over the largest stiffness of the bodies [-].
     stiff : bool
         Whether the springs of floating bodies are as stiff as the bodies.
     replaces : bool
-        Whether springs along closed gaps replace those of floating bodies if they resist all motions of these bodies.
+        Whether the springs along closed gaps replace those of floating bodies, provided that they resist all free motions.
     """
 
     geometric: int = WHOLE
-    held: float = 0.0
+    gap_stiffness: float = 0.0
     stiff: bool = False
     replaces: bool = False
 
     @property
     def linear(self) -> bool:
         """Whether iterations with this tangent converge linearly only."""
-        return self.geometric < WHOLE or self.held > 0.0
+        return self.geometric < WHOLE or self.gap_stiffness > 0.0
 
 
 class _Newton:
@@ -120,8 +120,8 @@ class _Newton:
     def _mixing(self) -> Anderson:
         return Anderson(DEPTH, np.arange(len(self._start.u)))
 
-    def iterated(self, origin: Array) -> StepEquilibrium:
-        """Return the equilibrium by iterations from displacements `origin` (n_dofs,) [length]."""
+    def equilibrium_from(self, origin: Array) -> StepEquilibrium:
+        """Return the equilibrium, by iterations that begin at the displacements `origin` (n_dofs,) [length]."""
         history: list[dict[str, Any]] = []
         u, changes = origin, [1.0]
         for _ in range(MAX_NEWTON_ITERATIONS):
@@ -133,32 +133,32 @@ class _Newton:
                     raise
                 log.info("an iterate is rejected: %s", error)  # an equilibrium may exist nevertheless
                 break
-            u, fraction = (target, 1.0) if self._terms.bodies is None else self._reach(before, target, changes)
-            balanced = self._balanced(u, contact_force, before)
+            u, fraction = (target, 1.0) if self._terms.bodies is None else self._damped_step(before, target, changes)
+            force_balance = self._force_balance(u, contact_force, before)
             if self._terms.bodies is None:
-                if self._is_exact(balanced):
-                    return StepEquilibrium(self._settled, u, balanced, self._terms)
+                if self._is_exact(force_balance):
+                    return StepEquilibrium(self._settled, u, force_balance, self._terms)
                 continue
-            if history and fraction == 1.0 and balanced.excess > 1.0:
+            if history and fraction == 1.0 and force_balance.excess > 1.0:
                 u, fraction = self._line_search(before, u, contact_force)
-                balanced = self._balanced(u, contact_force, before) if fraction < 1.0 else balanced
+                force_balance = self._force_balance(u, contact_force, before) if fraction < 1.0 else force_balance
             change = largest(u - before)
             changes.append(self._relative(change, u))
-            history.append(_history_entry(self._iterate, changes[-1], balanced, fraction))
+            history.append(_history_entry(self._iterate, changes[-1], force_balance, fraction))
             small = self._has_converged(changes) or change <= self._start.gap_round_off
-            if fraction == 1.0 and balanced.excess <= 1.0 and small:
-                return StepEquilibrium(self._settled, u, balanced, self._terms, history)
+            if fraction == 1.0 and force_balance.excess <= 1.0 and small:
+                return StepEquilibrium(self._settled, u, force_balance, self._terms, history)
             self._moved_fully = fraction == 1.0 and not self._regularisation.linear
             u = self._accelerated(before, u, changes) if fraction == 1.0 else u
             if len(changes) > WINDOW and min(changes[-WINDOW:]) > DECLINE * min(changes[:-WINDOW]):
                 break
         raise ConvergenceError(
             f"Newton's method does not converge: after {len(history)} iterations displacements change by {changes[-1]:.1e} "
-            f"of the largest one, and forces are out of balance by {balanced.relative:.1e}; use smaller load steps",
+            f"of the largest one, and forces are out of balance by {force_balance.relative:.1e}; use smaller load steps",
             history,
         )
 
-    def _is_exact(self, balanced: Balance) -> bool:
+    def _is_exact(self, force_balance: Balance) -> bool:
         """Return whether forces balance where tangents are exact; otherwise request more accurate linear solutions.
 
         Raises
@@ -167,10 +167,10 @@ class _Newton:
             If no higher accuracy is available.
         """
         if self._iterate.history:
-            self._iterate.history[-1]["residual"] = balanced.relative
-        if balanced.excess > 1.0 and self._problem.solver.improve(balanced.wanting):
+            self._iterate.history[-1]["residual"] = force_balance.relative
+        if force_balance.excess > 1.0 and self._problem.solver.improve(force_balance.accuracy_factor):
             return False
-        balanced.check(self._begin.index, self._problem, self._iterate.history)
+        force_balance.check(self._begin.index, self._problem, self._iterate.history)
         return True
 
     def _relative(self, change: float, u: Array) -> float:
@@ -230,7 +230,7 @@ class _Newton:
         C = last / before**2 if before else 1.0
         return len(changes) > 1 and C**2 * last**3 <= self._tolerance
 
-    def _balanced(self, u: Array, contact_force: Array, linearised_at: Array) -> Balance:
+    def _force_balance(self, u: Array, contact_force: Array, linearised_at: Array) -> Balance:
         """Return the force balance at displacements u with contact forces linearised at `linearised_at` (n_dofs,)."""
         internal = self._terms.residual(u, self._fluid(linearised_at))
         return balance(self._problem, u, contact_force, self._load.force, self._start.largest_force, internal)
@@ -241,14 +241,14 @@ class _Newton:
         The contact geometry converges to a fraction of the last relative change of the displacement in `changes`. If the
         tangent is not positive definite, the springs of floating bodies are stiffened. If this does not suffice, springs are
         added along closed gaps, with which convergence remains quadratic except for motions that contact does not restrain.
-        Finally, parts of the geometric stiffness are omitted. Once springs have been sufficient, they are tried first.
+        Finally, parts of the geometric stiffness are omitted. Once springs have sufficed, they are tried first.
         """
         if self._terms.bodies is None:
             first = self._load is self._begin.load and self._settled is None
             loaded = self._begin.loaded if first else with_loads(self._problem, self._load)
             return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
         # While a floating body moves along motions that springs along gaps do not resist, its forces are not in balance.
-        if self._regularisation.held and changes[-1] > changes[-2] > min(changes):
+        if self._regularisation.gap_stiffness and changes[-1] > changes[-2] > min(changes):
             self._replaces = True
         failure: Exception | None = None
         for regularisation in self._regularisations():
@@ -275,7 +275,7 @@ class _Newton:
         iterative = self._problem.solver.iterative
         unmodified = [Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + (floats and iterative)]]
         replaces = self._replaces or (settled is not None and settled.constraints.tangents != ())
-        with_springs = [Regularisation(held=HELD, stiff=floats, replaces=replaces)] if closed else []
+        with_springs = [Regularisation(gap_stiffness=GAP_STIFFNESS, stiff=floats, replaces=replaces)] if closed else []
         if self._regularisation in with_springs:
             unmodified = []  # the unmodified tangent failed before
         geometric = self._regularisation.geometric
@@ -358,7 +358,7 @@ class _Newton:
         springs affect iterations only to second order (as in the augmented Lagrangian method: Alart and Curnier, 1991).
         """
         matrices = [fluid.tangent(u) for fluid in self._fluid(u)]
-        if regularisation.held and self._settled is not None:
+        if regularisation.gap_stiffness and self._settled is not None:
             constraints, solution = self._settled.constraints, self._settled.solution
             dry = np.concatenate([part.contact_forces(np.ones(len(part))) for part in constraints.parts.values()])
             closed = solution.active & (dry > 0.0)
@@ -367,7 +367,7 @@ class _Newton:
             squares = np.asarray(rows.multiply(rows).sum(axis=1)).ravel()  # zero for tangents of pairs without friction
             nodal = K.data[K.indices == np.repeat(np.arange(len(K.indptr) - 1), np.diff(K.indptr))]
             stiffest = float(np.linalg.eigvalsh(nodal).max())  # the largest entry would depend on the axes
-            stiffness = regularisation.held * stiffest / np.where(squares > 0.0, squares, np.inf)
+            stiffness = regularisation.gap_stiffness * stiffest / np.where(squares > 0.0, squares, np.inf)
             matrices.append(csr_array(rows.T @ diags_array(stiffness) @ rows))
         for matrix in matrices:
             matrix.resize((len(u), len(u)))
@@ -381,7 +381,7 @@ class _Newton:
         wetted = [part.wetted for part in self._settled.constraints.parts.values()]
         return [FollowingForce(self._problem, w.force, w.stiffness, at) for w in wetted if w is not None]
 
-    def _reach(self, u: Array, target: Array, changes: list[float]) -> tuple[Array, float]:
+    def _damped_step(self, u: Array, target: Array, changes: list[float]) -> tuple[Array, float]:
         """Return the next displacements (n_dofs,), and the step length from u to the `target` (n_dofs,).
 
         The step is halved until no cells are inverted. After a full step, `changes` decide whether another tangent is needed.
@@ -391,18 +391,18 @@ class _Newton:
         changes = [*changes, self._relative(largest(target - u), target)]
         last = self._has_converged(changes) or (self._reusable is not None and self._tangent_suffices(changes))
         for _ in range(HALVINGS):
-            reached = target if fraction == 1.0 else u + fraction * (target - u)
+            trial = target if fraction == 1.0 else u + fraction * (target - u)
             try:
-                bodies.at(reached, tangent=not last)
+                bodies.at(trial, tangent=not last)
             except ConvergenceError as error:
                 failure = error
             else:
-                return reached, fraction
+                return trial, fraction
             fraction *= 0.5
         raise failure
 
     def _line_search(self, u: Array, target: Array, contact_force: Array) -> tuple[Array, float]:
-        """Return the result of `_reach` after a line search (Crisfield, 1991, section 9.2).
+        """Return the result of `_damped_step` after a line search (Crisfield, 1991, section 9.2).
 
         With fixed contact forces (n_dofs,) [force] the potential decreases at the beginning of the step; if its slope at
         the end is positive and larger than the initial one, the step is shortened.
@@ -424,12 +424,12 @@ class _Newton:
         return target, fraction
 
 
-def _history_entry(iterate: Iterate, change: float, balanced: Balance, fraction: float) -> dict[str, Any]:
+def _history_entry(iterate: Iterate, change: float, force_balance: Balance, fraction: float) -> dict[str, Any]:
     """Return the entry of the history for an iteration."""
-    inner = iterate.history
+    pairings = iterate.history
     return {
-        "displacement_change": change, "residual": balanced.relative, "pairings": len(inner),
-        "active": inner[-1]["active"] if inner else 0,
-        "active_set_iterations": sum(entry["active_set_iterations"] for entry in inner),
+        "displacement_change": change, "residual": force_balance.relative, "pairings": len(pairings),
+        "active": pairings[-1]["active"] if pairings else 0,
+        "active_set_iterations": sum(entry["active_set_iterations"] for entry in pairings),
         **({} if fraction == 1.0 else {"damped": fraction}),
     }  # fmt: skip

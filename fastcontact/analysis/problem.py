@@ -336,7 +336,7 @@ def prepare(
 def linearised(
     problem: Problem, K: bsr_array, u: Array, contact: csr_array | None, stiff: bool, replaces: bool
 ) -> Problem:
-    """Return the problem whose system and linear solver use the tangent of the terms at displacements u.
+    """Return a problem whose system and linear solver use the tangent of the terms at displacements u.
 
     In finite strain, rigid-body modes of floating bodies are those of the deformed configuration.
 
@@ -370,8 +370,10 @@ def linearised(
         values = np.linalg.eigvalsh(modes.T @ (contact @ modes))
         floating = None if values[0] > SINGLE_PRECISION * values[-1] else floating
     dofs = _prepared_dofs(model, solver, system, floating, problem.contact_dofs, displacement)
-    about = u if finite else None
-    return replace(problem, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=about)
+    linearised_at = u if finite else None
+    return replace(
+        problem, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=linearised_at
+    )
 
 
 def _floating_motions(model: Model, supported: Mask, displacement: Array | float = 0.0) -> FreeMotions:

@@ -37,7 +37,7 @@ def identity(model: Model, ramp: Ramp, criteria: Criteria) -> dict[str, Any]:
 
 
 def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
-    """Raise ModelError, with the reason, if `step` has no restart data or belongs to another case than `case`."""
+    """Raise a ModelError with the reason if `step` has no restart data, or belongs to a case other than `case`."""
     state = step.restart
     if state is None or state.get("format") != FORMAT:
         raise ModelError(
@@ -51,13 +51,13 @@ def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
             changed.append(f"the load history up to {end:g}")
     if changed:
         raise ModelError(
-            f"the steps so far belong to another case; changed since: {', '.join(changed)}. Continue with the model they "
-            f"were computed for, or start anew without resuming{_formulations(saved['parts'], case['parts'], model)}"
+            f"the steps so far belong to another case; changed since: {', '.join(changed)}. Continue with the model for "
+            f"which they were computed, or start anew without resuming{_formulations(saved['parts'], case['parts'], model)}"
         )
 
 
 def _formulations(saved: dict[str, str], current: dict[str, str], model: Model) -> str:
-    """Return the end of a message that names the formulations of pairs which differ only in the formulation."""
+    """Return the end of a message, which names the saved formulations of the pairs that differ only in the formulation."""
     changed = [pair.name for pair in model.contact if saved.get(key := f"contact '{pair.name}'") != current[key]]
     formulations = {name: formulation_behind(model, name, saved.get(f"contact '{name}'")) for name in changed}
     named = [f"contact '{name}' had {text}" for name, text in formulations.items() if text]
@@ -93,7 +93,7 @@ def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> Sta
 
 
 def _slips_from_tractions(problem: Problem, pairs: Mapping[str, Any]) -> dict[str, tuple[Array, Array]]:
-    """Return the elastic slips [length] of pairs with a penalty from files that contain tangential tractions instead."""
+    """Return the elastic slips [length] of pairs with a penalty, for files that store tangential tractions instead."""
     slips = {}
     for name in [name for name, data in pairs.items() if data.get("traction")]:
         (positions, traction), stiffness = pairs[name]["traction"], problem.pairs[name].options.tangential_penalty

@@ -20,7 +20,7 @@ from fastcontact.analysis.interpenetration import Peak, interpenetration
 from fastcontact.analysis.locking import ALTERNATING, locking_warning, nonlinear_scatter_warnings, scatter_warnings
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
-from fastcontact.analysis.wear import too_fast
+from fastcontact.analysis.wear import stability_ratio
 from fastcontact.arrays import Array, Mask, largest
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas
@@ -40,24 +40,26 @@ from fastcontact.model.rigid_motions import body_name
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
-# Limit of several ratios above which a warning is given: frictional work of nodes while they close to all frictional work,
-# work of the stresses on neglected strains to that on strains, wear depth to the size of the model, equivalent strain, and
-# excess of the largest nodal pressure near the edge over means of neighbouring facets where bodies yield.
-# The fraction of a strain that linear kinematics neglect is about as large as the strain.
+# Ratio above which a warning is given. It applies to
+# - the frictional work of nodes in the steps in which they close, relative to the total frictional work;
+# - the work of the stresses on strains that linear kinematics neglect, relative to that on strains;
+# - strains, because the fraction of a strain that linear kinematics neglect is about as large as the strain;
+# - the depth of wear, relative to the size of the model;
+# - the excess of the largest nodal pressure near the edge over means of neighbouring facets, where bodies yield.
 NEGLECTED = 0.1
-# Error of the moment of friction above which a warning is given. Where bodies rotate, linear kinematics apply forces at
-# undeformed positions, by which moments are out of balance by about the angle divided by the coefficient of friction.
+# Error of the moment of friction above which a warning is given. Linear kinematics apply forces at undeformed positions. In
+# bodies that rotate, moments are therefore out of balance by about the angle divided by the coefficient of friction.
 OUT_OF_BALANCE = 0.03
 # Largest recommended factor on the number of steps. A larger factor indicates a wrong coefficient of wear.
 MANY_STEPS = 1000
 # Alternation of nodal pressures on quadratic lines above which a warning is given, see `oscillating`; elsewhere ALTERNATING.
 ALTERNATING_ON_LINES = 0.15
-# Number of elements across the radius of a contact that resolve its pressure.
+# Smallest number of elements across the radius of a contact that resolves its pressure.
 ACROSS = 4
 # Relative residual of the displacement or of the forces above which a warning is given.
-LOOSE = 1e-4
+NOTABLE_RESIDUAL = 1e-4
 # Smallest number of nodes for which the median is meaningful.
-MANY = 10
+ENOUGH_NODES = 10
 
 
 def result_warnings(
@@ -79,7 +81,7 @@ def result_warnings(
     else:
         warnings += nonlinear_scatter_warnings(problem, state, last)
     if problem.solver.gave_up:
-        warnings.append(f'{problem.solver.gave_up}. With linear_solver="direct" the factorisation comes first')
+        warnings.append(f'{problem.solver.gave_up}. linear_solver="direct" factorises the matrix from the start')
     load = problem.load_at(last.load_factor)
     loaded, sag = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)
     clearances = _clearances(problem, state)
@@ -98,8 +100,8 @@ def result_warnings(
             texts = [*_unresolved(pair, at_peak[name], state), *oscillating(pair, at_peak[name], mesh)]
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
         warnings += [*pressures, *_peak_at_edge(pair, last, contact), *_too_fast(name, pair, state)]
-    warnings += [*_unsettled(state), *_loose(problem, last), *_unbalanced(state)]
-    return [*warnings, *_slipping_before(problem.criteria, state), *_turning_flow(state)]
+    warnings += [*_unconverged_geometry(state), *_loose_criteria(problem, last), *_unbalanced(state)]
+    return [*warnings, *_slip_before_contact(problem.criteria, state), *_changing_flow(state)]
 
 
 def _deep_penetration(pair: Formulation, contact: ContactResult, displacement: Array) -> Iterator[str]:
@@ -133,7 +135,7 @@ def _undetermined_tractions(pair: Formulation, contact: ContactResult, undetermi
 
 def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
     """Yield a warning where a contact wears faster than its load steps can follow."""
-    if name not in state.worn or (factor := too_fast(pair, state.worn[name])) <= 1.0:
+    if name not in state.worn or (factor := stability_ratio(pair, state.worn[name])) <= 1.0:
         return
     depth, size = float(state.worn[name].depth.max()), float(np.ptp(pair.points, axis=0).max())
     if factor > MANY_STEPS or depth > NEGLECTED * size:
@@ -161,7 +163,7 @@ def _unbalanced(state: State) -> Iterator[str]:
         )
 
 
-def _slipping_before(criteria: Criteria, state: State) -> Iterator[str]:
+def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
     """Yield a warning where nodes that close and slide in one step do much of the frictional work.
 
     This part must also exceed the energy of a notable error of the displacement, NOTABLE squared times the strain energy.
@@ -179,7 +181,7 @@ def _slipping_before(criteria: Criteria, state: State) -> Iterator[str]:
         )
 
 
-def _unsettled(state: State) -> Iterator[str]:
+def _unconverged_geometry(state: State) -> Iterator[str]:
     """Yield a warning where the last of a fixed number of geometry updates changed the displacement notably."""
     update, change = state.last_change or (0, 0.0)
     if change > NOTABLE:
@@ -189,10 +191,10 @@ def _unsettled(state: State) -> Iterator[str]:
         )
 
 
-def _turning_flow(state: State) -> Iterator[str]:
+def _changing_flow(state: State) -> Iterator[str]:
     """Yield a warning where the plastic flow changes its direction notably within load steps.
 
-    The change of single steps depends on whether the edge of the contact crosses a node in them. Its mean decreases: under a
+    The change in a single step depends on whether the edge of the contact crosses a node. Its mean decreases: under a
     ball that is pressed in with 4, 8, 16 and 32 steps, the mean changes of stress are 2.3, 1.9, 1.6 and 0.9 %, and the
     depth is 7, 4, 2 and 1 % too large. In the first step, the path is unknown, and changes would be underestimated.
     """
@@ -205,31 +207,31 @@ def _turning_flow(state: State) -> Iterator[str]:
         )
 
 
-def _loose(problem: Problem, last: StepResult) -> Iterator[str]:
+def _loose_criteria(problem: Problem, last: StepResult) -> Iterator[str]:
     """Yield warnings where loose criteria let the last step end early."""
     history, criteria, scatter = last.iterations["history"], problem.criteria, last.iterations.get("scatter")
     if not history:
         return
     change, residual = history[-1]["displacement_change"], history[-1]["residual"]
-    if problem.until_settled and change > LOOSE:
+    if problem.until_settled and change > NOTABLE_RESIDUAL:
         yield (
             f"the contact geometry counts as converged although the displacement still changed by {change:.1e} of its "
             f"largest component (Criteria.geometry = {criteria.geometry:g}): results are no more accurate than that"
         )
-    flipped = next((previous for previous, following in pairwise(history) if "rounded" in following), None)
-    if flipped is not None:
+    last_alternation = next((previous for previous, following in pairwise(history) if "rounded" in following), None)
+    if last_alternation is not None:
         yield (
-            "nodes alternated between two facets of the primary side, or gained and lost their gaps, which changed the "
-            f"displacement by {flipped['displacement_change']:.1e} of its largest component, until normals were interpolated "
-            'from one facet to the other over a tenth of either (normals="averaged" does not need this), and nodes with a '
-            "small overlap had no gap"
+            "nodes alternated between two facets of the primary side, or between open and closed gaps, which changed the "
+            f"displacement by {last_alternation['displacement_change']:.1e} of its largest component. To converge, normals "
+            "were interpolated between facets over a tenth of each facet, and nodes with a small overlap had no gap; "
+            'normals="averaged" makes this unnecessary'
         )
     if scatter is not None and scatter["force"] > criteria.relative:
         yield (
             f"round-off makes contact forces scatter by {scatter['force']:.1e} of the largest one from update to update, and "
             f"displacements by {scatter['displacement']:.1e}: results are no more accurate than that"
         )
-    if residual > min(LOOSE, criteria.relative):
+    if residual > min(NOTABLE_RESIDUAL, criteria.relative):
         cause = "by round-off of a stiff body that moves far, for which a rigid obstacle may be substituted; "
         yield (
             f"forces are out of balance by {residual:.1e} of the largest force (Criteria.relative = {criteria.relative:g}): "
@@ -249,7 +251,7 @@ def _carrying_springs(problem: Problem, state: State) -> Iterator[str]:
 
 
 def _undetermined(last: StepResult, free: tuple[int, dict[str, list[str]]] | None) -> Iterator[str]:
-    """Yield a warning about bodies whose position nothing determines, for the first such step `free`."""
+    """Yield a warning about bodies whose position is undetermined in a step; for `free` see `result_warnings`."""
     if free is not None:
         index, bodies = free
         names = "; ".join(f"{body}: {', '.join(motions)}" for body, motions in bodies.items())
@@ -337,7 +339,7 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
 
 
 def _clearances(problem: Problem, state: State) -> set[str]:
-    """Return the names of automatically detected pairs that were apart and never closed, such as a shank in its hole."""
+    """Return the names of automatically detected pairs that begin open and never close, such as a shank in its hole."""
     gap_by_pair = {pair.name: pair.found_gap for pair in problem.model.contact if pair.found_gap is not None}
     if not state.touched & gap_by_pair.keys():
         return set()
@@ -377,12 +379,12 @@ def _without_force(problem: Problem, name: str, last: StepResult, touched: bool,
 
 
 def _depth_of_primary(problem: Problem, pair: Formulation, last: StepResult) -> float:
-    """Return the largest depth inside secondary bodies of primary nodes that belong to no closed pair [length]."""
-    model, of_secondary = problem.model, bodies(problem.model.mesh)[1][pair.secondary.points]
+    """Return the largest depth, inside secondary bodies, of the primary nodes that belong to no closed pair [length]."""
+    model, secondary_bodies = problem.model, bodies(problem.model.mesh)[1][pair.secondary.points]
     closed = [other.primary.points for name, other in problem.pairs.items() if last.contact[name].active.any()]
     primary = np.setdiff1d(pair.primary.points, np.concatenate([np.empty(0, np.intp), *closed]))
     overlaps = depths(model.mesh, model.kinematics, model.mesh.points + last.displacement)
-    inside = (depth[np.isin(points, primary)] for _, body, points, depth in overlaps if body in of_secondary)
+    inside = (depth[np.isin(points, primary)] for _, body, points, depth in overlaps if body in secondary_bodies)
     return max((float(depth.max(initial=0.0)) for depth in inside), default=0.0)
 
 
@@ -430,20 +432,20 @@ def oscillating(pair: Formulation, contact: ContactResult, mesh: Mesh) -> Iterat
     The measure is the median difference from the mean of the neighbours, over the mean pressure. On rings of tri3 cells 4.6
     times as deep as wide it is 0.30, with pressure errors of 0.16 to 0.27; on wider ones 0.16 (0.09 to 0.13), on quadrangles
     0.002; under punches of hex8 and tet4, whose pressures are singular at the edges, 0.10 to 0.12, and under a wearing hex8
-    sole 0.22. On quadratic facets, the neighbours of corners are the other nodes and vice versa, see `_alternating`. On rings
-    of quad8 and tri6 cells it is 0.15 or more with pressure errors of 0.14 to 1, and less with errors of up to 0.2, or 0.4
-    where meshes nearly match: errors then come and go along the side, which a median does not see. On coarse faces of hex20
-    under an elastic punch it is up to 0.18.
+    sole 0.22. On quadratic facets, the neighbours of corners are the other nodes and vice versa, see `_alternation_matrix`.
+    On rings of quad8 and tri6 cells it is 0.15 or more with pressure errors of 0.14 to 1, and less with errors of up to 0.2,
+    or 0.4 where meshes nearly match: errors then vary along the side, which the median does not show. On coarse faces of
+    hex20 under an elastic punch it is up to 0.18.
 
     Sides that never separate or that adhere carry tension as well. Their mean may be zero or round-off and is not used.
     """
     if pair.options.always_closed or pair.options.cohesion is not None:
         return
     side = pair.secondary
-    others = _alternating(side)
+    others = _alternation_matrix(side)
     count = np.asarray(others.sum(axis=1)).ravel()
     inside = contact.active & (side.beside @ ~contact.active == 0) & (count > 0)
-    if inside.sum() < MANY:
+    if inside.sum() < ENOUGH_NODES:
         return
     pressure = contact.pressure[inside]
     deviation = pressure - (others @ contact.pressure)[inside] / count[inside]
@@ -487,7 +489,7 @@ def _peak_at_edge(pair: Formulation, last: StepResult, contact: ContactResult) -
         )
 
 
-def _alternating(side: Surface) -> csr_array:
+def _alternation_matrix(side: Surface) -> csr_array:
     """Return the matrix (m, m) that is 1 for nodes of a facet between which pressures may alternate, otherwise 0.
 
     On quadratic facets they alternate between corners and other nodes, and on linear ones between any two.
@@ -505,9 +507,9 @@ def _alternating(side: Surface) -> csr_array:
 def neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Iterator[str]:
     """Yield a warning for the body in which linear kinematics neglect most; `angle` is the largest rotation [radian]."""
     mesh = problem.model.mesh
-    neglected, strained = _works_on_strains(problem, last)
+    neglected, strain_works = _works_on_strains(problem, last)
     # Bodies whose work on strains is round-off of that of other bodies are free of stress.
-    ratio = np.abs(neglected) / np.maximum(strained, max(SINGLE_PRECISION * strained.max(initial=0.0), TINY))
+    ratio = np.abs(neglected) / np.maximum(strain_works, max(SINGLE_PRECISION * strain_works.max(initial=0.0), TINY))
     worst = int(np.argmax(ratio))
     if ratio[worst] > NEGLECTED:
         name = body_name(mesh, bodies(mesh)[1], worst)
@@ -550,8 +552,8 @@ def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
         sides = (contact.points, contact.force_vectors), (contact.primary_points, contact.primary_force_vectors)
         for points, force in sides if friction else ():
             arm = np.maximum(np.linalg.norm(motion[points], axis=1), np.linalg.norm(rotation[points], axis=1))
-            of_friction = friction * np.linalg.norm(force, axis=1) * arm
-            work = np.maximum(of_friction, np.abs((force * motion[points]).sum(axis=1)))
+            friction_work = friction * np.linalg.norm(force, axis=1) * arm
+            work = np.maximum(friction_work, np.abs((force * motion[points]).sum(axis=1)))
             np.add.at(capacity, body[points], rotating[points] * work)
     return capacity
 
@@ -560,7 +562,7 @@ def _works_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]
     """Return the work of the stresses on neglected strains, and its absolute value on strains, both (n_bodies,) [energy]."""
     mesh, dim, axisymmetric = problem.model.mesh, problem.model.mesh.dim, problem.model.kinematics == "axisymmetric"
     count, body = bodies(mesh)
-    neglected, strained = np.zeros((2, count))
+    neglected, strain_works = np.zeros((2, count))
     pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]
     for name, block in mesh.solids.items():
         element = elements.get(name)
@@ -581,5 +583,5 @@ def _works_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]
             # The neglected strain is half the product of the transposed rotation, which is antisymmetric, with the rotation.
             neglected_work = -0.5 * np.einsum("cqij,cqij->cq", tensor, rotation @ rotation)
             np.add.at(neglected, body[cells[:, 0]], (neglected_work * volume).sum(axis=1))
-            np.add.at(strained, body[cells[:, 0]], (np.abs(strain_work) * volume).sum(axis=1))
-    return neglected, strained
+            np.add.at(strain_works, body[cells[:, 0]], (np.abs(strain_work) * volume).sum(axis=1))
+    return neglected, strain_works

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import lsqr
 
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.html_table import fields_table
-from fastcontact.analysis.wear import worn_in_step
+from fastcontact.analysis.wear import wear_depth_in_step
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
@@ -324,7 +324,7 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
                 "steps in order, beginning with the first"
             )
         pressure = 0.0 if before is None else before.contact[name].pressure
-        depth = depth + worn_in_step(pair, end_of(before, step, name), step.contact[name], pressure, coefficient)
+        depth = depth + wear_depth_in_step(pair, end_of(before, step, name), step.contact[name], pressure, coefficient)
         depths.append(depth)
         before = step
     return np.array(depths).reshape(len(depths), len(depth))

@@ -97,11 +97,11 @@ def solve(
     steps, ramp = Steps(resume), ramp_of(ramp)
     total = len(steps) + len(restart.remaining(ramp, steps[-1] if steps else None))
     with Progress(total, show=progress, done=len(steps)) as status:
-        new = solve_steps(
+        new_steps = solve_steps(
             model, ramp, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
             linear_precision=linear_precision, criteria=criteria, resume=steps,
         )  # fmt: skip
-        for step in new:
+        for step in new_steps:
             if on_step is not None:
                 on_step(step)
             status.step(step)
@@ -154,7 +154,7 @@ def solve_steps(
         prepare, ramp=ramp, criteria=criteria, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
         linear_precision=linear_precision,
     )  # fmt: skip
-    earlier = _touched(resume), _peaks(resume)
+    earlier = _touched_pairs(resume), _peaks(resume)
     return _solved_steps(model, ramp, prepare_model, instants, case, last, earlier)
 
 
@@ -166,7 +166,7 @@ def _kernel_sets(model: Model, linear_solver: str) -> list[str]:
     return [f"{dim}d", *([f"{dim}d amg"] if multigrid else [])]
 
 
-def _touched(steps: Sequence[StepResult]) -> frozenset[str]:
+def _touched_pairs(steps: Sequence[StepResult]) -> frozenset[str]:
     """Return the names of the contact pairs that were closed at the end of any of the steps."""
     touched: set[str] = set()
     # In reverse order, because in most analyses all pairs are closed in the last step.
@@ -191,7 +191,7 @@ def _solved_steps(
     model: Model, ramp: Ramp, prepare_model: Callable[[Model], Problem], instants: list[float], case: dict[str, Any],
     last: StepResult | None, earlier: tuple[frozenset[str], dict[str, Peak]],
 ) -> Iterator[StepResult]:  # fmt: skip
-    """Yield the steps at `instants`, which follow the step `last`; `earlier` are `_touched` and `_peaks` of earlier steps."""
+    """Yield the steps at `instants`, which follow the step `last`; `earlier` are `_touched_pairs` and `_peaks` before."""
     doubtful = model_warnings(model, ramp)
     for text in doubtful if last is None else ():
         warn(text)
@@ -202,16 +202,16 @@ def _solved_steps(
     touched, peaks = earlier
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
     begin, last_index = problem.ramp.table[0][0], 0
-    free: tuple[int, dict[str, list[str]]] | None = None  # first step in which nothing determines positions
+    undetermined: tuple[int, dict[str, list[str]]] | None = None  # first step in which nothing determines positions
     if last is not None:
         begin, last_index, last = last.load_factor, last.index, None  # to free the memory of the step
     for index, instant in enumerate(instants, start=last_index + 1):
         problem, state = next_stage(prepare_model, model, problem, state, begin)
         state, step = step_halving.advance(problem, state, index, begin, instant)
-        free = free or (index, step.iterations.get("regularised", {}).get("undetermined", {}))
-        free = free if free[1] else None
+        undetermined = undetermined or (index, step.iterations.get("regularised", {}).get("undetermined", {}))
+        undetermined = undetermined if undetermined[1] else None
         peaks = _peaks([step], peaks)
-        warnings = result_warnings(problem, state, step, free, peaks) if instant == instants[-1] else []
+        warnings = result_warnings(problem, state, step, undetermined, peaks) if instant == instants[-1] else []
         for text in warnings:
             warn(text)
         warned = (*doubtful * (index == 1), *warnings)

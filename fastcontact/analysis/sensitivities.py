@@ -184,19 +184,19 @@ def _kink_message(contact: MovingContact, kinks: csr_array, jump: float) -> str:
     mesh = contact.problem.model.mesh
     dofs = np.unique(kinks.indices)
     points = np.unique(dofs[dofs < contact.problem.model.n_dofs] // mesh.dim)
-    named = ", ".join(f"{p} {np.array2string(mesh.points[p], precision=4)}" for p in points[:3])
-    rest = f" and {len(points) - 3} more" if len(points) > 3 else ""
+    first_points = ", ".join(f"{p} {np.array2string(mesh.points[p], precision=4)}" for p in points[:3])
+    remainder = f" and {len(points) - 3} more" if len(points) > 3 else ""
     return (
-        f"points {named}{rest} lie opposite nodes of the other side, between two of its facets: the one-sided derivatives "
-        f"differ by a fraction of {jump:.1e}. {REMEDY}; or keep the pairing (Criteria(keep_pairing=True)), mesh both sides "
-        "differently, or use the default formulation"
+        f"points {first_points}{remainder} lie opposite nodes of the other side, between two of its facets: the one-sided "
+        f"derivatives differ by a fraction of {jump:.1e}. {REMEDY}; or keep the pairing (Criteria(keep_pairing=True)), mesh "
+        "both sides differently, or use the default formulation"
     )
 
 
 def settled_step(
     model: Model, step: StepResult, ramp: Ramp, criteria: Criteria, linear_solver: str
 ) -> tuple[Problem, MovingContact]:
-    """Return the problem, and the contact at the end of a step with its multipliers.
+    """Return the problem of a step, and the contact at its end with fixed multipliers.
 
     Raises
     ------
@@ -212,8 +212,8 @@ def settled_step(
     state, load = restart.put_back(problem, step, touched), problem.load_at(step.load_factor)
     state = replace(state, obstacles=problem.obstacles_at(load, state.u))
     equilibrium = newton(prepare_start(problem, state, step.index, load), load)
-    u, none, inactive = equilibrium.u, np.empty(0), np.empty(0, bool)
-    without_contact = Solution.frictionless(u, none, none, inactive, inactive)
+    u, no_values, inactive = equilibrium.u, np.empty(0), np.empty(0, bool)
+    without_contact = Solution.frictionless(u, no_values, no_values, inactive, inactive)
     solution = without_contact if equilibrium.settled is None else equilibrium.settled.solution
     return problem, MovingContact(problem, state, load, step.load_factor, u, solution)
 

@@ -1,4 +1,4 @@
-"""Nodes that contact pairs, or both ends of a period or sector, share: one constraint, whose force is distributed.
+"""Nodes shared by several contact pairs, or by both ends of a period or sector: one constraint with distributed force.
 
 A node of several pairs behaves like a node of one pair over all their facets. Its constraints are linearly dependent. They
 determine only the sum of their forces and cannot all be eliminated, so that their mean replaces them. This constraint has
@@ -60,14 +60,14 @@ class SharedNodes:
         return cls(representative, behind, *_fractions(constraints, representative), _frame(constraints, interfaces))
 
     @property
-    def idle(self) -> Mask:
-        """Constraints (m,) that are not solved for."""
+    def redundant(self) -> Mask:
+        """Constraints (m,) that are not part of the reduced problem."""
         redundant = self.representative != np.arange(len(self.representative))
         redundant[self.behind] = True
         return redundant
 
     def closed(self, active: Mask) -> Mask:
-        """Return the representatives (m,) with at least one active constraint, for active constraints (m,)."""
+        """Return which constraints (m,) represent at least one active constraint, given the active ones (m,)."""
         return np.asarray(self.summed(active) > 0)
 
     def summed(self, values: NDArray[np.generic]) -> Array:
@@ -77,13 +77,13 @@ class SharedNodes:
         return total
 
     def merged_constraints(self, constraints: StackedConstraints) -> Constraints:
-        """Return constraints with only the representatives, each with the area of all of its constraints."""
+        """Return the constraints of the representatives alone, each with the area of all constraints it represents."""
         mean = self._summation(self.normal_fraction)
         merged = {
             "B": csr_array(mean @ constraints.B),
             "gap0": mean @ constraints.gap0,
             "tangents": self._tangents(constraints),
-            "equality": constraints.equality & ~self.idle,
+            "equality": constraints.equality & ~self.redundant,
             "slip0": self._mean(constraints.slip0.T, self.tangential_fraction).T,
             "friction": self.summed(self.normal_fraction * constraints.friction),
         }
@@ -95,7 +95,7 @@ class SharedNodes:
             merged["tangential_softness"] = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
             weight = np.divide(stiffness, total[self.representative], out=np.ones_like(total), where=finite)
             merged["elastic_slip"] = self._mean(constraints.elastic_slip.T, weight).T
-        return replace(constraints, **merged).without(self.idle)  # type: ignore[arg-type]
+        return replace(constraints, **merged).without(self.redundant)  # type: ignore[arg-type]
 
     def _summation(self, weight: Array) -> csr_array:
         """Return the matrix (m, m) that sums values with weights (m,) for each representative."""
@@ -118,10 +118,11 @@ class SharedNodes:
         slips = self._mean(gaps[1:].T, self.tangential_fraction).T
         return np.vstack([self._summation(self.normal_fraction) @ gaps[0], slips])
 
-    def gathered(
+    def of_representatives(
         self, constraints: Constraints, gap: Array, normal: Array, traction: Array, closing: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """Return gaps (m,) [length], forces (m,) and (m, dim) [force], and slips of closing (m, dim) of representatives.
+        """Return the gaps (m,) [length], normal and tangential forces (m,), (m, dim) [force] and closing slips (m, dim) of
+        representatives.
 
         The arguments are the same quantities of all constraints.
         """
@@ -131,17 +132,17 @@ class SharedNodes:
         forces, slips = (np.einsum("mk,mkd->md", along, tangents) for along in means)
         return self._summation(self.normal_fraction) @ gap, self.summed(normal), forces, slips
 
-    def shared(self, solution: Solution, constraints: StackedConstraints, u: Array) -> Solution:
+    def with_distributed_forces(self, solution: Solution, constraints: StackedConstraints, u: Array) -> Solution:
         """Return a solution of `merged_constraints` at `u` (n_dofs,) [length] with forces distributed to all constraints."""
         representative = self.representative
         normal, gap = self.normal_fraction * solution.multiplier[representative], solution.gap[representative]
         gap[self.behind] = constraints.gaps(u)[self.behind]
         active = solution.active[representative]
-        frame = self.frame
+        frame, early_slip = self.frame, solution.slip_before_closing
 
         def along_own_tangents(components: Array) -> Array:
-            at_first = np.einsum("md,mkd->mk", np.einsum("mk,mkd->md", components, frame)[representative], frame)
-            return np.where(self.idle[:, None], at_first, components)
+            rotated = np.einsum("md,mkd->mk", np.einsum("mk,mkd->md", components, frame)[representative], frame)
+            return np.where(self.redundant[:, None], rotated, components)
 
         return replace(
             solution,
@@ -152,7 +153,7 @@ class SharedNodes:
             wanted=active,
             sticking=solution.sticking[representative],
             work=None if solution.work is None else self.tangential_fraction * solution.work[representative],
-            approach=None if solution.approach is None else along_own_tangents(solution.approach),
+            slip_before_closing=None if early_slip is None else along_own_tangents(early_slip),
             tangential=self.tangential_fraction[:, None] * along_own_tangents(solution.tangential),
         )
 
@@ -181,8 +182,8 @@ def _at_periodic_interfaces(
         row = np.full(max(last, int(nodes.max())) + 1, -1)
         row[nodes[usable_rows]] = usable_rows
         for interface in interfaces:
-            both = row[np.stack([interface.first, interface.second])]
-            pairs.append(both[:, (both >= 0).all(axis=0) & (both[0] != both[1])])
+            rows_of_ends = row[np.stack([interface.first, interface.second])]
+            pairs.append(rows_of_ends[:, (rows_of_ends >= 0).all(axis=0) & (rows_of_ends[0] != rows_of_ends[1])])
     ends = np.hstack(pairs)
     return ends[:, constraints.equality[ends[0]] == constraints.equality[ends[1]]]
 
@@ -245,7 +246,7 @@ def _dependent(constraints: StackedConstraints) -> tuple[Indices, Indices, Indic
     Constraints behind others face the same point along the same normal with a larger clearance. The constraint in front,
     unless it is compliant, prevents them from closing.
     """
-    first, second = _of_one_node(constraints)
+    first, second = _pairs_at_nodes(constraints)
     if not len(first):
         return first, first, first
     difference = abs(constraints.B[first] - constraints.B[second]).max(axis=1).toarray().ravel()
@@ -260,7 +261,7 @@ def _dependent(constraints: StackedConstraints) -> tuple[Indices, Indices, Indic
     return first[free], second[free], behind
 
 
-def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
+def _pairs_at_nodes(constraints: StackedConstraints) -> tuple[Indices, Indices]:
     """Return the pairs (k,), (k,) of constraints at one node, the second with an equal or larger gap."""
     nodes = _nodes(constraints)
     usable = np.isfinite(_areas(constraints)) & constraints.usable & (nodes >= 0)

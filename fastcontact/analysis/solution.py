@@ -166,14 +166,14 @@ class Path:
 
 
 @dataclass(frozen=True, eq=False)
-class Slid:
+class SlipSoFar:
     """Data of the constraints at the beginning of the last increment of a load step.
 
     Attributes
     ----------
     slip : ndarray (m, dim)
         Slip vectors since the beginning of the step [length].
-    approach : ndarray (m, dim)
+    slip_before_closing : ndarray (m, dim)
         Part of `slip` before the constraint closed in this step, zero if it was closed at the beginning [length].
     work : ndarray (m,)
         Frictional work since the beginning of the step [energy].
@@ -182,7 +182,7 @@ class Slid:
     """
 
     slip: Array
-    approach: Array
+    slip_before_closing: Array
     work: Array
     normal: Array
 
@@ -222,9 +222,9 @@ class Solution:
         Function without arguments that returns the `Response` of this solution, for a constant contact state.
     work : ndarray (m,), optional
         Frictional work in the step [energy]; only if the step is solved in increments.
-    approach : ndarray (m, k), optional
+    slip_before_closing : ndarray (m, k), optional
         Part of `slip` before the constraint closed in this step [length]; only if the step is solved in increments.
-    slid : Slid, optional
+    slip_so_far : SlipSoFar, optional
         Data at the beginning of the last increment; only if the step is solved in increments.
     """
 
@@ -242,8 +242,8 @@ class Solution:
     directions: tuple[Array, ...] = ()
     response: Callable[[], Response] | None = field(default=None, repr=False)
     work: Array | None = None
-    approach: Array | None = None
-    slid: Slid | None = None
+    slip_before_closing: Array | None = None
+    slip_so_far: SlipSoFar | None = None
 
     @classmethod
     def frictionless(cls, u: Array, multiplier: Array, gap: Array, active: Mask, wanted: Mask) -> Solution:
@@ -288,11 +288,11 @@ def in_increments(
         Gaps at the end of the step, and the slips of the whole step [length].
     before : (ndarray (k, m), ndarray (k, m), ndarray (m,), ndarray (m,))
         Slips along the tangents, and their part before the constraint closed [length], frictional work [energy] and
-        normal forces [force] at the beginning of the last increment; see `Slid`.
+        normal forces [force] at the beginning of the last increment; see `SlipSoFar`.
     """
     closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros(lag.shape[1]), 0, True
     gap = last_gap = closing[0]
-    approach = np.zeros_like(slip)
+    slip_before_closing = np.zeros_like(slip)
     added = np.where(gap > 0.0, closing[1:], 0.0)
     lag = lag + np.vstack([np.zeros_like(gap), added])
 
@@ -313,16 +313,16 @@ def in_increments(
         if (waiting & (forces.gaps[0] < 0.0)).any():
             # In 3D about as many constraints close together as lie along the edge of the closed region.
             group_size = max(int(closed.sum() ** (1.0 - 1.0 / len(slip))), int(GROWTH * closed.sum()), 1)
-            instants, touching = _touching(last_gap, forces.gaps[0], waiting, group_size)
+            instants, touching = _next_to_close(last_gap, forces.gaps[0], waiting, group_size)
             fraction = min(float(instants[touching].max()), 1.0)
             end = begin + fraction * (1.0 - begin)
             since = np.where(touching, instants, 0.0) * forces.gaps[1:]
             slip = np.where(touching, slip_after(since, np.zeros_like(gap)), slip)
-            approach = np.where(touching, slip, approach)
+            slip_before_closing = np.where(touching, slip, slip_before_closing)
             waiting = waiting & ~touching
             forces = increment(end)
             iterations += forces.iterations
-        before = slip, approach, work.copy(), y[0]
+        before = slip, slip_before_closing, work.copy(), y[0]
         work += friction_work(y[0], forces.y[0], forces.y[1:], np.where(forces.closed, forces.gaps[1:], 0.0))
         total_slip = slip + forces.gaps[1:]
         slip = slip_after(forces.gaps[1:], forces.gaps[0])
@@ -332,7 +332,7 @@ def in_increments(
     return replace(forces, iterations=iterations, settled=settled), gaps, before
 
 
-def _touching(begin: Array, end: Array, waiting: Mask, count: int) -> tuple[Array, Mask]:
+def _next_to_close(begin: Array, end: Array, waiting: Mask, count: int) -> tuple[Array, Mask]:
     """Return the fractions (m,) of the remaining step at which constraints close, and the next `count` of them (m,).
 
     `begin` and `end` are the gaps (m,) now and at the end of the step, if the `waiting` constraints (m,) carry no forces
@@ -365,18 +365,18 @@ def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) 
     return np.asarray(-0.5 * (1.0 + ratio) * (tangential * slip).sum(axis=0))
 
 
-def shifted(constraints: Constraints, slid: Slid) -> Constraints:
+def in_last_increment(constraints: Constraints, slip_so_far: SlipSoFar) -> Constraints:
     """Return the constraints with slips measured from the beginning of the last increment."""
-    before = np.stack([(slid.slip * tangent).sum(axis=1) for tangent in constraints.directions])
+    before = np.stack([(slip_so_far.slip * tangent).sum(axis=1) for tangent in constraints.directions])
     return replace(constraints, slip0=constraints.slip0 - before)
 
 
-def completed(solution: Solution, slid: Slid) -> Solution:
-    """Return the solution with the slips and the frictional work of the step, given the solution of `shifted` constraints."""
+def over_whole_step(solution: Solution, slip_so_far: SlipSoFar) -> Solution:
+    """Return the solution with the slips and the frictional work of the step, given the solution of its last increment."""
     last = np.where(solution.active[:, None], solution.slip, 0.0)
-    work = slid.work + friction_work(slid.normal, solution.multiplier, solution.tangential.T, last.T)
-    before, approach = (
+    work = slip_so_far.work + friction_work(slip_so_far.normal, solution.multiplier, solution.tangential.T, last.T)
+    before, slip_before_closing = (
         np.stack([(vectors * tangent).sum(axis=1) for tangent in solution.directions], axis=1)
-        for vectors in (slid.slip, slid.approach)
+        for vectors in (slip_so_far.slip, slip_so_far.slip_before_closing)
     )
-    return replace(solution, slip=solution.slip + before, work=work, approach=approach)
+    return replace(solution, slip=solution.slip + before, work=work, slip_before_closing=slip_before_closing)

@@ -16,8 +16,8 @@ from fastcontact.analysis.work import ContactForces, Work
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
 
-# Keys of restart data, each with the attribute of `State` that is stored under it: data of each contact pair, and numbers.
-OF_PAIRS = {
+# Keys of restart data, with the attributes of `State` that they store: data of each contact pair, and numbers.
+PAIR_DATA = {
     "closed": "never_opening", "now": "obstacles", "first_contact": "first_contact", "elastic_slip": "elastic_slip",
     "angle": "angles", "slipped": "slipped", "worn": "worn",
 }  # fmt: skip
@@ -144,7 +144,7 @@ class State:
             "active": dict(self.active),
             "pressure": dict(self.pressure),
             "pairs": {
-                pair: {key: _listed(getattr(self, name).get(pair)) for key, name in OF_PAIRS.items()}
+                pair: {key: _as_list(getattr(self, name).get(pair)) for key, name in PAIR_DATA.items()}
                 for pair in self.active
             },
             "extrapolation": self.extrapolation.to_dict(),
@@ -166,14 +166,14 @@ class State:
         """
         u = np.concatenate([displacement.ravel(), data["obstacles"]])
         pairs, numbers, extrapolation = data["pairs"], data["numbers"], data.get("extrapolation")
-        of_pairs: dict[str, Any] = {
+        pair_data: dict[str, Any] = {
             name: {pair: _from_list(key, entry[key]) for pair, entry in pairs.items() if entry.get(key) is not None}
-            for key, name in OF_PAIRS.items()
+            for key, name in PAIR_DATA.items()
         }
         return cls(
             u,
             **{name: numbers[key] for key, name in NUMBERS.items()},
-            **of_pairs,
+            **pair_data,
             history=dict(data.get("history", {})),
             flow=tuple(data.get("flow", (0.0, 0.0))),
             rise=data.get("rise"),
@@ -190,15 +190,15 @@ class State:
         )
 
 
-def _listed(value: Any) -> Any:
+def _as_list(value: Any) -> Any:
     """Return the value of an attribute as a list if it is a tuple or a `Worn`, and unchanged otherwise."""
     if isinstance(value, Worn):
-        return [value.depth, value.pressure, value.pace]
+        return [value.depth, value.pressure, value.largest_rate]
     return list(value) if isinstance(value, tuple) else value
 
 
 def _from_list(key: str, value: Any) -> Any:
-    """Return the value of an attribute, given what `_listed` returned for it and its key in `OF_PAIRS`."""
+    """Return the value of an attribute, given what `_as_list` returned for it and its key in `PAIR_DATA`."""
     if key == "worn":
         return Worn(*value)
     return tuple(value) if isinstance(value, list) else value

@@ -28,7 +28,7 @@ log = logging.getLogger("fastcontact")
 # Functions that are called when a step is halved, with its number and the instants of its beginning and end.
 listeners: list[Callable[[int, float, float], None]] = []
 # Number of Newton iterations up to which the next substep is twice as large.
-FEW = 6
+FEW_ITERATIONS = 6
 
 
 def advance(problem: Problem, state: State, index: int, begin: float, end: float) -> tuple[State, StepResult]:
@@ -51,7 +51,7 @@ def advance(problem: Problem, state: State, index: int, begin: float, end: float
         with suppress(ConvergenceError):
             state, initial = _substeps(problem, state, index, (begin, begin), 0)
     state, substeps = _substeps(problem, state, index, (begin, end), 0)
-    return state, _summed(initial + substeps)
+    return state, _with_sums(initial + substeps)
 
 
 def _begins_loaded(problem: Problem, begin: float, end: float) -> bool:
@@ -87,8 +87,8 @@ def _substeps(
                 log.info("step %d from %.6g to %.6g has two equilibria with friction, cut in halves", index, begin, end)
             if last or not (ambiguous or _slides_while_touching(problem, state, after)):
                 if problem.bodies is not None:  # how many times the next step is halved before its first attempt
-                    few = len(result.iterations["history"]) <= FEW
-                    after = replace(after, halved=max(halved - few, 0))
+                    converged_fast = len(result.iterations["history"]) <= FEW_ITERATIONS
+                    after = replace(after, halved=max(halved - converged_fast, 0))
                 return after, [result]
         except ConvergenceError as error:
             if last or not error.smaller_steps_help:
@@ -117,18 +117,18 @@ def _slides_while_touching(problem: Problem, state: State, after: State) -> bool
 
     See `Criteria.friction_while_touching`; the result is False for linear bodies.
     """
-    allowed = problem.criteria.friction_while_touching
-    if allowed is None or problem.bodies is None or state.work is None or after.work is None:
+    limit = problem.criteria.friction_while_touching
+    if limit is None or problem.bodies is None or state.work is None or after.work is None:
         return False
-    return after.work.touching - state.work.touching > allowed * after.work.friction
+    return after.work.touching - state.work.touching > limit * after.work.friction
 
 
 def _has_two_equilibria(problem: Problem, state: State, after: State, index: int) -> bool:
     """Return whether the step has another equilibrium, in which bodies pass each other or slide instead of sticking.
 
-    It is sought from the equilibrium without friction. Smaller steps find which of them the load path leads to. Steps that
-    begin with contact, and those in which contact surfaces move by less than the smallest facet, are taken to have only one,
-    and so are those with heat conduction or a fixed number of geometry updates.
+    The search starts from the equilibrium without friction. If there are two equilibria, smaller steps show to which one the
+    load path leads. The equilibrium is assumed to be unique in steps that begin with contact, in which contact surfaces move
+    by less than the smallest facet, with heat conduction, and with a fixed number of geometry updates.
     """
     pairs = {name: pair for name, pair in problem.pairs.items() if pair.friction and not pair.options.tied}
     closed = [any(ends.active[name].any() for name in pairs if name in ends.active) for ends in (state, after)]
@@ -136,25 +136,25 @@ def _has_two_equilibria(problem: Problem, state: State, after: State, index: int
         return False
     zero = np.zeros(problem.model.mesh.dim)
     poses = [np.stack([ends.obstacles.get(name, zero) for name in pairs]) for ends in (state, after)]
-    turned = [
+    rotation_lengths = [
         abs(angle - state.angles.get(name, 0.0)) * float(np.linalg.norm(np.ptp(pairs[name].points, axis=0)))
         for name, angle in after.angles.items() if name in pairs
     ]  # fmt: skip
-    motion = max(largest((after.u - state.u)[problem.contact_dofs]), largest(poses[1] - poses[0]), *turned)
+    motion = max(largest((after.u - state.u)[problem.contact_dofs]), largest(poses[1] - poses[0]), *rotation_lengths)
     if motion < min(float(facet_lengths(pair).min()) for pair in pairs.values()):
         return False
     load = problem.load_at(after.instant)
     problem.solver.put_back(state.solver)
     begin, frictionless = prepare_start(problem, state, index, load), dict.fromkeys(pairs, 0.0)
-    smooth = replace(load, friction_factors={**load.friction_factors, **frictionless})
+    frictionless_load = replace(load, friction_factors={**load.friction_factors, **frictionless})
     try:
-        u = newton(begin, load, newton(replace(begin, load=smooth), smooth)).u
+        u = newton(begin, load, newton(replace(begin, load=frictionless_load), frictionless_load)).u
     except ConvergenceError:
         return False
     return largest(u - after.u) > NOTABLE * largest(after.u - state.u)
 
 
-def _summed(substeps: list[StepResult]) -> StepResult:
+def _with_sums(substeps: list[StepResult]) -> StepResult:
     """Return the result of the last substep, with iterations, slips and dissipation summed over all substeps."""
     end = substeps[-1]
     if len(substeps) == 1:

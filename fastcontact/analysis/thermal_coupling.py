@@ -34,7 +34,7 @@ Solve = Callable[[StepLoad, StepEquilibrium | None], StepEquilibrium]
 
 
 @dataclass(frozen=True, eq=False)
-class Heated(Temperatures):
+class HeatSolution(Temperatures):
     """Temperatures with the heat flux through contacts.
 
     Attributes
@@ -45,13 +45,13 @@ class Heated(Temperatures):
 
     fluxes: dict[str, Array]
 
-    def completed(self, problem: Problem, step: StepResult) -> StepResult:
+    def with_heat_results(self, problem: Problem, step: StepResult) -> StepResult:
         """Return the result of a load step with heat fluxes and heat reactions added."""
         assert problem.heat is not None
         flux = problem.heat.conductors(step.displacement).flux(self.rise)
-        heated = {name: replace(step.contact[name], heat_flux=power) for name, power in self.fluxes.items()}
+        with_flux = {name: replace(step.contact[name], heat_flux=power) for name, power in self.fluxes.items()}
         return replace(
-            step, contact=step.contact | heated, heat_reaction=self.reaction,
+            step, contact=step.contact | with_flux, heat_reaction=self.reaction,
             iterations={**step.iterations, "heat": self.balance},
             cell_fields={**step.cell_fields, **dict(zip(HEAT_FLUX, flux.T, strict=False))},
         )  # fmt: skip
@@ -67,7 +67,7 @@ def first_rise(problem: Problem, heat: Heat, state: State, instant: float) -> Ar
 def settle_heat(
     problem: Problem, start: State, load: StepLoad, instant: float, rise: Array, equilibrium: StepEquilibrium,
     solve: Solve,
-) -> tuple[Heated, StepEquilibrium]:  # fmt: skip
+) -> tuple[HeatSolution, StepEquilibrium]:  # fmt: skip
     """Return the temperatures and the equilibrium of a load step.
 
     Parameters
@@ -96,14 +96,17 @@ def settle_heat(
     tolerance = max(problem.criteria.geometry, 10 * heat.linear_tolerance)
     change, limit = np.inf, max(problem.criteria.max_geometry_updates, 1)
     for exchange in range(1, limit + 1):
-        heated = _conducted(problem, start, load, instant, equilibrium)
-        change = largest(heated.rise - rise)
-        settled = change <= tolerance * largest(heated.rise) or not problem.model.expands
+        heat_solution = _steady_temperatures(problem, start, load, instant, equilibrium)
+        change = largest(heat_solution.rise - rise)
+        settled = change <= tolerance * largest(heat_solution.rise) or not problem.model.expands
         negligible = max(tolerance * equilibrium.balance.largest, equilibrium.balance.noise)
-        if settled or largest(problem.model.expansion_forces(problem.field, heated.rise - rise).ravel()) <= negligible:
-            return replace(heated, balance={**heated.balance, "exchanges": exchange}), equilibrium
-        rise = mixing.mixed(rise, heated.rise)
-        equilibrium = solve(expanded(problem, load, rise), equilibrium)
+        if (
+            settled
+            or largest(problem.model.expansion_forces(problem.field, heat_solution.rise - rise).ravel()) <= negligible
+        ):
+            return replace(heat_solution, balance={**heat_solution.balance, "exchanges": exchange}), equilibrium
+        rise = mixing.mixed(rise, heat_solution.rise)
+        equilibrium = solve(thermal_load(problem, load, rise), equilibrium)
     raise ConvergenceError(
         f"heat and contact do not converge: after {limit} times temperatures still change by {change:.3g}, for "
         "instance because a contact opens when heat flows through it and closes when none does; let its "
@@ -112,7 +115,7 @@ def settle_heat(
     )
 
 
-def expanded(problem: Problem, load: StepLoad, rise: Array) -> StepLoad:
+def thermal_load(problem: Problem, load: StepLoad, rise: Array) -> StepLoad:
     """Return the load with thermal expansion by a temperature rise (n_points,) [temperature].
 
     For linear bodies its nodal forces are added to the forces of the load.
@@ -130,14 +133,16 @@ def expansion_as_force(problem: Problem, load: StepLoad) -> StepLoad:
     return replace(load, force=load.force + np.pad(forces, (0, len(load.force) - len(forces))), rise=None)
 
 
-def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, equilibrium: StepEquilibrium) -> Heated:
+def _steady_temperatures(
+    problem: Problem, start: State, load: StepLoad, instant: float, equilibrium: StepEquilibrium
+) -> HeatSolution:
     """Return the temperatures for the contact conductances and the frictional heat of an equilibrium."""
     settled, u = equilibrium.settled, equilibrium.u
     heat, displacement = problem.heat, problem.displacement(u)
     assert heat is not None
     if settled is None or not heat.depends_on_contact:
         steady = heat.temperatures(instant, displacement)
-        return Heated(steady.rise, steady.reaction, {**steady.balance, "contacts": {}}, {})
+        return HeatSolution(steady.rise, steady.reaction, {**steady.balance, "contacts": {}}, {})
     n, solution, laws = problem.model.mesh.n_points, settled.solution, problem.model.conductances()
     matrix, friction_power, crossings = csr_array((n, n)), np.zeros(n), {}
     obstacles, obstacle_power = csr_array((n, n)), np.zeros(n)
@@ -172,7 +177,7 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
     powers = {name: h * link.area * (link.jump @ steady.rise - r) for name, (link, _, h, r, _) in crossings.items()}
     fluxes = {name: crossings[name][1].over_whole_side(power) / crossings[name][4] for name, power in powers.items()}
     balance = {**steady.balance, "contacts": {name: float(power.sum()) for name, power in powers.items()}}
-    return Heated(steady.rise, steady.reaction, balance, fluxes)
+    return HeatSolution(steady.rise, steady.reaction, balance, fluxes)
 
 
 def _normal_state(

@@ -24,13 +24,13 @@ from fastcontact.linear.protocol import LinearSolver
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Forcing term of iterative solutions: ratio of the relative residual to the last relative change of the displacements, or
-# to the last relative residual if that is smaller. More accurate solutions are of no use, because contact detection has an
-# error of the size of this change. The relative residual of the first solution of a step is NOTABLE.
+# to the last relative residual if that is smaller. More accurate solutions would not help, because the error of contact
+# detection is as large as this change. The relative residual of the first solution of a step is NOTABLE.
 RESIDUAL = 0.03
 # If the residual of the friction law determines the tolerance, the tolerance decreases at least by this factor, because
 # the residual of the law may not decrease if linear solutions are inaccurate.
 LEAST_FALL = 0.2
-# Number of updates, or of Newton iterations, within which changes must decline.
+# Number of geometry updates, or of Newton iterations, within which changes must decline.
 WINDOW = 8
 # Changes or distances below this fraction of earlier ones are regarded as decreasing. An iteration is regarded as converging
 # if the changes in the second half of the window are below this fraction of those in the first half.
@@ -116,13 +116,13 @@ class Scatter:
     force: float
 
 
-class Watch:
-    """Window of the last displacements and contact forces, to detect whether they only scatter by round-off."""
+class ScatterWindow:
+    """The last displacements and contact forces of a geometry loop, which show whether they only scatter by round-off."""
 
     def __init__(self) -> None:
         self._window: deque[tuple[Array, Array, float]] = deque(maxlen=WINDOW)
 
-    def seen(
+    def add(
         self, displacement: Array, force: Array, change: float, size: float, contraction: float = np.inf
     ) -> Scatter | None:
         """Add an update to the window, and return the scatter of the window.
@@ -150,8 +150,8 @@ class Watch:
             self.forget()
             return None
         self._window.append((displacement.copy(), force.copy(), change))
-        sooner = contraction <= DECLINE and change <= LENGTH_ROUND_OFF * size
-        window = WINDOW // 2 if sooner else WINDOW
+        contracts = contraction <= DECLINE and change <= LENGTH_ROUND_OFF * size
+        window = WINDOW // 2 if contracts else WINDOW
         if len(self._window) < window:
             return None
         (displacements, forces, changes), half = zip(*list(self._window)[-window:], strict=True), window // 2

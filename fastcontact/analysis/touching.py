@@ -21,7 +21,7 @@ from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Shear of nodes that close and slide, relative to the friction capacity, that is neglected by default.
+# Shear of nodes that close and slide which is neglected by default, relative to the frictional capacity.
 NEGLIGIBLE = 1e-3
 
 
@@ -44,7 +44,7 @@ class Touching:
     """
 
     def __init__(self, step: StepContext, newton: bool) -> None:
-        self._allowed, self._near = _allowed(step.problem), NOTABLE if newton else 0.0
+        self._shear_limit, self._near = _shear_limit(step.problem), NOTABLE if newton else 0.0
         self.due = self.unfinished = self._settled = False
         self._paired, self._shift = None, np.inf
 
@@ -70,11 +70,11 @@ class Touching:
 
         `excess` is the change of the displacements beyond the tolerance, and `size` the largest displacement [length].
         """
-        self._settled = self._allowed < 1.0 and solution.settled and excess <= self._near * size
+        self._settled = self._shear_limit < 1.0 and solution.settled and excess <= self._near * size
         self._active, self._size = solution.active, size
         self.due = self._outdated(step, constraints, u)
         if self._paired is None:
-            self.due = self._settled and _slides(step, constraints, solution, self._allowed)
+            self.due = self._settled and _slides(step, constraints, solution, self._shear_limit)
 
     def _outdated(self, step: StepContext, constraints: StackedConstraints, u: Array) -> bool:
         """Return whether the geometry has changed since the increments were solved, but by less than the last time.
@@ -84,7 +84,7 @@ class Touching:
         before = self._paired
         if before is None or not (self._settled and step.problem.until_settled):
             return False
-        if not len(before) == len(constraints) == len(self._active):  # slips of other constraints are of no use
+        if not len(before) == len(constraints) == len(self._active):  # slips of other constraints cannot be used
             return True
         difference = _gaps_and_slips(before, u, step.state.u) - _gaps_and_slips(constraints, u, step.state.u)
         shift = largest(difference[self._active])
@@ -103,13 +103,13 @@ def _gaps_and_slips(constraints: StackedConstraints, u: Array, start: Array) -> 
     return np.column_stack([constraints.gap0 + constraints.B @ u, np.sum(vectors, axis=0)])
 
 
-def _slides(step: StepContext, constraints: StackedConstraints, solution: Solution, allowed: float) -> bool:
-    """Return whether nodes that close in the step carry more shear than the fraction `allowed` of the friction capacity."""
+def _slides(step: StepContext, constraints: StackedConstraints, solution: Solution, limit: float) -> bool:
+    """Return whether nodes that close in the step carry more shear than the fraction `limit` of the friction capacity."""
     if not constraints.tangents or (forces := _forces(step, constraints)) is None:
         return False
     shear, capacity = np.linalg.norm(solution.tangential, axis=1), constraints.friction * solution.multiplier
     frictional = solution.active & (constraints.friction > 0.0)
-    return bool(shear[frictional & (forces[0] == 0.0)].sum() > allowed * capacity[frictional].sum())
+    return bool(shear[frictional & (forces[0] == 0.0)].sum() > limit * capacity[frictional].sum())
 
 
 def _path(
@@ -127,12 +127,12 @@ def _path(
     size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
     slips = _closing(step, constraints, gap)
     if nodes is not None:
-        gap, normal, traction, slips = nodes.gathered(constraints, gap, normal, traction, slips)
+        gap, normal, traction, slips = nodes.of_representatives(constraints, gap, normal, traction, slips)
     waiting = (gap > LENGTH_ROUND_OFF * size) & ~constraints.equality
     return Path(gap, normal, traction, slips, waiting) if waiting.any() else None
 
 
-def _allowed(problem: Problem) -> float:
+def _shear_limit(problem: Problem) -> float:
     """Return `Criteria.friction_while_touching` or its default; 1 means that friction is solved in whole steps.
 
     With nonlinear bodies it is 1, because their steps are halved instead. Between bodies the default is 1 unless each node

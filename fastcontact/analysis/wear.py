@@ -25,30 +25,30 @@ class Worn:
     ----------
     depth, pressure : ndarray (m,)
         Wear depth at the secondary nodes [length], and the pressure there [pressure].
-    pace : float
-        Largest ratio of the wear of a node in a step to its mean pressure in this step, over all steps [length / pressure].
+    largest_rate : float
+        Largest ratio of the wear depth of a node in one step to its mean pressure in this step [length / pressure].
     """
 
     depth: Array
     pressure: Array
-    pace: float = 0.0
+    largest_rate: float = 0.0
 
     @classmethod
     def nothing(cls, count: int) -> Worn:
-        """Return the initial state, for `count` nodes."""
+        """Return zero wear for `count` nodes, the state before the first step."""
         return cls(np.zeros(count), np.zeros(count))
 
     def after(
         self, pair: Formulation, configuration: Configuration, contact: ContactResult, coefficient: float
     ) -> Worn:
-        """Return the wear after one more load step; for parameters see `worn_in_step`."""
-        depth = worn_in_step(pair, configuration, contact, self.pressure, coefficient)
+        """Return the wear after one more load step; for parameters see `wear_depth_in_step`."""
+        depth = wear_depth_in_step(pair, configuration, contact, self.pressure, coefficient)
         mean = 0.5 * np.maximum(contact.pressure + self.pressure, 0.0)
-        pace = np.divide(depth, mean, out=np.zeros_like(depth), where=mean > 0.0)
-        return Worn(self.depth + depth, contact.pressure, max(self.pace, float(pace.max(initial=0.0))))
+        largest_rate = np.divide(depth, mean, out=np.zeros_like(depth), where=mean > 0.0)
+        return Worn(self.depth + depth, contact.pressure, max(self.largest_rate, float(largest_rate.max(initial=0.0))))
 
 
-def worn_in_step(
+def wear_depth_in_step(
     pair: Formulation, configuration: Configuration, contact: ContactResult, earlier_pressure: Array | float,
     coefficient: float,
 ) -> Array:  # fmt: skip
@@ -83,17 +83,17 @@ def at_points(points: Numbers, depth: Array, n_points: int) -> Array:
     return depths
 
 
-def too_fast(pair: Formulation, worn: Worn) -> float:
+def stability_ratio(pair: Formulation, worn: Worn) -> float:
     """Return the ratio of the wear per step to its stability limit [-]; above 1, pressures may oscillate from node to node.
 
     Let h be the length of a facet edge, and E* the contact modulus. A wave of the gap with the wavelength 2 h causes
     pressures of ``pi E* / (2 h)`` times its amplitude (Johnson, Contact Mechanics, 1985, section 13.2). The wear of a step
     is computed with the mean of the pressures at its beginning and end, and changes the gaps in the next step. The wave
-    decays if the product of `Worn.pace` and this stiffness is less than two. For pressures at integration points the
+    decays if the product of `Worn.largest_rate` and this stiffness is less than two. For pressures at integration points the
     stiffness is up to twice as large, so that the limit used here is one.
     """
     edge = np.inf
     for block in pair.secondary.blocks:
         lengths = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
         edge = min(edge, float(lengths.min()) / elements.get(block.element).order)
-    return worn.pace * np.pi * pair.modulus / (2.0 * edge)
+    return worn.largest_rate * np.pi * pair.modulus / (2.0 * edge)

@@ -188,7 +188,7 @@ def contact_work(
     no_tangents = np.zeros((len(constraints), 0, contact.coordinates.shape[1]))
     directions = np.stack(constraints.directions, axis=1) if k else no_tangents
     force, slips = (np.einsum("mk,mkd->md", values, directions) for values in (tangents, slip))
-    after = _forces(pair, constraints, normal, tangents, force, contact, _added(pair, configuration, contact))
+    after = _forces(pair, constraints, normal, tangents, force, contact, _added_gaps(pair, configuration, contact))
     before = before or _no_forces(after)
     areas = constraints.finite_areas
     pressure, traction = before.at(constraints.positions)
@@ -199,12 +199,13 @@ def contact_work(
     if solution.work is not None:  # the work of all increments, in which constraints carry no force before they close
         work, closing = solution.work[rows], np.zeros_like(closing)
     elif work_at_end[closing].any():
-        # A constraint was open at the beginning of the step if the nearest secondary node that then faced the other side was.
+        # A constraint was open at the beginning of the step if this holds for the nearest secondary node that faced the other
+        # side at that time.
         gap = pair.nodal_gap(replace(configuration, displacement=configuration.start, pose=configuration.pose_start))[0]
-        faced = np.isfinite(gap)
-        if faced.any():
-            open_before = gap[faced] > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
-            closing &= open_before[nearest(pair.points[pair.secondary.points[faced]], constraints.positions)[1]]
+        facing = np.isfinite(gap)
+        if facing.any():
+            open_before = gap[facing] > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
+            closing &= open_before[nearest(pair.points[pair.secondary.points[facing]], constraints.positions)[1]]
     touching, friction, mu = float(work_at_end[closing].sum()), float(work.sum()), constraints.friction
     over_slip = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(slips, axis=1)
     np.divide(work, mu, out=over_slip, where=mu > 0.0)
@@ -277,7 +278,7 @@ def _no_forces(forces: ContactForces) -> ContactForces:
     )  # fmt: skip
 
 
-def _added(pair: Formulation, configuration: Configuration, contact: ContactResult) -> Array:
+def _added_gaps(pair: Formulation, configuration: Configuration, contact: ContactResult) -> Array:
     """Return the contribution of clearances and wear to the gaps (n_nodes,) of the secondary nodes [length]."""
     if pair.options.clearance is None and configuration.worn is None:
         return np.zeros(len(contact.gap))

@@ -298,7 +298,7 @@ class Constraints:
     def moved_past(self, rows: Indices, Q: csr_array | None) -> Mask:
         """Return whether supports or obstacles impose a slip along each tangent (k, q) of the constraints `rows` (q,).
 
-        The tangents are rotated by Q ((1 + k) q, (1 + k) q) if it is given, see `cone_newton.aligning`.
+        The tangents are rotated by Q ((1 + k) q, (1 + k) q) if it is given, see `cone_newton.aligning_rotation`.
         """
         if self.driven is None:
             return np.zeros((len(self.tangents), len(rows)), bool)

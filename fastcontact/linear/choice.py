@@ -26,7 +26,7 @@ LOOSEST = 1e-3
 # bench/README.md). If constraints need columns of K^-1, the limit is AFFORDABLE, because multigrid needs one solution for
 # each column.
 DIRECT_UP_TO = {2: AFFORDABLE[2], 3: 15_000}
-# The same in 3D for quadratic cells, with which multigrid takes some ten times as many iterations.
+# The same limit in 3D for quadratic cells, with which multigrid takes about ten times as many iterations.
 QUADRATIC_UP_TO = 50_000
 
 

@@ -66,8 +66,8 @@ class InverseColumns:
     n : int
         Size of K.
     entries : method
-        Method of the solver or factors to which this object belongs, which returns the entries (m, k) of ``K^-1`` in given
-        rows (m,) and columns (k,) [length / force].
+        Method of the solver, or of the factors, that returns the entries (m, k) of ``K^-1`` in given rows (m,) and columns
+        (k,) [length / force].
     limit : int, optional
         Largest number of columns; unlimited by default.
 

@@ -25,10 +25,10 @@ log = logging.getLogger("fastcontact")
 LAST_UP_TO = 4000
 # Largest number of unknowns for which a factorisation is affordable, by the dimension.
 AFFORDABLE = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
-# Relative residual of direct solutions.
+# Relative residual that direct solutions attain.
 ATTAINABLE = ROUND_OFF / 100
-# Number of stored right-hand sides: loads and supports seldom have more independent ramps.
-KEPT = 4
+# Number of stored right-hand sides. Loads and supports seldom have more independent ramps.
+STORED_LOADS = 4
 
 
 class KnownLoads:
@@ -56,7 +56,7 @@ class KnownLoads:
                 return sum((w * u for w, u in zip(weights, self._solutions, strict=True)), np.zeros_like(f))
         f = f / norm
         u = solve(f)
-        self._loads, self._solutions = [*self._loads[1 - KEPT :], f], [*self._solutions[1 - KEPT :], u]
+        self._loads, self._solutions = [*self._loads[1 - STORED_LOADS :], f], [*self._solutions[1 - STORED_LOADS :], u]
         return norm * u
 
     def snapshot(self) -> list[dict[str, Any]]:

@@ -106,13 +106,13 @@ class FieldCompliance:
 
         Values of the field that no equation involves are eliminated from E.
         """
-        rest = np.setdiff1d(np.flatnonzero(self.others.diagonal() > 0.0), values)
+        unused = np.setdiff1d(np.flatnonzero(self.others.diagonal() > 0.0), values)
         E = csr_array(self.others[values][:, values])
-        coupling = csr_array(self.others[values][:, rest])
+        coupling = csr_array(self.others[values][:, unused])
         if coupling.nnz:
             coupled = np.flatnonzero(np.diff(coupling.indptr))
             rows = csr_array(coupling[coupled])
-            correction = rows @ splu(csc_array(self.others[rest][:, rest])).solve(rows.T.toarray())
+            correction = rows @ splu(csc_array(self.others[unused][:, unused])).solve(rows.T.toarray())
             n = len(coupled)
             selection = csr_array((np.ones(n), (coupled, np.arange(n))), (len(values), n))
             E = csr_array(E - selection @ csr_array(correction) @ selection.T)

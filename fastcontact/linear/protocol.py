@@ -23,7 +23,8 @@ from fastcontact.linear.springs import Springs
 TOLERANCE = 1e-10
 # Largest `LinearSolver.contrast` that needs no special treatment.
 MILD = 10.0
-# Function of an unconverged solution u (n,), its multiplier (m,) and its relative residual, which returns whether to stop.
+# Function that returns whether to stop the iteration, given an unconverged solution u (n,), its multipliers (m,) and its
+# relative residual.
 Monitor = Callable[[Array, Array, float], bool]
 
 
@@ -250,8 +251,8 @@ class LinearSolver(Protocol):
         """
 
     def put_back(self, snapshot: Mapping[str, Any]) -> None:
-        """Restore the data of a `snapshot`, taken of this solver or of one of the same class for the same matrix."""
+        """Restore the data of a `snapshot` of this solver, or of a solver of the same class for the same matrix."""
 
     def improve(self, excess: float) -> bool:
-        """Reduce `tolerance`, as the residual exceeds its bound by the factor `excess`; return whether this is possible."""
+        """Reduce `tolerance`, as required by a residual that is `excess` times its bound; return whether this is possible."""
         return False

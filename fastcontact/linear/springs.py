@@ -13,8 +13,8 @@ from scipy.sparse import csr_array, vstack
 from fastcontact.arrays import AnyArray, Indices
 from fastcontact.linear.sparse_rows import entry_rows, scaled
 
-# Relative difference of two sets of springs, or of weights of eliminated unknowns, up to which a preconditioner for one set
-# serves for the other.
+# Largest relative difference between two sets of springs, or between weights of eliminated unknowns, for which they have the
+# same preconditioner.
 ALIKE = 0.3
 
 
@@ -55,13 +55,13 @@ class Springs:
         """Return these springs together with `others`."""
         if others is None:
             return self
-        both = (self, others)
-        rows = csr_array(vstack([springs.rows for springs in both], format="csr"))
+        all_springs = (self, others)
+        rows = csr_array(vstack([springs.rows for springs in all_springs], format="csr"))
         through = None
         if self.through is not None or others.through is not None:
-            rows_of_forces = [springs.rows if springs.through is None else springs.through for springs in both]
+            rows_of_forces = [springs.rows if springs.through is None else springs.through for springs in all_springs]
             through = csr_array(vstack(rows_of_forces, format="csr"))
-        return Springs(rows, np.concatenate([springs.stiffness for springs in both]), through)
+        return Springs(rows, np.concatenate([springs.stiffness for springs in all_springs]), through)
 
     def reduced(self, pivots: Indices, weights: csr_array) -> Springs:
         """Return the springs after the elimination ``u[pivots] = weights @ u`` with weights (m, n).
@@ -74,9 +74,9 @@ class Springs:
         column = number[R.indices]
         is_pivot = column >= 0
         starts = np.concatenate([[0], np.cumsum(is_pivot)])[R.indptr]
-        of_pivots = csr_array((R.data[is_pivot], column[is_pivot], starts), shape=(R.shape[0], W.shape[0]))
-        of_others = csr_array((R.data[~is_pivot], R.indices[~is_pivot], R.indptr - starts), shape=R.shape)
-        return Springs(csr_array(of_others + of_pivots @ W), self.stiffness)
+        pivot_columns = csr_array((R.data[is_pivot], column[is_pivot], starts), shape=(R.shape[0], W.shape[0]))
+        other_columns = csr_array((R.data[~is_pivot], R.indices[~is_pivot], R.indptr - starts), shape=R.shape)
+        return Springs(csr_array(other_columns + pivot_columns @ W), self.stiffness)
 
     def scaled(self, factor: float, dtype: DTypeLike = float) -> Springs:
         """Return the springs with the stiffness multiplied by `factor`, in the data type `dtype`."""

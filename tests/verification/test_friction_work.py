@@ -7,7 +7,7 @@ from stepping import Stepping
 
 import fastcontact as fc
 from fastcontact.analysis import touching
-from fastcontact.analysis.result_warnings import _slipping_before
+from fastcontact.analysis.result_warnings import _slip_before_contact
 from fastcontact.analysis.state import State
 from fastcontact.analysis.work import Work
 from fastcontact.mesh.generate import box, renamed, union
@@ -295,12 +295,12 @@ def test_increments_of_friction_are_those_of_the_converged_geometry(formulation,
 @pytest.mark.parametrize("friction", [0.5, 0.0, -0.5])
 def test_the_share_of_work_while_touching_is_at_most_all_of_it(friction):
     """Elastic slip that recovers may leave less work in total than was done while nodes touched."""
-    (text,) = _slipping_before(fc.Criteria(), State(np.zeros(2), 0.0, work=Work(1.0, friction, 1.0)))
+    (text,) = _slip_before_contact(fc.Criteria(), State(np.zeros(2), 0.0, work=Work(1.0, friction, 1.0)))
     assert text.startswith("100% of the work of friction")
 
 
 def test_no_work_of_friction_is_not_told_where_the_strain_energy_is_round_off():
-    assert not [*_slipping_before(fc.Criteria(), State(np.zeros(2), 0.0, work=Work(-1e-30, 0.0, 0.0)))]
+    assert not [*_slip_before_contact(fc.Criteria(), State(np.zeros(2), 0.0, work=Work(-1e-30, 0.0, 0.0)))]
 
 
 def test_steps_as_a_whole_have_the_work_of_slip_before_nodes_touch():

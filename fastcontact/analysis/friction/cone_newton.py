@@ -13,7 +13,7 @@ search ensures that their norm decreases. Newton's method does not depend on how
 forces, see `Linearised`.
 
 To implement another law, begin with `Law`. The tangential force of the law is also used in `eliminated.Eliminated`,
-which linearises sliding constraints, and in the fallback `dense._on_edges`. Parameters of the law
+which linearises sliding constraints, and in the fallback `dense._polyhedral_forces`. Parameters of the law
 come from `PairOptions` through `Constraints`; parameters that are forces must be scaled by the caller that creates the
 `Law`. `Law.state` and the formulations assume that a constraint without friction needs no tangents.
 
@@ -71,15 +71,15 @@ class Law:
 
         Its rows are ``n - max(n - g, 0)`` and ``t - P(t - s)``, where P is the projection onto the friction disc.
         """
-        n, t, reach, radius = self.trial(y, gaps)
-        scale = np.divide(radius, reach, out=np.ones_like(reach), where=reach > radius)
+        n, t, norm, radius = self.trial(y, gaps)
+        scale = np.divide(radius, norm, out=np.ones_like(norm), where=norm > radius)
         normal = np.where(self.equality, n, np.maximum(n, 0.0))
         return np.vstack([y[0] - normal, y[1:] - t * scale])
 
     def state(self, y: Array, gaps: Array) -> tuple[Mask, Mask]:
         """Return which constraints (m,) are closed, and which (m,) of the closed ones stick."""
-        n, _, reach, radius = self.trial(y, gaps)
-        return (n > 0) | self.equality, (n > 0) & (reach <= radius) & (self.mu > 0)
+        n, _, norm, radius = self.trial(y, gaps)
+        return (n > 0) | self.equality, (n > 0) & (norm <= radius) & (self.mu > 0)
 
     def slide(self, y: Array, gaps: Array, sliding: Indices) -> tuple[Array, Array]:
         """Return the directions d of t - s and their influence on t, at the constraints numbered `sliding` (q,).
@@ -92,8 +92,8 @@ class Law:
             Derivative of t with respect to the component of t - s perpendicular to d: the radius of the friction disc over
             the norm of t - s, at most 1.
         """
-        _, t, reach, radius = self.trial(y, gaps)
-        length = np.maximum(reach[sliding], TINY)
+        _, t, norm, radius = self.trial(y, gaps)
+        length = np.maximum(norm[sliding], TINY)
         return t[:, sliding] / length, np.minimum(radius[sliding] / length, 1.0)
 
     def linearised(self, y: Array, gaps: Array, rows: Indices, sticking: Mask) -> tuple[Array, Array]:
@@ -217,7 +217,7 @@ def compliance_of_rows(rows: tuple[csr_array, ...], unknown_compliance: Array) -
     return np.array([[weighted_rows.multiply(R).sum(axis=1) for R in rows] for weighted_rows in weighted])
 
 
-def aligning(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array | None:
+def aligning_rotation(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array | None:
     """Return the matrix that rotates the two tangents of each constraint in 3D so that one is held if possible.
 
     If supports leave one slip direction free, both tangents may be oblique to it, and neither is held before the rotation.
@@ -245,12 +245,13 @@ def aligning(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array
     oblique = (least <= TOLERANCE * np.maximum(largest, gap)) & (np.abs(mixed) > TOLERANCE * np.maximum(largest, gap))
     if not oblique.any() and not directions:
         return None
-    angle = np.where(oblique, 0.5 * np.arctan2(2 * mixed, first - second), _to_axes(*directions) if directions else 0.0)
+    axis_angle = _angles_to_axes(*directions) if directions else 0.0
+    angle = np.where(oblique, 0.5 * np.arctan2(2 * mixed, first - second), axis_angle)
     c, s, zero = diags_array(np.cos(angle)), diags_array(np.sin(angle)), csr_array((m, m))
     return csr_array(block_array([[diags_array(np.ones(m)), zero, zero], [zero, c, s], [zero, -s, c]], format="csr"))
 
 
-def _to_axes(tangent: Array, second_tangent: Array) -> Array:
+def _angles_to_axes(tangent: Array, second_tangent: Array) -> Array:
     """Return angles (m,) by which the tangents (m, 3) rotate until the first is perpendicular to a coordinate axis [rad].
 
     The axis is the one with the largest angle to the normal.
@@ -268,6 +269,6 @@ def held_tangents(compliance: Array) -> Mask:
     solutions determine the compliance.
     """
     k = len(compliance) - 1
-    of_slips, normal = compliance[np.arange(1, k + 1), np.arange(1, k + 1)], compliance[0, 0]
-    bound = TOLERANCE * normal * np.maximum(of_slips, normal)
-    return np.asarray(of_slips * normal - compliance[1:, 0] ** 2 <= bound)
+    slip_compliance, normal = compliance[np.arange(1, k + 1), np.arange(1, k + 1)], compliance[0, 0]
+    bound = TOLERANCE * normal * np.maximum(slip_compliance, normal)
+    return np.asarray(slip_compliance * normal - compliance[1:, 0] ** 2 <= bound)

@@ -125,7 +125,7 @@ class _Problem:
         if len(rows):
             A, D = _equations(self.law, self.F, y, gaps, rows, sticking)
             right_side = -np.einsum("abq,bq->aq", D, self.free[:, rows])
-            forces[:, rows] = _solved(A, right_side.ravel()).reshape(right_side.shape)
+            forces[:, rows] = _dense_solution(A, right_side.ravel()).reshape(right_side.shape)
         return forces, self.gaps(forces)
 
     def starts(self, closed: Mask, guess: Array | None) -> Iterator[tuple[Array, bool]]:
@@ -139,18 +139,18 @@ class _Problem:
             yield guess, True
         equality = self.law.equality
         sticking = closed & ~equality if (closed & ~equality).any() else (self.free[0] < 0) & ~equality
-        stick_forces = self.step(np.zeros_like(self.free), self.free, sticking | equality, sticking)[0]
-        yield stick_forces, True
-        yield self._softened(stick_forces), True
+        sticking_forces = self.step(np.zeros_like(self.free), self.free, sticking | equality, sticking)[0]
+        yield sticking_forces, True
+        yield self._by_continuation(sticking_forces), True
         if guess is not None:
             yield guess, False
-        yield stick_forces, False
+        yield sticking_forces, False
         for edges in EDGES if len(self.free) == 3 else (2,):
-            edge_forces = _on_edges(self, edges)
+            edge_forces = _polyhedral_forces(self, edges)
             if edge_forces is not None:
                 yield edge_forces, True
 
-    def _softened(self, y: Array) -> Array:
+    def _by_continuation(self, y: Array) -> Array:
         """Return forces (1 + k, m) near a solution, from `y` with a compliance that decreases to round-off.
 
         Where constraints are nearly dependent, such as those of two pairs on one facet, Newton's method may alternate between
@@ -183,7 +183,7 @@ def _equations(law: Law, F: Array, y: Array, gaps: Array, rows: Indices, stickin
 
 
 def response(F: Array, law: Law, forces: Forces) -> Callable[[Array], Array]:
-    """Return the derivative of the solution `forces`, as a function.
+    """Return a function that computes the derivative of the solution `forces`.
 
     The function returns the change (1 + k, m) of the forces due to a change (1 + k, m) of the gaps and slips without forces.
     F and the constraints of `law` are those of `solve`.
@@ -196,12 +196,12 @@ def response(F: Array, law: Law, forces: Forces) -> Callable[[Array], Array]:
     A, D = _equations(law, units[:, None] * F * units, forces.y / unit, forces.gaps * unit, rows, forces.sticking)
     solve_dense = lu_solver(A)
 
-    def varied(gaps: Array) -> Array:
+    def force_change(gaps: Array) -> Array:
         change, right_side = np.zeros_like(gaps), -np.einsum("abq,bq->aq", D, (gaps * unit)[:, rows])
         change[:, rows] = solve_dense(right_side.ravel()).reshape(right_side.shape)
         return change * unit
 
-    return varied
+    return force_change
 
 
 def _units(F: Array, m: int) -> Array:
@@ -213,7 +213,7 @@ def _units(F: Array, m: int) -> Array:
     return np.asarray(1.0 / np.sqrt(np.maximum(compliance, np.finfo(float).eps * compliance.max())))
 
 
-def _solved(A: Array, right: Array) -> Array:
+def _dense_solution(A: Array, right: Array) -> Array:
     """Return the solution of ``A x = right``, or the least-squares solution of minimum norm if A is nearly singular."""
     try:
         solution = np.linalg.solve(A, right)
@@ -224,7 +224,7 @@ def _solved(A: Array, right: Array) -> Array:
     return np.asarray(np.linalg.lstsq(A, right, rcond=None)[0])
 
 
-def _on_edges(problem: _Problem, edges: int) -> Array | None:
+def _polyhedral_forces(problem: _Problem, edges: int) -> Array | None:
     """Return the forces (1 + k, m) for a friction cone of `edges` edges; None if it is too large or Lemke's method fails.
 
     The unknowns of the linear complementarity problem are the normal forces, the tangential forces along each edge, the

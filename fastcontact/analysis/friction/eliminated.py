@@ -35,11 +35,11 @@ STIFFEST = 100.0
 # of a surface (`LinearSolver.contrast`). If this contrast exceeds MILD, the estimate is divided by the square root of their
 # ratio; otherwise Newton's method reverses a few slips repeatedly (with nu = 0.4999 and 161 442 unknowns, 588 iterations
 # did not converge; nu = 0.499 was not affected).
-SOFTER = 0.2
+STIFFNESS_ESTIMATE = 0.2
 # Tolerance of the residual of the friction law relative to the tolerance of the linear solutions, and the larger tolerance
 # that is accepted where it cannot be reached. If contact forces are a small fraction of all forces, they cannot be more
 # accurate.
-ENOUGH, ACCEPTABLE = 10.0, 300.0
+LAW_TOLERANCE, ACCEPTABLE = 10.0, 300.0
 
 
 def solve(
@@ -77,7 +77,7 @@ def solve(
         y, gaps = problem.step(y, gaps, *state)
         if not state[0].any():  # if all were open, close those that penetrate in the solution without contact
             y, gaps = problem.step(y, gaps, gaps[0] < 0.0, gaps[0] < 0.0)
-        exact = max(ROUND_OFF, ENOUGH * tolerance)
+        exact = max(ROUND_OFF, LAW_TOLERANCE * tolerance)
         iterate = cone_newton.newton(problem, y, gaps, exact, 0 if accuracy.inexact else None)
         if problem.finish():
             y, gaps = problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)
@@ -86,7 +86,7 @@ def solve(
             iterate = replace(iterate, settled=iterate.residual <= ACCEPTABLE * tolerance)
             if not iterate.settled:
                 return None
-        if iterate.y is not problem.reached:  # after a damped step: displacements are only known at full steps
+        if iterate.y is not problem.last_forces:  # after a damped step, for which no displacements were computed
             problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)
     except ConvergenceError:
         return None
@@ -103,7 +103,7 @@ class Eliminated:
     ----------
     u : ndarray (n,)
         Unknowns at the end of the last step [length].
-    reached : ndarray (1 + k, m)
+    last_forces : ndarray (1 + k, m)
         Scaled forces at the end of the last step.
     """
 
@@ -119,21 +119,21 @@ class Eliminated:
         unknown_compliance = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
         self._compliance = diagonal_compliance(constraints)
         compliance = self._compliance_of_rows(rows, unknown_compliance)
-        self._turn = cone_newton.aligning(compliance, constraints.directions) if k == 2 else None
-        if self._turn is not None:
-            turned = csr_array(self._turn @ vstack(rows, format="csr"))
-            rows = tuple(turned[a * m : (a + 1) * m] for a in range(3))
-            free = (self._turn @ free.ravel()).reshape(free.shape)
+        self._rotation = cone_newton.aligning_rotation(compliance, constraints.directions) if k == 2 else None
+        if self._rotation is not None:
+            rotated_rows = csr_array(self._rotation @ vstack(rows, format="csr"))
+            rows = tuple(rotated_rows[a * m : (a + 1) * m] for a in range(3))
+            free = (self._rotation @ free.ravel()).reshape(free.shape)
             compliance = self._compliance_of_rows(rows, unknown_compliance)
         held_slips = cone_newton.held_tangents(compliance)
-        prescribed = held_slips & constraints.moved_past(np.arange(m), self._turn)
+        prescribed = held_slips & constraints.moved_past(np.arange(m), self._rotation)
         self._compliance[1:] += np.where(prescribed, cone_newton.SLIP_COMPLIANCE * compliance[0, 0], 0.0)
         slip_rows = [scaled(T, np.where(is_held, 0.0, 1.0)) for T, is_held in zip(rows[1:], held_slips, strict=True)]
         self._rows = (rows[0], *slip_rows)
         self._free = np.vstack([free[0], np.where(held_slips & ~prescribed, 0.0, free[1:])])
-        self._slips = ~held_slips | prescribed
-        normal, softer = compliance[0, 0], SOFTER / np.sqrt(max(1.0, loaded.contrast / MILD))
-        self._unit = np.sqrt(1.0 / (np.where(normal > 0.0, normal, 1.0) / softer + self._compliance[0]))
+        self._free_slips = ~held_slips | prescribed
+        normal, estimate = compliance[0, 0], STIFFNESS_ESTIMATE / np.sqrt(max(1.0, loaded.contrast / MILD))
+        self._unit = np.sqrt(1.0 / (np.where(normal > 0.0, normal, 1.0) / estimate + self._compliance[0]))
         self.law = cone_newton.Law(np.where(usable, mu, 0.0), constraints.equality & usable)
         self.u = u
         self.round_off = SUM_ROUND_OFF * largest((self._unit * self._gaps(u))[:, usable])
@@ -151,21 +151,21 @@ class Eliminated:
     def start(self, forces: Array | None) -> tuple[Array, Array]:
         """Return scaled forces and gaps (1 + k, m) at the initial unknowns, given initial `forces` (1 + k, m) [force]."""
         y = np.zeros_like(self._free) if forces is None else np.where(self._usable, forces, 0.0)
-        if self._turn is not None:
-            y = (self._turn @ y.ravel()).reshape(y.shape)
-        y[1:][~self._slips] = 0.0
-        self.reached = y / self._unit
-        return self.reached, self._scaled(self._gaps(self.u, y))
+        if self._rotation is not None:
+            y = (self._rotation @ y.ravel()).reshape(y.shape)
+        y[1:][~self._free_slips] = 0.0
+        self.last_forces = y / self._unit
+        return self.last_forces, self._scaled(self._gaps(self.u, y))
 
     def unscaled(self, scaled: Forces) -> Forces:
         """Return forces [force] and gaps [length] along the original tangents, from the last step.
 
         Whether constraints are closed or stick, the residual and the number of iterations are those of `scaled`.
         """
-        y = self.reached * self._unit
+        y = self.last_forces * self._unit
         gaps = self._gaps(self.u, y)
-        if self._turn is not None:
-            y, gaps = ((self._turn.T @ values.ravel()).reshape(values.shape) for values in (y, gaps))
+        if self._rotation is not None:
+            y, gaps = ((self._rotation.T @ values.ravel()).reshape(values.shape) for values in (y, gaps))
         return Forces(y, gaps, scaled.closed, scaled.sticking, scaled.settled, scaled.residual, 1 + scaled.iterations)
 
     def _gaps(self, u: Array, forces: Array | float = 0.0) -> Array:
@@ -182,18 +182,18 @@ class Eliminated:
         """See `cone_newton.Linearised.step`."""
         closed = closed & self._usable
         # Equations of gaps and then of the slips along each tangent.
-        held = np.vstack([closed, closed & sticking & self._slips])
-        rows = [taken(R, np.flatnonzero(at)) for R, at in zip(self._rows, held, strict=True)]
-        B, nodes = csr_array(vstack(rows, format="csr")), self._nodes[held.nonzero()[1]]
+        equations = np.vstack([closed, closed & sticking & self._free_slips])
+        rows = [taken(R, np.flatnonzero(at)) for R, at in zip(self._rows, equations, strict=True)]
+        B, nodes = csr_array(vstack(rows, format="csr")), self._nodes[equations.nonzero()[1]]
         sliding = self._sliding(y, gaps, np.flatnonzero(closed & ~sticking & (self.law.mu > 0.0)))
         friction_terms = self._friction_terms(B, np.flatnonzero(closed), sliding) if len(sliding.at) else None
-        self._last, c, C = self._accuracy(y, gaps), -self._free[held], self._compliance[held]
+        self._last, c, C = self._accuracy(y, gaps), -self._free[equations], self._compliance[equations]
         u, multiplier = self._loaded.solve_nonsymmetric(B, c, nodes, self.u, self._last, friction_terms, C)
         forces = np.zeros_like(y)
-        forces[held] = multiplier
+        forces[equations] = multiplier
         forces[1:, sliding.at] += sliding.force(forces[0, sliding.at], u)
-        self.u, self.reached = u, forces / self._unit
-        return self.reached, self._scaled(self._gaps(u, forces))
+        self.u, self.last_forces = u, forces / self._unit
+        return self.last_forces, self._scaled(self._gaps(u, forces))
 
     def _accuracy(self, y: Array, gaps: Array) -> float:
         """Return the relative residual to which the linear system of a step from forces `y` and `gaps` is solved.
@@ -215,22 +215,22 @@ class Eliminated:
     def _sliding(self, y: Array, gaps: Array, at: Indices) -> _Sliding:
         """Return the friction terms of the sliding constraints numbered `at` (q,), linearised at `y` and `gaps`."""
         d, turning = self.law.slide(y, gaps, at)
-        pull = self.law.mu[at] * d
+        ratios = self.law.mu[at] * d
         if len(d) == 1:
-            return _Sliding(at, pull)
+            return _Sliding(at, ratios)
         across = np.stack([-d[1], d[0]])
         rows = sum(scaled(taken(T, at), factor) for factor, T in zip(across, self._rows[1:], strict=True))
         spring = np.minimum(turning / np.maximum(1.0 - turning, TINY), STIFFEST) * self._unit[at] ** 2
         spring = spring / (1.0 + spring * self._compliance[1, at])  # in series with the compliance of the constraint
         free = (across * self._free[1:, at]).sum(axis=0)
-        return _Sliding(at, pull, Springs(csr_array(rows), spring), across, free)
+        return _Sliding(at, ratios, Springs(csr_array(rows), spring), across, free)
 
     def _friction_terms(self, B: csr_array, closed_rows: Indices, sliding: _Sliding) -> FrictionTerms:
         """Return the friction terms of the linear system, whose equations `B` begin with the gaps of `closed_rows`."""
-        pull = np.zeros((len(self._rows) - 1, len(self._usable)))
-        pull[:, sliding.at] = sliding.pull
+        ratios = np.zeros((len(self._rows) - 1, len(self._usable)))
+        ratios[:, sliding.at] = sliding.ratios
         force_rows = taken(self._rows[0], closed_rows)
-        for T, factor in zip(self._rows[1:], pull, strict=True):
+        for T, factor in zip(self._rows[1:], ratios, strict=True):
             force_rows = force_rows + scaled(taken(T, closed_rows), factor[closed_rows])
         force_rows = csr_array(vstack([force_rows, B[len(closed_rows) :]], format="csr"))
         if sliding.springs is None:
@@ -252,7 +252,7 @@ class _Sliding:
     ----------
     at : ndarray of int (q,)
         Numbers of the constraints.
-    pull : ndarray (k, q)
+    ratios : ndarray (k, q)
         Ratios of the tangential forces to the normal force, ``mu d`` [-].
     springs : Springs, optional
         Springs perpendicular to the slip directions, in 3D.
@@ -263,14 +263,14 @@ class _Sliding:
     """
 
     at: Indices
-    pull: Array
+    ratios: Array
     springs: Springs | None = None
     across: Array = field(default_factory=lambda: np.empty(0))
     free: Array = field(default_factory=lambda: np.empty(0))
 
     def force(self, normal: Array, u: Array) -> Array:
         """Return the tangential forces (k, q) for normal forces (q,) [force] and unknowns u (n,) [length]."""
-        friction = self.pull * normal
+        friction = self.ratios * normal
         if self.springs is None:
             return friction
         elongation = self.springs.rows @ u + self.free

@@ -19,8 +19,14 @@ import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction import dense, eliminated
-from fastcontact.analysis.friction.cone_newton import SLIP_COMPLIANCE, Law, aligning, compliance_of_each, held_tangents
-from fastcontact.analysis.solution import Accuracy, Forces, Path, Response, Slid, Solution, in_increments, response
+from fastcontact.analysis.friction.cone_newton import (
+    SLIP_COMPLIANCE,
+    Law,
+    aligning_rotation,
+    compliance_of_each,
+    held_tangents,
+)
+from fastcontact.analysis.solution import Accuracy, Forces, Path, Response, SlipSoFar, Solution, in_increments, response
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import normals
@@ -69,16 +75,16 @@ def solve(
         log.info("friction: the iteration on eliminated constraints did not converge, their compliance is formed")
     usable = constraints.usable
     initial = closed | constraints.equality if path is None else closed | constraints.equality | ~path.waiting
-    chosen = usable if coupled else usable & initial
+    included = usable if coupled else usable & initial
     iterations = 0
     while True:
-        solution = _with_chosen(chosen, loaded, constraints, closed, u, forces, path)
+        solution = _with_included(included, loaded, constraints, closed, u, forces, path)
         solution.gap[~usable], solution.slip[~usable] = np.inf, 0.0
         iterations += solution.iterations
-        missing = usable & ~chosen & (solution.gap < 0.0)
+        missing = usable & ~included & (solution.gap < 0.0)
         if not missing.any():
             return replace(solution, iterations=iterations)
-        chosen = chosen | missing
+        included = included | missing
 
 
 def _eliminated(
@@ -88,7 +94,7 @@ def _eliminated(
     """Return the solution by `eliminated`, without the Delassus operator; None if this fails. Parameters as in `solve`."""
     usable, before = constraints.usable, None
 
-    def solved(constraints: Constraints, closed: Mask, accuracy: Accuracy, forces: Array | None) -> Forces:
+    def solve_eliminated(constraints: Constraints, closed: Mask, accuracy: Accuracy, forces: Array | None) -> Forces:
         nonlocal u
         solution = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
         if solution is None:
@@ -100,14 +106,14 @@ def _eliminated(
     def increment(offset: Array, carrying: Mask, closed: Mask, forces: Array | None) -> Forces:
         gaps = constraints.gaps_at_rest() + offset
         gaps[0, ~carrying] += distance
-        moved = replace(constraints, gap0=gaps[0], slip0=gaps[1:], elastic_slip=np.empty(0))
-        result = solved(moved, closed, accuracy, forces)
+        shifted_constraints = replace(constraints, gap0=gaps[0], slip0=gaps[1:], elastic_slip=np.empty(0))
+        result = solve_eliminated(shifted_constraints, closed, accuracy, forces)
         result.gaps[0, ~carrying] -= distance
         return result
 
     try:
         if path is None:
-            result = solved(constraints, closed, accuracy, forces)
+            result = solve_eliminated(constraints, closed, accuracy, forces)
         else:
             y, closing = path.along(constraints.directions, np.arange(len(constraints)))
             lag = _lag(loaded, constraints, path, y)
@@ -120,7 +126,7 @@ def _eliminated(
     return Solution(
         u, result.y[0], gap, active, active, result.settled, result.iterations, result.y[1:].T, result.gaps[1:].T,
         result.sticking, result.residual, constraints.directions,
-        slid=None if before is None else _slid(before, None, np.arange(len(constraints)), constraints),
+        slip_so_far=None if before is None else _slip_so_far(before, None, np.arange(len(constraints)), constraints),
     )  # fmt: skip
 
 
@@ -133,29 +139,29 @@ def _lag(loaded: Loaded, constraints: Constraints, path: Path, y: Array) -> Arra
     return np.where(constraints.usable, lag, 0.0)
 
 
-def _with_chosen(
-    chosen: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None, path: Path | None
+def _with_included(
+    included: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None, path: Path | None
 ) -> Solution:  # fmt: skip
-    """Return the solution with the `chosen` constraints (m,) alone, by the dense Delassus operator.
+    """Return the solution with only the `included` constraints (m,), by the dense Delassus operator.
 
     The gaps and slips of the other constraints follow from the displacements. The other parameters are those of `solve`, with
     initial `forces` (1 + k, m) or None [force].
     """
-    rows = np.flatnonzero(chosen)
+    rows = np.flatnonzero(included)
     k, m = len(constraints.tangents), len(constraints)
     check_rows((1 + k) * len(rows), MOST_ROWS_WITH_FRICTION)
     R = csr_array(vstack([matrix[rows] for matrix in (constraints.B, *constraints.tangents)], format="csr"))
-    at_rest = constraints.gaps_at_rest()
+    gaps_at_rest = constraints.gaps_at_rest()
     free, F = loaded.delassus(R)
     slips = np.arange(len(rows), len(F))
     # This compliance is added before held tangents are detected, since compliant tangents are not held.
     F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
-    Q = aligning(compliance_of_each(F, 3)) if k == 2 else None
+    Q = aligning_rotation(compliance_of_each(F, 3)) if k == 2 else None
     C = compliance_of_each(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k)
     held_slips = held_tangents(C)
     held_rows = np.flatnonzero(held_slips) + len(rows)
     _add_compliance(F, constraints, rows)
-    free = free.reshape(1 + k, -1) + at_rest[:, rows]
+    free = free.reshape(1 + k, -1) + gaps_at_rest[:, rows]
     guess = None if forces is None else forces[:, rows]
     y0, closing = np.zeros_like(free), np.zeros_like(free)
     if path is not None:
@@ -173,19 +179,19 @@ def _with_chosen(
     mu, equations = constraints.friction[rows], constraints.equality[rows]
     if path is None:
         result, before = dense.solve(F, free, mu, closed[rows], guess, equations), None
-        gaps_of_chosen = result.gaps
+        gaps_of_included = result.gaps
     else:
         lag = -free - (F @ y0.ravel()).reshape(free.shape)
         lag[0] += closing[0]
         increment = partial(_increment, F, free, mu, equations)
-        result, gaps_of_chosen, before = in_increments(lag, closing, y0, path.waiting[rows], increment)
+        result, gaps_of_included, before = in_increments(lag, closing, y0, path.waiting[rows], increment)
     y = result.y
     if Q is not None:
-        y, gaps_of_chosen = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ gaps_of_chosen.ravel()).reshape(y.shape)
+        y, gaps_of_included = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ gaps_of_included.ravel()).reshape(y.shape)
     u = loaded.involved_solution(R.T @ y.ravel(), u)
     all_forces = np.zeros((1 + k, m))
-    gaps = at_rest + np.stack([matrix @ u for matrix in (constraints.B, *constraints.tangents)])
-    all_forces[:, rows], gaps[:, rows] = y, gaps_of_chosen
+    gaps = gaps_at_rest + np.stack([matrix @ u for matrix in (constraints.B, *constraints.tangents)])
+    all_forces[:, rows], gaps[:, rows] = y, gaps_of_included
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = result.closed, result.sticking
 
@@ -195,13 +201,13 @@ def _with_chosen(
     return Solution(
         u, all_forces[0], gaps[0], active, active, result.settled, result.iterations, all_forces[1:].T, gaps[1:].T,
         sticking, result.residual, constraints.directions,
-        slid=None if before is None else _slid(before, Q, rows, constraints),
+        slip_so_far=None if before is None else _slip_so_far(before, Q, rows, constraints),
         response=partial(_response, loaded, (R, rows, Q), held_slips, (F, Law(mu, equations), at_end)),
     )  # fmt: skip
 
 
 def _response(
-    loaded: Loaded, among: tuple[csr_array, Indices, csr_array | None], held_slips: Mask,
+    loaded: Loaded, rows_and_rotation: tuple[csr_array, Indices, csr_array | None], held_slips: Mask,
     forces: tuple[Array, Law, Forces],
 ) -> Response:  # fmt: skip
     """Return the linear response of a solution to additional forces and gaps.
@@ -209,27 +215,27 @@ def _response(
     Parameters
     ----------
     loaded : Loaded
-    among : (csr_array ((1 + k) q, n), ndarray of int (q,), csr_array or None)
+    rows_and_rotation : (csr_array ((1 + k) q, n), ndarray of int (q,), csr_array or None)
         R, and the numbers of its q constraints; rotation Q of their tangents.
     held_slips : ndarray of bool (k, q)
-        Idle tangents, along which slips do not vary.
+        Held tangents, along which slips do not vary.
     forces : tuple
         Arguments of `dense.response`.
     """
-    (R, rows, Q), varied = among, dense.response(*forces)
+    (R, rows, Q), force_change = rows_and_rotation, dense.response(*forces)
 
     def forces_of(values: Array) -> Array:
         values = (values if Q is None else Q @ values).reshape(1 + len(held_slips), len(rows))
         values[1:][held_slips] = 0.0
-        change = varied(values).ravel()
+        change = force_change(values).ravel()
         return change if Q is None else np.asarray(Q.T @ change)
 
     return response(loaded, R, rows, forces_of)
 
 
-def _slid(
+def _slip_so_far(
     before: tuple[Array, Array, Array, Array], Q: csr_array | None, rows: Indices, constraints: Constraints
-) -> Slid:
+) -> SlipSoFar:
     """Return the data at the beginning of the last increment, for all constraints.
 
     Parameters
@@ -246,22 +252,22 @@ def _slid(
     """
     *slips, work, normal = before
     m, dim = constraints.positions.shape
-    slid = Slid(np.zeros((m, dim)), np.zeros((m, dim)), np.zeros(m), np.zeros(m))
-    for vectors, slip in zip((slid.slip, slid.approach), slips, strict=True):
+    slip_so_far = SlipSoFar(np.zeros((m, dim)), np.zeros((m, dim)), np.zeros(m), np.zeros(m))
+    for vectors, slip in zip((slip_so_far.slip, slip_so_far.slip_before_closing), slips, strict=True):
         unrotated = slip
         if Q is not None:
             unrotated = (Q.T @ np.vstack([np.zeros(len(rows)), slip]).ravel()).reshape(-1, len(rows))[1:]
         tangents = np.stack([tangent[rows] for tangent in constraints.directions])
         vectors[rows] = np.einsum("km,kmd->md", unrotated, tangents)
-    slid.work[rows], slid.normal[rows] = work, normal
-    return slid
+    slip_so_far.work[rows], slip_so_far.normal[rows] = work, normal
+    return slip_so_far
 
 
 def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
     """Add, in place, the compliance of the constraints `rows` (q,) to their Delassus operator F ((1 + k) q, (1 + k) q)."""
     if constraints.compliance is not None and len(rows):
         frame = np.stack([direction[rows] for direction in constraints.coupled_directions or constraints.directions])
-        F += _of_components(constraints.compliance.block(rows), frame)
+        F += _componentwise(constraints.compliance.block(rows), frame)
     if constraints.low_rank_compliance.size and len(rows):
         Z = constraints.low_rank_compliance[:, rows].reshape(len(F), -1)
         F += Z @ Z.T
@@ -284,7 +290,7 @@ def _increment(
     return replace(result, y=y, gaps=gaps, closed=closed_of_all, sticking=sticking)
 
 
-def _of_components(C: Array, along: Array) -> Array:
+def _componentwise(C: Array, along: Array) -> Array:
     """Return a compliance ((1 + k) m, (1 + k) m) with respect to the components of forces along normals and tangents.
 
     C couples force vectors. Their components along normals and tangents are coupled by the scalar products of these

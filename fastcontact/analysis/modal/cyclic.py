@@ -60,17 +60,17 @@ class Sectors:
         centre = np.linalg.lstsq(np.eye(len(offset)) - first.turn, offset)[0]
         return cls(first.sectors, first.turn, periodic_interfaces, centre)
 
-    def diameters(self, chosen: int | str | Sequence[int]) -> list[int]:
+    def diameters(self, request: int | str | Sequence[int]) -> list[int]:
         """Return the requested nodal diameters, ascending; ModelError if the ring cannot have one of them."""
         highest = self.number // 2
-        if isinstance(chosen, str):
-            if chosen != "all":
-                raise ModelError(f"nodal_diameters = '{chosen}': write \"all\", or whole numbers from 0 to {highest}")
+        if isinstance(request, str):
+            if request != "all":
+                raise ModelError(f"nodal_diameters = '{request}': write \"all\", or whole numbers from 0 to {highest}")
             return list(range(highest + 1))
-        diameters = sorted({chosen} if isinstance(chosen, int) else set(chosen))
+        diameters = sorted({request} if isinstance(request, int) else set(request))
         invalid = [d for d in diameters if not 0 <= d <= highest]
         if invalid or not diameters:
-            raise ModelError(f"nodal_diameters = {chosen}: a ring of {self.number} sectors has 0 to {highest}")
+            raise ModelError(f"nodal_diameters = {request}: a ring of {self.number} sectors has 0 to {highest}")
         return diameters
 
 
@@ -137,14 +137,14 @@ class Wave:
         The test function of a condition at one end of a sector extends into the next sector, which is represented by the
         other end; at the axis it extends over all sectors.
         """
-        P, main = self._combined(conditions)
+        P, main = self._combination_matrix(conditions)
         nodes, areas = conditions.nodes[main], self.repeated(conditions.areas[main])
         n_points = conditions.rows.shape[1] // self.sectors.turn.shape[0]
         compliance = None if conditions.compliance is None else self.real(P @ conditions.compliance @ P.conj().T)
         ring_nodes = nodes if self.single else np.concatenate([nodes, nodes + n_points])
         return Conditions(self.real(P @ conditions.rows), ring_nodes, areas, compliance=compliance)
 
-    def _combined(self, conditions: Conditions) -> tuple[csr_array, Indices]:
+    def _combination_matrix(self, conditions: Conditions) -> tuple[csr_array, Indices]:
         """Return the matrix (k, q) that maps conditions to those of the ring, and the main condition (k,) of each."""
         nodes = conditions.nodes
         is_single, blocks = np.ones(len(nodes), bool), []
@@ -153,10 +153,10 @@ class Wave:
             for a, b in zip(interface.first.tolist(), interface.second.tolist(), strict=True):
                 first, second = (on_interface[nodes[on_interface] == node] for node in (a, b))
                 if a == b and len(first):
-                    blocks.append((self._around(conditions, first), first, first))
+                    blocks.append((self._combinations_at_axis(conditions, first), first, first))
                     is_single[first] = False
                 elif len(first) and len(second):
-                    block = self._across(conditions, interface, first, second)
+                    block = self._combinations_across(conditions, interface, first, second)
                     blocks.append((block, first, np.concatenate([first, second])))
                     is_single[first] = is_single[second] = False
         single = np.flatnonzero(is_single)
@@ -171,7 +171,7 @@ class Wave:
         entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
         return csr_array(coo_array(entries, shape=(count, len(nodes)))), np.concatenate(main_conditions)
 
-    def _across(
+    def _combinations_across(
         self, conditions: Conditions, interface: PeriodicInterface, at_first: Indices, at_second: Indices
     ) -> AnyArray:
         """Return the combinations (k, k + l) of the k and l conditions at the first and second node of an interface."""
@@ -184,7 +184,7 @@ class Wave:
             products = conditions.directions[at_first] @ (conditions.directions[at_second] @ interface.turn).T
         return np.hstack([weight * np.eye(len(at_first)), (1.0 - weight) * np.conj(self.phase(interface)) * products])
 
-    def _around(self, conditions: Conditions, at_node: Indices) -> AnyArray:
+    def _combinations_at_axis(self, conditions: Conditions, at_node: Indices) -> AnyArray:
         """Return the combinations (k, q) of the conditions of a node on the axis that do not cancel over the ring."""
         directions = None if conditions.directions is None else conditions.directions[at_node]
         total, rotation = np.zeros((len(at_node), len(at_node)), complex), np.eye(len(self.sectors.turn))

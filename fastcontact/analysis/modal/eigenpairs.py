@@ -59,7 +59,7 @@ def lowest(
     """
     K, M = matrices
     if free.sum() < max(COARSEST, 3 * n):
-        return _of_few(K, M, np.flatnonzero(free), n, shift)
+        return _dense_eigenpairs(K, M, np.flatnonzero(free), n, shift)
     shifted = bsr_array(K + shift * M)
     shifted.sort_indices()
     try:
@@ -69,17 +69,17 @@ def lowest(
     rng = np.random.default_rng(0)
     if isinstance(solver, Multigrid):
         start = rng.normal(size=(len(free), n + n // 2 + 2)) * free[:, None]
-        pairs = _by_multigrid(solver, shifted, M, start, n)
+        basis = _lobpcg_vectors(solver, shifted, M, start, n)
     else:
-        pairs = _by_factors(solver, shifted, M, rng.normal(size=len(free)) * free, n)
+        basis = _lanczos_vectors(solver, shifted, M, rng.normal(size=len(free)) * free, n)
     # Ritz pairs in the span of the iterates are more accurate, and their vectors are orthogonal for equal eigenvalues.
-    small_K, small_M = pairs.T @ (K @ pairs), pairs.T @ (M @ pairs)
+    small_K, small_M = basis.T @ (K @ basis), basis.T @ (M @ basis)
     inverse_factor = np.linalg.inv(np.linalg.cholesky(small_M))
     values, vectors = np.linalg.eigh(inverse_factor @ (0.5 * (small_K + small_K.T)) @ inverse_factor.T)
-    return values[:n], (pairs @ (inverse_factor.T @ vectors))[:, :n]
+    return values[:n], (basis @ (inverse_factor.T @ vectors))[:, :n]
 
 
-def _of_few(K: bsr_array, M: bsr_array, free: Indices, n: int, shift: float) -> tuple[Array, Array]:
+def _dense_eigenpairs(K: bsr_array, M: bsr_array, free: Indices, n: int, shift: float) -> tuple[Array, Array]:
     """Return the result of `lowest` for few unknowns `free` (k,), by a dense eigenvalue problem."""
     dense_K, dense_M = (np.asarray(matrix.tocsr()[free][:, free].todense()) for matrix in (K, M))
     try:  # for the inverse eigenvalues, since M may be singular
@@ -91,7 +91,8 @@ def _of_few(K: bsr_array, M: bsr_array, free: Indices, n: int, shift: float) -> 
     return 1.0 / inverse[::-1] - shift, vectors
 
 
-def _by_factors(solver: LinearSolver, shifted: bsr_array, M: bsr_array, start: Array, n: int) -> Array:
+def _lanczos_vectors(solver: LinearSolver, shifted: bsr_array, M: bsr_array, start: Array, n: int) -> Array:
+    """Return n eigenvectors (size, n) by the Lanczos method with a factorised matrix."""
     zero = np.zeros(len(start))
     loaded = solver.load(zero)
     inverse = LinearOperator(shifted.shape, matvec=loaded.full_solution, dtype=float)
@@ -103,7 +104,9 @@ def _by_factors(solver: LinearSolver, shifted: bsr_array, M: bsr_array, start: A
         ) from error
 
 
-def _by_multigrid(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Array, n: int) -> Array:
+def _lobpcg_vectors(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Array, n: int) -> Array:
+    """Return at least n eigenvectors (size, k) by LOBPCG with one multigrid cycle as preconditioner."""
+
     def cycle(residuals: Array) -> Array:
         corrections = np.zeros((residuals.shape[1], residuals.shape[0]))
         for z, residual in zip(corrections, residuals.T, strict=True):
@@ -129,7 +132,7 @@ def _by_multigrid(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Ar
 
 
 class Reduced:
-    """Motions ``u = T v`` of a system under further equations ``rows @ u = 0``.
+    """Motions ``u = T v`` that satisfy the constraints of a system and the additional equations ``rows @ u = 0``.
 
     Parameters
     ----------
@@ -159,7 +162,7 @@ class Reduced:
         rows_of_unknowns = system.rows(rows, np.zeros(rows.shape[0]), np.zeros(n))[0]
         nonempty = np.flatnonzero(np.diff(rows_of_unknowns.indptr) > 0)
         if len(nonempty):
-            pivots, weights = _eliminated(csr_array(rows_of_unknowns[nonempty]), nodes[nonempty], size)
+            pivots, weights = _pivots_and_weights(csr_array(rows_of_unknowns[nonempty]), nodes[nonempty], size)
             self.free[pivots] = False
             at_pivots = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
             projection = csr_array(diags_array(self.free.astype(float)) + at_pivots @ weights)
@@ -173,7 +176,7 @@ class Reduced:
         return np.asarray(self._T @ v)
 
 
-def _eliminated(rows: csr_array, nodes: Indices, size: int) -> tuple[Indices, csr_array]:
+def _pivots_and_weights(rows: csr_array, nodes: Indices, size: int) -> tuple[Indices, csr_array]:
     """Return the unknowns (p,) that equations (m, n) eliminate, as weighted sums (p, n) of the other unknowns.
 
     Linearly dependent equations, as at corners where several sides meet, are dropped.
@@ -181,11 +184,12 @@ def _eliminated(rows: csr_array, nodes: Indices, size: int) -> tuple[Indices, cs
     try:
         elimination = eliminate(rows, np.zeros(rows.shape[0]), None, nodes, size)
     except RepeatedError:
-        return _independent(rows)
+        return _by_qr(rows)
     return elimination.pivots, elimination.full_weights()
 
 
-def _independent(rows: csr_array) -> tuple[Indices, csr_array]:
+def _by_qr(rows: csr_array) -> tuple[Indices, csr_array]:
+    """Return the result of `_pivots_and_weights` for linearly dependent equations, by a dense QR factorisation."""
     columns = np.unique(rows.indices)
     _, R, order = qr(rows[:, columns].toarray(), mode="economic", pivoting=True)
     rank = int((np.abs(np.diag(R)) > LENGTH_ROUND_OFF * abs(R[0, 0])).sum())

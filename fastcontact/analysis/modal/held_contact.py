@@ -27,7 +27,7 @@ from fastcontact.results.step import ContactResult, StepResult
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Relative displacements of one contact pair, along its normals or along its tangents, that vanish or have a compliance.
+    """Relative displacements of a contact pair along its normals or tangents, which vanish or have a compliance.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ def _conditions(
     if tied is not None:
         yield Conditions(tied.rows[0], nodes, areas)
         if directions:
-            yield _along(directions, tied.rows[1:], np.arange(n), nodes, areas)
+            yield _tangential_conditions(directions, tied.rows[1:], np.arange(n), nodes, areas)
         return
     closed = abs(moments) @ constraints.equality.astype(float) > 0.0
     sticking = np.zeros(len(closed), bool)
@@ -144,10 +144,10 @@ def _conditions(
         weights = csr_array(moments[sticking_rows])
         rows = [weights @ T for T in constraints.tangents]
         compliance = _compliance(weights, constraints.tangential_softness)
-        yield _along(directions, rows, sticking_rows, nodes, areas, compliance)
+        yield _tangential_conditions(directions, rows, sticking_rows, nodes, areas, compliance)
 
 
-def _along(
+def _tangential_conditions(
     directions: Sequence[Array], rows: Sequence[csr_array], selected: Indices, nodes: Indices, areas: Array,
     compliance: csr_array | None = None,
 ) -> Conditions:  # fmt: skip

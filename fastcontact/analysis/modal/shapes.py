@@ -49,7 +49,7 @@ class Shapes(StepSequence):
         return phases(self[number], count)
 
 
-def _as_step(number: int, frequency: float, u: Array, stress: Array, model: Model) -> StepResult:
+def _mode_step(number: int, frequency: float, u: Array, stress: Array, model: Model) -> StepResult:
     equivalent = recovery.von_mises(stress)
     signed = recovery.von_mises_signed(stress, equivalent)
     lengths = {key: name for key, name in model.units.items() if key == "length"}  # shapes have no scale
@@ -119,7 +119,7 @@ class Modes(Shapes):
         stress = recovery.nodal_stress(
             model.mesh, model.kinematics, self._field.moduli, self._field.loops, u, self._field.treatment
         )
-        return _as_step(number, self.frequencies[number], u.copy(), stress, model)
+        return _mode_step(number, self.frequencies[number], u.copy(), stress, model)
 
     def whole_ring(self) -> RingModes:
         """Return the same modes on the mesh of the whole ring; ModelError if no nodal diameters were requested."""
@@ -213,11 +213,11 @@ class RingModes(Shapes):
             angle = 2.0 * math.pi * d * k / self._sectors.number
             real, imaginary = math.cos(angle), -sign * math.sin(angle)
             u.append((real * mode.displacement + imaginary * twin_mode.displacement) @ rotation.T)
-            stress.append(_rotated(real * mode.stress + imaginary * twin_mode.stress, rotation))
-        return _as_step(number, modes.frequencies[number], np.concatenate(u), np.concatenate(stress), modes._model)
+            stress.append(_rotated_stress(real * mode.stress + imaginary * twin_mode.stress, rotation))
+        return _mode_step(number, modes.frequencies[number], np.concatenate(u), np.concatenate(stress), modes._model)
 
 
-def _rotated(stress: Array, rotation: Array) -> Array:
+def _rotated_stress(stress: Array, rotation: Array) -> Array:
     """Return stresses (n, 4 or 6) of a body rotated by a rotation matrix (dim, dim) [pressure]."""
     Q, size = np.eye(3), stress.shape[1]
     Q[: len(rotation), : len(rotation)] = rotation

@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array, eye_array
 
-from fastcontact.analysis.contact_result import carried
+from fastcontact.analysis.contact_result import closed_node_pressures
 from fastcontact.analysis.inequalities import Iterate, pair_surfaces
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Solution
@@ -31,7 +31,7 @@ from fastcontact.round_off import DIFFERENCES
 REMEDY = "Change the load slightly, or use one-sided finite differences between two solutions"
 # Increment of finite differences, relative to the admissible range of a constant or to the largest force. One-sided
 # differences of smooth functions have errors of this order, and central differences have errors of the order of its square.
-CHANGED = 1e-3
+INCREMENT = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,11 +124,13 @@ class MovingContact:
         assert self.closed is not None
         part = constraints.parts[self.pair]
         forces = part.normal_forces(part.contact_forces(multiplier[constraints.rows[self.pair]]))
-        return carried(part, forces, self.closed, self.problem.pairs[self.pair].secondary)[1]
+        return closed_node_pressures(part, forces, self.closed, self.problem.pairs[self.pair].secondary)[1]
 
-    def parameter_derivative(self, changed: Callable[[float], MovingContact], increment: float) -> Array:
-        """Return the derivative of `Sample.all` with respect to a parameter, which `changed(d)` increases by d."""
-        return np.asarray((changed(increment).at(self.u).all - changed(-increment).at(self.u).all) / (2.0 * increment))
+    def parameter_derivative(self, modified: Callable[[float], MovingContact], increment: float) -> Array:
+        """Return the derivative of `Sample.all` with respect to a parameter, which `modified(d)` increases by d."""
+        return np.asarray(
+            (modified(increment).at(self.u).all - modified(-increment).at(self.u).all) / (2.0 * increment)
+        )
 
     @cached_property
     def step(self) -> float:
@@ -155,11 +157,11 @@ class MovingContact:
         dofs = np.empty(0, np.intp) if fixed else self._moving_dofs()
         if not len(dofs):
             return csr_array((size, n)), csr_array((size, n))
-        reached = self._reached()
-        derivatives = self._differences(_independent_groups(dofs, reached, self.problem.model.mesh.dim), reached)
-        if self._agrees(0.5 * (derivatives[0] + derivatives[1]), dofs):
+        dependence = self._dependence()
+        derivatives = self._differences(_independent_groups(dofs, dependence, self.problem.model.mesh.dim), dependence)
+        if self._is_consistent(0.5 * (derivatives[0] + derivatives[1]), dofs):
             return derivatives
-        return self._differences([np.array([dof]) for dof in dofs], reached)
+        return self._differences([np.array([dof]) for dof in dofs], dependence)
 
     def kinks(self, forward: csr_array, backward: csr_array) -> csr_array:
         """Return half the difference of the two `derivatives` where points project onto an edge between two facets."""
@@ -169,16 +171,16 @@ class MovingContact:
         # Half the difference of one-sided derivatives is larger at a kink. Pressures follow from forces: they are smooth
         # where forces are.
         scale = np.where(row < n, force, np.where(row < n + len(self.active), 1.0, np.inf))
-        jump.data[np.abs(jump.data) <= CHANGED * scale] = 0.0
+        jump.data[np.abs(jump.data) <= INCREMENT * scale] = 0.0
         jump.eliminate_zeros()
         return jump
 
     def _moving_dofs(self) -> Indices:
         """Return the displacement components that active constraints may depend on."""
         dim, contact_dofs = self.problem.model.mesh.dim, self.problem.contact_dofs
-        reached = np.unique(self._reached().nonzero()[1])
+        points = np.unique(self._dependence().nonzero()[1])
         obstacle_dofs = contact_dofs[contact_dofs >= self.problem.model.n_dofs]
-        dofs = (reached[:, None] * dim + np.arange(dim)).ravel()
+        dofs = (points[:, None] * dim + np.arange(dim)).ravel()
         return np.concatenate([dofs, obstacle_dofs]).astype(np.intp)
 
     @cached_property
@@ -187,10 +189,10 @@ class MovingContact:
         dim, B = self.problem.model.mesh.dim, csr_array(self.constraints.B[self.active])
         keep = (B.indices < self.problem.model.n_dofs) & (B.data != 0.0)
         entries, n_points = (entry_rows(B)[keep], B.indices[keep] // dim), self.problem.model.mesh.n_points
-        return _ones(csr_array((np.ones(keep.sum()), entries), shape=(len(self.active), n_points)))
+        return _with_unit_entries(csr_array((np.ones(keep.sum()), entries), shape=(len(self.active), n_points)))
 
-    def _reached(self) -> csr_array:
-        """Return the incidence (k, n_points) of active constraints and the points they may depend on, neighbours included."""
+    def _dependence(self) -> csr_array:
+        """Return the incidence matrix (k, n_points) of active constraints and the points on which they may depend."""
         n = self.problem.model.mesh.n_points
         neighbours = eye_array(n, format="csr")
         for side in self._surfaces():
@@ -201,30 +203,30 @@ class MovingContact:
         for name, pair in self.problem.pairs.items():
             if pair.options.tied:  # paired once, before any load
                 moving[self.constraints.rows[name]] = 0.0
-        return _ones(csr_array((self._involved * moving[self.active, None]) @ neighbours))
+        return _with_unit_entries(csr_array((self._involved * moving[self.active, None]) @ neighbours))
 
-    def _differences(self, groups: list[Indices], reached: csr_array) -> tuple[csr_array, csr_array]:
+    def _differences(self, groups: list[Indices], dependence: csr_array) -> tuple[csr_array, csr_array]:
         base, n = self.at(self.u).all, len(self.u)
         columns: list[list[csr_array]] = [[], []]
         for dofs in groups:
             shift = np.zeros(n)
             shift[dofs] = self.step
             for side, sign in enumerate((1.0, -1.0)):
-                changed = sign * (self.at(self.u + sign * shift).all - base) / self.step
-                rows = np.flatnonzero(changed)
-                column = self._owners(rows, dofs, reached) if len(dofs) > 1 else np.full(len(rows), dofs[0])
-                columns[side].append(csr_array((changed[rows], (rows, column)), shape=(len(base), n)))
+                difference = sign * (self.at(self.u + sign * shift).all - base) / self.step
+                rows = np.flatnonzero(difference)
+                column = self._sources(rows, dofs, dependence) if len(dofs) > 1 else np.full(len(rows), dofs[0])
+                columns[side].append(csr_array((difference[rows], (rows, column)), shape=(len(base), n)))
         forward, backward = (csr_array(sum(of_side[1:], of_side[0])) for of_side in columns)
         return forward, backward
 
-    def _owners(self, rows: Indices, dofs: Indices, reached: csr_array) -> Indices:
-        """Return, for each of the values `rows`, which of the simultaneously moved components `dofs` has changed it."""
+    def _sources(self, rows: Indices, dofs: Indices, dependence: csr_array) -> Indices:
+        """Return, for each value in `rows`, the one of the simultaneously moved components `dofs` that changes it."""
         dim, n = self.problem.model.mesh.dim, len(self.u)
-        by_constraint = np.full(reached.shape[0], dofs[0])
+        by_constraint = np.full(dependence.shape[0], dofs[0])
         by_point = np.full(self.problem.model.mesh.n_points, dofs[0])
-        moved = csr_array(reached[:, dofs // dim])
-        first = entry_rows(moved)
-        by_constraint[first] = dofs[moved.indices]
+        dependence_on_group = csr_array(dependence[:, dofs // dim])
+        first = entry_rows(dependence_on_group)
+        by_constraint[first] = dofs[dependence_on_group.indices]
         for constraint in np.unique(first):
             begin, end = self._involved.indptr[constraint : constraint + 2]
             by_point[self._involved.indices[begin:end]] = by_constraint[constraint]
@@ -233,7 +235,7 @@ class MovingContact:
         dof_of_value = np.concatenate([np.repeat(by_point, dim), others, by_constraint, by_point[nodes]])
         return dof_of_value[rows].astype(np.intp)
 
-    def _agrees(self, derivative: csr_array, dofs: Indices) -> bool:
+    def _is_consistent(self, derivative: csr_array, dofs: Indices) -> bool:
         """Return whether the derivative agrees with that along a direction in which all points move."""
         shift = np.zeros(len(self.u))
         shift[dofs] = np.random.default_rng(0).uniform(-1.0, 1.0, len(dofs))
@@ -242,15 +244,15 @@ class MovingContact:
         n, k = len(self.u), len(self.active)
         error = np.abs(difference - derivative @ shift)
         blocks = (slice(0, n), slice(n, n + k), slice(n + k, None))
-        return all(largest(error[block]) <= CHANGED**2 * largest(difference[block]) for block in blocks)
+        return all(largest(error[block]) <= INCREMENT**2 * largest(difference[block]) for block in blocks)
 
 
-def _independent_groups(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
+def _independent_groups(dofs: Indices, dependence: csr_array, dim: int) -> list[Indices]:
     """Return groups of components, no two of which affect the same constraint or constraints that share points."""
-    n_points = reached.shape[1]
+    n_points = dependence.shape[1]
     points = np.unique(dofs[dofs < n_points * dim] // dim)
-    adjacent = _ones(csr_array(reached.T @ reached))
-    dependent = _ones(csr_array(adjacent @ adjacent))
+    adjacent = _with_unit_entries(csr_array(dependence.T @ dependence))
+    dependent = _with_unit_entries(csr_array(adjacent @ adjacent))
     colour: dict[int, int] = {}
     for point in points.tolist():
         neighbours = dependent.indices[dependent.indptr[point] : dependent.indptr[point + 1]].tolist()
@@ -263,7 +265,7 @@ def _independent_groups(dofs: Indices, reached: csr_array, dim: int) -> list[Ind
     return groups + [np.array([dof]) for dof in dofs[dofs >= n_points * dim]]
 
 
-def _ones(pattern: csr_array) -> csr_array:
+def _with_unit_entries(pattern: csr_array) -> csr_array:
     """Return the matrix `pattern` with ones in place of its nonzero entries; it is modified."""
     pattern.eliminate_zeros()
     pattern.data[:] = 1.0

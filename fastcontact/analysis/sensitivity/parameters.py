@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fastcontact.analysis.sensitivity.adjoint import Change
-from fastcontact.analysis.sensitivity.moving_contact import CHANGED, MovingContact
+from fastcontact.analysis.sensitivity.moving_contact import INCREMENT, MovingContact
 from fastcontact.analysis.sensitivity.quantities import Label
 from fastcontact.analysis.wear import Worn
 from fastcontact.arrays import Array
@@ -31,20 +31,20 @@ from fastcontact.model.ramp import combined, multiplier
 CONSTANTS = {"E": "123", "nu": NAMES, "G": NAMES, "expansion": "123"}
 
 
-def _by_constant(contact: MovingContact, parameter: Label) -> Change:
+def _constant_derivatives(contact: MovingContact, parameter: Label) -> Change:
     """Return the derivatives with respect to a constant of a material, by finite differences."""
     model, name = contact.problem.model, str(parameter[0])
     number, material, component = _constant_of(model, parameter)
-    step = CHANGED * _admissible_range(material, name, component)
+    step = INCREMENT * _admissible_range(material, name, component)
 
     def with_increment(increment: float) -> MovingContact:
-        changed, problem = copy.copy(model), contact.problem
-        changed.materials = [
+        changed_model, problem = copy.copy(model), contact.problem
+        changed_model.materials = [
             (_with_constant(m, name, component, increment) if i == number else m, groups)
             for i, (m, groups) in enumerate(model.materials)
         ]
-        pairs = {pair.name: changed.bind(pair, problem.pairs[pair.name].held) for pair in changed.contact}
-        return replace(contact, problem=replace(problem, model=changed, pairs=pairs))
+        pairs = {pair.name: changed_model.bind(pair, problem.pairs[pair.name].held) for pair in changed_model.contact}
+        return replace(contact, problem=replace(problem, model=changed_model, pairs=pairs))
 
     # Central differences with an error of fourth order in the step.
     differences = [
@@ -93,7 +93,7 @@ def _admissible_range(material: Material, name: str, component: int | None) -> f
     """
     value = getattr(material, name)
     if name == "expansion":  # forces are linear in it, so that any increment is accurate
-        return 1.0 / CHANGED
+        return 1.0 / INCREMENT
     if name != "nu":
         return float(value if component is None else value[component])
     if isinstance(material, LinearElastic):
@@ -165,7 +165,7 @@ def _zero_change(contact: MovingContact) -> Change:
     return Change(np.zeros(n), np.zeros(n), np.zeros(n + len(contact.active) + nodes))
 
 
-def _named(kind: str, items: Sequence[Item], parameter: Label, others: Sequence[str] = ()) -> list[Item]:
+def _items_on_group(kind: str, items: Sequence[Item], parameter: Label, others: Sequence[str] = ()) -> list[Item]:
     """Return the loads or temperatures on a group, restricted to this group.
 
     Raises ModelError if there are none and the name is not in `others`.
@@ -184,7 +184,7 @@ def _named(kind: str, items: Sequence[Item], parameter: Label, others: Sequence[
 def _loads(model: Model, parameter: Label) -> list[Load]:
     """Return the loads on a group; empty for a force-driven obstacle."""
     driven = [pair.name for pair in model.force_driven.pairs]
-    return _named("group with a load, or obstacle with a force,", model.loads, parameter, driven)
+    return _items_on_group("group with a load, or obstacle with a force,", model.loads, parameter, driven)
 
 
 def _forces(contact: MovingContact, loads: Sequence[Load]) -> Array:
@@ -196,7 +196,7 @@ def _forces(contact: MovingContact, loads: Sequence[Load]) -> Array:
     return force
 
 
-def _of_load(contact: MovingContact, parameter: Label) -> Change:
+def _load_derivatives(contact: MovingContact, parameter: Label) -> Change:
     """Return the derivatives with respect to a factor of the loads on a group, or of the force on an obstacle."""
     problem = contact.problem
     driven = problem.force_driven.number(str(parameter[1]))
@@ -212,10 +212,10 @@ def _of_load(contact: MovingContact, parameter: Label) -> Change:
 def _speeds(model: Model, parameter: Label) -> list[Centrifugal]:
     """Return the centrifugal forces on a group."""
     centrifugal = [load for load in model.loads if isinstance(load, Centrifugal)]
-    return _named("group with a centrifugal force", centrifugal, parameter)
+    return _items_on_group("group with a centrifugal force", centrifugal, parameter)
 
 
-def _of_speed(contact: MovingContact, parameter: Label) -> Change:
+def _speed_derivatives(contact: MovingContact, parameter: Label) -> Change:
     """Return the derivatives with respect to the angular speed of a group; forces are proportional to its square."""
     loads = [load for load in _speeds(contact.problem.model, parameter) if load.speed]
     derivatives = [-2.0 / load.speed * _forces(contact, [load]) for load in loads]
@@ -224,16 +224,16 @@ def _of_speed(contact: MovingContact, parameter: Label) -> Change:
 
 def _temperatures(model: Model, parameter: Label) -> list[Temperature]:
     """Return the temperatures of a group."""
-    return _named("group with a temperature", model.temperatures, parameter)
+    return _items_on_group("group with a temperature", model.temperatures, parameter)
 
 
-def _of_temperature(contact: MovingContact, parameter: Label) -> Change:
+def _temperature_derivatives(contact: MovingContact, parameter: Label) -> Change:
     """Return the derivatives with respect to a factor of the temperature rise of a group."""
     problem, change = contact.problem, _zero_change(contact)
-    heated = copy.copy(problem.model)
-    heated.temperatures = _temperatures(heated, parameter)
-    forces = combined(heated.thermal_forces_by_ramp(), problem.ramp, contact.instant, heated.mesh.points.shape)
-    change.residual[: heated.n_dofs] = -forces.ravel()
+    restricted = copy.copy(problem.model)
+    restricted.temperatures = _temperatures(restricted, parameter)
+    forces = combined(restricted.thermal_forces_by_ramp(), problem.ramp, contact.instant, restricted.mesh.points.shape)
+    change.residual[: restricted.n_dofs] = -forces.ravel()
     return change
 
 
@@ -243,18 +243,18 @@ def _pretension(model: Model, parameter: Label) -> Pretension:
     return section
 
 
-def _of_pretension(contact: MovingContact, parameter: Label) -> Change:
+def _pretension_derivatives(contact: MovingContact, parameter: Label) -> Change:
     """Return the derivatives with respect to a factor of the force or of the shortening of a pretension section."""
     model = contact.problem.model
     section = _pretension(model, parameter)
     if section.shortening is not None:
         relation_numbers = [i for i, relation in enumerate(model.relations) if relation.name == section.prescribed]
-        return _of_prescribed_values(contact, np.zeros(contact.problem.shape), relation_numbers)
+        return _prescribed_value_derivatives(contact, np.zeros(contact.problem.shape), relation_numbers)
     forces = [load for load in model.loads if isinstance(load, PretensionForce) and load.section is section]
     return replace(_zero_change(contact), residual=-_forces(contact, forces))
 
 
-def _prescribing(model: Model, parameter: Label) -> tuple[list[Support], list[int]]:
+def _prescribed_parts(model: Model, parameter: Label) -> tuple[list[Support], list[int]]:
     """Return the supports on a group, and the numbers of constraints that prescribe displacements along normals or axes."""
     group, component = parameter[1], "xyz".find(str(parameter[2])) if len(parameter) == 3 else None
     supports = [s for s in model.supports if s.group == group and component in (None, s.component)]
@@ -268,11 +268,11 @@ def _prescribing(model: Model, parameter: Label) -> tuple[list[Support], list[in
     return supports, relation_numbers
 
 
-def _of_prescribed(contact: MovingContact, parameter: Label) -> Change:
+def _prescribed_derivatives(contact: MovingContact, parameter: Label) -> Change:
     """Return the derivatives with respect to a factor of the prescribed displacements of a group."""
     problem, instant = contact.problem, contact.instant
     model = problem.model
-    supports, relation_numbers = _prescribing(model, parameter)
+    supports, relation_numbers = _prescribed_parts(model, parameter)
     if any(support.rotation is not None for support in supports):
         raise ModelError(
             f"results are not linear in the rotation of '{parameter[1]}': its sensitivity is not available"
@@ -284,10 +284,10 @@ def _of_prescribed(contact: MovingContact, parameter: Label) -> Change:
         values[nodes, support.component] = displacements * multiplier(support.ramp, problem.ramp, instant)
     if model.kinematics == "axisymmetric":
         values[model.axis_nodes, 0] = 0.0
-    return _of_prescribed_values(contact, values, relation_numbers)
+    return _prescribed_value_derivatives(contact, values, relation_numbers)
 
 
-def _of_prescribed_values(contact: MovingContact, values: Array, relation_numbers: Sequence[int]) -> Change:
+def _prescribed_value_derivatives(contact: MovingContact, values: Array, relation_numbers: Sequence[int]) -> Change:
     """Return the derivatives with respect to a factor of prescribed displacements and of the values of constraints.
 
     `values` (n_points, dim) are the displacements [length], and `relation_numbers` the numbers of the constraints.
@@ -300,17 +300,17 @@ def _of_prescribed_values(contact: MovingContact, values: Array, relation_number
     return replace(_zero_change(contact), lift=problem.system.lift(values.ravel(), factors))
 
 
-def _with_motion(model: Model, parameter: Label) -> ContactPair:
+def _moving_obstacle(model: Model, parameter: Label) -> ContactPair:
     """Return the pair of a rigid obstacle with a prescribed motion."""
     pairs = {pair.name: pair for pair in model.contact if any(pair.motion)}
     obstacle: ContactPair = _item("rigid obstacle with a motion", pairs, parameter)
     return obstacle
 
 
-def _of_motion(contact: MovingContact, parameter: Label) -> Change:
+def _motion_derivatives(contact: MovingContact, parameter: Label) -> Change:
     """Return the derivatives with respect to a factor of the motion of a rigid obstacle."""
     problem, name = contact.problem, str(parameter[1])
-    pair = _with_motion(problem.model, parameter)
+    pair = _moving_obstacle(problem.model, parameter)
     motion = np.array(pair.motion) * multiplier(pair.ramp, problem.ramp, contact.instant)
     number = problem.force_driven.number(name)
     if number is not None:
@@ -319,48 +319,48 @@ def _of_motion(contact: MovingContact, parameter: Label) -> Change:
         zero_factors = [0.0] * len(problem.model.relations)
         return replace(_zero_change(contact), lift=problem.system.lift(values, zero_factors))
 
-    def changed(increment: float) -> MovingContact:
+    def with_increment(increment: float) -> MovingContact:
         obstacles = {**contact.load.obstacles, name: contact.load.obstacles[name] + increment * motion}
         return replace(contact, load=replace(contact.load, obstacles=obstacles))
 
     size = float(np.abs(motion).max())
     if size == 0.0:
         return _zero_change(contact)
-    return replace(_zero_change(contact), sample=contact.parameter_derivative(changed, contact.step / size))
+    return replace(_zero_change(contact), sample=contact.parameter_derivative(with_increment, contact.step / size))
 
 
-def _with_clearance(model: Model, parameter: Label) -> None:
+def _check_clearance(model: Model, parameter: Label) -> None:
     """Raise ModelError if a contact pair does not exist or is tied, so that it has no clearance."""
     if _item("contact pair", {pair.name: pair for pair in model.contact}, parameter).options.get("kind") == "tied":
         raise ModelError(f"contact '{parameter[1]}' is tied: its gaps are fixed, and it has no clearance")
 
 
-def _of_clearance(contact: MovingContact, parameter: Label) -> Change:
+def _clearance_derivatives(contact: MovingContact, parameter: Label) -> Change:
     """Return the derivatives with respect to a length that is added to the gaps of a contact pair."""
     name = str(parameter[1])
     pair = contact.problem.pairs[name]
     count = len(pair.secondary.points)
 
-    def changed(increment: float) -> MovingContact:
+    def with_increment(increment: float) -> MovingContact:
         worn = {**contact.state.worn, name: Worn(np.full(count, increment), np.zeros(count))}
         return replace(contact, state=replace(contact.state, worn=worn))
 
-    return replace(_zero_change(contact), sample=contact.parameter_derivative(changed, contact.step))
+    return replace(_zero_change(contact), sample=contact.parameter_derivative(with_increment, contact.step))
 
 
-_BY_CONSTANT = _constant_of, _by_constant
+_CONSTANT = _constant_of, _constant_derivatives
 # The form of each kind of parameter, the function that raises ModelError if a model does not have the parameter, and the
 # function that returns the derivatives of the residual.
 KINDS: dict[str, tuple[str, Callable[[Model, Label], object], Callable[[MovingContact, Label], Change]]] = {
-    "E": ('("E", material), or ("E", material, "1") along axis 1 of an Orthotropic', *_BY_CONSTANT),
-    "nu": ('("nu", material), or ("nu", material, "12") for axes 1 and 2 of an Orthotropic', *_BY_CONSTANT),
-    "G": ('("G", material, "12") for axes 1 and 2 of an Orthotropic', *_BY_CONSTANT),
-    "expansion": ('("expansion", material), or ("expansion", material, "1") along axis 1', *_BY_CONSTANT),
-    "load": ('("load", group)', _loads, _of_load),
-    "speed": ('("speed", group)', _speeds, _of_speed),
-    "temperature": ('("temperature", group)', _temperatures, _of_temperature),
-    "pretension": ('("pretension", name)', _pretension, _of_pretension),
-    "prescribed": ('("prescribed", group) or ("prescribed", group, "y")', _prescribing, _of_prescribed),
-    "motion": ('("motion", obstacle)', _with_motion, _of_motion),
-    "clearance": ('("clearance", pair)', _with_clearance, _of_clearance),
+    "E": ('("E", material), or ("E", material, "1") along axis 1 of an Orthotropic', *_CONSTANT),
+    "nu": ('("nu", material), or ("nu", material, "12") for axes 1 and 2 of an Orthotropic', *_CONSTANT),
+    "G": ('("G", material, "12") for axes 1 and 2 of an Orthotropic', *_CONSTANT),
+    "expansion": ('("expansion", material), or ("expansion", material, "1") along axis 1', *_CONSTANT),
+    "load": ('("load", group)', _loads, _load_derivatives),
+    "speed": ('("speed", group)', _speeds, _speed_derivatives),
+    "temperature": ('("temperature", group)', _temperatures, _temperature_derivatives),
+    "pretension": ('("pretension", name)', _pretension, _pretension_derivatives),
+    "prescribed": ('("prescribed", group) or ("prescribed", group, "y")', _prescribed_parts, _prescribed_derivatives),
+    "motion": ('("motion", obstacle)', _moving_obstacle, _motion_derivatives),
+    "clearance": ('("clearance", pair)', _check_clearance, _clearance_derivatives),
 }

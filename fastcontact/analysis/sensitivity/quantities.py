@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fastcontact.analysis.sensitivity.adjoint import Gradient
-from fastcontact.analysis.sensitivity.moving_contact import CHANGED, MovingContact
+from fastcontact.analysis.sensitivity.moving_contact import INCREMENT, MovingContact
 from fastcontact.errors import ModelError, unknown
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
@@ -125,7 +125,7 @@ def _pressure(
     contact = replace(contact, pair=name, closed=result.active)
     multiplier, by_multiplier = contact.solution.multiplier, zero.multiplier
     rows_of_pair, rows = contact.constraints.rows[name], contact.active
-    change = CHANGED * (float(np.abs(multiplier[rows_of_pair]).max(initial=0.0)) or 1.0)
+    change = INCREMENT * (float(np.abs(multiplier[rows_of_pair]).max(initial=0.0)) or 1.0)
     base = contact.pressure(multiplier)[row]
     for k in np.flatnonzero((rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)):
         increased = multiplier.copy()

@@ -87,7 +87,7 @@ def counts(start: Numbers, rows: Numbers, parent: Numbers, order: Numbers, count
             before, last[i] = last[i], j
             count[j] += 1
             if before != -1:
-                count[_common(before, ancestor)] -= 1
+                count[_root(before, ancestor)] -= 1
         if parent[j] != -1:
             ancestor[j] = parent[j]
     for j in range(n):
@@ -96,7 +96,7 @@ def counts(start: Numbers, rows: Numbers, parent: Numbers, order: Numbers, count
 
 
 @inlined_kernel
-def _common(j: int, ancestor: Numbers) -> int:
+def _root(j: int, ancestor: Numbers) -> int:
     """Return the root of the set of j, with path compression."""
     root = j
     while root != ancestor[root]:
@@ -112,14 +112,14 @@ def _common(j: int, ancestor: Numbers) -> int:
 def supernodes(
     parent: Numbers, count: Numbers, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets
 ) -> int:
-    """Find supernodes, sequences of columns with (nearly) the same rows below them; return their number.
+    """Find supernodes, which are sequences of columns with nearly the same rows below them; return their number.
 
     Parameters
     ----------
     parent, count : ndarray of int (n,)
         Tree, and number of entries of each column, for columns numbered in postorder.
     given : ndarray of bool (n,)
-        Columns that are not put into the same supernode as other columns.
+        Marked columns, which do not share supernodes with columns that are not marked.
     widths : ndarray (k,), shares : ndarray (k + 1,)
         Adjacent supernodes are merged if the fraction of explicit zeros in the result is at most ``shares[i]``, i the
         first of the ascending `widths` not smaller than the width of the result. The last share applies to all wider ones.
@@ -129,10 +129,10 @@ def supernodes(
     n, top = len(parent), -1
     entries = np.empty(n, np.int64)
     for j in range(n + 1):
-        same = 0 < j < n and parent[j - 1] == j and count[j - 1] == count[j] + 1 and given[j - 1] == given[j]
-        if not same:
+        continues = 0 < j < n and parent[j - 1] == j and count[j - 1] == count[j] + 1 and given[j - 1] == given[j]
+        if not continues:
             if top >= 0:
-                top = _joined(parent, given, widths, shares, first, below, entries, top, j)
+                top = _merged(parent, given, widths, shares, first, below, entries, top, j)
             top += 1
             first[top] = j
             if j < n:
@@ -144,7 +144,7 @@ def supernodes(
 
 
 @inlined_kernel
-def _joined(
+def _merged(
     parent: Numbers, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets, entries: Offsets,
     top: int, end: int,
 ) -> int:  # fmt: skip
@@ -174,7 +174,7 @@ def rows_below(
     column ``order[k]`` of the matrix, and `position` is the inverse of `order`.
     """
     n, count = len(order), len(first) - 1
-    members, seen, at = np.empty(n, np.int32), np.full(count, -1, np.int32), row_start[:count].copy()
+    members, last_row, at = np.empty(n, np.int32), np.full(count, -1, np.int32), row_start[:count].copy()
     for s in range(count):
         members[first[s] : first[s + 1]] = s
     for i in range(n):
@@ -184,8 +184,8 @@ def rows_below(
             if j >= i:
                 continue
             s = members[j]
-            while s != members[i] and seen[s] != i:
-                seen[s] = i
+            while s != members[i] and last_row[s] != i:
+                last_row[s] = i
                 row_indices[at[s]] = i
                 at[s] += 1
                 s = members[parent[first[s + 1] - 1]]

@@ -33,8 +33,8 @@ def fill_reducing(K: bsr_array, last: Indices, connected: bool = False) -> Indic
 
     With `connected`, the order takes into account that the unknowns `last` are coupled with each other after the elimination
     of all others. Nodes are ordered by the minimum degree algorithm for the pattern of K (Liu, 1985). SciPy only provides
-    this order as a part of the factorisations of SuperLU. An incomplete factorisation that drops all entries costs little
-    more than the ordering.
+    this order as a part of the factorisations of SuperLU. An incomplete factorisation, which drops all entries, takes little
+    more time than the ordering.
     """
     size = K.blocksize[0]
     n = K.shape[0] // size
@@ -102,11 +102,11 @@ class SymbolicFactors:
         n, is_last = K.shape[0], np.zeros(K.shape[0], bool)
         self._pattern, self._last = (K.indptr, K.indices), last
         self._previous = Previous(np.empty(0), np.empty(0, np.int64), NO_FACTORS)
-        self._numbers: csc_array | None = None
+        self._entry_numbers: csc_array | None = None
         self._first: csc_array | None
         orders = [fill_reducing(K, last, connected) for connected in (False, True)[: 1 + repeated]]
-        analysed = [(order, A := reordered(K, order), elimination_tree(A)) for order in orders]
-        order, self._first, self._tree = min(analysed, key=lambda entry: np.square(entry[2].entries, dtype=float).sum())
+        options = [(order, A := reordered(K, order), elimination_tree(A)) for order in orders]
+        order, self._first, self._tree = min(options, key=lambda entry: np.square(entry[2].entries, dtype=float).sum())
         self._unknowns, self._position = order[self._tree.order], np.empty(n, np.intp)
         self._position[self._unknowns] = np.arange(n)
         is_last[self._position[last]] = True
@@ -127,12 +127,12 @@ class SymbolicFactors:
         ModelError
             If K is singular or not positive definite.
         """
-        (A, *permutation), nodes, n = self._numbered(K), self._supernodes, K.shape[0]
+        (A, *permutation), nodes, n = self._in_elimination_order(K), self._supernodes, K.shape[0]
         width, below = np.diff(nodes.first), np.diff(nodes.row_start)
         start = np.concatenate([[0], np.cumsum(np.repeat(nodes.first[1:] + below, width) - np.arange(n))])
         values, d = np.empty(start[-1]), np.empty(n)
         sizes = factorisation_kernels.work_sizes(self._tree.parent, nodes.first, nodes.row_start)
-        source, target, updates = self._planned(A, permutation[0])
+        source, target, updates = self._plan(A, permutation[0])
         failed = factorisation_kernels.factorise(
             A.indptr, A.indices, A.data, *permutation, self._tree.parent, *nodes, sizes, start,
             source, self._previous.factors, target, updates, values, d,
@@ -141,11 +141,11 @@ class SymbolicFactors:
             if abs(d[failed]) <= LENGTH_ROUND_OFF * A.diagonal()[permutation[0][failed]]:
                 raise singular()
             raise ModelError("the stiffness matrix is not positive definite: check the material and the cells")
-        if self._numbers is not None:
+        if self._entry_numbers is not None:
             self._previous = Previous(A.data, target, (values, d, updates) if (target >= 0).any() else NO_FACTORS)
         return SymmetricFactors(LowerTriangle(start, values, *nodes), d, self._position, self._last)
 
-    def _planned(self, A: csc_array, order: Numbers) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    def _plan(self, A: csc_array, order: Numbers) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """Return `source` and `target` (n_supernodes,) of `factorisation_kernels.plan`, and an array for update matrices."""
         nodes, previous, size = self._supernodes, self._previous, 0
         source, target = np.full((2, len(self._parent)), -1)
@@ -156,7 +156,7 @@ class SymbolicFactors:
             )  # fmt: skip
         return source, target, np.empty(size)
 
-    def _numbered(self, K: bsr_array) -> tuple[csc_array, Numbers, Numbers]:
+    def _in_elimination_order(self, K: bsr_array) -> tuple[csc_array, Numbers, Numbers]:
         """Return K, its columns in the order of elimination, and the inverse; see `factorisation_kernels.factorise`.
 
         From the second matrix on, only the lower triangle in this order is returned, by the cached positions of its entries.
@@ -164,12 +164,12 @@ class SymbolicFactors:
         if self._first is not None:
             A, self._first = self._first, None
             return A, self._tree.order, self._tree.position
-        if self._numbers is None:
+        if self._entry_numbers is None:
             numbers = np.arange(K.data.size, dtype=np.int64).reshape(K.data.shape)
             A = reordered(bsr_array((numbers, K.indices, K.indptr), shape=K.shape), self._unknowns).tocoo()
             lower = A.row >= A.col
-            self._numbers = csc_array((A.data[lower], (A.row[lower], A.col[lower])), shape=K.shape)
-        A, identity = self._numbers, np.arange(K.shape[0], dtype=np.intc)
+            self._entry_numbers = csc_array((A.data[lower], (A.row[lower], A.col[lower])), shape=K.shape)
+        A, identity = self._entry_numbers, np.arange(K.shape[0], dtype=np.intc)
         return csc_array((K.data.ravel()[A.data], A.indices, A.indptr), shape=K.shape), identity, identity
 
 

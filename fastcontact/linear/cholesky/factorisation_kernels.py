@@ -27,15 +27,15 @@ def work_sizes(parent: Numbers, first: Offsets, row_start: Offsets) -> tuple[int
     """Return the numbers of entries of the largest front, and of the stack of update matrices at its peak."""
     count = len(first) - 1
     largest_front = peak = used = top = 0
-    stacked = np.empty(count, np.int64)  # supernodes whose update matrix is on the stack
+    stack_supernodes = np.empty(count, np.int64)  # supernodes whose update matrix is on the stack
     for s in range(count):
         below = row_start[s + 1] - row_start[s]
         largest_front = max(largest_front, (first[s + 1] - first[s] + below) ** 2)
-        while top > 0 and first[s] <= parent[first[stacked[top - 1] + 1] - 1] < first[s + 1]:
+        while top > 0 and first[s] <= parent[first[stack_supernodes[top - 1] + 1] - 1] < first[s + 1]:
             top -= 1
-            used -= (row_start[stacked[top] + 1] - row_start[stacked[top]]) ** 2
+            used -= (row_start[stack_supernodes[top] + 1] - row_start[stack_supernodes[top]]) ** 2
         if below:
-            stacked[top] = s
+            stack_supernodes[top] = s
             top += 1
             used += below**2
             peak = max(peak, used)
@@ -123,7 +123,7 @@ def factorise(
     """
     count = len(first) - 1
     front, stack = np.empty(sizes[0]), np.empty(sizes[1])
-    local, stacked = np.empty(len(order), np.int64), np.empty(count, np.int64)
+    local, stack_supernodes = np.empty(len(order), np.int64), np.empty(count, np.int64)
     # Work space for a panel, the panel multiplied by its pivots, and the product of both.
     widest = 0
     for s in range(count):
@@ -137,13 +137,13 @@ def factorise(
             size = high - low + m
             F = front[: size * size].reshape(size, size)
             _gather(start, rows, values, order, position, low, high, rows_below, local, F)
-            while top > 0 and low <= parent[first[stacked[top - 1] + 1] - 1] < high:
+            while top > 0 and low <= parent[first[stack_supernodes[top - 1] + 1] - 1] < high:
                 top -= 1
-                child = below[row_start[stacked[top]] : row_start[stacked[top] + 1]]
+                child = below[row_start[stack_supernodes[top]] : row_start[stack_supernodes[top] + 1]]
                 n = len(child)
                 used -= n * n
                 _add(stack[used : used + n * n].reshape(n, n), child, local, F)
-            failed = _eliminated(F, high - low, panel, scaled_panel, product)
+            failed = _eliminate_columns(F, high - low, panel, scaled_panel, product)
             if failed >= 0:
                 d[low + failed] = F[failed, failed]
                 return low + failed
@@ -157,7 +157,7 @@ def factorise(
         if saved_offsets[s] >= 0:
             _copy(stack, used, updates, saved_offsets[s], m * m)
         if m:
-            stacked[top] = s
+            stack_supernodes[top] = s
             top += 1
             used += m * m
     return -1
@@ -216,7 +216,7 @@ def _add(update: Array, rows: Numbers, local: Offsets, F: Array) -> None:
 
 
 @kernel
-def _eliminated(F: Array, width: int, panel: Array, scaled_panel: Array, product: Array) -> int:
+def _eliminate_columns(F: Array, width: int, panel: Array, scaled_panel: Array, product: Array) -> int:
     """Eliminate the first `width` columns of a front; return -1, or the first without a positive pivot.
 
     The pivots remain on the diagonal, and the columns of L are stored to the right of it.
@@ -237,7 +237,7 @@ def _eliminated(F: Array, width: int, panel: Array, scaled_panel: Array, product
                     F[j, k] /= pivot
         m = size - end
         if (end - begin) * m * m >= BLAS_THRESHOLD:
-            _reduced_by_blocks(F, begin, end, panel, scaled_panel, product)
+            _subtract_by_blocks(F, begin, end, panel, scaled_panel, product)
         else:
             for low in range(begin, end, COLUMNS_PER_PASS):
                 _subtract(F, low, min(low + COLUMNS_PER_PASS, end), end, size, True)
@@ -271,7 +271,7 @@ def _factor(F: Array, j: int, i: int, scaled: bool) -> float:
 
 
 @kernel
-def _reduced_by_blocks(F: Array, begin: int, end: int, panel: Array, scaled_panel: Array, product: Array) -> None:
+def _subtract_by_blocks(F: Array, begin: int, end: int, panel: Array, scaled_panel: Array, product: Array) -> None:
     """Subtract the contribution of the columns `begin` to ``end - 1`` of L from the rows below by matrix products."""
     size, width = len(F), end - begin
     m = size - end

@@ -112,36 +112,36 @@ def solve_together(
     start: Offsets, values: Array, first: Offsets, row_start: Offsets, rows: Numbers, d: Array, loaded: Mask, required: Mask,
     X: Array,
 ) -> None:  # fmt: skip
-    """Replace the rows `required` of X (n, k) by those of ``(L D L.T)^-1 X``, for all k columns at once.
+    """Replace the rows `required` of X (n, k) by those of ``(L D L.T)^-1 X``, for all k columns simultaneously.
 
     Only the rows `loaded` (n,) of X may have nonzero entries; d (n,) is the diagonal of D. The forward substitution skips
-    supernodes that are not `_reached` from the rows `loaded`, and the backward substitution those that are not `_reached`
-    from the rows `required` (n,). Both masks are overwritten, and the other rows of X are undefined afterwards.
+    supernodes that the rows `loaded` do not affect, and the backward substitution those that do not affect the rows
+    `required` (n,); see `_affected`. Both masks are overwritten, and the other rows of X are undefined afterwards.
     """
     widest = 0
     for s in range(len(first) - 1):
         widest = max(widest, first[s + 1] - first[s] + row_start[s + 1] - row_start[s])
-    room, below = np.empty(PANEL * widest), np.empty(widest, np.int64)
-    beside, product = np.empty((widest, X.shape[1])), np.empty((PANEL, X.shape[1]))
-    reached = _reached(first, row_start, rows, loaded)
-    for s in range(len(reached)):
-        for low in range(first[s], first[s + 1] if reached[s] else first[s], PANEL):
+    panel, below = np.empty(PANEL * widest), np.empty(widest, np.int64)
+    panel_rows, product = np.empty((widest, X.shape[1])), np.empty((PANEL, X.shape[1]))
+    affected = _affected(first, row_start, rows, loaded)
+    for s in range(len(affected)):
+        for low in range(first[s], first[s + 1] if affected[s] else first[s], PANEL):
             high = min(low + PANEL, first[s + 1])
             for j in range(low, high):
                 for i in range(j + 1, high):
                     X[i] -= values[start[j] + i - j] * X[j]
-            size = _copied(start, values, low, high, first[s + 1], rows[row_start[s] : row_start[s + 1]], room, below)
-            np.dot(room[: (high - low) * size].reshape(high - low, size).T, X[low:high], beside[:size])
+            size = _copy(start, values, low, high, first[s + 1], rows[row_start[s] : row_start[s + 1]], panel, below)
+            np.dot(panel[: (high - low) * size].reshape(high - low, size).T, X[low:high], panel_rows[:size])
             for k in range(size):
-                X[below[k]] -= beside[k]
-    reached = _reached(first, row_start, rows, required)
-    for s in range(len(reached) - 1, -1, -1):
-        for high in range(first[s + 1], first[s] if reached[s] else first[s + 1], -PANEL):
+                X[below[k]] -= panel_rows[k]
+    affected = _affected(first, row_start, rows, required)
+    for s in range(len(affected) - 1, -1, -1):
+        for high in range(first[s + 1], first[s] if affected[s] else first[s + 1], -PANEL):
             low = max(high - PANEL, first[s])
-            size = _copied(start, values, low, high, first[s + 1], rows[row_start[s] : row_start[s + 1]], room, below)
+            size = _copy(start, values, low, high, first[s + 1], rows[row_start[s] : row_start[s + 1]], panel, below)
             for k in range(size):
-                beside[k] = X[below[k]]
-            np.dot(room[: (high - low) * size].reshape(high - low, size), beside[:size], product[: high - low])
+                panel_rows[k] = X[below[k]]
+            np.dot(panel[: (high - low) * size].reshape(high - low, size), panel_rows[:size], product[: high - low])
             for j in range(high - 1, low - 1, -1):
                 X[j] = X[j] / d[j] - product[j - low]
                 for i in range(j + 1, high):
@@ -149,22 +149,22 @@ def solve_together(
 
 
 @kernel
-def _reached(first: Offsets, row_start: Offsets, rows: Numbers, marked: Mask) -> Mask:
+def _affected(first: Offsets, row_start: Offsets, rows: Numbers, marked: Mask) -> Mask:
     """Return which supernodes (n_supernodes,) contain `marked` columns (n,), or have descendants that do.
 
     Descendants and ancestors are those in the elimination tree. All ancestors of marked columns are marked as well.
     """
-    reached = np.zeros(len(first) - 1, np.bool_)
-    for s in range(len(reached)):
-        reached[s] = marked[first[s] : first[s + 1]].any()
-        if reached[s]:
+    affected = np.zeros(len(first) - 1, np.bool_)
+    for s in range(len(affected)):
+        affected[s] = marked[first[s] : first[s + 1]].any()
+        if affected[s]:
             for k in range(row_start[s], row_start[s + 1]):
                 marked[rows[k]] = True
-    return reached
+    return affected
 
 
 @kernel
-def _copied(
+def _copy(
     start: Offsets, values: Array, low: int, high: int, end: int, rows_below: Numbers, panel: Array, below: Offsets
 ) -> int:
     """Copy columns `low` to ``high - 1`` of L, from row `high` on, to `panel` one by one; return their length.

@@ -127,10 +127,10 @@ Inverse: TypeAlias = SparseInverse | CoupledPivots
 
 
 def lumped(P: csr_array, pivots: Indices, size: int) -> csr_array:
-    """Return P (m, m) with the entries of each row summed into the diagonal block of its node, separately by direction.
+    """Return P (m, m) with the entries of each row summed, for each direction, into the diagonal block of its node.
 
-    Entries in directions in which the node of the row has no pivot are left out. In the other directions, the product with a
-    translation of all pivots is unchanged. `pivots` (m,) are the unknowns of the columns, and `size` is the number of
+    Entries in directions in which the node of the row has no pivot are omitted. In the other directions, the product with a
+    translation of all pivots does not change. `pivots` (m,) are the unknowns of the columns, and `size` is the number of
     unknowns of a node.
     """
     node, direction = pivots // size, pivots % size
@@ -159,14 +159,14 @@ def block_inverse(A: csr_array) -> csr_array:
     entries = coo_array(A)
     rows, cols, values = [], [], []
     for k in np.unique(size):
-        of_size = np.flatnonzero(size == k)
+        components = np.flatnonzero(size == k)
         block_number = np.full(len(size), -1, np.intp)
-        block_number[of_size] = np.arange(len(of_size))
+        block_number[components] = np.arange(len(components))
         selected = block_number[label[entries.row]] >= 0
         row, col = entries.row[selected], entries.col[selected]
-        blocks = np.zeros((len(of_size), k, k))
+        blocks = np.zeros((len(components), k, k))
         np.add.at(blocks, (block_number[label[row]], position[row], position[col]), entries.data[selected])
-        members = order[first[of_size][:, None] + np.arange(k)]
+        members = order[first[components][:, None] + np.arange(k)]
         rows.append(np.repeat(members, k, axis=1).ravel())
         cols.append(np.tile(members, k).ravel())
         values.append(_inverses(blocks).ravel())

@@ -17,7 +17,7 @@ from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledPivots, Inverse, SparseInverse
 from fastcontact.linear.sparse_rows import entry_rows
 
-NONE = SparseInverse(csr_array((0, 0)))
+NO_INVERSE = SparseInverse(csr_array((0, 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +51,8 @@ class Elimination:
     weights: csr_array
     offset: Array
     force_weights: csr_array
-    inverse: Inverse = NONE
-    pivot_inverse: Inverse = NONE
+    inverse: Inverse = NO_INVERSE
+    pivot_inverse: Inverse = NO_INVERSE
     compliance: Array | None = None
 
     @property
@@ -63,8 +63,8 @@ class Elimination:
     @cached_property
     def _entry_equations(self) -> tuple[Indices, Indices]:
         """Equations of the entries of `weights` (k,) and of `force_weights` (l,)."""
-        of_weights = entry_rows(self.weights)
-        return of_weights, of_weights if self.force_weights is self.weights else entry_rows(self.force_weights)
+        rows = entry_rows(self.weights)
+        return rows, rows if self.force_weights is self.weights else entry_rows(self.force_weights)
 
     def multiplier(self, forces: Array) -> Array:
         """Return the multipliers (m,) [force], given their `forces` (m,) at the pivots, ``(K u - f)[pivots]`` [force]."""
@@ -99,7 +99,7 @@ class Elimination:
         """Return an elimination with sparse weights for a preconditioner: an approximation if pivots are coupled."""
         if not self.coupled:
             return self
-        weights = _weighted(self.pivot_inverse.sparse, self.weights)
+        weights = _sparse_weights(self.pivot_inverse.sparse, self.weights)
         return Elimination(self.pivots, weights, np.zeros(len(self.pivots)), weights, self.pivot_inverse.sparse)
 
 
@@ -134,21 +134,21 @@ def eliminate(
     weights, offset = _weights(B, pivots, inverse), inverse.solve(c)
     if force_rows is None:
         return Elimination(pivots, weights, offset, weights, inverse, inverse)
-    of_forces = pivot_order.inverse_of(force_rows, pivots, size)
-    return Elimination(pivots, weights, offset, _weights(force_rows, pivots, of_forces), of_forces, inverse)
+    force_inverse = pivot_order.inverse_of(force_rows, pivots, size)
+    return Elimination(pivots, weights, offset, _weights(force_rows, pivots, force_inverse), force_inverse, inverse)
 
 
 def _weights(B: csr_array, pivots: Indices, inverse: Inverse) -> csr_array:
     """Return `Elimination.weights` (m, n), given the inverse of the columns of B that belong to the pivots."""
     is_pivot = np.zeros(B.shape[1], bool)
     is_pivot[pivots] = True
-    rest = csr_array((np.where(is_pivot[B.indices], 0.0, -B.data), B.indices, B.indptr), shape=B.shape, copy=True)
-    rest.eliminate_zeros()
-    return rest if isinstance(inverse, CoupledPivots) else _weighted(inverse, rest)
+    remainder = csr_array((np.where(is_pivot[B.indices], 0.0, -B.data), B.indices, B.indptr), shape=B.shape, copy=True)
+    remainder.eliminate_zeros()
+    return remainder if isinstance(inverse, CoupledPivots) else _sparse_weights(inverse, remainder)
 
 
-def _weighted(inverse: SparseInverse, rest: csr_array) -> csr_array:
-    """Return the product (m, n) of the inverse of the pivot columns and the negative remaining columns `rest` (m, n)."""
-    weights = csr_array(inverse.matrix @ rest)
+def _sparse_weights(inverse: SparseInverse, remainder: csr_array) -> csr_array:
+    """Return the product (m, n) of the inverse of the pivot columns and the negative remaining columns `remainder` (m, n)."""
+    weights = csr_array(inverse.matrix @ remainder)
     weights.sort_indices()
     return weights

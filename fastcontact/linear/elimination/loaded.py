@@ -40,7 +40,7 @@ class LoadedIteration:
         self._solver, self._f = solver, np.ascontiguousarray(f, float)
 
     @functools.cached_property
-    def _free(self) -> Array:
+    def _unconstrained(self) -> Array:
         """Solution (n,) without equations [length]."""
         return np.asarray(self._solver.solution(self._f, None, None))
 
@@ -62,16 +62,16 @@ class LoadedIteration:
             else:
                 u = solver.solution(self._f, elimination, guess, monitor, tolerance)
                 return u, solver.multiplier(elimination, u, self._f)
-        multiplier = solve_multipliers(solver.columns.of_rows(B), c - B @ self._free, C)
+        multiplier = solve_multipliers(solver.columns.of_rows(B), c - B @ self._unconstrained, C)
         return solver.solution(self._f + B.T @ multiplier, None, guess), multiplier
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
-        return R @ self._free, self._solver.columns.of_rows(R)
+        return R @ self._unconstrained, self._solver.columns.of_rows(R)
 
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """See `Loaded`."""
-        return self._solver.solution(self._f + force, None, None) if force.any() else self._free
+        return self._solver.solution(self._f + force, None, None) if force.any() else self._unconstrained
 
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
@@ -83,9 +83,9 @@ class LoadedIteration:
 
 
 def tighten(solver: LinearSolver, excess: float) -> bool:
-    """Reduce the tolerance of `solver`, whose residual exceeds its bound by the factor `excess`.
+    """Reduce the tolerance of `solver`, whose residual exceeds its bound by the factor `excess`; return whether it changed.
 
-    Return False if the tolerance is already as small as round-off permits.
+    It does not change if it is already as small as round-off permits.
     """
     tolerance = max(solver.tolerance * REDUCTION / excess, SUM_ROUND_OFF)
     if not tolerance < solver.tolerance:

@@ -30,7 +30,7 @@ from fastcontact.linear.elimination.coupled_pivots import (
 from fastcontact.linear.sparse_rows import entry_rows
 
 # Smallest ratio of a pivot to the largest entry of its equation.
-SMALLEST = 0.25
+SMALLEST_PIVOT = 0.25
 # Largest size of a block that is inverted instead of factorised, and largest size of a block that is inverted if it cannot be
 # factorised (`test_many_coupled_equations_are_assigned_unknowns`). The latter is also the largest number of equations whose
 # pivots are chosen by a dense QR factorisation.
@@ -108,13 +108,13 @@ def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInvers
         return None
     inside = np.repeat(label, np.diff(P.indptr)) == label[P.indices]
     values = (np.where(mask, P.data, 0.0) for mask in (inside, ~inside))
-    diagonal, beyond = (csr_array((data, P.indices, P.indptr), shape=P.shape, copy=True) for data in values)
+    diagonal, off_diagonal = (csr_array((data, P.indices, P.indptr), shape=P.shape, copy=True) for data in values)
     diagonal.eliminate_zeros()
-    beyond.eliminate_zeros()
+    off_diagonal.eliminate_zeros()
     # The inverse of a block triangular matrix is a finite Neumann series.
-    total = term = inner = block_inverse(diagonal)
+    total = term = diagonal_inverse = block_inverse(diagonal)
     for _ in range(layers):
-        term = csr_array(-(inner @ beyond @ term))
+        term = csr_array(-(diagonal_inverse @ off_diagonal @ term))
         if not term.nnz:
             return SparseInverse(total)
         total = csr_array(total + term)
@@ -124,7 +124,7 @@ def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInvers
 def of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indices | None:
     """Return the pivots (m,), chosen among the exclusive unknowns of groups; None if a group has too few of them.
 
-    An unknown is exclusive to a group if no other group of the same and of later layers involves it. The first layer
+    An unknown is exclusive to a group if no other group of the same or of a later layer involves it. The first layer
     contains the groups with enough exclusive unknowns among all groups, the second layer those with enough among the
     remaining ones, and so on, up to `layers` layers. An example is the set of weighted gaps of quadratic facets with dual
     multipliers: no other midside node involves the unknowns of a midside node, and without the midside nodes the same holds
@@ -190,7 +190,7 @@ def of_nodes(B: csr_array, nodes: Indices, size: int) -> Indices | None:
 def _pivots_in_groups(B: csr_array, group: Indices, eligible: Mask) -> Indices:
     """Return the pivots (m,) by complete pivoting within each group, in all groups simultaneously.
 
-    A pivot must be at least SMALLEST times the largest entry of its row. If a group has fewer pivots than rows, all its
+    A pivot must be at least SMALLEST_PIVOT times the largest entry of its row. If a group has fewer pivots than rows, all its
     rows get -1.
 
     Parameters
@@ -223,7 +223,7 @@ def _pivots_in_groups(B: csr_array, group: Indices, eligible: Mask) -> Indices:
             break
         r, c = np.divmod(np.abs(blocks[unfinished]).reshape(len(unfinished), -1).argmax(axis=1), blocks.shape[2])
         chosen_row, pivot = equation[unfinished, r], blocks[unfinished, r, c]
-        accepted = (np.abs(pivot) >= SMALLEST * largest[chosen_row]) & (pivot != 0.0)
+        accepted = (np.abs(pivot) >= SMALLEST_PIVOT * largest[chosen_row]) & (pivot != 0.0)
         failed[unfinished[~accepted]] = True
         unfinished, r, c, chosen_row, pivot = (array[accepted] for array in (unfinished, r, c, chosen_row, pivot))
         pivots[chosen_row] = unknown[unfinished, c]
@@ -243,7 +243,7 @@ def _rank_in_group(group: Indices) -> Indices:
 
 
 def assigned(B: csr_array) -> Indices:
-    """Return pivots (m,) of the equations B (m, n) for which the pivot columns are well conditioned.
+    """Return pivots (m,) of the equations B (m, n) such that the matrix of the pivot columns is well conditioned.
 
     They are chosen by a QR factorisation with column pivoting or, for more than FULL_UP_TO equations, by the bipartite
     matching with the largest product of entries.

@@ -21,10 +21,10 @@ from fastcontact.linear.krylov.krylov_kernels import CHUNK, WORK_OF_NUMBER
 Multiply = Callable[[Array, Array], None]
 Precondition = Callable[[Array, float, Array], None]
 # Number of earlier search directions of the conjugate residual method to which a new one is made orthogonal.
-KEPT = 20
+STORED_DIRECTIONS = 20
 # A step of the conjugate residual method counts as failed if the norm of the residual stays above this fraction of the
 # previous norm.
-LOST = 0.98
+FAILED_REDUCTION = 0.98
 
 
 def scaled(factor: float, a: AnyArray, b: AnyArray) -> None:
@@ -89,8 +89,8 @@ class Iteration:
 class ConjugateGradients(Iteration):
     """Preconditioned conjugate gradients; see `Iteration`.
 
-    Round-off makes a preconditioner in single precision slightly variable. The search directions are therefore updated by the
-    Polak-Ribiere formula (flexible conjugate gradients; Notay, 2000), which takes one more dot product.
+    Because of round-off, a preconditioner in single precision is slightly variable. Search directions are therefore updated
+    by the Polak-Ribiere formula (flexible conjugate gradients; Notay, 2000), which takes one more dot product.
     """
 
     def __init__(self, n: int) -> None:
@@ -136,20 +136,20 @@ class ConjugateResiduals(Iteration):
     def __init__(self, n: int) -> None:
         super().__init__(n)
         # Search directions p with images A p of unit norm, and -A p, so that `_stepped` makes vectors orthogonal to A p.
-        self._kept: deque[tuple[Array, Array]] = deque()
+        self._stored: deque[tuple[Array, Array]] = deque()
         self._unused: list[tuple[Array, Array]] = []  # memory for directions and images
-        self._failed = False  # whether the last step failed, see LOST
+        self._failed = False  # whether the last step failed, see FAILED_REDUCTION
 
     @property
     def nbytes(self) -> int:
         """Memory [bytes]."""
-        return (4 + 2 * (len(self._kept) + len(self._unused))) * self.x.nbytes + self._sums.nbytes
+        return (4 + 2 * (len(self._stored) + len(self._unused))) * self.x.nbytes + self._sums.nbytes
 
     def start(self) -> None:
         """See `Iteration.start`."""
         super().start()
-        self._unused += self._kept
-        self._kept.clear()
+        self._unused += self._stored
+        self._stored.clear()
         self._failed = False
 
     def step(self, multiply: Multiply, precondition: Precondition) -> bool:
@@ -159,26 +159,26 @@ class ConjugateResiduals(Iteration):
         """
         z, q, norm = self.z, self.q, self.norm
         if self._failed:
-            precondition(self._kept[-1][1], 1.0, z)
+            precondition(self._stored[-1][1], 1.0, z)
         else:
             precondition(self.r, norm, z)
         multiply(z, q)
         square = before = self.dot(q, q)
-        for direction, image in self._kept:
+        for direction, image in self._stored:
             square = self._stepped(self.dot(q, image), direction, image, z, q)
         if not square > np.finfo(float).eps ** 2 * before:
             return False
         self._advance(self.dot(self.r, q) / square, z, q)
-        self._keep(z, q, float(np.sqrt(square)))
-        self._failed = self.norm > LOST * norm
+        self._store(z, q, float(np.sqrt(square)))
+        self._failed = self.norm > FAILED_REDUCTION * norm
         return True
 
-    def _keep(self, z: Array, q: Array, size: float) -> None:
-        """Store a direction and its image of norm `size`; the oldest one is replaced if KEPT are stored."""
-        if len(self._kept) == KEPT:
-            pair = self._kept.popleft()
+    def _store(self, z: Array, q: Array, size: float) -> None:
+        """Store a direction and its image of norm `size`; the oldest one is replaced if STORED_DIRECTIONS are stored."""
+        if len(self._stored) == STORED_DIRECTIONS:
+            pair = self._stored.popleft()
         else:
             pair = self._unused.pop() if self._unused else (np.empty_like(z), np.empty_like(q))
         scaled(1.0 / size, z, pair[0])
         scaled(-1.0 / size, q, pair[1])
-        self._kept.append(pair)
+        self._stored.append(pair)

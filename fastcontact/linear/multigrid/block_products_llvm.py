@@ -56,15 +56,15 @@ def _all_blocks(row: _Row, signature: Any, args: Any) -> Any:
 
 def add_product(_context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
     """Return the signature and the code generator of `block_products.add_product`."""
-    return _added(lambda r, t, _m, k: r * k + t, to, left, right, sizes)
+    return _product_adder(lambda r, t, _m, k: r * k + t, to, left, right, sizes)
 
 
 def add_transposed(_context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
     """Return the signature and the code generator of `block_products.add_transposed`."""
-    return _added(lambda r, t, m, _k: t * m + r, to, left, right, sizes)
+    return _product_adder(lambda r, t, m, _k: t * m + r, to, left, right, sizes)
 
 
-def _added(index: Callable[[int, int, int, int], int], to: Any, left: Any, right: Any, sizes: Any) -> Any:
+def _product_adder(index: Callable[[int, int, int, int], int], to: Any, left: Any, right: Any, sizes: Any) -> Any:
     """Return the signature and the code generator of an added product; `index` locates (row, inner) in the left factor."""
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -80,7 +80,7 @@ def _added(index: Callable[[int, int, int, int], int], to: Any, left: Any, right
             for p, piece in enumerate(pieces):
                 total = write.numbers([out], args[1], r * n + piece.column, piece.width)
                 for t in range(k):
-                    total = write.plus(total, write.broadcast(factors[t], piece.width), rows_of_right[t][p])
+                    total = write.multiply_add(total, write.broadcast(factors[t], piece.width), rows_of_right[t][p])
                 builder.store(total, write.address(out, args[1], r * n + piece.column, piece.width), align=8)
         return context.get_dummy_value()
 
@@ -123,7 +123,7 @@ class _Writer:
             parts = [self.builder.fpext(part, self.kind(self.real, width)) for part in parts]
         return parts[0] if len(parts) == 1 else self.builder.fadd(*parts)
 
-    def plus(self, total: Any, a: Any, b: Any) -> Any:
+    def multiply_add(self, total: Any, a: Any, b: Any) -> Any:
         """Return ``total + a * b``, as a fused multiply-add if the processor has one.
 
         If the compiler chose whether to fuse, this would depend on the surrounding code, and copies of a kernel would differ
@@ -132,8 +132,8 @@ class _Writer:
         if not self.fused:
             return self.builder.fadd(total, self.builder.fmul(a, b))
         kind = total.type
-        letter = "f32" if self.real == ir.FloatType() else "f64"
-        name = f"llvm.fma.{letter}" if kind == self.real else f"llvm.fma.v{kind.count}{letter}"
+        suffix = "f32" if self.real == ir.FloatType() else "f64"
+        name = f"llvm.fma.{suffix}" if kind == self.real else f"llvm.fma.v{kind.count}{suffix}"
         module = self.builder.module
         function = module.globals.get(name) or ir.Function(module, ir.FunctionType(kind, [kind] * 3), name)
         return self.builder.call(function, [a, b, total])
@@ -193,14 +193,14 @@ class _Row(_Writer):
             column = builder.sext(column, self.offset)
         j = builder.mul(column, self.offset(n))
         at = builder.mul(k, self.offset(m * n))
-        x_j = self._three(j) if self.shifted else [self.numbers([self.x], j, p.column, p.width) for p in self.pieces]
+        x_j = self._triple(j) if self.shifted else [self.numbers([self.x], j, p.column, p.width) for p in self.pieces]
         x_of_last = [self.shuffled(x_j[0], [0, 0, 1, 2])] if self.shifted else x_j
         for r in range(m):
             last = self.shifted and r == m - 1
             inputs = x_of_last if last else x_j
             for p, (piece, total, x) in enumerate(zip(self.pieces, self.totals[r], inputs, strict=True)):
                 numbers = self.numbers(self.data, at, r * n + piece.column - last, piece.width)
-                builder.store(self.plus(builder.load(total), numbers, x), total)
+                builder.store(self.multiply_add(builder.load(total), numbers, x), total)
                 self.process(r, p, numbers, last)
         self.finish(j)
 
@@ -228,7 +228,7 @@ class _Row(_Writer):
             partial = self.builder.fadd(partial, lane)
         return partial
 
-    def _three(self, j: Any) -> list[Any]:
+    def _triple(self, j: Any) -> list[Any]:
         """Return the three numbers of x from j on and an arbitrary fourth, without reading beyond them."""
         pair = self.shuffled(self.numbers([self.x], j, 0, 2), [0, 1, 0, 1])
         return [self.builder.insert_element(pair, self.numbers([self.x], j, 2, 1), self.lane(2))]
@@ -251,7 +251,7 @@ class _RowBothWays(_Row):
         width = self.pieces[p].width
         if r == 0:
             self.added.append(self.zeros(width))
-        self.added[p] = self.plus(self.added[p], numbers, self.broadcast(self.x_of_row[r], width))
+        self.added[p] = self.multiply_add(self.added[p], numbers, self.broadcast(self.x_of_row[r], width))
 
     def finish(self, j: Any) -> None:
         """Add the sums to y, without touching other entries."""

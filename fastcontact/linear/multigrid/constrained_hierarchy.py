@@ -25,8 +25,7 @@ from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, composed, followers
 from fastcontact.linear.springs import Springs
 
-# Factor of the stiffening of a node by equations above which the smoother and the coarser levels are corrected, see
-# `stiffened_nodes`.
+# Smallest stiffening factor of a node for which the smoother and the coarser levels are corrected, see `stiffened_nodes`.
 STIFFENED = 4.0
 
 
@@ -60,16 +59,16 @@ class ConstrainedHierarchy:
         self.stiffening = 0.0
         if elimination is not None and not len(elimination.pivots):
             elimination = None
-        added = springs
+        reduced = springs
         if springs is not None and elimination is not None:
-            added = springs.reduced(elimination.pivots, elimination.weights)
-        if added is not None and not added.rows.nnz:  # The springs act only on supported unknowns or on pivots.
-            added = None
-        if elimination is None and added is None:
+            reduced = springs.reduced(elimination.pivots, elimination.weights)
+        if reduced is not None and not reduced.rows.nnz:  # The springs act only on supported unknowns or on pivots.
+            reduced = None
+        if elimination is None and reduced is None:
             self.hierarchy.coarse.set(None)
             self.hierarchy.set_bounds()
             return
-        self._change_levels(elimination, added)
+        self._change_levels(elimination, reduced)
         # Equations and springs widen the spectra of all levels. A bound of the finest level that is too low by a tenth makes
         # blocks with nu = 0.45 take three times the iterations.
         self.hierarchy.set_bounds(estimated=True)
@@ -77,14 +76,14 @@ class ConstrainedHierarchy:
     def _change_levels(self, elimination: Elimination | None, springs: Springs | None) -> None:
         """Change all levels for the equations, and for springs after the elimination."""
         finest = self.hierarchy.levels[0]
-        kind = finest.b.dtype
+        dtype = finest.b.dtype
         changes = []
         if elimination is not None:
-            rounded = elimination.weights.astype(kind)
+            rounded = elimination.weights.astype(dtype)
             finest.eliminated = replace(elimination, weights=rounded, force_weights=rounded)
             changes.append(SymmetricChange.of_equations(self.A, elimination.pivots, elimination.weights))
         if springs is not None:
-            finest.springs = springs.scaled(1.0, kind)
+            finest.springs = springs.scaled(1.0, dtype)
             changes.append(SymmetricChange.of_springs(springs, len(self.A.rows)))
         if finest.P is None:
             self.hierarchy.coarse.set(csc_array(sum(change.on_finest() for change in changes)))
@@ -97,10 +96,10 @@ class ConstrainedHierarchy:
         change = merged(*(change.on_coarse(finest.P) for change in changes))
         for level in self.hierarchy.levels[1:]:
             if level.P is None:
-                self.hierarchy.coarse.set(change.scattered(level.n))
+                self.hierarchy.coarse.set(change.on_all_nodes(level.n))
                 return
             self._change_diagonal(level, change)
-            level.change = change.rows(kind)
+            level.change = change.rows(dtype)
             change = change.coarser(level.P)
 
     def _restore(self) -> None:
@@ -118,22 +117,22 @@ class ConstrainedHierarchy:
         `change` is the change of the diagonal blocks by the equations.
         """
         size = change.size
-        of_all = self.hierarchy.levels[0].diagonal.reshape(-1, size * size)[change.nodes]
-        trace, added = (np.einsum("kii->k", blocks.reshape(-1, size, size)) for blocks in (of_all, change.diagonal()))
+        before = self.hierarchy.levels[0].diagonal.reshape(-1, size * size)[change.nodes]
+        trace, added = (np.einsum("kii->k", blocks.reshape(-1, size, size)) for blocks in (before, change.diagonal()))
         factors = np.divide(added, trace, out=np.zeros(len(added)), where=trace > 0.0)
         self.stiffening = float(factors.max(initial=0.0))
         return change.nodes[(factors > STIFFENED) & ~np.isin(change.nodes, elimination.pivots // size)]
 
     def _exchange_roles(
-        self, elimination: Elimination, springs: Springs | None, stiffened: Indices, of_springs: list[LocalChange]
+        self, elimination: Elimination, springs: Springs | None, stiffened: Indices, by_springs: list[LocalChange]
     ) -> list[SymmetricChange]:
-        """Let stiffened nodes follow the pivots in corrections from coarser levels, and return the changes of these levels.
+        """Make stiffened nodes follow the pivots in corrections from coarser levels, and return the changes of these levels.
 
-        `stiffened` (k,) are the numbers of the nodes, and `of_springs` the changes of diagonal blocks by springs. See
+        `stiffened` (k,) are the numbers of the nodes, and `by_springs` the changes of diagonal blocks by springs. See
         `stiffened_nodes`.
         """
         finest, size = self.hierarchy.levels[0], len(self.A.rows)
-        finest.free_motions = FreeMotions(elimination.weights, stiffened, self._inverse_blocks(stiffened, of_springs))
+        finest.free_motions = FreeMotions(elimination.weights, stiffened, self._inverse_blocks(stiffened, by_springs))
         following = followers(elimination, stiffened, size)
         rounded = following.weights.astype(finest.b.dtype)
         finest.followers = replace(following, weights=rounded, force_weights=rounded)
@@ -142,7 +141,7 @@ class ConstrainedHierarchy:
             changes.append(SymmetricChange.of_springs(springs.reduced(following.pivots, following.weights), size))
         return changes
 
-    def _inverse_blocks(self, nodes: Indices, of_springs: list[LocalChange]) -> Array:
+    def _inverse_blocks(self, nodes: Indices, by_springs: list[LocalChange]) -> Array:
         """Return the inverses (k, size, size) of the diagonal blocks of `nodes` (k,) on the finest level.
 
         The blocks include springs, but not the effect of equations.
@@ -150,7 +149,7 @@ class ConstrainedHierarchy:
         size = len(self.A.rows)
         blocks = np.zeros((self.hierarchy.n // size, size**2))
         blocks[nodes] = self.hierarchy.levels[0].diagonal.reshape(-1, size**2)[nodes]
-        for change in of_springs:
+        for change in by_springs:
             blocks[change.nodes] += change.diagonal().reshape(-1, size**2)
         inverses = np.empty(len(nodes) * size**2)
         cycle_kernels.invert_blocks(blocks[nodes].ravel(), size, inverses)

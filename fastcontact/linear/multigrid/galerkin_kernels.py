@@ -52,13 +52,15 @@ def smooth_prolongator(
 
 
 @kernel
-def _reach(row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, reached):
+def _neighbours_of_row(
+    row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, coarse_neighbours
+):
     """Find the fine nodes and the coarse nodes that a coarse row of ``P.T A P`` involves; return both counts.
 
-    `near` receives the neighbours in A of the fine nodes of the row, and `reached` their coarse nodes. `seen` and
+    `near` receives the neighbours in A of the fine nodes of the row, and `coarse_neighbours` their coarse nodes. `seen` and
     `seen_coarse` contain the last row that involved each node.
     """
-    n_near = n_reached = 0
+    n_near = n_coarse_neighbours = 0
     for e in range(tstart[row], tstart[row + 1]):
         i = torigin[e]
         for k in range(indptr[i], indptr[i + 1]):
@@ -73,9 +75,9 @@ def _reach(row, indptr, indices, start, columns, tstart, torigin, seen, near, se
             J = columns[k]
             if seen_coarse[J] != row:
                 seen_coarse[J] = row
-                reached[n_reached] = J
-                n_reached += 1
-    return n_near, n_reached
+                coarse_neighbours[n_coarse_neighbours] = J
+                n_coarse_neighbours += 1
+    return n_near, n_coarse_neighbours
 
 
 @kernel
@@ -83,10 +85,10 @@ def count_galerkin(low, high, indptr, indices, start, columns, tstart, torigin, 
     """Fill the numbers of blocks (`count`) and of fine nodes (`near_count`) of the rows of ``P.T A P``."""
     n, n_coarse = indptr.shape[0] - 1, tstart.shape[0] - 1
     seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)
-    seen_coarse, reached = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
+    seen_coarse, coarse_neighbours = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
     for row in range(low, high):
-        near_count[row], count[row] = _reach(
-            row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, reached
+        near_count[row], count[row] = _neighbours_of_row(
+            row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, coarse_neighbours
         )
 
 
@@ -128,17 +130,17 @@ def galerkin(
     """
     n, n_coarse = indptr.shape[0] - 1, tstart.shape[0] - 1
     seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)
-    seen_coarse, reached = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
+    seen_coarse, coarse_neighbours = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
     position, coarse_position = np.empty(n, np.int32), np.empty(n_coarse, np.int32)
     products = np.empty(largest * len(rows) * len(cols))
     for row in range(low, high):
-        n_near, n_reached = _reach(
-            row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, reached
+        n_near, n_coarse_neighbours = _neighbours_of_row(
+            row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, coarse_neighbours
         )
-        reached[:n_reached].sort()
-        for e in range(n_reached):
-            coarse_position[reached[e]] = e
-            out_columns[into[row] + e] = reached[e]
+        coarse_neighbours[:n_coarse_neighbours].sort()
+        for e in range(n_coarse_neighbours):
+            coarse_position[coarse_neighbours[e]] = e
+            out_columns[into[row] + e] = coarse_neighbours[e]
         _galerkin_row(
             row, near, n_near, position, products, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot,
             into[row], coarse_position, out, rows, cols,

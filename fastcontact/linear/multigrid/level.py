@@ -56,8 +56,8 @@ class Level:
     eliminated : Elimination or None
         Eliminated equations, only on the finest level. The weights are stored in the precision of the cycle.
     change : tuple of ndarray, or None
-        What eliminated equations and springs add to the matrix, only on coarser levels: the numbers (k,) of the block rows
-        that change, and the change in these rows as `indptr`, `indices` and `data` of a `BlockMatrix`.
+        Change of the matrix by eliminated equations and springs, only on coarser levels: the numbers (k,) of the block rows
+        that change, and these rows of the change as `indptr`, `indices` and `data` of a `BlockMatrix`.
     springs : Springs or None
         Springs that are added to the matrix after the elimination of equations, only on the finest level.
     followers : Elimination or None

@@ -49,13 +49,13 @@ class LoadedMultigrid(LoadedIteration):
         if C is not None and len(c) and (isinstance(C, FieldCompliance) or C.ndim == 1):
             try:
                 if isinstance(C, FieldCompliance):
-                    return self._solved_for_field(B, c, C, guess, monitor, tolerance)
+                    return self._field_solution(B, c, C, guess, monitor, tolerance)
                 parts = self._parts(B, c, C, nodes)
             except RepeatedError as repeated:
                 log.info("%s: their compliance is formed", repeated)
         if parts is None:
             return super().solve(B, c, C, guess, monitor, tolerance, nodes)
-        return self._solved(parts, c, guess, monitor, tolerance)
+        return self._solution(parts, c, guess, monitor, tolerance)
 
     @property
     def contrast(self) -> float:
@@ -73,7 +73,7 @@ class LoadedMultigrid(LoadedIteration):
         """See `LoadedNonsymmetric`."""
         parts = self._parts(B, c, C, nodes, None if friction is None else friction.rows)
         if friction is None:
-            return self._solved(parts, c, guess, None, tolerance)
+            return self._solution(parts, c, guess, None, tolerance)
         solver, elimination, springs = self._solver, parts.elimination, parts.springs
         springs = friction.springs if springs is None else springs.joined(friction.springs)
         f = self._f if friction.forces is None else self._f + friction.forces
@@ -81,21 +81,21 @@ class LoadedMultigrid(LoadedIteration):
         u = solver.nonsymmetric_solution(f, elimination, springs, guess, tolerance)
         return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), c)
 
-    def _solved(
+    def _solution(
         self, parts: _Parts, c: Array, guess: Array | None, monitor: Monitor | None, tolerance: float | None
     ) -> tuple[Array, Array]:
         """Return u (n,) [length] and the multipliers (m,) [force] under equations without friction."""
         solver, elimination, springs = self._solver, parts.elimination, parts.springs
         f = parts.with_spring_forces(self._f, c)
 
-        def watch(u: Array, multiplier: Array, error: float) -> bool:
+        def check(u: Array, multiplier: Array, error: float) -> bool:
             assert monitor is not None
             return monitor(u, parts.multiplier(u, multiplier, c), error)
 
-        u = solver.solution(f, elimination, guess, monitor and watch, tolerance, springs)
+        u = solver.solution(f, elimination, guess, monitor and check, tolerance, springs)
         return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), c)
 
-    def _solved_for_field(
+    def _field_solution(
         self, B: csr_array, c: Array, C: FieldCompliance, guess: Array | None, monitor: Monitor | None,
         tolerance: float | None,
     ) -> tuple[Array, Array]:  # fmt: skip
@@ -104,12 +104,12 @@ class LoadedMultigrid(LoadedIteration):
         elimination, springs, border = parts.elimination, parts.springs, parts.border()
         f = parts.with_spring_forces(self._f, c)
 
-        def watch(u: Array, inside: Array, error: float) -> bool:
+        def check(u: Array, inside: Array, error: float) -> bool:
             assert monitor is not None
             return monitor(u, parts.multiplier(u, inside, np.empty(0), c), error)
 
         if border is None:
-            u, at_edge = solver.solution(f, elimination, guess, monitor and watch, tolerance, springs), np.empty(0)
+            u, at_edge = solver.solution(f, elimination, guess, monitor and check, tolerance, springs), np.empty(0)
         else:
             start, field = np.zeros(C.P.shape[1]), parts.field
             if guess is not None and len(self._at_edge) == len(start):
@@ -192,12 +192,12 @@ class _Parts:
         force_rows = self.springs.rows if self.springs.through is None else self.springs.through
         return f + force_rows.T @ (self.springs.stiffness * c[~self.stiff])
 
-    def multiplier(self, u: Array, of_stiff: Array, c: Array) -> Array:
-        """Return the multipliers (m,) of all equations [force], given those of the eliminated ones, `of_stiff`."""
+    def multiplier(self, u: Array, eliminated: Array, c: Array) -> Array:
+        """Return the multipliers (m,) of all equations [force], given those of the eliminated ones, `eliminated`."""
         if self.springs is None:
-            return of_stiff
+            return eliminated
         multiplier = np.empty(len(c))
-        multiplier[self.stiff] = of_stiff
+        multiplier[self.stiff] = eliminated
         multiplier[~self.stiff] = self.springs.stiffness * (c[~self.stiff] - self.springs.rows @ u)
         return multiplier
 
@@ -232,7 +232,7 @@ class _FieldParts:
         field, elimination = C.of_field(B, c), None
         if not field.edge.all():
             rows = csr_array(field.rows[~field.edge])
-            elimination = eliminate(rows, field.right[~field.edge], None, _nodes(rows, size), size)
+            elimination = eliminate(rows, field.right[~field.edge], None, _nodes_of_rows(rows, size), size)
         springs = scaled(B, (C.stiffness > 0.0).astype(float))
         return cls(field, elimination, Springs(springs, C.stiffness), C.weights)
 
@@ -257,6 +257,6 @@ class _FieldParts:
         return self.weights * (self.field.P @ p) + self.springs.stiffness * (c - self.springs.rows @ u)
 
 
-def _nodes(rows: csr_array, size: int) -> Indices:
+def _nodes_of_rows(rows: csr_array, size: int) -> Indices:
     """Return the node (m,) of the entry with the largest absolute value in each row; a node has `size` unknowns."""
     return np.asarray(abs(rows).argmax(axis=1), np.intp).ravel() // size

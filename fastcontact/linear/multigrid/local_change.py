@@ -60,11 +60,11 @@ class LocalChange:
         product.sort_indices()
         return LocalChange(coarse_nodes, product)
 
-    def scattered(self, n: int) -> csc_array:
+    def on_all_nodes(self, n: int) -> csc_array:
         """Return the change as a matrix (n, n) of all unknowns."""
-        return self.spread(np.arange(n // self.size)).tocsc()
+        return self.on_nodes(np.arange(n // self.size)).tocsc()
 
-    def spread(self, nodes: Indices) -> bsr_array:
+    def on_nodes(self, nodes: Indices) -> bsr_array:
         """Return `blocks` with zero rows and columns added for a superset `nodes` (l,), in ascending order."""
         index = np.searchsorted(nodes, self.nodes)
         count = np.zeros(len(nodes), np.intp)
@@ -77,7 +77,7 @@ def merged(change: LocalChange, *others: LocalChange) -> LocalChange:
     """Return the sum of several changes of the same matrix."""
     for other in others:
         nodes = np.union1d(change.nodes, other.nodes)
-        total = bsr_array(change.spread(nodes) + other.spread(nodes))
+        total = bsr_array(change.on_nodes(nodes) + other.on_nodes(nodes))
         total.sort_indices()
         change = LocalChange(nodes, total)
     return change
@@ -133,8 +133,8 @@ class SymmetricChange:
         nodes, slot = np.unique(D.indices, return_inverse=True)
         blocks = np.zeros((len(nodes), self.size, self.size))
         np.add.at(blocks, slot[in_D], half + half.transpose(0, 2, 1))
-        n, each = len(nodes) * self.size, np.arange(len(nodes) + 1)
-        return LocalChange(nodes, bsr_array((blocks, each[:-1], each), shape=(n, n)))
+        n, offsets = len(nodes) * self.size, np.arange(len(nodes) + 1)
+        return LocalChange(nodes, bsr_array((blocks, offsets[:-1], offsets), shape=(n, n)))
 
     @staticmethod
     def _keys(rows: bsr_array) -> Indices:

@@ -189,7 +189,7 @@ class ScaledMatrix:
             self.unit = float(0.5 ** np.round(np.log2(largest)))
         else:
             self.unit = near.unit
-        self.scaled = _split(K, self.unit, release, None if near is None else near.scaled)
+        self.scaled = _split_matrix(K, self.unit, release, None if near is None else near.scaled)
 
     def change(self, precision: str) -> None:
         """Store the numbers for a cycle in another precision."""
@@ -228,7 +228,7 @@ class ScaledMatrix:
         return self.scaled.row_sums(u) / self.unit
 
 
-def _split(K: bsr_array, unit: float, release: bool, near: BlockMatrix | None) -> BlockMatrix:
+def _split_matrix(K: bsr_array, unit: float, release: bool, near: BlockMatrix | None) -> BlockMatrix:
     """Return ``unit K``, split into high and low parts; see `ScaledMatrix` for `release`.
 
     The storage of the matrix `near` is used if it has the same pattern.

@@ -133,8 +133,8 @@ class _Excess:
         compliant, self._compliance = compliance > 0.0, compliance
         self._stiffness = np.divide(1.0, compliance, out=np.zeros(len(compliance)), where=compliant)
         # Diagonal of the operator at the excesses: the stiffness of the equation plus that of the pivot.
-        of_pivots = elimination.pivot_inverse.sparse.matrix.power(2).T @ diagonal[self._pivots]
-        self._inverse = np.where(compliant, 1.0 / (self._stiffness + of_pivots), 0.0)
+        pivot_stiffness = elimination.pivot_inverse.sparse.matrix.power(2).T @ diagonal[self._pivots]
+        self._inverse = np.where(compliant, 1.0 / (self._stiffness + pivot_stiffness), 0.0)
         self._compliant = compliant
         self._u = np.empty(len(diagonal))
 

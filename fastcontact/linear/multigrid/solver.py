@@ -19,7 +19,7 @@ from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.delassus import InverseColumns, inverse_entries
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.krylov.iterations import (
-    KEPT,
+    STORED_DIRECTIONS,
     ConjugateGradients,
     ConjugateResiduals,
     Iteration,
@@ -40,19 +40,19 @@ MAX_ITERATIONS = 1000
 # Largest number of columns of K^-1, each of which takes one solution, before a factorisation costs less.
 MOST_COLUMNS = 300
 # Number of iterations between two calls of a monitor.
-WATCH_EVERY = 2
+MONITOR_INTERVAL = 2
 # Number of iterations before the first call of a monitor if `_contrast` is large, because errors of soft parts are not yet
 # known: row "nu 0.499" takes 123 iterations, and 132 with the first call after two.
-WATCH_CONTRAST_FROM = 6
+FIRST_MONITOR_CONTRAST = 6
 # Largest estimated error of displacements, relative to the largest one, over the tolerance of the residual. It is reached
 # only if bodies differ in stiffness: forces in the stiff body dominate the residual, and the soft body converges later.
 DISPLACEMENT_ERROR = 3e3
-# Cost of a change of the hierarchy, including the elimination of its equations, as a number of iterations; about that of a
-# new hierarchy, too.
+# Cost of a change of the hierarchy, including the elimination of equations, in iterations. A new hierarchy costs about as
+# much.
 CHANGE = 15
 # A nonsymmetric solution whose initial guess is accurate already is iterated further: until the residual has fallen by the
 # factor WARM, or to WARM_LEAST times its tolerance, with at most MOST_WARM iterations after the tolerance is reached. If
-# equations stiffen nodes strongly, the latter number is doubled, up to the number of directions KEPT, each time that the
+# equations stiffen nodes strongly, the latter number is doubled, up to STORED_DIRECTIONS, each time that the
 # residual at the next start is larger than WARM times the residual at the last start.
 WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
 # If the smoother amplifies a vector, the upper bounds of the eigenvalues are multiplied by RAISE, at most RAISES times.
@@ -109,13 +109,13 @@ class Multigrid:
         self._near: Hierarchy | None = None
         self._renewed = False
         # Whether coarser levels may be taken over; shared by all copies.
-        self._lasting = [True]
+        self._reuses_levels = [True]
         self.begin()
 
     def begin(self) -> None:
         """Reset the statistics of warm starts for a new load step."""
-        self._most_warm, self._cut_short = MOST_WARM, np.inf
-        self._yielding = np.inf  # change of displacements in an iteration, over the fall of the residual
+        self._most_warm, self._unfinished_norm = MOST_WARM, np.inf
+        self._change_rate = np.inf  # change of displacements in an iteration, divided by the decrease of the residual
 
     @property
     def nbytes(self) -> int:
@@ -139,7 +139,7 @@ class Multigrid:
         If convergence is slow with them in one solution, all hierarchies are built anew from then on.
         """
         new = copy.copy(self)
-        new._near = self.hierarchy if self._lasting[0] else None
+        new._near = self.hierarchy if self._reuses_levels[0] else None
         return new
 
     def _build(self, rigid_modes: Array, near: Hierarchy | None = None) -> None:
@@ -156,9 +156,9 @@ class Multigrid:
 
     def _build_anew(self) -> None:
         """Build all levels of the hierarchy, here and from now on for all matrices."""
-        self._lasting[0], reduced = False, self._reduced
+        self._reuses_levels[0], reduced = False, self._reduced
         self._build(self._modes.astype(float))
-        self._worked(CHANGE)
+        self._add_work(CHANGE)
         self.constrain(reduced.elimination, reduced.springs)
 
     def build_in(self, precision: str) -> None:
@@ -181,10 +181,10 @@ class Multigrid:
         if elimination is not self._reduced.elimination or springs is not self._reduced.springs:
             sparse = elimination and elimination.with_sparse_weights()
             old_springs = self._hierarchy_springs
-            springs_alike = old_springs is None if springs is None else springs.alike(old_springs)
-            if not (springs_alike and _alike(sparse, self._hierarchy_equations, self._constrained.stiffening)):
+            same_springs = old_springs is None if springs is None else springs.alike(old_springs)
+            if not (same_springs and _nearly_equal(sparse, self._hierarchy_equations, self._constrained.stiffening)):
                 self._change_hierarchy(sparse, springs)
-                self._worked(CHANGE)
+                self._add_work(CHANGE)
             compliant = elimination is not None and elimination.compliance is not None
             self._reduced = Reduced(self.K, elimination, springs, self.diagonal() if compliant else None)
 
@@ -225,31 +225,31 @@ class Multigrid:
         self.constrain(elimination, springs)
         cg.x[:] = 0.0 if guess is None else guess
         self._begin(cg, f)
-        enough = self._enough(tolerance or 0.0)
-        made, raised = 0, 0
-        watched_from = WATCH_EVERY if self._contrast <= MILD else WATCH_CONTRAST_FROM
-        while not self._done(cg, enough, scale):
-            if self._renewed and made >= CHANGE:
+        limit = self._stopping_residual(tolerance or 0.0)
+        count, attempts = 0, 0
+        first_monitor = MONITOR_INTERVAL if self._contrast <= MILD else FIRST_MONITOR_CONTRAST
+        while not self._done(cg, limit, scale):
+            if self._renewed and count >= CHANGE:
                 self._build_anew()
                 self._begin(cg, f)
-            above = cg.norm > enough * scale
-            if made >= MAX_ITERATIONS or raised > RAISES:
-                if not above:
+            unconverged = cg.norm > limit * scale
+            if count >= MAX_ITERATIONS or attempts > RAISES:
+                if not unconverged:
                     break
                 raise StallError(
-                    f"conjugate gradients stall at a relative residual of {cg.norm / scale:.1e} after {made} iterations, "
+                    f"conjugate gradients stall at a relative residual of {cg.norm / scale:.1e} after {count} iterations, "
                     f"above {self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
                 )
-            if monitor is not None and above and made >= watched_from and made % WATCH_EVERY == 0:
+            if monitor is not None and unconverged and count >= first_monitor and count % MONITOR_INTERVAL == 0:
                 u = self._reduced.displacement(cg.x)
                 if monitor(u, self._reduced.multiplier(u, f), self._contrast * cg.norm / scale):
                     break
             if cg.step(self._reduced.multiply, self.precondition):
-                made += 1
+                count += 1
                 self._count()
             else:
-                raised += 1
-                self._strengthen(raised)
+                attempts += 1
+                self._strengthen(attempts)
                 self._begin(cg, f)
         return self._reduced.displacement(cg.x).copy()
 
@@ -287,13 +287,13 @@ class Multigrid:
         iteration = self._residuals
         scale = self._scale(f, elimination)
         self.constrain(elimination, springs)
-        enough = self._enough(tolerance)
+        limit = self._stopping_residual(tolerance)
         iteration.x[:] = guess
         self._begin(iteration, f)
         # If some parts are much stiffer than others, the tolerance of the solver leaves errors in the soft parts. Later
         # pairings would reduce them only slowly.
         aim = tolerance / self._contrast * scale
-        self._reduce(iteration, enough, scale, self._reduced.multiply, self.precondition, aim)
+        self._reduce(iteration, limit, scale, self._reduced.multiply, self.precondition, aim)
         return self._reduced.displacement(iteration.x).copy()
 
     def bordered_solution(
@@ -342,8 +342,8 @@ class Multigrid:
                 elimination.move_forces(forces)
 
         multiply = border.multiply(self._reduced.multiply, move_forces)
-        enough, precondition = self._enough(tolerance or 0.0), border.precondition(self.precondition)
-        self._reduce(iteration, enough, scale, multiply, precondition)
+        limit, precondition = self._stopping_residual(tolerance or 0.0), border.precondition(self.precondition)
+        self._reduce(iteration, limit, scale, multiply, precondition)
         return x.copy(), iteration.x[n:].copy()
 
     def _reduce(
@@ -355,22 +355,22 @@ class Multigrid:
         An initial guess may satisfy this tolerance although the forces of a small contact are still inaccurate. The iteration
         therefore continues for some iterations, see WARM, or until the norm of the residual is `aim`, if that is smaller.
         """
-        enough = tolerance * scale
-        made, target = 0, max(min(enough, WARM * iteration.norm, aim), WARM_LEAST * enough)
-        begun = iteration.norm
-        if begun > WARM * self._cut_short and self._constrained.stiffening > MILD:
-            self._most_warm = min(2 * self._most_warm, KEPT)
-        self._cut_short = np.inf
+        limit = tolerance * scale
+        count, target = 0, max(min(limit, WARM * iteration.norm, aim), WARM_LEAST * limit)
+        initial_norm = iteration.norm
+        if initial_norm > WARM * self._unfinished_norm and self._constrained.stiffening > MILD:
+            self._most_warm = min(2 * self._most_warm, STORED_DIRECTIONS)
+        self._unfinished_norm = np.inf
         while not (done := self._done(iteration, tolerance, scale)) or iteration.norm > target:
-            if done and made >= self._most_warm:
-                self._cut_short = begun
+            if done and count >= self._most_warm:
+                self._unfinished_norm = initial_norm
                 return
-            if made >= MAX_ITERATIONS or not iteration.step(multiply, precondition):
-                if iteration.norm <= enough:
+            if count >= MAX_ITERATIONS or not iteration.step(multiply, precondition):
+                if iteration.norm <= limit:
                     return
-                excess = iteration.norm / enough
-                raise StallError(f"conjugate residuals stall at {excess:.1e} times the tolerance after {made} steps")
-            made += 1
+                excess = iteration.norm / limit
+                raise StallError(f"conjugate residuals stall at {excess:.1e} times the tolerance after {count} steps")
+            count += 1
             self._count()
 
     def _done(self, iteration: Iteration, tolerance: float, scale: float) -> bool:
@@ -382,17 +382,17 @@ class Multigrid:
         if iteration.norm > tolerance * scale:
             return False
         n = self.K.shape[0]
-        self._yielding = iteration.change(n) or self._yielding
+        self._change_rate = iteration.change(n) or self._change_rate
         if tolerance > self.tolerance or not iteration.norm:
             return True
-        return self._yielding * iteration.norm <= DISPLACEMENT_ERROR * self.tolerance * largest(iteration.x[:n])
+        return self._change_rate * iteration.norm <= DISPLACEMENT_ERROR * self.tolerance * largest(iteration.x[:n])
 
     def _count(self) -> None:
         """Count one iteration."""
         self.counters.iterations += 1
-        self._worked(1)
+        self._add_work(1)
 
-    def _worked(self, iterations: int) -> None:
+    def _add_work(self, iterations: int) -> None:
         """Add a number of iterations to `work`; raise TooManyIterationsError if it exceeds `allowed`."""
         self.work += iterations
         if self.allowed is not None and self.work > self.allowed:
@@ -405,7 +405,7 @@ class Multigrid:
         return self._diagonal
 
     def _strengthen(self, times: int) -> None:
-        """Make the preconditioner positive definite again: by larger bounds and, at the last attempt, by double precision."""
+        """Make the preconditioner positive definite, by larger bounds or, at the last attempt, by double precision."""
         if self._renewed:
             self._build_anew()
             return
@@ -432,7 +432,7 @@ class Multigrid:
             square += self._cg.dot(forces, forces)
         return float(np.sqrt(square))
 
-    def _enough(self, tolerance: float) -> float:
+    def _stopping_residual(self, tolerance: float) -> float:
         """Return the relative residual [-] at which the iteration stops if `tolerance` is requested.
 
         It is at least the tolerance of the solver.
@@ -463,7 +463,7 @@ class Multigrid:
         return multiplier(self.K, elimination, springs, u, f)
 
 
-def _alike(new: Elimination | None, old: Elimination | None, stiffening: float) -> bool:
+def _nearly_equal(new: Elimination | None, old: Elimination | None, stiffening: float) -> bool:
     """Return whether two eliminations have the same pivots and nearly the same weights.
 
     If the pivots belong to a body that is stiffer by the factor `stiffening`, a difference d of the weights increases the

@@ -21,8 +21,9 @@ from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.round_off import SINGLE_PRECISION
 
-# An unknown follows the pivots of its equations if a unit translation of its side moves them on average at least so far.
-LEAST = 0.3
+# Smallest mean displacement of the pivots due to a unit translation of the other side for which an unknown of this side
+# follows the pivots of its equations.
+LEAST_MOTION = 0.3
 
 
 class FreeMotions:
@@ -89,16 +90,16 @@ def followers(elimination: Elimination, nodes: Indices, size: int) -> Eliminatio
     mean = csr_array((W.data[follows], (column, W.row[follows])), shape=(len(unknowns), m))
     # Displacement of each pivot due to unit translations of the opposite side along each direction.
     translation = csr_array((W.data[is_opposite], (W.row[is_opposite], direction[is_opposite])), shape=(m, size))
-    moved = np.asarray((mean @ translation).toarray())
-    moved_enough = moved[np.arange(len(unknowns)), unknowns % size] >= LEAST * np.asarray(mean.sum(axis=1))
-    unknowns, mean, moved = unknowns[moved_enough], csr_array(mean[moved_enough]), moved[moved_enough]
-    of_pivots = csr_array((-W.data[~is_opposite], (W.row[~is_opposite], W.col[~is_opposite])), shape=(m, n))
-    of_pivots = of_pivots + csr_array((np.ones(m), pivots, np.arange(m + 1)), shape=(m, n))
+    pivot_motion = np.asarray((mean @ translation).toarray())
+    couples = pivot_motion[np.arange(len(unknowns)), unknowns % size] >= LEAST_MOTION * np.asarray(mean.sum(axis=1))
+    unknowns, mean, pivot_motion = unknowns[couples], csr_array(mean[couples]), pivot_motion[couples]
+    pivot_terms = csr_array((-W.data[~is_opposite], (W.row[~is_opposite], W.col[~is_opposite])), shape=(m, n))
+    pivot_terms = pivot_terms + csr_array((np.ones(m), pivots, np.arange(m + 1)), shape=(m, n))
     dofs_of_nodes = unknowns[:, None] // size * size + np.arange(size)
     row, other = np.nonzero(~np.isin(dofs_of_nodes, unknowns))
-    of_others = csr_array((moved[row, other], (row, dofs_of_nodes[row, other])), shape=(len(unknowns), n))
-    divisor = moved[np.arange(len(unknowns)), unknowns % size]
-    weights = csr_array(diags_array(1.0 / divisor, format="csr") @ (mean @ of_pivots - of_others))
+    other_terms = csr_array((pivot_motion[row, other], (row, dofs_of_nodes[row, other])), shape=(len(unknowns), n))
+    divisor = pivot_motion[np.arange(len(unknowns)), unknowns % size]
+    weights = csr_array(diags_array(1.0 / divisor, format="csr") @ (mean @ pivot_terms - other_terms))
     return Elimination(unknowns, weights, np.zeros(len(unknowns)), weights)
 
 

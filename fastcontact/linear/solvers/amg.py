@@ -49,7 +49,7 @@ class Amg(Multigrid, LinearSolver):
     instead : Direct or None
         The direct solver that has replaced multigrid; None as long as multigrid is used.
     gave_up : str
-        Reason for the replacement; empty if there was none.
+        Reason for the replacement; empty if multigrid is used.
     """
 
     name = "amg"
@@ -57,7 +57,7 @@ class Amg(Multigrid, LinearSolver):
     def __init__(self, tolerance: float = TOLERANCE, precision: str = "single") -> None:
         super().__init__(tolerance, precision)
         self.instead: Direct | None = None
-        self._factored: Direct | None = None  # kept when an analysis returns to a state before the replacement
+        self._factor_solver: Direct | None = None  # kept when an analysis returns to a state before the replacement
         self.gave_up = ""
 
     def __repr__(self) -> str:
@@ -77,7 +77,7 @@ class Amg(Multigrid, LinearSolver):
     ) -> bsr_array | Product:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
         self.build(K, rigid_modes, release)
-        self._involved, self.instead, self._factored, self.gave_up = involved, None, None, ""
+        self._involved, self.instead, self._factor_solver, self.gave_up = involved, None, None, ""
         return self.K if release else K
 
     def load(self, f: Array) -> Loaded:
@@ -112,7 +112,8 @@ class Amg(Multigrid, LinearSolver):
         instead = None if self.instead is None else {"why": self.gave_up, **self.instead.snapshot()}
         return {
             "precision": self.precision, "tolerance": self.tolerance, "bounds": self.hierarchy.bounds,
-            "asked": list(self.columns.asked), **self._constrained_by(), "instead": instead, "lasting": self._lasting[0],
+            "asked": list(self.columns.asked), **self._constrained_by(), "instead": instead,
+            "lasting": self._reuses_levels[0],
         }  # fmt: skip
 
     def _constrained_by(self) -> dict[str, Any]:
@@ -129,8 +130,8 @@ class Amg(Multigrid, LinearSolver):
             (self.instead or self._factorise(instead["why"])).put_back(instead)
             return
         if self.instead is not None:  # The factorisation replaced multigrid after the time of the snapshot.
-            self._factored, self.instead, self.gave_up = self.instead, None, ""
-        self._lasting[0] = snapshot.get("lasting", True)
+            self._factor_solver, self.instead, self.gave_up = self.instead, None, ""
+        self._reuses_levels[0] = snapshot.get("lasting", True)
         put_back_tolerance(self, snapshot)
         if snapshot["precision"] != self.precision:
             self.build_in(snapshot["precision"])
@@ -170,14 +171,14 @@ class Amg(Multigrid, LinearSolver):
 
     def _factorise(self, why: str) -> Direct:
         """Replace multigrid by a factorisation with the reason `why`, and return the direct solver."""
-        if self._factored is None:
+        if self._factor_solver is None:
             log.warning("%s", why)
-            self._factored = Direct()
-            self._factored.counters = self.counters
-            self._factored.prepare(self.K.restored(), self._modes.astype(float), self._involved)
+            self._factor_solver = Direct()
+            self._factor_solver.counters = self.counters
+            self._factor_solver.prepare(self.K.restored(), self._modes.astype(float), self._involved)
         else:
-            self._factored.put_back({"asked": [], "loads": []})
-        self.gave_up, self.instead = why, self._factored
+            self._factor_solver.put_back({"asked": [], "loads": []})
+        self.gave_up, self.instead = why, self._factor_solver
         # From now on the tolerance is that of the direct solver.
         self.asked = self.tolerance if self.asked is None else self.asked
         self.tolerance = self.instead.tolerance
@@ -198,11 +199,11 @@ def _elimination(tied: Mapping[str, Any], n: int) -> Elimination:
     return Elimination(tied["pivots"], rows, np.zeros(m), rows)
 
 
-def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:
+def _with_fallback(method: Callable[..., Any]) -> Callable[..., Any]:
     """Return a method of `_Loaded` that uses the factorisation if the iteration stalls or multigrid has been replaced."""
 
     @functools.wraps(method)
-    def with_fallback(self: _Loaded, *args: Any, **options: Any) -> Any:
+    def wrapper(self: _Loaded, *args: Any, **options: Any) -> Any:
         if self._solver.instead is None:
             try:
                 return method(self, *args, **options)
@@ -210,16 +211,16 @@ def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:
                 self._solver.give_up(stalled)
         return getattr(self._factored, method.__name__)(*args, **options)
 
-    return with_fallback
+    return wrapper
 
 
 class _Loaded(LoadedMultigrid):
     """A matrix prepared by `Amg` with a right-hand side; see `linear.protocol.LoadedNonsymmetric`."""
 
-    solve = _or_by_factors(LoadedMultigrid.solve)
-    delassus = _or_by_factors(LoadedMultigrid.delassus)
-    involved_solution = _or_by_factors(LoadedMultigrid.involved_solution)
-    full_solution = _or_by_factors(LoadedMultigrid.full_solution)
+    solve = _with_fallback(LoadedMultigrid.solve)
+    delassus = _with_fallback(LoadedMultigrid.delassus)
+    involved_solution = _with_fallback(LoadedMultigrid.involved_solution)
+    full_solution = _with_fallback(LoadedMultigrid.full_solution)
 
     @functools.cached_property
     def _factored(self) -> Loaded:

@@ -1,7 +1,7 @@
 """Reference solver: conjugate gradients of SciPy, preconditioned by the smoothed aggregation of pyamg.
 
-This solver is deliberately simple and slow. It serves to verify the solver "amg" and as a basis of comparison: except for the
-choice of pivots, it consists of calls of pyamg and SciPy. Equations are eliminated, ``u = T v + t``, and each set of
+This solver is simple and slow. Except for the choice of pivots, it only consists of calls of pyamg and SciPy, so that the
+solver "amg" can be verified against it. Equations are eliminated, ``u = T v + t``, and each set of
 equations requires a new hierarchy for the matrix ``T.T K T``.
 """
 

@@ -9,7 +9,7 @@ from models import elastic_model, plates, united
 from pairwise import first_of
 
 import fastcontact as fc
-from fastcontact.analysis.floating_bodies import MAX_NEWTON_ITERATIONS, FloatingBodies, Freed
+from fastcontact.analysis.floating_bodies import MAX_NEWTON_ITERATIONS, FloatingBodies, PositionResponse
 from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import prepare
 from fastcontact.analysis.solution import Solution
@@ -71,7 +71,7 @@ def test_newton_steps_that_overshoot_are_halved(start):
         return dataclasses.replace(solution(-stretch), response=lambda: None)
 
     def freed(held):
-        return Freed(held, np.eye(1), np.array([[-slopes[-1]]]), DOFS, np.zeros((1, 1, 1)), 1.0)
+        return PositionResponse(held, np.eye(1), np.array([[-slopes[-1]]]), DOFS, np.zeros((1, 1, 1)), 1.0)
 
     found = bodies_at(DOFS).settle(solve_at, freed, DOFS, np.array([start]), 1.0, 0.0, 0.0)
     assert found.slack
@@ -96,7 +96,7 @@ def test_a_body_moves_on_to_the_gap_that_stops_it():
     def freed(held):
         closed = calls[-1] + 1.0 > gap
         stretched = np.array([[-stiffness / (1.0 + stiffness) if closed else 0.0]])
-        return Freed(held, np.eye(1), stretched, DOFS, np.array([[[-1.0], [1.0]]]), 1.0)
+        return PositionResponse(held, np.eye(1), stretched, DOFS, np.array([[[-1.0], [1.0]]]), 1.0)
 
     found = bodies_at(DOFS).settle(solve_at, freed, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
     assert found.slack

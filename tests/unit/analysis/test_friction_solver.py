@@ -12,7 +12,12 @@ import fastcontact as fc
 from fastcontact.analysis import newton, step_halving
 from fastcontact.analysis.friction import cone_newton, dense
 from fastcontact.analysis.friction import solve as friction
-from fastcontact.analysis.friction.cone_newton import aligning, compliance_of_each, compliance_of_rows, held_tangents
+from fastcontact.analysis.friction.cone_newton import (
+    aligning_rotation,
+    compliance_of_each,
+    compliance_of_rows,
+    held_tangents,
+)
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import normals, tangents
@@ -40,13 +45,13 @@ def test_the_compliance_of_components_is_that_of_the_vectors(dim):
     vectors = components[0][:, None] * normal + np.einsum("km,kmd->md", components[1:], along)
     given = C @ vectors  # (m, dim)
     wanted = np.concatenate([[np.einsum("md,md->m", given, normal)], np.einsum("md,kmd->km", given, along)])
-    found = friction._of_components(C, along) @ components.ravel()
+    found = friction._componentwise(C, along) @ components.ravel()
     np.testing.assert_allclose(found, wanted.ravel(), atol=1e-12)
 
 
 def test_constraints_without_friction_keep_their_own_compliance():
     C = np.array([[2.0, 1.0], [1.0, 3.0]])
-    found = friction._of_components(C, np.zeros((1, 2, 2)))
+    found = friction._componentwise(C, np.zeros((1, 2, 2)))
     np.testing.assert_array_equal(found[:2, :2], C)
     assert not found[2:].any()
 
@@ -79,10 +84,10 @@ def test_tangents_turn_to_the_slip_that_supports_leave():
     K_inverse[held], K_inverse[:, held] = 0.0, 0.0
     F = R @ K_inverse @ R.T
     assert not len(np.flatnonzero(held_tangents(compliance_of_each(F, 3))))
-    Q = aligning(compliance_of_each(F, 3))
+    Q = aligning_rotation(compliance_of_each(F, 3))
     np.testing.assert_allclose((Q @ Q.T).toarray(), np.eye(6), atol=1e-15)
     np.testing.assert_array_equal(held_tangents(compliance_of_each(Q @ (Q @ F).T, 3)), [[False, False], [True, True]])
-    assert aligning(compliance_of_each(R @ (A @ A.T) @ R.T, 3)) is None
+    assert aligning_rotation(compliance_of_each(R @ (A @ A.T) @ R.T, 3)) is None
 
 
 def test_frames_of_eliminated_slips_do_not_depend_on_the_choice_of_tangents():
@@ -95,7 +100,7 @@ def test_frames_of_eliminated_slips_do_not_depend_on_the_choice_of_tangents():
     for along in ((one, other), (np.cos(turn) * one + np.sin(turn) * other, np.cos(turn) * other - np.sin(turn) * one)):
         rows = np.stack([normal, *along])
         own = np.einsum("amd,d,bmd->abm", rows, [1.0, 2.0, 3.0], rows)
-        Q = aligning(own, along)
+        Q = aligning_rotation(own, along)
         np.testing.assert_allclose((Q @ Q.T).toarray(), np.eye(3 * m), atol=1e-15)
         frames.append((Q @ rows.reshape(3 * m, 3)).reshape(3, m, 3))
     np.testing.assert_allclose(frames[0], frames[1], atol=1e-14)
@@ -196,7 +201,7 @@ def test_compliance_of_rows_against_dense_products():
 
 
 @pytest.mark.parametrize(
-    ("push", "told"), [(0.58, "before it 97% of the friction that contact can carry is used"), (0.3, "")]
+    ("push", "told"), [(0.58, "at its beginning, contact uses 97% of its frictional capacity"), (0.3, "")]
 )
 def test_the_message_states_how_much_friction_is_used(monkeypatch, push, told):
     """A block under the pressure 0.3 on a plane with the friction 0.3 slides at a push of 0.18 on its side."""
@@ -217,7 +222,7 @@ def test_the_message_states_how_much_friction_is_used(monkeypatch, push, told):
     with pytest.raises(fc.ConvergenceError, match="no equilibrium") as failed:
         fc.solve(model, [1.0, 2.0, 3.0])
     assert told in str(failed.value)
-    assert bool(told) == ("friction that contact can carry" in str(failed.value))
+    assert bool(told) == ("frictional capacity" in str(failed.value))
 
 
 def test_a_verdict_about_a_diverged_iterate_does_not_end_the_analysis(monkeypatch):

@@ -7,18 +7,18 @@ import pytest
 from models import elastic_model, united
 
 import fastcontact as fc
-from fastcontact.analysis.tolerances import WINDOW, Watch
+from fastcontact.analysis.tolerances import WINDOW, ScatterWindow
 
 RNG = np.random.default_rng(5)
 
 
 def watched(parts, size=1.0, forces=None):
     """Return the number of the update at which scatter is found, and the scatter."""
-    watch = Watch()
+    watch = ScatterWindow()
     for k in range(1, len(parts)):
         change = np.abs(parts[k] - parts[k - 1]).max()
         force = np.ones(3) if forces is None else forces[k]
-        found = watch.seen(parts[k], force, change, size)
+        found = watch.add(parts[k], force, change, size)
         if found is not None:
             return k, found
     return None, None

@@ -74,7 +74,7 @@ def light_contact_beside_a_large_force(shift):
 @pytest.mark.parametrize("acceptable", first_of(1, [eliminated.ACCEPTABLE, 0.0]))
 def test_forces_that_cannot_be_more_accurate_settle_without_a_compliance(acceptable, monkeypatch):
     monkeypatch.setattr(eliminated, "ROUND_OFF", 0.0)
-    monkeypatch.setattr(eliminated, "ENOUGH", 1e-9)  # more than linear solutions to 1e-10 can give
+    monkeypatch.setattr(eliminated, "LAW_TOLERANCE", 1e-9)  # more than linear solutions to 1e-10 can give
     monkeypatch.setattr(eliminated, "ACCEPTABLE", acceptable)
     model = light_contact_beside_a_large_force(6e-4)
     (solver, step), exact = solved(model, "amg"), solved(model, "direct")[1].contact["c"]

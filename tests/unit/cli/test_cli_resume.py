@@ -134,7 +134,7 @@ def test_a_case_that_was_changed_since_is_refused(name, whole, begun, path, caps
     assert run(changed, path, "--resume") == 1
     assert only_line(capsys.readouterr().err) == (
         f"error: '{path}' cannot be resumed: the steps so far belong to another case; changed since: {what}. Continue with "
-        "the model they were computed for, or start anew without resuming"
+        "the model for which they were computed, or start anew without resuming"
     )
     assert path.read_bytes() == before
 

@@ -176,5 +176,5 @@ def test_fronts_are_eliminated_as_by_hand(size, share):
         expected[j + 1 :, j + 1 :] -= np.outer(row, expected[j, j + 1 :])
         expected[j, j + 1 :] = row
     room = (np.empty(count * size) for count in (kernels.PANEL, kernels.PANEL, 2 * kernels.PANEL))
-    assert kernels._eliminated(F, width, *room) == -1
+    assert kernels._eliminate_columns(F, width, *room) == -1
     np.testing.assert_allclose(np.triu(F), np.triu(expected), atol=1e-13 * np.abs(A).max())

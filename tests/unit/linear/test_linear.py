@@ -14,7 +14,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.contact.configuration import Configuration
 from fastcontact.errors import ModelError
 from fastcontact.linear import choice as linear
-from fastcontact.linear.krylov.iterations import KEPT, ConjugateResiduals
+from fastcontact.linear.krylov.iterations import STORED_DIRECTIONS, ConjugateResiduals
 
 pytestmark = pytest.mark.pairwise
 
@@ -158,7 +158,9 @@ def conjugate_residuals(A, f, most):
     return iteration, norms
 
 
-@pytest.mark.parametrize("n", [2, 7, KEPT - 2, 3 * KEPT])  # more directions are kept where the residual falls slowly
+@pytest.mark.parametrize(
+    "n", [2, 7, STORED_DIRECTIONS - 2, 3 * STORED_DIRECTIONS]
+)  # the last: more steps than directions
 @pytest.mark.parametrize("turned", [0.0, 1e-9, 1e-3])
 def test_conjugate_residuals_progress_where_the_image_of_the_residual_is_orthogonal_to_it(n, turned):
     """The matrix passes every unknown on to the next one; a small diagonal lets the residual turn slowly, too."""
@@ -175,7 +177,7 @@ def test_conjugate_residuals_solve_nonsymmetric_equations(n):
     iteration, norms = conjugate_residuals(A, f, 200)
     assert len(norms) < 100
     assert np.abs(A @ iteration.x - f).max() < 1e-8
-    assert iteration.nbytes <= (4 + 2 * KEPT) * 8 * n + 8 * (n // 4096 + 1)
+    assert iteration.nbytes <= (4 + 2 * STORED_DIRECTIONS) * 8 * n + 8 * (n // 4096 + 1)
     iteration.r[:] = 0.0
     iteration.start()
     assert not iteration.step(lambda p, q: np.copyto(q, A @ p), lambda r, norm, z: np.copyto(z, r))  # nowhere to go
