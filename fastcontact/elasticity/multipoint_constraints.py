@@ -69,7 +69,7 @@ class TemporaryConstraint(MultiPointConstraint):
     def after(self, reached: Array) -> list[MultiPointConstraint]:
         """Return the constraints that begin with the values `reached` (m,) of ``rows @ u`` at the instant `begins`.
 
-        The unit of these values is [length] times the unit of the coefficients.
+        The values `reached` [length times the unit of the coefficients] are those of the displacements there.
         """
         if self.keeps:
             return [MultiPointConstraint(self.name, self.rows, reached, ((0.0, 1.0),))]

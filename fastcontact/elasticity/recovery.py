@@ -248,7 +248,7 @@ def nodal_stress(
 ) -> Array:
     """Return the stress (n_points, n_components) [pressure] at the nodes: `nodal_average` of `stress_at_points`.
 
-    The other arguments are those of `stress_at_points`. To save memory, stresses at points are computed for a limited number
+    Other arguments are as for `stress_at_points`. To save memory, stresses at points are computed for a limited number
     of cells at a time. With `sides` the result has a row for each of its slots (n_slots, n_components): the mean at a
     node over the cells of one material.
     """

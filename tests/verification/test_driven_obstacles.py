@@ -409,9 +409,9 @@ def test_slip_is_zero_where_a_point_sticks_and_the_arc_where_it_stands_still(dim
     before, centre = rng.normal(size=(5, dim)), np.array(rotation.centre)
     stuck = (before - centre - then.displacement) @ rotation.matrix(0.7).T + centre + now.displacement
     moved = now.displacement - then.displacement
-    assert stuck - before == pytest.approx(side.carried(stuck, before, now, then), abs=1e-12)
+    assert stuck - before == pytest.approx(side.rigid_motion(stuck, before, now, then), abs=1e-12)
     # A point that only goes along with the axis stands still on the way of the turn: the surface passes it along an arc.
-    carried = side.carried(before + moved, before, now, then) - moved
+    carried = side.rigid_motion(before + moved, before, now, then) - moved
     arm = before - centre - then.displacement
     unit = np.array(axis) / np.linalg.norm(axis)
     across = np.cross(np.pad(unit, (0, 3 - len(unit))), np.pad(arm, ((0, 0), (0, 3 - dim))))[:, :dim]

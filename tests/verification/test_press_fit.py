@@ -130,7 +130,7 @@ def test_the_two_sides_may_be_swapped(element):
 
 def test_curved_sides_need_averaged_normals():
     """Opposite a node the normal of either facet is off by half their angle: the pairing flips until edges are rounded."""
-    with pytest.warns(fc.FastcontactWarning, match='normals="averaged" does not need this'):
+    with pytest.warns(fc.FastcontactWarning, match='normals="averaged" makes this unnecessary'):
         model, last = quarter("quad8", 8, 12, "node_to_segment", clearance=-INTERFERENCE, normals="facet")
     assert abs(errors(model, last)[1]) < 5e-4
     model, last = quarter("quad8", 8, 12, "node_to_segment", clearance=-INTERFERENCE, normals="averaged")
