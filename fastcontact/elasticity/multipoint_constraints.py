@@ -67,9 +67,9 @@ class TemporaryConstraint(MultiPointConstraint):
         return self.begins <= begin < self.ends
 
     def after(self, reached: Array) -> list[MultiPointConstraint]:
-        """Return the constraints that begin with the values `reached` of ``rows @ u`` at the instant `begins`.
+        """Return the constraints that begin at the instant `begins`.
 
-        The values `reached` (m,) are in [length times the unit of the coefficients].
+        The values of ``rows @ u`` then are `reached` (m,) [length times the unit of the coefficients].
         """
         if self.keeps:
             return [MultiPointConstraint(self.name, self.rows, reached, ((0.0, 1.0),))]
