@@ -372,3 +372,21 @@ def test_nodes_that_face_nothing_do_not_disturb_the_increments_of_a_step():
         assert np.isfinite(last.contact["pair"].slip).all()
         found.append(last.displacement)
     assert np.abs(found[1] - found[0]).max() < 1e-6 * np.abs(found[0]).max()
+
+
+@pytest.mark.parametrize("strain", ["small", "finite"])
+@pytest.mark.parametrize("instants", [[1.0], [0.25, 0.5, 0.75, 1.0]])
+def test_a_block_that_is_hot_at_first_shrinks_towards_its_middle(instants, strain):
+    """The heat and the weight act at the beginning: friction opposes the shrinking, for any number of load steps."""
+    model = fc.Model(fc.generate.block((0.1, 0.02), (10, 2), "quad8"), "plane_strain", strain=strain)
+    model.add_material(fc.LinearElastic(E=1e9, nu=0.3, expansion=1e-5))
+    model.couple("TOP", "xy")
+    model.fix("TOP_LEFT", "x")
+    model.add_force("TOP", y=-1e3, ramp=[(0.0, 1.0), (1.0, 1.0)])
+    model.add_temperature(100.0, ramp=[(0.0, 1.0), (1.0, 0.0)])
+    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, friction=0.2)
+    contact = fc.solve(model, instants)[-1].contact["floor"]
+    right = contact.coordinates[:, 0] > 0.05
+    assert not contact.sticking[contact.active].all()
+    assert contact.force_vectors[right, 0].sum() > 0.19 * contact.force_vectors[right, 1].sum()

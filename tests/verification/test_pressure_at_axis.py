@@ -139,6 +139,22 @@ def test_quadratic_facets_with_accurate_pressures_are_not_told(element, inner, o
     assert np.abs(contact.pressure / LAME - 1).max() < 0.1
 
 
+@pytest.mark.parametrize(("depth", "oscillates"), [(0.0, False), (1e-3, True)])
+def test_pressures_oscillate_where_every_second_node_is_open(depth, oscillates):
+    """Grooves at the nodes between corners, as wear may leave them."""
+    model = fc.Model(fc.generate.block((8.0, 2.0), (16, 4), "quad8"), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.prescribe("TOP", x=0.0, y=-1e-3)
+    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    grooves = lambda x: depth * (np.mod(x[:, 0] / 0.5, 1.0) > 0.25)  # noqa: E731
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, formulation="continuous", clearance=grooves)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        step = fc.solve(model, 1)[-1]
+    assert step.contact["floor"].active.all() != oscillates
+    assert any("oscillate" in text for text in step.warnings) == oscillates
+
+
 @pytest.mark.parametrize(
     ("element", "count", "remedy"),
     [
