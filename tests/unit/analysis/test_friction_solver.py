@@ -175,7 +175,7 @@ def test_pivots_against_all_bases():
         A = rng.normal(size=(n, n))
         M, q = A @ A.T + 0.1 * np.eye(n) + (A - A.T), rng.normal(size=n)
         z, count = dense.lemke(M, q, 100)
-        assert count == 0 or dense.lemke(M, q, count - 1)[0] is None
+        assert count == 0 or (count > 1 and dense.lemke(M, q, count - 1)[0] is None)
         wanted = None
         for basis in itertools.product([False, True], repeat=n):
             on, x = np.flatnonzero(basis), np.zeros(n)

@@ -307,7 +307,7 @@ def test_shell_stays_in_space(tmp_path, suffix):
 
 
 def test_missing_file_folder_and_suffix(tmp_path):
-    with pytest.raises(FileError, match=r"no file '.*none\.vtu'"):
+    with pytest.raises(FileError, match=r"file '.*none\.vtu'"):
         read_mesh(tmp_path / "none.vtu")
     with pytest.raises(FileError, match="is a folder"):
         read_mesh(tmp_path)
