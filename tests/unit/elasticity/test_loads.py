@@ -310,6 +310,7 @@ def test_a_ramp_of_its_own_must_cover_the_instants(model):
     ],
 )
 def test_relations_that_contradict_supports_or_each_other_are_refused(model, consistent, contrary, value):
+    model.couple("BOTTOM", "y")  # consistent with its supports
     for terms in consistent:
         model.relate(terms)
     model.check()
