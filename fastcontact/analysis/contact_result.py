@@ -96,8 +96,8 @@ def contact_result(
     forces, total, primary_points, primary_forces = _nodal_forces(pair, constraints, multiplier, tangential)
     finite_normal = np.where(np.isfinite(normal), normal, 0.0)
     middle = contact_middle(pair, finite_normal, np.einsum("nd,nd->n", forces, finite_normal), closed, gap)
-    place, along = middle.places(constraints.positions), middle.tangent
-    across = place if along is None else (constraints.positions - middle.position) @ along
+    place, tangent = middle.places(constraints.positions), middle.tangent
+    along_tangent = place if tangent is None else (constraints.positions - middle.position) @ tangent
     fluid = None if pair.options.source is None else np.zeros(len(points))
     if constraints.wetted is not None:
         fluid = constraints.wetted.pressure
@@ -124,12 +124,12 @@ def contact_result(
         normal=normal,
         active=closed,
         force=total,
-        radius=_contact_radius(pair, middle, (place, across), active, closed),
+        radius=_contact_radius(pair, middle, (place, along_tangent), active, closed),
         shear=shear,
         sticking=closed & sticking,
         middle=middle.position,
         place=middle.places(coordinates),
-        tangent=middle.tangent,
+        tangent=tangent,
         primary_points=primary_points,
         primary_force_vectors=primary_forces,
         fluid_pressure=fluid,
@@ -140,9 +140,9 @@ def contact_result(
 def _contact_radius(
     pair: Formulation, middle: ContactMiddle, distances: tuple[Array, Array], active: Mask, closed: Mask
 ) -> tuple[float, float]:
-    """Return `ContactResult.radius` from `distances` of the constraints from the middle, and the closed nodes (n_nodes,).
+    """Return the bounds `ContactResult.radius`, given two `distances` of each constraint from the middle.
 
-    In 3D the radius may depend on the direction, and closed nodes carry facets that are only partly in contact.
+    In 3D the radius may depend on the direction, and facets of closed nodes (n_nodes,) may be only partly in contact.
     """
     low, high = half_width(distances[0], active, distances[1])
     side = pair.secondary
@@ -217,8 +217,8 @@ def _closed_nodes(
         closed = np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
     else:
         # Nodes of a cohesive layer are closed under tension as well.
-        pressing = side_pressure if pair.options.cohesion is None else np.abs(side_pressure)
-        closed = field.closed_nodes(active, gap, pressing)
+        magnitude = side_pressure if pair.options.cohesion is None else np.abs(side_pressure)
+        closed = field.closed_nodes(active, gap, magnitude)
         never_opening = pair.never_opening(pair.points[pair.secondary.points], configuration)
         closed = closed | (never_opening & np.isfinite(gap))
     closed, pressure = closed_node_pressures(constraints, forces, closed & ~excluded, pair.secondary)
@@ -251,19 +251,19 @@ def closed_node_pressures(constraints: Constraints, forces: Array, closed: Mask,
     """
     field, may_pull = constraints.nodal, bool(constraints.equality.any())
     assert field is not None
-    nodal, shares, areas = field.over_whole_side(forces), field.shares(forces), field.nodal_areas
+    nodal_pressure, shares, areas = field.over_whole_side(forces), field.shares(forces), field.nodal_areas
     with_area = areas > NO_AREA * np.abs(areas).mean()  # nodes that may receive shares of others
     while True:
         if not may_pull:
-            closed = closed & (nodal >= 0.0)
+            closed = closed & (nodal_pressure >= 0.0)
             if shares.sum() > 0.0 and not (closed & with_area).any():
                 largest = np.argmax(np.where(with_area, shares, -np.inf))
                 single_node = np.arange(len(areas)) == largest
                 return single_node, np.where(single_node, shares.sum() / areas[largest], 0.0)
         receivers = closed & with_area
-        excess = np.where(closed, shares - nodal * areas, shares)
+        excess = np.where(closed, shares - nodal_pressure * areas, shares)
         excess[receivers | (np.abs(excess) <= SUM_ROUND_OFF * np.abs(shares).max(initial=0.0))] = 0.0
-        pressure = nodal + (
+        pressure = nodal_pressure + (
             _received_pressures(receivers, excess, areas, side) if excess.any() else np.zeros_like(excess)
         )
         tension = closed & (pressure < 0.0)
@@ -293,19 +293,19 @@ def _received_pressures(receivers: Mask, excess: Array, areas: Array, side: Surf
 
 def _nodal_shear(
     constraints: Constraints, directions: tuple[Array, ...], tangential: Array, normal: Array,
-    along_normal: Array | None = None,
+    normal_forces: Array | None = None,
 ) -> Array:  # fmt: skip
     """Return the tangential traction on the secondary nodes (n_nodes, dim) [pressure].
 
-    Because tangents vary from point to point, the traction is computed from Cartesian components of the forces. Its component
-    along the nodal normals is then removed.
+    Because tangents vary from point to point, the traction is computed from Cartesian components of the `tangential` and
+    `normal_forces` of the constraints. Its component along the nodal normals is then removed.
     """
-    nodal = constraints.nodal
-    assert nodal is not None
+    field = constraints.nodal
+    assert field is not None
     forces = np.einsum("nk,ndk->nd", tangential, np.stack(directions, axis=2))
-    if along_normal is not None:
-        forces += along_normal[:, None] * normals(directions)
-    traction = nodal.traction(forces) * np.reshape(nodal.covered, (-1, 1))
+    if normal_forces is not None:
+        forces += normal_forces[:, None] * normals(directions)
+    traction = field.traction(forces) * np.reshape(field.covered, (-1, 1))
     return traction - np.einsum("nd,nd->n", traction, normal)[:, None] * normal
 
 
@@ -330,7 +330,7 @@ def mean_slip_before_closing(
 
 
 def sliding_load(
-    constraints: Constraints, solution: Solution, rows: slice, over_slip: Array, closed: Mask, side: Surface
+    constraints: Constraints, solution: Solution, rows: slice, slip_integrals: Array, closed: Mask, side: Surface
 ) -> Array:
     """Return the integrals (n_nodes,) of the pressure over the slip in the step [pressure * length].
 
@@ -338,7 +338,7 @@ def sliding_load(
     ----------
     constraints, solution, rows
         See `contact_result`.
-    over_slip : ndarray (m,)
+    slip_integrals : ndarray (m,)
         Integrals of the normal forces of the constraints over their slips [energy].
     closed : ndarray of bool (n_nodes,)
         Secondary nodes that are closed at the beginning or at the end of the step. Like the contact force, the integral is
@@ -348,8 +348,8 @@ def sliding_load(
     """
     # If the step is solved at once, slips of sticking constraints are elastic. If it is solved in increments, a constraint
     # that sticks at the end may have slid before.
-    slides = over_slip if solution.work is not None else np.where(solution.sticking[rows], 0.0, over_slip)
-    return np.maximum(closed_node_pressures(constraints, constraints.normal_forces(slides), closed, side)[1], 0.0)
+    sliding = slip_integrals if solution.work is not None else np.where(solution.sticking[rows], 0.0, slip_integrals)
+    return np.maximum(closed_node_pressures(constraints, constraints.normal_forces(sliding), closed, side)[1], 0.0)
 
 
 def _on_deformed_surface(pair: Formulation, contact: ContactResult, displacement: Array) -> ContactResult:
@@ -397,7 +397,7 @@ def _stretch(contact: ContactResult, displacement: Array, before: Array, after: 
 
 
 def _with_periodic_nodes(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
-    """Return contact results in which both nodes of a periodic pair have the same traction, and close together."""
+    """Return contact results in which both nodes of a periodic pair have the same traction and contact status."""
     merged_results = dict(results)
     for name, contact in results.items():
         pair = problem.pairs[name]

@@ -321,10 +321,10 @@ def balance(
     if not 0.0 < residual <= bound:
         # In stiff parts with large displacements, the round-off of internal forces may exceed the forces in soft parts. If
         # there are no forces, the relative residual is not defined, and the round-off of internal forces is the bound. Both
-        # cases need the row sums, which cost as much as a product with K.
-        row_sums = problem.system.K.row_sums(problem.accurate_to(u))
-        residual = problem.system.balance(unbalanced, SUM_ROUND_OFF * row_sums)[1]
-        round_off, noise = _round_off(problem, row_sums, forces, largest_so_far)
+        # cases need abs(K) @ lengths, which costs as much as a product with K.
+        product = problem.system.K.absolute_product(problem.accurate_to(u))
+        residual = problem.system.balance(unbalanced, SUM_ROUND_OFF * product)[1]
+        round_off, noise = _round_off(problem, product, forces, largest_so_far)
     reaction = reaction[: problem.model.mesh.points.size]
     if problem.model.springs:
         reaction = reaction + ground_force(problem.model.springs, u[: len(reaction)])
@@ -332,7 +332,7 @@ def balance(
     return Balance(reaction, largest_so_far, residual, max(bound, round_off), relative, noise, energy)
 
 
-def _round_off(problem: Problem, row_sums: Array, forces: tuple[Array, ...], scale: float) -> tuple[float, float]:
+def _round_off(problem: Problem, product: Array, forces: tuple[Array, ...], scale: float) -> tuple[float, float]:
     """Return a bound of the residual that is due to round-off, and the level of round-off.
 
     A force is significant if it exceeds the level of round-off, and if the round-off of its row is below the criterion. If
@@ -342,7 +342,7 @@ def _round_off(problem: Problem, row_sums: Array, forces: tuple[Array, ...], sca
     Parameters
     ----------
     problem : Problem
-    row_sums : ndarray (n_dofs,)
+    product : ndarray (n_dofs,)
         ``abs(K) @ lengths`` with the lengths of `Problem.accurate_to` [force].
     forces : tuple of ndarray
         Reactions, contact forces and external forces [force].
@@ -355,11 +355,11 @@ def _round_off(problem: Problem, row_sums: Array, forces: tuple[Array, ...], sca
         [force].
     """
     force_round_off = ROUND_OFF * scale
-    noise = max(force_round_off, SUM_ROUND_OFF * largest(row_sums) / NOTABLE)
+    noise = max(force_round_off, SUM_ROUND_OFF * largest(product) / NOTABLE)
     for magnitudes in map(np.abs, forces):
-        if ((magnitudes > noise) & (magnitudes * problem.criteria.relative > SUM_ROUND_OFF * row_sums)).any():
+        if ((magnitudes > noise) & (magnitudes * problem.criteria.relative > SUM_ROUND_OFF * product)).any():
             return force_round_off, noise
-    return max(max(ROUND_OFF, 10 * problem.solver.tolerance) * largest(row_sums), force_round_off), noise
+    return max(max(ROUND_OFF, 10 * problem.solver.tolerance) * largest(product), force_round_off), noise
 
 
 @dataclass(frozen=True, eq=False)

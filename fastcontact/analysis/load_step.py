@@ -238,12 +238,12 @@ def accumulate_results(
             results_so_far[name] = replace(results_so_far[name], damage=end.bonds[name].at(contact.coordinates)[1])
         elif not (pair.options.tied or pair.options.gap_only):
             arguments = constraints, settled.solution, rows, configuration, contact, start.forces.get(name)
-            forces[name], work_of_pair, over_slip = contact_work(pair, *arguments)
+            forces[name], work_of_pair, slip_integrals = contact_work(pair, *arguments)
             load_of_pair = None
             if pair.friction:
                 closed_before = start.forces[name].pressing > 0.0 if name in start.forces else False
                 closed = contact.active | closed_before
-                load_of_pair = sliding_load(constraints, settled.solution, rows, over_slip, closed, pair.secondary)
+                load_of_pair = sliding_load(constraints, settled.solution, rows, slip_integrals, closed, pair.secondary)
             results_so_far[name] = replace(results_so_far[name], dissipation=work_of_pair[0], sliding_load=load_of_pair)
             works += work_of_pair
         if pair.options.wear is not None:

@@ -172,7 +172,7 @@ def _steady_temperatures(
             crossings[name] = link, constraints.nodal, h, obstacle_rise, area_ratio[pair.secondary.points]
         if pair.options.friction_heat:
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
-            friction_power += link.shared(pair.options.friction_heat * work / (instant - start.instant))
+            friction_power += link.nodal_powers(pair.options.friction_heat * work / (instant - start.instant))
     steady = heat.temperatures(instant, displacement, matrix, friction_power, (obstacles, obstacle_power))
     powers = {name: h * link.area * (link.jump @ steady.rise - r) for name, (link, _, h, r, _) in crossings.items()}
     fluxes = {name: crossings[name][1].over_whole_side(power) / crossings[name][4] for name, power in powers.items()}

@@ -180,7 +180,7 @@ def contact_work(
     forces : ContactForces
     works : (float, float, float)
         Increments of `Work.friction`, `Work.touching` and `Work.imbalance` [energy].
-    over_slip : ndarray (m,)
+    slip_integrals : ndarray (m,)
         Integrals of the normal forces over the slips in the step [energy].
     """
     normal, k = constraints.contact_forces(solution.multiplier[rows]), len(constraints.tangents)
@@ -207,8 +207,8 @@ def contact_work(
             open_before = gap[facing] > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
             closing &= open_before[nearest(pair.points[pair.secondary.points[facing]], constraints.positions)[1]]
     touching, friction, mu = float(work_at_end[closing].sum()), float(work.sum()), constraints.friction
-    over_slip = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(slips, axis=1)
-    np.divide(work, mu, out=over_slip, where=mu > 0.0)
+    slip_integrals = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(slips, axis=1)
+    np.divide(work, mu, out=slip_integrals, where=mu > 0.0)
     sliding = float((work_at_end + work_at_begin).sum())
     displacement = configuration.displacement - configuration.start
     if isinstance(pair.primary, RigidSide):  # relative to the obstacle
@@ -221,7 +221,7 @@ def contact_work(
     added_gap = np.where((after.pressing != 0.0) & (before.pressing != 0.0), after.added - before.added, 0.0)
     gained -= 0.5 * float((after.pressing + before.pressing) @ added_gap)
     gained -= 0.5 * float(((after.tangential + before.tangential) * displacement).sum())
-    return after, (friction, touching, gained - (after.stored - before.stored) - sliding), over_slip
+    return after, (friction, touching, gained - (after.stored - before.stored) - sliding), slip_integrals
 
 
 def _forces(

@@ -31,24 +31,24 @@ from fastcontact.results.units import known_units
 if TYPE_CHECKING:
     from fastcontact.cases.decks.deck import Deck
 
-# Label of a quantity or a parameter of a sensitivity.
+# Label of a quantity, or of a parameter with respect to which it is differentiated.
 Label = tuple[str | int, ...]
 # File suffix of input decks of Abaqus and CalculiX.
-DECK = ".inp"
+DECK_SUFFIX = ".inp"
 _PACKAGE = Path(__file__).resolve().parents[1]
 # Folders of the ready-made cases, in an installed package and in a checkout.
 _FOLDERS = (_PACKAGE / "data" / "cases", _PACKAGE.parent / "data" / "cases")
 
 
-def shipped_cases() -> dict[str, Path]:
+def ready_made_cases() -> dict[str, Path]:
     """Return the files of the ready-made cases by name, in alphabetical order."""
     folder = next((folder for folder in _FOLDERS if folder.is_dir()), None)
     return {} if folder is None else {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def shipped_case(name: str) -> Path:
+def ready_made_case(name: str) -> Path:
     """Return the path of a ready-made case. Raises CaseError, with the most similar names, if there is no such case."""
-    cases = shipped_cases()
+    cases = ready_made_cases()
     check_known("ready-made case", name, cases, CaseError)
     return cases[name]
 
@@ -69,7 +69,7 @@ def case_path(given: str | Path) -> Path:
         reason = getattr(error, "strerror", None) or error
         raise CaseError(f"cannot look for the case file '{str(given)[:200]}' ({reason}): check its name") from None
     try:
-        return shipped_case(path.name)
+        return ready_made_case(path.name)
     except CaseError as error:
         raise CaseError(f"cannot read the case file '{given}': it does not exist, and {error}") from None
 
@@ -191,12 +191,13 @@ def read_case(path: str | Path) -> Case:
     Raises
     ------
     CaseError
-        If the file is missing, is not TOML, or has an unknown key or an invalid value; the message names file and key.
+        If the file is missing, is not TOML, or has an unknown key or an invalid value. The message names the
+        file and the key.
     FastcontactError
         If its mesh or model is invalid.
     """
     path = case_path(path)
-    if path.suffix.lower() == DECK:
+    if path.suffix.lower() == DECK_SUFFIX:
         return _case_of_deck(path)
     text, data = _read_toml(path)
     try:
@@ -234,7 +235,7 @@ def files_of_case(path: str | Path) -> list[Path]:
     Raises CaseError or FileError if a file cannot be read.
     """
     path = case_path(path)
-    if path.suffix.lower() == DECK:
+    if path.suffix.lower() == DECK_SUFFIX:
         from fastcontact.cases.decks.blocks import files_of_deck
 
         return files_of_deck(existing_file(path))
@@ -265,7 +266,7 @@ def _reading_error(path: Path, error: Exception) -> str:
         return "it is a folder; name a file in it"
     if not path.exists():
         hint = f"; the ready-made case of this name needs no path: '{path.stem}'"
-        return "it does not exist" + (hint if path.stem in shipped_cases() else "")
+        return "it does not exist" + (hint if path.stem in ready_made_cases() else "")
     if isinstance(error, OSError):
         return error.strerror or type(error).__name__
     return "it is not UTF-8 text; name a TOML file, whose table [mesh] may name a mesh file"
@@ -436,7 +437,7 @@ def _theory(where: str, data: dict[str, Any], kinematics: str) -> Any:
     return called(where, analytic.THEORIES[kind], arguments)
 
 
-def described(data: dict[str, Any]) -> dict[str, Any]:
+def stored_description(data: dict[str, Any]) -> dict[str, Any]:
     """Return the title, the theories, the approaches and the ramp table of a case whose text a result file contains.
 
     `data` is the parsed text. It is empty for results without a case file.

@@ -1,4 +1,4 @@
-"""Output files of commands, including pictures: their checks before a computation, and their writing after it."""
+"""Checks of the output files of a command before its computation, and functions that write them, including pictures."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 def check_outputs(
-    read: Iterable[PathLike | None], files: Iterable[PathLike | None], pictures: Iterable[PathLike | None] = ()
+    input_files: Iterable[PathLike | None], files: Iterable[PathLike | None], pictures: Iterable[PathLike | None] = ()
 ) -> None:
     """Check that output files can be written, and that they replace neither an input file nor another output.
 
-    Each command that writes files calls this function before it opens any file. `read` are the input files; entries of None
-    are ignored. Files are identified by device and inode, so that links to a file are recognised as the same file.
+    Each command that writes files calls this function before it opens any file. Entries of None are ignored. Files are
+    identified by device and inode, so that links to a file are recognised as the same file.
 
     Raises FileError if a folder is missing or write-protected, if a path is a folder, an input file or another output, or
     if the format of a picture is unknown; FastcontactError if Matplotlib is missing.
@@ -32,17 +32,17 @@ def check_outputs(
     from fastcontact._tools.paths import checked_target, is_stream
 
     picture_paths = [str(path) for path in pictures if path]
-    inputs = {_identity(Path(os.path.realpath(path))) for path in read if path}
-    outputs: set[object] = set()
+    input_ids = {_identity(Path(os.path.realpath(path))) for path in input_files if path}
+    output_ids: set[object] = set()
     for path in [*(str(path) for path in files if path), *picture_paths]:
         if is_stream(path):
             continue
         identity = _identity(checked_target(path))
-        if identity in inputs:
+        if identity in input_ids:
             raise FileError(f"'{path}' is an input of this command: name another output file")
-        if identity in outputs:
+        if identity in output_ids:
             raise FileError(f"two outputs are to be written to '{path}': name another file for one of them")
-        outputs.add(identity)
+        output_ids.add(identity)
     if picture_paths:
         _check_formats(picture_paths)
 
@@ -84,9 +84,9 @@ def say_written(options: Any, *paths: object) -> None:
         say(f"wrote {', '.join(str(path) for path in paths if path)}")
 
 
-def write_json(path: str, numbers: Any, indent: int = 2) -> None:
+def write_json(path: str, data: Any, indent: int = 2) -> None:
     """Write a JSON file; errors as for `write_text`."""
-    write_text(path, json.dumps(numbers, indent=indent) + "\n")
+    write_text(path, json.dumps(data, indent=indent) + "\n")
 
 
 def save(axes: Any, path: str) -> None:
@@ -117,7 +117,7 @@ def profile_picture(case: Any, step: StepResult, path: str) -> None:
 
 
 def draw_profile(contact: ContactResult, step: StepResult, theories: dict[str, Any], path: str, title: str) -> None:
-    """Plot the pressure of a contact pair and of theories, which are given by their label in the legend."""
+    """Plot the pressure of a contact pair and those of `theories`, which map labels in the legend to curves."""
     from fastcontact.results import plot
     from fastcontact.results.tables import normal_stress
 

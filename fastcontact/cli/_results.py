@@ -53,13 +53,13 @@ def chosen_contact(options: Namespace, step: Any) -> str:
 
 def case_data(results: Any) -> dict[str, Any]:
     """Return title, theories, approaches and ramp of the case that a result file stores; defaults if it stores none."""
-    from fastcontact.cases.case import described
+    from fastcontact.cases.case import stored_description
 
     try:
         data = toml_text.parsed(results.case_text or "")
     except ValueError:
         data = {}
-    return described(data)
+    return stored_description(data)
 
 
 def load_multiplier(table: Sequence[tuple[float, float]], step: Any) -> float:

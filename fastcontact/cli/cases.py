@@ -21,19 +21,19 @@ ARGUMENTS = {
 
 def run(options: Namespace) -> int:
     """List the ready-made cases, or print or copy one of them."""
-    from fastcontact.cases.case import shipped_case, shipped_cases
+    from fastcontact.cases.case import ready_made_case, ready_made_cases
 
     if options.copy and options.name:
         raise FastcontactError("give either a name to print or --copy NAME, not both")
     if options.output and not options.copy:
         raise FastcontactError("-o needs --copy NAME, the case to copy")
     if options.copy:
-        written = copied(shipped_case(options.copy), Path(options.output or f"{options.copy}.toml"))
+        written = copied(ready_made_case(options.copy), Path(options.output or f"{options.copy}.toml"))
         say_written(options, *written)
     elif options.name:
-        say(shipped_case(options.name).read_text(encoding="utf-8").rstrip("\n"))
+        say(ready_made_case(options.name).read_text(encoding="utf-8").rstrip("\n"))
     elif not options.quiet:
-        say("\n".join(line for path in shipped_cases().values() for line in _lines(path)))
+        say("\n".join(line for path in ready_made_cases().values() for line in _lines(path)))
         say("solve one with: fastcontact run NAME")
     return 0
 

@@ -1,8 +1,9 @@
-"""Thermal contact conductance as a function of pressure and gap, and the discrete heat transfer between both sides.
+"""Thermal contact conductance as a function of pressure and gap, and the discrete heat transfer between the two sides.
 
 The heat flow at a constraint is ``h * area * (T_secondary - T_primary)``, where temperatures are weighted with the test
-functions of the gap of the constraint. The transpose distributes heat flows to the nodes. Mortar functions sum to one, so
-that a uniform flux is transmitted exactly between non-matching meshes (Hueber and Wohlmuth, 2009, section 3).
+functions of the gap of the constraint. The transpose distributes heat flows to the nodes. The shape functions of the mortar
+multiplier sum to one, so that a uniform flux is transmitted exactly between non-matching meshes (Hueber and Wohlmuth,
+2009, section 3).
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ class Conductance:
         )
 
     @property
-    def sampled(self) -> Any:
+    def signature(self) -> Any:
         """Values that identify the conductance: the argument itself or, for a function, samples of its values."""
         if not callable(self._law):
             return self._law
@@ -125,14 +126,14 @@ class HeatTransfer:
 
     @property
     def jump(self) -> csr_array:
-        """Rows (m, n_points) of the temperature jump, secondary minus primary side [-]."""
+        """Matrix (m, n_points) that maps nodal temperatures to their jumps, secondary minus primary side [-]."""
         return csr_array(self.secondary - self.primary)
 
     def matrix(self, h: Array) -> csr_array:
         """Return the matrix (n_points, n_points) of conductances `h` (m,) [power / temperature]."""
         return csr_array(self.jump.T @ diags_array(h * self.area) @ self.jump)
 
-    def shared(self, power: Array) -> Array:
+    def nodal_powers(self, power: Array) -> Array:
         """Return the nodal powers (n_points,) of heat generated at the constraints (m,), half of it on each side [power]."""
         return np.asarray(0.5 * (self.secondary.T @ power + self.primary.T @ power))
 

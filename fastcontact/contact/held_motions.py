@@ -48,7 +48,7 @@ class HeldMotions:
         supported : ndarray of bool (n_points, dim)
             Components that supports hold.
         mpc_rows : csr_array (m, n_dofs)
-            Rows of multi-point constraints; only those that involve a single node count.
+            Rows of multi-point constraints; only those that involve a single node are used.
         driven : ndarray of bool (n_points, dim), optional
             Components with a prescribed displacement other than zero; by default none.
         """
@@ -88,21 +88,21 @@ def _rows_of_single_nodes(mpc_rows: csr_array, dim: int) -> tuple[Indices, Array
     return node[first[single_node]], normals[rows[single_node]] / length[single_node, None]
 
 
-def eigenspaces(tensors: Array, least: float) -> Array:
-    """Return projectors (n, dim, dim) onto the eigenvectors of symmetric `tensors` whose eigenvalues are at least `least`."""
+def eigenspaces(tensors: Array, threshold: float) -> Array:
+    """Return projectors (n, dim, dim) onto eigenvectors of symmetric `tensors` with eigenvalues of at least `threshold`."""
     values, vectors = np.linalg.eigh(tensors)
-    vectors = np.where(values[:, None, :] >= least, vectors, 0.0)
+    vectors = np.where(values[:, None, :] >= threshold, vectors, 0.0)
     return np.asarray(vectors @ vectors.transpose(0, 2, 1))
 
 
-def deflate(projectors: Array, vectors: Array, least: Array | float) -> Array:
+def deflate(projectors: Array, vectors: Array, threshold: Array | float) -> Array:
     """Return projectors (n, dim, dim) from which the directions of the projected `vectors` (n, dim) are removed.
 
-    Vectors whose projection is shorter than `least` are ignored.
+    Vectors whose projection is shorter than `threshold` are ignored.
     """
     inside = np.einsum("nde,ne->nd", projectors, vectors)
     length = np.linalg.norm(inside, axis=1, keepdims=True)
-    inside = np.where(length > least, inside / np.where(length > 0.0, length, 1.0), 0.0)
+    inside = np.where(length > threshold, inside / np.where(length > 0.0, length, 1.0), 0.0)
     return projectors - inside[:, :, None] * inside[:, None, :]
 
 
@@ -131,16 +131,16 @@ def direction_fields(projectors: Array, positions: Array) -> list[tuple[Array, M
         seeds = seeds[rank[seeds] == least]
         seeds = seeds if least == 1 else seeds[:1]  # if all nodes are held in several directions, start from any node
         axis = np.linalg.eigh(remaining[seeds])[1][:, :, -1]
-        apart = np.where(np.abs(axis @ axis.T) >= SAME_DIRECTION, _distances(positions[seeds], positions[seeds]), 0.0)
-        order, predecessor = breadth_first_order(minimum_spanning_tree(csr_array(apart)), 0, directed=False)
+        edges = np.where(np.abs(axis @ axis.T) >= SAME_DIRECTION, _distances(positions[seeds], positions[seeds]), 0.0)
+        order, predecessor = breadth_first_order(minimum_spanning_tree(csr_array(edges)), 0, directed=False)
         for child in order[1:]:  # orient each vector like its predecessor in the tree of nearest neighbours
             axis[child] *= np.sign(axis[child] @ axis[predecessor[child]])
         # Elsewhere, directions are interpolated with powers of the inverse distances as weights. With this power, the
         # contributions of distant nodes decrease faster than their number increases.
         field = np.tile(axis[order][0], (len(positions), 1))
         if not (axis[order] @ axis[order][0] > 1.0 - ROUND_OFF).all():
-            apart = _distances(positions, positions[seeds[order]])
-            field = _unit((apart.min(axis=1, keepdims=True) / apart) ** (1 + axis.shape[1]) @ axis[order])
+            distance = _distances(positions, positions[seeds[order]])
+            field = _unit((distance.min(axis=1, keepdims=True) / distance) ** (1 + axis.shape[1]) @ axis[order])
         field[seeds[order]] = axis[order]
         held = np.einsum("nd,nde,ne->n", field, remaining, field) >= SAME_DIRECTION**2
         field[held] = _unit(np.einsum("nde,ne->nd", remaining[held], field[held]))

@@ -163,13 +163,13 @@ def _respond_in_plane_stress(constants, D, bulk, finite, stretch_z, F, old, new,
 
     `stretch_z` is the thermal out-of-plane stretch. Returns the energy density, and whether the iteration converged.
     """
-    everywhere = np.bool_(True)  # for literals, Numba would compile the laws once more
+    tangent = np.bool_(True)  # for literals, Numba would compile the laws once more
     F[2, 2] = (1.0 + old[8]) / stretch_z if finite else 2.0 + old[8] - stretch_z
     for _ in range(MOST_ITERATIONS):
         J = _dilatation(F, finite, G)
         pressure = bulk * (J - 1.0)
         volumetric = (pressure, bulk, pressure if finite else 0.0)
-        energy = respond(constants, D, F, J, G, volumetric, everywhere, old, new, P, A)
+        energy = respond(constants, D, F, J, G, volumetric, tangent, old, new, P, A)
         if not A[8, 8] > 0.0:
             return energy, False
         if abs(P[2, 2]) <= TOLERANCE * A[8, 8]:
@@ -184,21 +184,21 @@ def _respond_in_plane_stress(constants, D, bulk, finite, stretch_z, F, old, new,
 
 @kernel
 def _respond(
-    constants, D, bulk, pressure, stretch_z, plane_stress, finite, geometric, everywhere, F, J, G, old, new, P, A
+    constants, D, bulk, pressure, stretch_z, plane_stress, finite, geometric, tangent, F, J, G, old, new, P, A
 ):
     """Fill the history `new` (9,), P and A of a point; return its energy density, and whether plane stress converged.
 
     `pressure` is that of the projected dilatation, `bulk` the bulk modulus of the remainder, and G (3, 3) the derivative of
     J. Other arguments are described for `linearise`, `_respond_in_plane_stress` and `respond`.
     """
-    omitted = finite and geometric == 0 and everywhere
+    omitted = finite and geometric == 0 and tangent
     if plane_stress:
         energy, converged = _respond_in_plane_stress(constants, D, bulk, finite, stretch_z, F, old, new, P, A, G)
         _subtract_initial_stress(omitted, G, determinant(F), P, 0.0, 0.0, A)
         return energy, converged
     pressure += bulk * (J - 1.0)
-    d2J_factor = pressure if finite and geometric == 2 and everywhere else min(pressure, 0.0) if omitted else 0.0
-    energy = respond(constants, D, F, J, G, (pressure, bulk, d2J_factor), everywhere, old, new, P, A)
+    d2J_factor = pressure if finite and geometric == 2 and tangent else min(pressure, 0.0) if omitted else 0.0
+    energy = respond(constants, D, F, J, G, (pressure, bulk, d2J_factor), tangent, old, new, P, A)
     _subtract_initial_stress(omitted, G, J, P, pressure, d2J_factor, A)
     return energy + 0.5 * bulk * (J - 1.0) ** 2, True
 
@@ -207,10 +207,10 @@ def _respond(
 def _subtract_elastic(constants, D, bulk, plane_stress, A):
     """Subtract the elastic tangent at small strains from A (18, 12), without the contribution of the projected dilatation."""
     no_history, new, P, G, elastic = np.zeros(9), np.empty(9), np.empty((3, 3)), np.empty((3, 3)), np.zeros((18, 12))
-    F, finite, everywhere, geometric = np.eye(3), np.bool_(False), np.bool_(True), np.int64(2)  # no literals, see above
+    F, finite, tangent, geometric = np.eye(3), np.bool_(False), np.bool_(True), np.int64(2)  # no literals, see above
     J = _dilatation(F, finite, G)
     _respond(
-        constants, D, bulk, 0.0, 1.0, plane_stress, finite, geometric, everywhere, F, J, G, no_history, new, P, elastic
+        constants, D, bulk, 0.0, 1.0, plane_stress, finite, geometric, tangent, F, J, G, no_history, new, P, elastic
     )
     A -= elastic
 

@@ -5,11 +5,11 @@ Shared arguments: ``F`` (3, 3) is the deformation gradient [-] and ``P`` (3, 3) 
 The first nine rows and columns of ``A`` (18, 12) contain its derivative dP/dF, in which component iJ has the index 3 i + J;
 the other entries are work space. Laws for small strains take the symmetric part of F - I; their P is the Cauchy stress.
 `constants` (n_constants,) begin with the number of the law, see `nonlinear_materials`. `old` and `new` (9,) are the history
-at the beginning and the end of the load step. It consists of the plastic strain (xx, yy, zz, xy, yz, xz, tensor
+variables at the beginning and the end of the load step: the plastic strain (xx, yy, zz, xy, yz, xz, tensor
 components), the equivalent plastic strain, the plastic work [energy / volume], and in plane stress F_zz - 1. At finite
 strains, L - I takes the place of the plastic strain, where L is the lower triangular factor of the inverse plastic metric,
-C_p^-1 = L L^T. For laws that have a bulk modulus, `respond` adds the volumetric part of P and A, and the element loop that
-of the energy, U(J) = K (J - 1)^2 / 2.
+C_p^-1 = L L^T. For laws that have a bulk modulus, `respond` adds the volumetric part of P and A, and the element loop
+adds that of the energy, U(J) = K (J - 1)^2 / 2.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ LINEAR, PLASTIC, SAINT_VENANT, INVARIANTS, OGDEN, LOGARITHMIC = range(6)
 # First rows of the two groups of rows of A that are work space of `first_invariant`.
 LEFT, RIGHT = 12, 15
 # Relative excess of the trial stress over the yield stress that counts as round-off.
-YIELDING = 1e-12
+YIELD_TOLERANCE = 1e-12
 # Relative difference of squared stretches below which the tangent treats them as equal.
 EQUAL = 1e-7
 # Relative difference of squared stretches below which second divided differences are computed by a series.
@@ -110,12 +110,12 @@ def _hooke(D, strain, stress):
 
 
 @kernel
-def _linear(D, F, everywhere, P, A):
+def _linear(D, F, tangent, P, A):
     """Apply Hooke's law for small strains with moduli D (6, 6); return the energy density."""
     strain = 0.5 * (F + F.T)
     for i in range(3):
         strain[i, i] -= 1.0
-    for row in range(9 if everywhere else 0):
+    for row in range(9 if tangent else 0):
         for column in range(9):
             A[row, column] = D[voigt(row // 3, row % 3), voigt(column // 3, column % 3)]
     return _hooke(D, strain, P)
@@ -134,24 +134,25 @@ def _yield_stress(constants, p):
 
 
 @kernel
-def _plastic(constants, F, everywhere, old, new, P, A):
+def _plastic(constants, F, tangent, old, new, P, A):
     """Apply von Mises plasticity by radial return (Simo and Hughes, 1998, boxes 3.1, 3.2); return the elastic energy.
 
-    P, A and the energy are the deviatoric parts. Isotropic hardening is tabulated, and kinematic hardening linear (Prager).
+    P, A and the energy are the deviatoric parts. Isotropic hardening is tabulated. Kinematic hardening is linear (Prager),
+    with the modulus H.
     """
-    mu, kinematic, xi = constants[1], constants[3], np.empty(9)
-    third, square = (F[0, 0] + F[1, 1] + F[2, 2]) / 3.0, 0.0
+    mu, H, xi = constants[1], constants[3], np.empty(9)
+    mean, square = (F[0, 0] + F[1, 1] + F[2, 2]) / 3.0, 0.0
     for i in range(3):
         for j in range(3):
-            strain = 0.5 * (F[i, j] + F[j, i]) - (third if i == j else 0.0)
-            xi[3 * i + j] = 2.0 * mu * strain - (2.0 * mu + 2.0 / 3.0 * kinematic) * old[voigt(i, j)]
+            strain = 0.5 * (F[i, j] + F[j, i]) - (mean if i == j else 0.0)
+            xi[3 * i + j] = 2.0 * mu * strain - (2.0 * mu + 2.0 / 3.0 * H) * old[voigt(i, j)]
             square += xi[3 * i + j] ** 2
     trial = np.sqrt(1.5 * square)
-    p, work, remaining = old[6], old[7], trial
+    p, work, equivalent = old[6], old[7], trial
     limit, slope, end = _yield_stress(constants, p)
-    while remaining > limit * (1.0 + YIELDING):
-        step = min((remaining - limit) / (3.0 * mu + kinematic + slope), end - p)
-        remaining -= (3.0 * mu + kinematic) * step
+    while equivalent > limit * (1.0 + YIELD_TOLERANCE):
+        step = min((equivalent - limit) / (3.0 * mu + H + slope), end - p)
+        equivalent -= (3.0 * mu + H) * step
         work += (limit + 0.5 * slope * step) * step
         p += step
         if p < end:
@@ -167,15 +168,15 @@ def _plastic(constants, F, everywhere, old, new, P, A):
             before += old[c] ** 2
             new[c] = old[c] + flow * xi[3 * i + j]
             after += new[c] ** 2
-            P[i, j] = 2.0 * mu * (0.5 * (F[i, j] + F[j, i]) - (third if i == j else 0.0) - new[c])
+            P[i, j] = 2.0 * mu * (0.5 * (F[i, j] + F[j, i]) - (mean if i == j else 0.0) - new[c])
             energy += P[i, j] * P[i, j] / (4.0 * mu)
-    new[7] = work + kinematic / 3.0 * (after - before)
-    if not (everywhere or increment > 0.0):
+    new[7] = work + H / 3.0 * (after - before)
+    if not (tangent or increment > 0.0):
         return energy
     shear = 2.0 * mu * (1.0 - 2.0 * mu * flow)
     rank_one = 0.0
     if increment > 0.0:
-        rank_one = 9.0 * mu * mu / trial**2 * (1.0 / (3.0 * mu + kinematic + slope) - increment / trial)
+        rank_one = 9.0 * mu * mu / trial**2 * (1.0 / (3.0 * mu + H + slope) - increment / trial)
     for row in range(9):
         for column in range(9):
             A[row, column] = -rank_one * xi[row] * xi[column]
@@ -233,7 +234,7 @@ def _second_difference(x, y, z):
 
 
 @kernel
-def _logarithmic(constants, F, everywhere, old, new, P, A):
+def _logarithmic(constants, F, tangent, old, new, P, A):
     """Apply plasticity with logarithmic elastic strains (Eterovic and Bathe, 1990; Simo, 1992); return the elastic energy.
 
     For the plastic deformation at the beginning of the load step, with the factor L, the trial elastic strain is ln(C) / 2
@@ -256,12 +257,12 @@ def _logarithmic(constants, F, everywhere, old, new, P, A):
     for a in range(3):
         for b in range(3):
             slope[a, b] = 2.0 * _first_difference(squared[a], squared[b])
-    turn, T, factor = _turn(axes), axes.T @ T @ axes, slope.reshape(9)
+    transformation, T, factor = _congruence(axes), axes.T @ T @ axes, slope.reshape(9)
     S = L_axes @ (slope * T) @ L_axes.T
     _first_piola_kirchhoff(F, S, P)
-    if not everywhere:
+    if not tangent:
         return energy
-    moduli = turn.T @ D @ turn * factor
+    moduli = transformation.T @ D @ transformation * factor
     moduli *= factor.reshape(9, 1)
     for a in range(3):
         for b in range(3):
@@ -272,19 +273,19 @@ def _logarithmic(constants, F, everywhere, old, new, P, A):
                     for column in (3 * b + c, 3 * c + b):
                         moduli[row, column] += value
                         moduli[column, row] += value
-    turn = _turn(L_axes)
-    _push_forward(F, S, turn @ moduli @ turn.T, A)
+    transformation = _congruence(L_axes)
+    _push_forward(F, S, transformation @ moduli @ transformation.T, A)
     return energy
 
 
 @kernel
-def _turn(axes):
+def _congruence(axes):
     """Return the matrix (9, 9) that transforms a tensor M, as 9 components, to `axes` (3, 3) M `axes`^T."""
-    turn = np.empty((9, 9))
+    transformation = np.empty((9, 9))
     for row in range(9):
         for column in range(9):
-            turn[row, column] = axes[row // 3, column // 3] * axes[row % 3, column % 3]
-    return turn
+            transformation[row, column] = axes[row // 3, column // 3] * axes[row % 3, column % 3]
+    return transformation
 
 
 @kernel
@@ -310,7 +311,7 @@ def _flow(L_axes, axes, old, new):
 
 
 @kernel
-def _saint_venant(D, F, everywhere, P, A):
+def _saint_venant(D, F, tangent, P, A):
     """Apply Hooke's law to Green-Lagrange strain and second Piola-Kirchhoff stress; return the energy density."""
     strain, S, C = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9))
     right_cauchy_green(F, strain)
@@ -319,7 +320,7 @@ def _saint_venant(D, F, everywhere, P, A):
         strain[i, i] -= 0.5
     energy = _hooke(D, strain, S)
     _first_piola_kirchhoff(F, S, P)
-    if not everywhere:
+    if not tangent:
         return energy
     for row in range(9):
         for column in range(9):
@@ -329,34 +330,34 @@ def _saint_venant(D, F, everywhere, P, A):
 
 
 @innermost_kernel
-def _add_isochoric(value, first, number, power, scale, J, G, dW, d2W, everywhere, P, A):
-    """Add to P and A the terms of an energy of the isochoric invariant ``scale * value``, except for second derivatives.
+def _add_isochoric(value, first, number, power, scale, J, G, dW, d2W, tangent, P, A):
+    """Add to P and A the terms of a function of the isochoric invariant ``scale * value``, except for second derivatives.
 
     `scale` is ``J**-power``, and `first` (3, 3) the derivative of the value; `dW` and `d2W` are the first and second
     derivatives of the energy with respect to the invariant. The terms of A are stored in the rows LEFT, ``LEFT + number``
     and ``RIGHT + number``, see `first_invariant`. Returns the factors of the second derivatives of the value and of J.
     """
     inverse, factor = power / J, dW * scale
-    ratio, of_GG = inverse * value, factor * inverse * (inverse + 1.0 / J) * value
+    ratio, GG_factor = inverse * value, factor * inverse * (inverse + 1.0 / J) * value
     curvature, mixed = d2W * scale * scale, factor * inverse
     for i in range(3):
         for j in range(3):
             change = first[i, j] - ratio * G[i, j]
             P[i, j] += factor * change
-            if everywhere:
+            if tangent:
                 e = 3 * i + j
                 A[RIGHT + number, e] = first[i, j]
                 A[LEFT + number, e] = curvature * change - mixed * G[i, j]
-                A[LEFT, e] += of_GG * G[i, j] - mixed * first[i, j] - curvature * ratio * change
+                A[LEFT, e] += GG_factor * G[i, j] - mixed * first[i, j] - curvature * ratio * change
     return factor, -factor * ratio
 
 
 @innermost_kernel
-def first_invariant(constants, F, J, G, volumetric, everywhere, P, A):
+def first_invariant(constants, F, J, G, volumetric, tangent, P, A):
     """Fill P and the work space of A for a polynomial law of the isochoric first invariant with `volumetric` terms.
 
     The energy is C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 (Yeoh, 1993); see `respond` for the other terms. Except
-    for second derivatives, the tangent is a sum of dyadic products of the row LEFT + k of A and its row RIGHT + k. The rows
+    for second derivatives, the tangent is a sum of dyadic products of the rows LEFT + k and RIGHT + k of A. The rows
     from RIGHT on are G, F and, if there is another invariant, the derivative of half of it. Returns the energy density, the
     factors of the second derivatives of I1 / 2 (the identity) and J, I1 and ``J**(-2/3)``.
     """
@@ -367,43 +368,43 @@ def first_invariant(constants, F, J, G, volumetric, everywhere, P, A):
         for j in range(3):
             I1 += F[i, j] ** 2
             P[i, j] = pressure * G[i, j]
-            if everywhere:
+            if tangent:
                 A[RIGHT, 3 * i + j], A[LEFT, 3 * i + j] = G[i, j], bulk * G[i, j]
     root = np.cbrt(J)
     scale = 1.0 / (root * root)
     x = scale * I1 - 3.0
     dW, d2W = C10 + 2.0 * C20 * x + 3.0 * C30 * x * x, 2.0 * C20 + 6.0 * C30 * x
-    factor, of_J = _add_isochoric(0.5 * I1, F, 1, 2.0 / 3.0, scale, J, G, 2.0 * dW, 4.0 * d2W, everywhere, P, A)
-    return C10 * x + C20 * x**2 + C30 * x**3, factor, d2J_factor + of_J, I1, scale
+    factor, J_factor = _add_isochoric(0.5 * I1, F, 1, 2.0 / 3.0, scale, J, G, 2.0 * dW, 4.0 * d2W, tangent, P, A)
+    return C10 * x + C20 * x**2 + C30 * x**3, factor, d2J_factor + J_factor, I1, scale
 
 
 @innermost_kernel
-def sum_products(n, factor, d2J_factor, everywhere, F, A):
-    """If `everywhere`, fill A with the n dyadic products of its work space and the terms with second derivatives.
+def sum_products(n, factor, d2J_factor, tangent, F, A):
+    """If `tangent`, fill A with the n dyadic products of its work space and the terms with second derivatives.
 
     See `first_invariant` for the work space and the factors.
     """
-    for row in range(0, 12 if everywhere else 0, 4):
+    for row in range(0, 12 if tangent else 0, 4):
         for column in range(0, 12, 4):
             tile(A, LEFT, row, A, RIGHT, column, n, A, row, True)
-    for row in range(9 if everywhere else 0):
+    for row in range(9 if tangent else 0):
         A[row, row] += factor
-    _add_second_derivative(F, d2J_factor if everywhere else 0.0, A)
+    _add_second_derivative(F, d2J_factor if tangent else 0.0, A)
 
 
 @kernel
-def _invariants(constants, F, J, G, volumetric, everywhere, P, A):
+def _invariants(constants, F, J, G, volumetric, tangent, P, A):
     """Apply a polynomial law of the isochoric invariants (Rivlin and Saunders, 1951); see `first_invariant`, `respond`."""
     C01 = constants[4]
-    energy, factor, d2J_factor, I1, scale = first_invariant(constants, F, J, G, volumetric, everywhere, P, A)
+    energy, factor, d2J_factor, I1, scale = first_invariant(constants, F, J, G, volumetric, tangent, P, A)
     if C01 != 0.0:
-        return energy + _second_invariant(C01, I1, scale * scale, F, J, G, factor, d2J_factor, everywhere, P, A)
-    sum_products(2, factor, d2J_factor, everywhere, F, A)
+        return energy + _second_invariant(C01, I1, scale * scale, F, J, G, factor, d2J_factor, tangent, P, A)
+    sum_products(2, factor, d2J_factor, tangent, F, A)
     return energy
 
 
 @kernel
-def _second_invariant(C01, I1, scale, F, J, G, factor, d2J_factor, everywhere, P, A):
+def _second_invariant(C01, I1, scale, F, J, G, factor, d2J_factor, tangent, P, A):
     """Add the term C01 (I2 - 3) of the energy to P, and fill A with all terms; return this term.
 
     `factor` and `d2J_factor` are results of `first_invariant`.
@@ -415,20 +416,20 @@ def _second_invariant(C01, I1, scale, F, J, G, factor, d2J_factor, everywhere, P
             first[i, j] = I1 * F[i, j] - F[i, 0] * C[0, j] - F[i, 1] * C[1, j] - F[i, 2] * C[2, j]
             square += C[i, j] ** 2
     I2 = 0.5 * (I1 * I1 - square)
-    of_I2, of_J = _add_isochoric(0.5 * I2, first, 2, 4.0 / 3.0, scale, J, G, 2.0 * C01, 0.0, everywhere, P, A)
-    sum_products(3, factor + of_I2 * I1, d2J_factor + of_J, everywhere, F, A)
-    for i in range(3 if everywhere else 0):
+    I2_factor, J_factor = _add_isochoric(0.5 * I2, first, 2, 4.0 / 3.0, scale, J, G, 2.0 * C01, 0.0, tangent, P, A)
+    sum_products(3, factor + I2_factor * I1, d2J_factor + J_factor, tangent, F, A)
+    for i in range(3 if tangent else 0):
         for j in range(3):
             for k in range(3):
-                A[3 * i + j, 3 * i + k] -= of_I2 * C[k, j]
-                A[3 * i + j, 3 * k + j] -= of_I2 * (F[i, 0] * F[k, 0] + F[i, 1] * F[k, 1] + F[i, 2] * F[k, 2])
+                A[3 * i + j, 3 * i + k] -= I2_factor * C[k, j]
+                A[3 * i + j, 3 * k + j] -= I2_factor * (F[i, 0] * F[k, 0] + F[i, 1] * F[k, 1] + F[i, 2] * F[k, 2])
                 for m in range(3):
-                    A[3 * i + j, 3 * k + m] += of_I2 * (2.0 * F[i, j] * F[k, m] - F[i, m] * F[k, j])
+                    A[3 * i + j, 3 * k + m] += I2_factor * (2.0 * F[i, j] * F[k, m] - F[i, m] * F[k, j])
     return C01 * (scale * I2 - 3.0)
 
 
 @kernel
-def _ogden(constants, F, everywhere, P, A):
+def _ogden(constants, F, tangent, P, A):
     """Apply Ogden's law of the isochoric stretches; return the energy density.
 
     The energy is the sum of 2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3) (Ogden, 1972); the moduli in principal axes
@@ -452,9 +453,9 @@ def _ogden(constants, F, everywhere, P, A):
             for b in range(3):
                 gamma[a, b] += 2.0 * mu * (total / 9.0 - (powers[a] + powers[b]) / 3.0)
             gamma[a, a] += 2.0 * mu * powers[a]
-    S, moduli, turn = (axes * (beta / squared)) @ axes.T, np.zeros((9, 9)), _turn(axes)
+    S, moduli, transformation = (axes * (beta / squared)) @ axes.T, np.zeros((9, 9)), _congruence(axes)
     _first_piola_kirchhoff(F, S, P)
-    if not everywhere:
+    if not tangent:
         return energy
     for a in range(3):
         for b in range(3):
@@ -465,38 +466,38 @@ def _ogden(constants, F, everywhere, P, A):
                 if abs(difference) > EQUAL * squared[b]:
                     shear = (beta[b] / squared[b] - beta[a] / squared[a]) / difference
                 moduli[3 * a + b, 3 * a + b] = moduli[3 * a + b, 3 * b + a] = shear
-    _push_forward(F, S, turn @ moduli @ turn.T, A)
+    _push_forward(F, S, transformation @ moduli @ transformation.T, A)
     return energy
 
 
 @kernel
-def _other(constants, D, F, everywhere, old, new, P, A):
+def _other(constants, D, F, tangent, old, new, P, A):
     """Apply a law other than `_invariants`; return the elastic energy density without the volumetric part."""
     law = int(constants[0])
     if law == LINEAR:
-        return _linear(D, F, everywhere, P, A)
+        return _linear(D, F, tangent, P, A)
     if law == PLASTIC:
-        return _plastic(constants, F, everywhere, old, new, P, A)
+        return _plastic(constants, F, tangent, old, new, P, A)
     if law == LOGARITHMIC:
-        return _logarithmic(constants, F, everywhere, old, new, P, A)
+        return _logarithmic(constants, F, tangent, old, new, P, A)
     if law == SAINT_VENANT:
-        return _saint_venant(D, F, everywhere, P, A)
-    return _ogden(constants, F, everywhere, P, A)
+        return _saint_venant(D, F, tangent, P, A)
+    return _ogden(constants, F, tangent, P, A)
 
 
 @kernel
-def respond(constants, D, F, J, G, volumetric, everywhere, old, new, P, A):
+def respond(constants, D, F, J, G, volumetric, tangent, old, new, P, A):
     """Fill `new`, P and A by the law of `constants` and return the elastic energy [energy / volume].
 
     The energy does not include the volumetric part of the law. `volumetric` contains a pressure, a bulk modulus and a factor:
     P includes ``pressure dJ/dF``, and A includes ``bulk dJ/dF dJ/dF + factor d2J/dF2``. D (6, 6) are the moduli of Hooke's
-    law, and J and G (3, 3) the determinant of F and its derivative. If `everywhere` is false, the caller needs A at small
+    law, and J and G (3, 3) the determinant of F and its derivative. If `tangent` is false, the caller needs A at small
     strains only where plastic flow occurs, and not at all at finite strains.
     """
     for e in range(9):
         new[e] = old[e]
     if int(constants[0]) == INVARIANTS:
-        return _invariants(constants, F, J, G, volumetric, everywhere, P, A)
-    energy = _other(constants, D, F, everywhere, old, new, P, A)
-    _add_volumetric(F, G, volumetric, everywhere or new[6] > old[6], P, A)
+        return _invariants(constants, F, J, G, volumetric, tangent, P, A)
+    energy = _other(constants, D, F, tangent, old, new, P, A)
+    _add_volumetric(F, G, volumetric, tangent or new[6] > old[6], P, A)
     return energy

@@ -42,10 +42,11 @@ class Stiffness:
             total += matrix @ u
         return total
 
-    def row_sums(self, u: Array) -> Array:
+    def absolute_product(self, u: Array) -> Array:
         """Return ``|K| |u|`` (n,), summed over the parts, to which the round-off of ``K u`` is proportional [force]."""
         return sum(
-            (K.row_sums(u) if hasattr(K, "row_sums") else abs(K) @ np.abs(u) for K in self.parts), np.zeros(u.shape)
+            (K.absolute_product(u) if hasattr(K, "absolute_product") else abs(K) @ np.abs(u) for K in self.parts),
+            np.zeros(u.shape),
         )
 
 

@@ -215,7 +215,7 @@ class LoadedFactor:
         if change is None:
             return self._solver.back_substitute(self._f + force)
         self._solver.counters.iterations += 1
-        return self._free + self._solver.factors.extended(change)
+        return self._free + self._solver.factors.harmonic_extension(change)
 
     def condensed(self) -> CondensedProblem | None:
         """See `Loaded`."""

@@ -34,7 +34,7 @@ class Product(Protocol):
     def __matmul__(self, u: Array) -> Array:
         """Return ``K @ u`` (n,) [force]."""
 
-    def row_sums(self, u: Array) -> Array:
+    def absolute_product(self, u: Array) -> Array:
         """Return ``abs(K) @ abs(u)`` (n,) [force]."""
 
 

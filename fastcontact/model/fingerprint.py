@@ -48,7 +48,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         **({"the temperatures": _unordered(model.temperatures, mesh)} if model.temperatures else {}),
         **({"the initial states": _unordered(model.initial_states, mesh)} if model.initial_states else {}),
         **({"the heat": [model.reference_temperature, _unordered(model.heat_loads, mesh)]} if model.conducts else {}),
-        **{f"the conductance of contact '{name}'": law.sampled for name, law in model.conductances().items()},
+        **{f"the conductance of contact '{name}'": law.signature for name, law in model.conductances().items()},
         **({"the incompatible modes": modes} if any(modes) else {}),
         "the relations": _unordered(model.relations, mesh),
         "the springs": _unordered(model.springs, mesh),

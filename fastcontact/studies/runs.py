@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.cases.case import Case, build_case, described, read_case
+from fastcontact.cases.case import Case, build_case, read_case, stored_description
 from fastcontact.errors import CaseError, FastcontactError, check_known, unknown, warn
 from fastcontact.results.units import known_units
 from fastcontact.studies.case_parameters import substituted
@@ -414,7 +414,7 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
 def _theory_at(data: dict[str, Any], pair: str | None) -> dict[str, float]:
     """Return the quantities of the theory of a contact pair of a parsed case file; empty if it is undefined."""
     try:
-        theories = described(data)["theories"].get(pair or "", {})
+        theories = stored_description(data)["theories"].get(pair or "", {})
     except FastcontactError:  # for example because Poisson's ratio is outside the range of the theory
         return {}
     return of_theory(theories.get("theory"), theories.get("share", 1.0))

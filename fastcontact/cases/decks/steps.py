@@ -93,11 +93,11 @@ def condition(content: Content, step: Step | None, block: Block) -> None:
     """Store a block of supports or loads of a step, or a *BOUNDARY that precedes all steps."""
     if name := block.get("AMPLITUDE"):
         look_up("amplitude", name, content.amplitudes, block)
-    new = Condition(block, block.choice("OP", ("MOD", "NEW")) == "NEW", name)
+    entry = Condition(block, block.choice("OP", ("MOD", "NEW")) == "NEW", name)
     if step is not None:
-        step.conditions.append(new)
+        step.conditions.append(entry)
     elif block.keyword == "BOUNDARY":
-        content.supports.append(new)
+        content.supports.append(entry)
     else:
         raise block.refuse("loads belong in a step")
 
@@ -107,9 +107,9 @@ def amplitude(content: Content, block: Block) -> None:
     name = block.required("NAME")
     block.choice("DEFINITION", ("TABULAR",))
     block.choice("VALUE", ("RELATIVE",))
-    total = block.choice("TIME", ("STEP TIME", "TOTAL TIME")) == "TOTAL TIME"
+    total_time = block.choice("TIME", ("STEP TIME", "TOTAL TIME")) == "TOTAL TIME"
     numbers = block.numbers()
     times, values = numbers[::2], numbers[1::2]
     if not times or len(times) != len(values) or any(b <= a for a, b in pairwise(times)):
         raise block.refuse(f"amplitude '{name}' needs pairs of time and multiplier, with ascending times")
-    content.amplitudes[key_of(name)] = Amplitude(block.location, name, tuple(times), tuple(values), total)
+    content.amplitudes[key_of(name)] = Amplitude(block.location, name, tuple(times), tuple(values), total_time)

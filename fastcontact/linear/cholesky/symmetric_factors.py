@@ -1,4 +1,4 @@
-"""Factors ``P K P.T = L D L.T`` of a symmetric positive definite matrix: solution, and condensation to the last unknowns."""
+"""Factors ``P K P.T = L D L.T`` of a symmetric positive definite matrix: solution, and condensation onto last unknowns."""
 
 from __future__ import annotations
 
@@ -83,15 +83,15 @@ class SymmetricFactors:
         at = np.sort(self._position[self._last])
         index, trailing = np.full(self.n, -1), np.zeros((len(at), len(at)))
         index[at] = np.arange(len(at))
-        triangular_kernels.block(*self._L, index, trailing)
+        triangular_kernels.copy_block(*self._L, index, trailing)
         # The last block of L D^1/2 is the Cholesky factor of the Schur complement, whose inverse is that block of K^-1.
         inverse, _ = dpotri(trailing * np.sqrt(self._d[at]), lower=True)
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         order = np.searchsorted(at, self._position[self._last])
         return np.ascontiguousarray(inverse[np.ix_(order, order)])
 
-    def extended(self, u: Array) -> Array:
-        """Return the displacements (n,) under forces on the unknowns `last` alone, given those of `last`, u (m,) [length]."""
+    def harmonic_extension(self, u: Array) -> Array:
+        """Return the displacements (n,) that equal u (m,) at the unknowns `last`, with zero forces on all others [length]."""
         x = np.zeros(self.n)
         x[self._position[self._last]] = u
         triangular_kernels.backward(*self._L, self._given, x)

@@ -21,7 +21,7 @@ PANEL = 48
 
 
 @interpretable_kernel
-def block(
+def copy_block(
     start: Offsets, values: Array, first: Offsets, row_start: Offsets, rows: Numbers, index: Offsets, out: Array
 ) -> None:
     """Copy the requested rows and columns of L to `out` (m, m), which is initially zero.
@@ -118,11 +118,11 @@ def solve_together(
     supernodes that the rows `loaded` do not affect, and the backward substitution those that do not affect the rows
     `required` (n,); see `_affected`. Both masks are overwritten, and the other rows of X are undefined afterwards.
     """
-    widest = 0
+    max_rows = 0
     for s in range(len(first) - 1):
-        widest = max(widest, first[s + 1] - first[s] + row_start[s + 1] - row_start[s])
-    panel, below = np.empty(PANEL * widest), np.empty(widest, np.int64)
-    panel_rows, product = np.empty((widest, X.shape[1])), np.empty((PANEL, X.shape[1]))
+        max_rows = max(max_rows, first[s + 1] - first[s] + row_start[s + 1] - row_start[s])
+    panel, below = np.empty(PANEL * max_rows), np.empty(max_rows, np.int64)
+    panel_rows, product = np.empty((max_rows, X.shape[1])), np.empty((PANEL, X.shape[1]))
     affected = _affected(first, row_start, rows, loaded)
     for s in range(len(affected)):
         for low in range(first[s], first[s + 1] if affected[s] else first[s], PANEL):
@@ -130,7 +130,7 @@ def solve_together(
             for j in range(low, high):
                 for i in range(j + 1, high):
                     X[i] -= values[start[j] + i - j] * X[j]
-            size = _copy(start, values, low, high, first[s + 1], rows[row_start[s] : row_start[s + 1]], panel, below)
+            size = _pack(start, values, low, high, first[s + 1], rows[row_start[s] : row_start[s + 1]], panel, below)
             np.dot(panel[: (high - low) * size].reshape(high - low, size).T, X[low:high], panel_rows[:size])
             for k in range(size):
                 X[below[k]] -= panel_rows[k]
@@ -138,7 +138,7 @@ def solve_together(
     for s in range(len(affected) - 1, -1, -1):
         for high in range(first[s + 1], first[s] if affected[s] else first[s + 1], -PANEL):
             low = max(high - PANEL, first[s])
-            size = _copy(start, values, low, high, first[s + 1], rows[row_start[s] : row_start[s + 1]], panel, below)
+            size = _pack(start, values, low, high, first[s + 1], rows[row_start[s] : row_start[s + 1]], panel, below)
             for k in range(size):
                 panel_rows[k] = X[below[k]]
             np.dot(panel[: (high - low) * size].reshape(high - low, size), panel_rows[:size], product[: high - low])
@@ -164,7 +164,7 @@ def _affected(first: Offsets, row_start: Offsets, rows: Numbers, marked: Mask) -
 
 
 @kernel
-def _copy(
+def _pack(
     start: Offsets, values: Array, low: int, high: int, end: int, rows_below: Numbers, panel: Array, below: Offsets
 ) -> int:
     """Copy columns `low` to ``high - 1`` of L, from row `high` on, to `panel` one by one; return their length.

@@ -17,10 +17,10 @@ from fastcontact.linear.multigrid.block_products import row_times
 
 
 @kernel
-def multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows, cols):
-    """Fill `y` (n_rows * m,) with ``share * z + factor * A @ x``; z and y may be the same array.
+def multiply(low, high, indptr, indices, numbers, x, factor, z_factor, z, y, rows, cols):
+    """Fill `y` (n_rows * m,) with ``z_factor * z + factor * A @ x``; z and y may be the same array.
 
-    If `share` is zero, z need not be initialised.
+    If `z_factor` is zero, z need not be initialised.
 
     The `numbers` are the entries of A, as a tuple of one or two arrays, see `split_matrix_kernels`.
     """
@@ -28,7 +28,7 @@ def multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows, 
     for i in range(low, high):
         sums = row_times(indices, numbers, x, indptr[i], indptr[i + 1], rows, cols)
         for r in range(m):
-            y[m * i + r] = (share * z[m * i + r] if share != 0.0 else share) + factor * sums[r]
+            y[m * i + r] = (z_factor * z[m * i + r] if z_factor != 0.0 else z_factor) + factor * sums[r]
 
 
 @kernel

@@ -70,20 +70,20 @@ class BlockMatrix:
         """Fill `y` with ``A @ x``."""
         self.combine(1.0, x, 0.0, y, y)
 
-    def combine(self, factor: float, x: AnyArray, share: float, z: AnyArray, y: AnyArray) -> None:
-        """Fill `y` with ``share * z + factor * A @ x``, in the precision of x; x and y must be different arrays."""
+    def combine(self, factor: float, x: AnyArray, z_factor: float, z: AnyArray, y: AnyArray) -> None:
+        """Fill `y` with ``z_factor * z + factor * A @ x``, in the precision of x; x and y must be different arrays."""
         real = x.dtype.type
         numbers = (self.data,) if x.dtype == self.data.dtype else self.exact
         if self.storage is not ALL:
             length, n = self.storage[3], len(self.indptr) - 1
             parallel_for(
                 symmetric_storage_kernels.multiply, -(-n // length), self.work_of_row * length, self.storage, numbers, x,
-                real(factor), real(share), z, y, self.rows,
+                real(factor), real(z_factor), z, y, self.rows,
             )  # fmt: skip
             return
         parallel_for(
             cycle_kernels.multiply, len(self.indptr) - 1, self.work_of_row, self.indptr, self.indices, numbers, x,
-            real(factor), real(share), z, y, self.rows, self.cols,
+            real(factor), real(z_factor), z, y, self.rows, self.cols,
         )  # fmt: skip
 
     @property
@@ -104,11 +104,11 @@ class BlockMatrix:
             return diagonal_blocks(self.indptr, self.indices, data, size)
         return data.reshape(-1, size * size)[self.storage[1] - 1].ravel()
 
-    def row_sums(self, u: Array) -> Array:
+    def absolute_product(self, u: Array) -> Array:
         """Return ``abs(A) @ abs(u)`` (n,) for a square matrix, computed with its high part."""
         out = np.empty(len(u))
         parallel_for(
-            symmetric_storage_kernels.row_sums, len(self.indptr) - 1, self.work_of_row, self.indptr, self.indices,
+            symmetric_storage_kernels.absolute_product, len(self.indptr) - 1, self.work_of_row, self.indptr, self.indices,
             self.storage, (self.data,), u, len(self.rows), out,
         )  # fmt: skip
         return out
@@ -201,9 +201,9 @@ class ScaledMatrix:
         K.data /= self.unit
         return K
 
-    def combine(self, factor: float, x: Array, share: float, z: Array, y: Array) -> None:
-        """Fill `y` (n,) with ``share * z + factor * K @ x``."""
-        self.scaled.combine(factor / self.unit, x, share, z, y)
+    def combine(self, factor: float, x: Array, z_factor: float, z: Array, y: Array) -> None:
+        """Fill `y` (n,) with ``z_factor * z + factor * K @ x``."""
+        self.scaled.combine(factor / self.unit, x, z_factor, z, y)
 
     def __matmul__(self, u: Array) -> Array:
         out = np.empty(len(u))
@@ -223,9 +223,9 @@ class ScaledMatrix:
         size = range(self.blocksize[0])
         return self.scaled.diagonal_blocks()[:, size, size].ravel() / self.unit
 
-    def row_sums(self, u: Array) -> Array:
+    def absolute_product(self, u: Array) -> Array:
         """Return ``abs(K) @ abs(u)`` (n,) [force]."""
-        return self.scaled.row_sums(u) / self.unit
+        return self.scaled.absolute_product(u) / self.unit
 
 
 def _split_matrix(K: bsr_array, unit: float, release: bool, near: BlockMatrix | None) -> BlockMatrix:
@@ -253,22 +253,22 @@ def _split_matrix(K: bsr_array, unit: float, release: bool, near: BlockMatrix | 
 
 
 def _store(
-    indptr: Numbers, indices: Numbers, storage: Storage, unit: float, numbers: AnyArray, square: int, high: AnyArray
+    indptr: Numbers, indices: Numbers, storage: Storage, unit: float, numbers: AnyArray, block_size: int, high: AnyArray
 ) -> None:
-    """Fill the high parts of the stored blocks, of `square` numbers, times `unit`.
+    """Fill the high parts of the stored blocks, of `block_size` numbers, times `unit`.
 
     The low parts overwrite the beginning of the `numbers` of all blocks.
     """
     start, low = indptr if storage is ALL else storage[0], numbers.view(np.float32)
-    end, n, widest = 0, len(indptr) - 1, int(np.diff(indptr).max(initial=0))
+    end, n, max_blocks = 0, len(indptr) - 1, int(np.diff(indptr).max(initial=0))
     while end < n:  # up to `safe_end`, low parts overwrite only numbers that were read
         first = end
         safe_end = int(np.searchsorted(start, 2 * int(indptr[first]), side="right")) - 1
         end = max(min(n, safe_end), min(n, first + SHORTEST))
         work = len(indices) / n if end == safe_end else 0
         parallel_for(
-            symmetric_storage_kernels.store_rows, end - first, work, first, widest, indptr, indices, storage, unit, numbers,
-            square, high, low,
+            symmetric_storage_kernels.store_rows, end - first, work, first, max_blocks, indptr, indices, storage, unit,
+            numbers, block_size, high, low,
         )  # fmt: skip
 
 

@@ -9,8 +9,8 @@ are stored.
 The storage is a tuple ``storage = (start, upper, columns, length)``. The stored blocks of row i are ``start[i]`` to
 ``start[i + 1] - 1``, `columns` contains their block columns, and `length` is the number of rows of a part. Blocks between
 parts come first, then the diagonal block, and from ``upper[i]`` on the blocks of the upper triangle; each group has ascending
-columns. ``length = 0`` means that all blocks of the pattern ``indptr``, ``indices`` are stored, in its order. Numbers are a
-tuple, see `split_matrix_kernels`. Kernels with the arguments `low` and `high` process rows `low` to ``high - 1``.
+columns. ``length = 0`` means that all blocks of the pattern ``indptr``, ``indices`` are stored, in its order. `numbers` is
+a tuple of arrays, see `split_matrix_kernels`. Kernels with the arguments `low` and `high` process rows `low` to ``high - 1``.
 """
 
 import numpy as np
@@ -33,7 +33,8 @@ def part_of(storage, i):
 def slot_of(storage, part, i, j, k):
     """Return the slot of block (i, j), the `k`-th of the pattern, and whether its transpose is stored there.
 
-    `part` is ``part_of(storage, i)``. The slot is -1 if the block is not stored, since the pattern is not symmetric.
+    `part` is ``part_of(storage, i)``. The slot is -1 if the block is not stored, which happens only if the pattern is not
+    symmetric.
     """
     if part[1] == 0:
         return k, False
@@ -68,31 +69,33 @@ def entry_of(numbers, slot, a, b, size):
 
 
 @kernel
-def _store_blocks(row, begin, end, slot, factor, square, high, low):
+def _store_blocks(row, begin, end, slot, factor, block_size, high_parts, low_parts):
     """Store the high and low parts of blocks `begin` to ``end - 1`` of `row` times `factor` in successive slots."""
-    shift = (slot - begin) * square
-    for e in range(begin * square, end * square):
+    shift = (slot - begin) * block_size
+    for e in range(begin * block_size, end * block_size):
         number = factor * row[e]
         high_part = np.float32(number)
-        high[shift + e] = high_part
-        low[shift + e] = number - np.float64(high_part)
+        high_parts[shift + e] = high_part
+        low_parts[shift + e] = number - np.float64(high_part)
 
 
 @kernel
-def store_rows(begin, end, shift, widest, indptr, indices, storage, factor, numbers, square, high, low):
-    """Fill the parts of the stored blocks of rows ``shift + begin`` to ``shift + end - 1`` times `factor`.
+def store_rows(
+    begin, end, shift, max_blocks, indptr, indices, storage, factor, numbers, block_size, high_parts, low_parts
+):
+    """Store the high and low parts of the numbers of rows ``shift + begin`` to ``shift + end - 1``, times `factor`.
 
-    Rows have up to `widest` blocks of `square` numbers. `low` may be the beginning of `numbers`: a row is read before its
-    memory is overwritten. Columns ascend within a row, unless every block is stored.
+    Rows have up to `max_blocks` blocks of `block_size` numbers. `low_parts` may share the memory of the beginning of
+    `numbers`: a row is read before its memory is overwritten. Columns ascend within a row, unless every block is stored.
     """
-    row = np.empty(widest * square)
+    row = np.empty(max_blocks * block_size)
     for i in range(shift + begin, shift + end):
         count = indptr[i + 1] - indptr[i]
-        for e in range(count * square):
-            row[e] = numbers[indptr[i] * square + e]
+        for e in range(count * block_size):
+            row[e] = numbers[indptr[i] * block_size + e]
         first, after = part_of(storage, i)
         if after == 0:
-            _store_blocks(row, 0, count, indptr[i], factor, square, high, low)
+            _store_blocks(row, 0, count, indptr[i], factor, block_size, high_parts, low_parts)
             continue
         before_part = before_diagonal = up_to_part = 0  # numbers of blocks
         for k in range(indptr[i], indptr[i + 1]):
@@ -100,9 +103,9 @@ def store_rows(begin, end, shift, widest, indptr, indices, storage, factor, numb
             before_diagonal += indices[k] < i
             up_to_part += indices[k] < after
         outside = storage[0][i]
-        _store_blocks(row, 0, before_part, outside, factor, square, high, low)
-        _store_blocks(row, up_to_part, count, outside + before_part, factor, square, high, low)
-        _store_blocks(row, before_diagonal, up_to_part, storage[1][i] - 1, factor, square, high, low)
+        _store_blocks(row, 0, before_part, outside, factor, block_size, high_parts, low_parts)
+        _store_blocks(row, up_to_part, count, outside + before_part, factor, block_size, high_parts, low_parts)
+        _store_blocks(row, before_diagonal, up_to_part, storage[1][i] - 1, factor, block_size, high_parts, low_parts)
 
 
 @kernel
@@ -118,7 +121,7 @@ def expand(low, high, indptr, indices, storage, numbers, size, out):
 
 
 @kernel
-def row_sums(low, high, indptr, indices, storage, numbers, x, size, out):
+def absolute_product(low, high, indptr, indices, storage, numbers, x, size, out):
     """Fill `out` (n,) with ``|A| |x|``, which bounds the round-off of ``A x``."""
     for i in range(low, high):
         part = part_of(storage, i)
@@ -132,12 +135,12 @@ def row_sums(low, high, indptr, indices, storage, numbers, x, size, out):
 
 
 @kernel
-def _multiply_part(low, high, storage, numbers, x, factor, share, z, y, rows):
-    """Fill the rows `low` to ``high - 1`` of y, which are a part; see `multiply`."""
+def _multiply_part(low, high, storage, numbers, x, factor, z_factor, z, y, rows):
+    """Fill the rows `low` to ``high - 1`` of y, which form one part; see `multiply`."""
     start, upper, columns = storage[0], storage[1], storage[2]
     m = len(rows)
     for i in range(m * low, m * high):
-        y[i] = share * z[i] if share != 0.0 else share
+        y[i] = z_factor * z[i] if z_factor != 0.0 else z_factor
     for i in range(low, high):
         stored_twice = row_times(columns, numbers, x, start[i], upper[i], rows, rows)
         stored_once = row_times_both_ways(columns, numbers, x, upper[i], start[i + 1], i, factor, y, rows)
@@ -146,11 +149,11 @@ def _multiply_part(low, high, storage, numbers, x, factor, share, z, y, rows):
 
 
 @kernel
-def multiply(low, high, storage, numbers, x, factor, share, z, y, rows):
-    """Fill parts `low` to ``high - 1`` of `y` (n,) with ``share z + factor A x``; y may be z, but not x.
+def multiply(low, high, storage, numbers, x, factor, z_factor, z, y, rows):
+    """Fill parts `low` to ``high - 1`` of `y` (n,) with ``z_factor z + factor A x``; y may be z, but not x.
 
     Each part is processed by one thread, so that every number of y is summed in a fixed order.
     """
     n, length = y.shape[0] // len(rows), storage[3]
     for p in range(low, high):
-        _multiply_part(p * length, min(n, (p + 1) * length), storage, numbers, x, factor, share, z, y, rows)
+        _multiply_part(p * length, min(n, (p + 1) * length), storage, numbers, x, factor, z_factor, z, y, rows)

@@ -9,10 +9,10 @@ import pytest
 from pairwise import first_of
 
 import fastcontact as fc
-from fastcontact.cases.case import case_path, read_case, shipped_case, shipped_cases
+from fastcontact.cases.case import case_path, read_case, ready_made_case, ready_made_cases
 from fastcontact.cli import main
 
-NAMES = list(shipped_cases())
+NAMES = list(ready_made_cases())
 # The training case on the project's own meshes: how far from Hertz, beyond what code_aster allows on its meshes.
 BY_LITTLE = {"forma04a": 0.01296, "forma04b": 0.03111, "forma04c": 0.05339}
 
@@ -25,7 +25,7 @@ def test_the_cases_that_are_promised_are_there():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_ready_case_says_what_it_shows_and_what_to_expect(name):
-    text = shipped_case(name).read_text(encoding="utf-8")
+    text = ready_made_case(name).read_text(encoding="utf-8")
     comment = re.match(r"(#.*\n)+", text)
     assert comment
     assert "Expect " in comment.group()
@@ -57,14 +57,14 @@ def test_the_list_names_every_case_with_what_it_is_and_checks(capsys):
     assert main(["cases"]) == 0
     printed = capsys.readouterr().out
     for name in NAMES:
-        assert f"{name}: {tomllib.loads(shipped_case(name).read_text())['title']}\n" in printed
+        assert f"{name}: {tomllib.loads(ready_made_case(name).read_text())['title']}\n" in printed
     assert "axisymmetric, 3168 tri3, 20 load steps" in printed
     assert "checks pair.stick_radius against the theory's stick_radius within 0.02" in printed
 
 
 def test_a_case_is_printed_as_it_stands(capsys):
     assert main(["cases", "press-fit"]) == 0
-    assert capsys.readouterr().out == shipped_case("press-fit").read_text(encoding="utf-8")
+    assert capsys.readouterr().out == ready_made_case("press-fit").read_text(encoding="utf-8")
 
 
 def test_a_case_is_copied_with_its_mesh_and_runs_there(tmp_path, monkeypatch, capsys):
@@ -73,7 +73,7 @@ def test_a_case_is_copied_with_its_mesh_and_runs_there(tmp_path, monkeypatch, ca
     assert "mine.toml, forma04a.med" in capsys.readouterr().out
     assert main(["run", "mine.toml", "-q"]) == 0
     assert main(["cases", "--copy", "press-fit"]) == 0
-    assert (tmp_path / "press-fit.toml").read_text() == shipped_case("press-fit").read_text()
+    assert (tmp_path / "press-fit.toml").read_text() == ready_made_case("press-fit").read_text()
     capsys.readouterr()
     assert main(["cases", "--copy", "press-fit"]) == 1
     assert "exists already" in capsys.readouterr().err
@@ -128,7 +128,7 @@ def test_a_wheel_carries_the_cases_and_their_meshes(root):
     carried = project["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
     assert carried["data/cases"] == "fastcontact/data/cases"
     for name in NAMES:
-        mesh = tomllib.loads(shipped_case(name).read_text())["mesh"]
+        mesh = tomllib.loads(ready_made_case(name).read_text())["mesh"]
         if "file" in mesh:
             assert (root / "data/cases" / mesh["file"]).resolve().parent == root / "data/meshes"
             assert carried["data/meshes"] == "fastcontact/data/meshes"

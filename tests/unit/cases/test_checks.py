@@ -8,7 +8,7 @@ from case_texts import case_of
 from matplotlib_pictures import contact_of
 
 import fastcontact as fc
-from fastcontact.cases.case import build_case, described
+from fastcontact.cases.case import build_case, stored_description
 from fastcontact.cases.checks import Check, evaluated, measured, read_check
 from fastcontact.cases.summary import lines, of_step, summarise
 from fastcontact.errors import CaseError
@@ -149,11 +149,13 @@ def test_the_share_of_a_contact_lies_between_nothing_and_all_of_it():
     theory = {"kind": "hertz_point", "E1": 1.0, "nu1": 0.3, "R1": 1.0, "force": 1.0}
     for share in (0.0, 1.5):
         with pytest.raises(CaseError, match=r"theory.a.share = .* 0.25 for a quarter"):
-            described({"contact": {"a": {}}, "theory": {"a": {**theory, "share": share}}})
+            stored_description({"contact": {"a": {}}, "theory": {"a": {**theory, "share": share}}})
     with pytest.raises(CaseError, match="share"):
-        described({"contact": {"a": {}}, "theory": {"a": {**theory, "share": "half"}}})
+        stored_description({"contact": {"a": {}}, "theory": {"a": {**theory, "share": "half"}}})
     assert (
-        described({"contact": {"a": {}}, "theory": {"a": {**theory, "share": 0.5}}})["theories"]["a"]["theory"].force
+        stored_description({"contact": {"a": {}}, "theory": {"a": {**theory, "share": 0.5}}})["theories"]["a"][
+            "theory"
+        ].force
         == 1.0
     )
 
