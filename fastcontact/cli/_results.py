@@ -56,7 +56,7 @@ def case_data(results: Any) -> dict[str, Any]:
     from fastcontact.cases.case import described
 
     try:
-        data = toml_text.parsed(results.case_text or "")
+        data = toml_text.parse(results.case_text or "")
     except ValueError:
         data = {}
     return described(data)

@@ -374,17 +374,17 @@ def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> A
     }
     columns: dict[str, tuple[tuple[str, ...], str, list[Any]]]
     columns = {name: (*kind, [getattr(step, name) for step in all_steps]) for name, kind in fields.items()}
-    of_contact = [layout.contact_fields(mesh, step) for step in all_steps]
+    contact_values = [layout.contact_fields(mesh, step) for step in all_steps]
     for name, (_, quantity) in layout.CONTACT_FIELDS.items():
-        if all(name in contact for contact in of_contact):
+        if all(name in contact for contact in contact_values):
             dims: tuple[str, ...] = ("point",) if layout.POINT_FIELDS[name] == 1 else ("point", "axis")
-            columns[name] = dims, quantity, [contact[name] for contact in of_contact]
+            columns[name] = dims, quantity, [contact[name] for contact in contact_values]
     columns["contact_force"] = ("contact", "axis"), "force", of_pairs("force", np.full(dim, np.nan))
     columns["contact_pressure_max"] = ("contact",), "pressure", of_pairs("pressure_max", np.nan)
     sizes = {"point": mesh.n_points, "axis": dim, "stress_component": len(components), "contact": len(pairs)}
     data = {}
-    for name, (dims, quantity, of_steps) in columns.items():
-        values = np.array(of_steps, np.float64)
+    for name, (dims, quantity, values_of_steps) in columns.items():
+        values = np.array(values_of_steps, np.float64)
         values = values.reshape(len(all_steps), *(sizes[name_of_dim] for name_of_dim in dims))
         data[name] = (("step", *dims), values, _unit(units, quantity))
     coordinates = {

@@ -46,7 +46,7 @@ def full(patch, work):
 def opened(folder, change):
     with h5py.File(folder / "spoilt.h5", "w") as file:
         change(file)
-    with hdf5.opened(folder / "spoilt.h5") as file:
+    with hdf5.open_hdf5(folder / "spoilt.h5") as file:
         return hdf5.values(file, "a")
 
 
@@ -74,17 +74,17 @@ def vanished(folder):
 
 
 def packed_of_another_kind():
-    values = packing.packed({"a": np.arange(3.0)})
+    values = packing.pack({"a": np.arange(3.0)})
     raw = values.tobytes().replace(b"<f8", b"|O8")
     line, _, body = raw.partition(b"\n")
     old = b"%d" % zlib.crc32(body.replace(b"|O8", b"<f8"))
-    packing.unpacked(np.frombuffer(line.replace(old, b"%d" % zlib.crc32(body)) + b"\n" + body, np.uint8))
+    packing.unpack(np.frombuffer(line.replace(old, b"%d" % zlib.crc32(body)) + b"\n" + body, np.uint8))
 
 
 def packed_and_changed():
-    values = packing.packed({"a": np.arange(3.0)}).copy()
+    values = packing.pack({"a": np.arange(3.0)}).copy()
     values[-1] ^= 1
-    packing.unpacked(values)
+    packing.unpack(values)
 
 
 def resulting(folder, change):
@@ -176,7 +176,7 @@ CALLS = [
     ("an HDF5 file with groups in a circle", lambda folder: opened(folder, circle), fc.errors.FileError, r"spoilt\.h5' has groups in a cycle or too deep, at '.*': write it anew"),
     ("an HDF5 file with a strange filter", lambda folder: opened(folder, lzf), fc.errors.FileError, r"is packed by the filter 32000, which HDF5 may lack: use gzip"),
     ("an HDF5 file with texts for numbers", lambda folder: opened(folder, texts), fc.errors.FileError, r"contains no plain numbers: the file is damaged, write it anew"),
-    ("packed data without head", lambda: packing.unpacked(np.zeros(300, np.uint8)), ValueError, r"no packed data"),
+    ("packed data without head", lambda: packing.unpack(np.zeros(300, np.uint8)), ValueError, r"no packed data"),
     ("packed data that were changed", packed_and_changed, ValueError, r"packed data are cut off or changed"),
     ("packed data of another kind", packed_of_another_kind, ValueError, r"an array of \|O8 is not a packed array"),
     ("a result whose kinematics are a number", lambda folder: resulting(folder, kinematics_in_numbers), fc.errors.FileError, r"its kinematics or its case is not text"),

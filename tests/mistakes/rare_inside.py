@@ -163,7 +163,7 @@ def packed_beyond_its_size(folder, patch):
     with h5py.File(folder / "a.h5", "w") as file:
         file.create_dataset("a", data=np.random.default_rng(1).random(2000), chunks=(10,), compression="gzip")
     patch.setattr(hdf5, "PLAUSIBLE_BYTES", -(10**6))
-    with hdf5.opened(folder / "a.h5"):
+    with hdf5.open_hdf5(folder / "a.h5"):
         pass
 
 
