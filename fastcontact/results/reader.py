@@ -167,7 +167,7 @@ class Results(StepSequence):
             writes = journal.pending(self._raw) if not is_being_written(self.path) or repeat else []
             if writes:
                 self._raw = journal.JournalView(self._raw, writes)
-            with self._explained():
+            with self._readable_errors():
                 self._file = h5py.File(self._raw, "r")
                 self._read_header(self._checked_group())
         except BaseException:
@@ -343,7 +343,7 @@ class Results(StepSequence):
     def _step(self, number: int) -> StepResult:
         if not self._file:
             raise FileError(f"'{self.path}' is closed: open it again to read more steps")
-        with self._explained():
+        with self._readable_errors():
             notes, stored = self._notes(number), self.point_field_names
             return StepResult(
                 index=int(self._rows["index"][number]),
@@ -426,7 +426,7 @@ class Results(StepSequence):
         return contacts
 
     @contextlib.contextmanager
-    def _explained(self) -> Iterator[None]:
+    def _readable_errors(self) -> Iterator[None]:
         """Convert errors of HDF5, and errors due to damaged data, to a FileError."""
         try:
             yield

@@ -127,7 +127,7 @@ def not_announced(folder):
 def changed_by_others(folder, patch):
     model = square(BOTTOM="xy")
     with fc.ResultWriter(folder / "a.vtkhdf", model) as out:
-        patch.setattr(type(out._committed), "intact", lambda self: False)
+        patch.setattr(type(out._committed), "is_intact", lambda self: False)
         fc.solve(model, fc.linear_ramp(1), on_step=out.write)
 
 

@@ -85,13 +85,13 @@ def pressure_profile(
             f"stress has the shape {np.shape(stress)}, not {np.shape(contact.place)}: give one value for each secondary node"
         )
     ax, units = new_axes(ax, (6.4, 5.0)), units_of(units, contact)
-    earlier = sum(line.get_marker() == "o" for line in ax.lines)
-    colour = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:pink")[earlier % 6]
+    n_profiles = sum(line.get_marker() == "o" for line in ax.lines)
+    colour = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:pink")[n_profiles % 6]
     order = np.argsort(contact.place, kind="stable")
     position, flat = contact.place[order], contact.coordinates.shape[1] == 2
     curves = _curves(theory, other_theories or {})
     low, high = _shown_range(contact, curves)
-    limits = (low, high, *(ax.get_xlim() if earlier else ()))
+    limits = (low, high, *(ax.get_xlim() if n_profiles else ()))
     shown = (position >= low) & (position <= high)
     for style, (legend, curve) in zip(("-", "--", ":", "-."), curves.items(), strict=False):
         end = min(curve.radius, high)
@@ -137,10 +137,10 @@ def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
 
 
 def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) -> tuple[float, float]:
-    """Return the limits of the abscissa, which exceed the extent of the contact and of the theories by about one third.
+    """Return the limits of the x axis, which exceed the extent of the contact and of the theories by about one third.
 
-    They exceed the farthest node and theory by at most 2 %. Both sides of the middle are included if the surface has nodes on
-    both sides.
+    The limits exceed the farthest node and the radii of the theories by at most 2 %. They include both sides of the middle if
+    the surface has nodes on both sides.
     """
     closed = np.abs(contact.place[contact.active]).max(initial=0.0)
     radii = [value for value in (*contact.radius, *(c.radius for c in curves.values())) if np.isfinite(value)]
@@ -251,11 +251,13 @@ def axis_stress(
     values = {caption: stress[:, component] for caption, component in COMPONENTS.items()}
     values["von Mises"] = von_mises(stress)
     for number, name in enumerate(bodies):
-        here = shown & (side == 1 - 2 * number)
+        in_body = shown & (side == 1 - 2 * number)
         for (caption, value), colour, marker in zip(values.items(), COLOURS, "osD", strict=True):
-            if here.any():  # symbols of the second body are hollow, so that they do not hide those of the first body
+            if in_body.any():  # symbols of the second body are hollow, so that they do not hide those of the first body
                 face, label = ("none" if number else colour), f"{caption}, {name}"
-                axes.plot(depth[here], value[here], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label)
+                axes.plot(
+                    depth[in_body], value[in_body], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label
+                )
     depths = np.linspace(0.0, reach, 400)
     for style, (label, theory) in zip(("-", "--", ":"), (theories or {}).items(), strict=False):
         exact = theory.stress_on_axis(depths)
@@ -295,7 +297,7 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
         raise FastcontactError(
             f"the mesh has no nodes on the axis of contact '{pair}', along which stresses could be plotted"
         )
-    # Both bodies have a node at the intersection with the surface. The positions of its cells show to which body it belongs.
+    # Both bodies have a node where the axis intersects the surface. The side of the cells of such a node determines its body.
     body_side = _sides(mesh, nodes, origin, direction)
     side = np.where(np.abs(height) > tolerance, np.sign(height), body_side).astype(np.int64)
     order = np.lexsort((np.abs(height), side))
@@ -330,7 +332,7 @@ def _sides(mesh: Mesh, nodes: AnyArray, origin: Array, direction: Array) -> Arra
     return np.asarray(np.sign(total[nodes]))
 
 
-# Largest number of steps at which `contact_zones` shows the number of closed nodes.
+# Largest number of steps for which `contact_zones` shows the number of closed nodes.
 MOST_COUNTS = 20
 STATES = {"open": "0.85", "closed": "C0", "sticking": "C0", "sliding": "C1"}
 
@@ -429,12 +431,12 @@ def history(
 def _plot_bounds(ax: Any, x: Array, bounds: Array) -> None:
     """Draw a bar between the bounds (n, 2) of the radius at each step, or a tick if there is no upper bound."""
     low, high = bounds.T
-    both = np.isfinite(low) & np.isfinite(high)
-    all_closed = np.isfinite(low) & ~both
-    if both.any():
+    bounded = np.isfinite(low) & np.isfinite(high)
+    all_closed = np.isfinite(low) & ~bounded
+    if bounded.any():
         label = "computed: outermost closed node to first open one"
-        ax.vlines(x[both], low[both], high[both], lw=4, alpha=0.5, color="tab:blue", label=label)
-        ax.plot([x[both], x[both]], [low[both], high[both]], "_", ms=6, color="tab:blue")
+        ax.vlines(x[bounded], low[bounded], high[bounded], lw=4, alpha=0.5, color="tab:blue", label=label)
+        ax.plot([x[bounded], x[bounded]], [low[bounded], high[bounded]], "_", ms=6, color="tab:blue")
     if all_closed.any():
         ax.plot(x[all_closed], low[all_closed], "_", ms=9, color="tab:blue", label="computed: all nodes closed")
 

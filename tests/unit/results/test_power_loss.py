@@ -76,9 +76,9 @@ def recorded(largest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> t
             events.append(("size", max(os.fstat(self.fileno()).st_size, place + len(data))))
             super()._put(place, data)
 
-        def _cut(self, size: int) -> None:
+        def _set_size(self, size: int) -> None:
             events.append(("size", size))
-            super()._cut(size)
+            super()._set_size(size)
 
     def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
         events.append(("size", max(os.fstat(descriptor).st_size, start + size)))
