@@ -29,8 +29,8 @@ def run(options: Namespace) -> int:
 
     check_outputs([options.file], [options.csv, options.agr], [options.png])
     with open_results(options.file) as results:
-        step = _results.chosen_step(results, options.step)
-        name = _results.chosen_contact(options, step)
+        step = _results.select_step(results, options.step)
+        name = _results.select_contact(options, step)
         case = _results.case_data(results)
     contact = step.contact[name]
     table = contact_table(contact, step)

@@ -72,7 +72,7 @@ def _range(text: str, fields: list[str]) -> list[float]:
 
 
 def _value(text: str) -> Any:
-    """Return a text as a Boolean, an integer or a number if it represents one, otherwise unchanged."""
+    """Return the Boolean, integer or number that a text represents, or the text itself."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):

@@ -15,7 +15,7 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LAW = re.compile(rf"\s*(?:({_NUMBER})\s*\*\s*)?value(?:\s*\^\s*({_NUMBER}))?\s*$")
 
 
-def substituted(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+def substitute(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
     """Return a copy of a parsed case file with new values of parameters.
 
     A parameter is a path, or a name in the table ``[study.parameters]``. A name sets several paths, each by a law
@@ -32,7 +32,7 @@ def substituted(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str,
 
 
 def by_law(law: Any, value: Any, where: str) -> Any:
-    """Return ``a value^p`` for a law ``"a*value^p"``; CaseError if the law is invalid or cannot be applied to the value."""
+    """Return the value of a law ``"a*value^p"``. Raises CaseError if the law is invalid or cannot be applied to `value`."""
     match = _LAW.match(law) if isinstance(law, str) else None
     if match is None:
         raise CaseError(f"{where} = {law!r} must be 'value', 'a*value' or 'a*value^p' with numbers a and p")

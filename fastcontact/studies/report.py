@@ -1,4 +1,4 @@
-"""Reports of studies: tables of text, panels of axes, HTML pages, and the base class of results."""
+"""Reports of studies: text tables, figures with several panels, HTML pages, and the base class of results."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def panels(
 
 
 def message(ax: Any, text: str) -> None:
-    """Replace axes without data by a message."""
+    """Show a message in place of axes that have no data."""
     ax.set_axis_off()
     ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, wrap=True)
 
@@ -191,8 +191,8 @@ if TYPE_CHECKING:
     import pandas
 
 
-def of_case(case: Case) -> dict[str, Any]:
-    """Return the fields of a `Report` that describe its case."""
+def report_fields(case: Case) -> dict[str, Any]:
+    """Return the arguments of `Report` that describe a case."""
     units = units_of_results(case.units, case.model.kinematics)
     return {"name": case.name, "title": case.title, "text": case.text, "units": units}
 

@@ -134,7 +134,7 @@ def changed_by_others(folder, patch):
 def no_step_yet(folder):
     fc.ResultWriter(folder / "a.vtkhdf", square(BOTTOM="xy")).close()
     with fc.open_results(folder / "a.vtkhdf") as results:
-        _results.chosen_step(results, -1)
+        _results.select_step(results, -1)
 
 
 def unexpected(patch):
@@ -166,7 +166,7 @@ CALLS = [
     ("a picture on a full disk", picture_on_a_full_disk, fc.errors.FileError, r"'a\.png' cannot be written \(No space left on device\)"),
     ("a picture without contact", lambda: _outputs.profile_picture(None, SimpleNamespace(contact={}), "a.png"), fc.errors.FastcontactError, r"there is no contact pair whose pressure could be plotted"),
     ("a step of no steps", no_step_yet, fc.errors.CaseError, r"a\.vtkhdf' contains no finished step yet"),
-    ("a pair of a result without contact", lambda: _results.chosen_contact(SimpleNamespace(contact=None), SimpleNamespace(contact={})), fc.errors.CaseError, r"this result contains no contact pair"),
+    ("a pair of a result without contact", lambda: _results.select_contact(SimpleNamespace(contact=None), SimpleNamespace(contact={})), fc.errors.CaseError, r"this result contains no contact pair"),
     ("figures of benchmarks on a full disk", lambda patch: full(patch, write_json), fc.errors.FileError, r"'a\.json' cannot be written \(No space left on device\)"),
     ("a summary on a full disk", lambda patch: full(patch, write_json), fc.errors.FileError, r"'a\.json' cannot be written \(No space left on device\)"),
     ("a mesh from a pipe", pipe, fc.errors.FileError, r"pipe\.med' is a device or a pipe: name a regular file"),

@@ -105,7 +105,7 @@ def copied_to_a_full_disk(patch, folder):
     case = folder / "a.toml"
     case.write_text("title = 'a'\n")
     patch.setattr(Path, "write_bytes", refusing(errno.ENOSPC))
-    cases.copied(case, folder / "b.toml")
+    cases.copy_case(case, folder / "b.toml")
 
 
 def distorted_facets(patch):

@@ -87,7 +87,7 @@ def no_worker_starts(patch):
         end = shutdown
 
     patch.setattr(execute, "Workers", Pool)
-    with execute.started_pool(1):
+    with execute.process_pool(1):
         pass
 
 
