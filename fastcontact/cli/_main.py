@@ -79,7 +79,7 @@ class Parser(argparse.ArgumentParser):
     """An argument parser that reports errors as the package does, in one line and with exit code 1."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        """Raise FastcontactError instead of exiting with code 2. The message about an invalid choice suggests a similar one."""
+        """Raise FastcontactError instead of exiting with code 2. For an invalid choice, a similar valid one is suggested."""
         choice = _CHOICE.search(message)
         if choice:
             message = unknown(choice["kind"].lower(), choice["given"], _NAME.findall(choice["known"]))
