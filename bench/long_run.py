@@ -97,8 +97,9 @@ CYCLE = 20  # steps
 MIN_STEPS = 4 * CYCLE  # smallest number of steps that can be evaluated
 STEPS_PER_SECOND = {False: 100, True: 20}  # upper bounds for small and for large models
 MAX_RATIO = {"cpu": 1.15, "bytes": 1.05, "calls": 1.05}  # of the last tenth of the steps to the second
-MAX_GROWTH = 1000.0  # growth of the memory in 1000 steps [kB], unless it is less than
-MAX_SHARE = 0.01  # of the memory in the entire run
+# The memory may grow by the larger of this number [kB] per 1000 steps, and this fraction of it in the entire run.
+MAX_GROWTH = 1000.0
+MAX_SHARE = 0.01
 
 
 @dataclass

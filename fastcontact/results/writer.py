@@ -424,7 +424,7 @@ def _steps_to_resume(
                 f"{start_anew}"
             )
         if missing := old.missing_paths(layout.NEEDED_TO_RESUME):
-            raise FileError(f"'{path}' is damaged, it missing_paths '{missing[0]}': restore a copy, {start_anew}")
+            raise FileError(f"'{path}' is damaged, it lacks '{missing[0]}': restore a copy, {start_anew}")
         if not _same_mesh(old.mesh, mesh) or old.kinematics != kinematics:
             difference = "kinematics" if _same_mesh(old.mesh, mesh) else "mesh"
             raise FileError(f"'{path}' belongs to another {difference}: resume the case it was begun for, {start_anew}")
