@@ -16,7 +16,7 @@ Numbers: TypeAlias = NDArray[np.int32]
 AnyArray: TypeAlias = NDArray[Any]
 
 # End of the error message about an argument with masked entries.
-REFUSAL = "has entries that are masked, and masks are not kept: fill them first, or leave them out"
+REFUSAL = "has masked entries, which are not supported: fill or remove them"
 
 
 def largest(x: Array) -> float:

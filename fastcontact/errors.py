@@ -196,7 +196,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     names, name = sorted(known), str(name)
     name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     if not names:
-        return f"unknown {kind} '{name}': there is none here"
+        return f"unknown {kind} '{name}': none is defined"
     if similar := nearest(name, names):
         return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in similar) + "?"
     listed = ", ".join(names[:MAX_SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > MAX_SHOWN else "")

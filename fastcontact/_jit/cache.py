@@ -120,7 +120,7 @@ class KernelFiles(_Cache):  # type: ignore[misc]
         try:
             with open(path, "rb") as file:
                 if not _is_protected(os.fstat(file.fileno())):
-                    _log_once(f"others may write to the compiled kernel '{path}'")
+                    _log_once(f"other users may write to the compiled kernel '{path}'")
                     return None
                 content = file.read()
             if _digest(content[:-DIGEST]).encode() == content[-DIGEST:]:
@@ -141,7 +141,7 @@ class KernelFiles(_Cache):  # type: ignore[misc]
             temporary.write_bytes(content + _digest(content).encode())
             os.replace(temporary, path)
         except OSError as error:
-            _log_once(f"compiled kernels cannot be kept in '{path.parent}' ({error.strerror or error})")
+            _log_once(f"compiled kernels cannot be stored in '{path.parent}' ({error.strerror or error})")
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
 
@@ -178,7 +178,7 @@ def attach_cache(kernel: Any, function: Callable[..., Any], options: str) -> str
     if folder is None:
         return "no writable folder for compiled kernels"
     if not is_trusted(folder):
-        return f"others may write to the folder of compiled kernels, {folder}"
+        return f"other users may write to the folder of compiled kernels, {folder}"
     name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
     files[function] = kernel._cache = KernelFiles(folder, name, function, options)
     return ""

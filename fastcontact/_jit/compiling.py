@@ -6,7 +6,7 @@ import logging
 import sys
 from collections.abc import Callable
 
-TEXT = "compiling kernels: once, for up to a minute; they are kept for later runs"
+TEXT = "compiling kernels, which takes up to a minute; later runs reuse them"
 log = logging.getLogger("fastcontact")
 count = 0  # number of kernels that this process has compiled, or has run in Python instead
 _reported = False

@@ -49,7 +49,7 @@ def open_hdf5(path: PathLike) -> Iterator[Any]:
     except (FastcontactError, Warning):
         raise
     except Exception as error:  # damage can cause any exception
-        raise FileError(f"cannot read '{path}', it is damaged or incomplete: write it anew") from error
+        raise FileError(f"cannot read '{path}', it is damaged or incomplete: write it again") from error
 
 
 def check_contents(file: Any, path: PathLike) -> None:
@@ -83,12 +83,14 @@ def check_contents(file: Any, path: PathLike) -> None:
                 if total > limit_in_all:
                     raise FileError(
                         f"'{path}' declares more than {limit_in_all:.3g} bytes in total, which a file of its size cannot "
-                        "hold: write it anew"
+                        "hold: write it again"
                     )
             elif isinstance(item, h5g.GroupID):
                 address = h5o.get_info(item).addr
                 if address in seen or depth >= DEEPEST:
-                    raise FileError(f"'{path}' has groups in a cycle or too deep, at '{name[:80]}': write it anew")
+                    raise FileError(
+                        f"'{path}' has cyclic or too deeply nested groups, at '{name[:80]}': write it again"
+                    )
                 seen.add(address)
                 waiting.append((item, name, depth + 1))
 
@@ -105,7 +107,7 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
     size = count * item
     # Each string or reference becomes a Python object, and takes space in the file.
     if count > max(FEW_OBJECTS, file_size // 8) and dataset.dtype.hasobject:
-        raise FileError(f"{where} declares {count} texts or references, which its file cannot hold: write it anew")
+        raise FileError(f"{where} declares {count} texts or references, which its file cannot hold: write it again")
     if layout == h5d.CHUNKED:
         chunk = int(np.prod([int(n) for n in settings.get_chunk()], dtype=object)) * item
         built_in = (h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SZIP,
@@ -115,10 +117,10 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
         if not set(filters) <= set(built_in):
             raise FileError(f"{where} is packed by the filter {filters[0]}, which HDF5 may lack: use gzip")
         if dataset.get_storage_size() > 2 * (size + chunk) + PLAUSIBLE_BYTES:
-            raise FileError(f"{where} is larger compressed than uncompressed: the file is damaged, write it anew")
+            raise FileError(f"{where} is larger compressed than uncompressed: the file is damaged, write it again")
         size = max(size, chunk)
     if size > limit:
-        raise FileError(f"{where} declares {size:.3g} bytes, which a file of its size cannot hold: write it anew")
+        raise FileError(f"{where} declares {size:.3g} bytes, which a file of its size cannot hold: write it again")
     return int(size)
 
 
@@ -126,7 +128,9 @@ def check_size(where: str, shape: tuple[int, ...], file: Any) -> None:
     """Raise FileError if an array of doubles assembled from a file is too large for the size of the file."""
     size = 8 * int(np.prod(shape, dtype=object))
     if size > max(PLAUSIBLE_IN_ALL, PLAUSIBLE_EXPANSION_IN_ALL * file.id.get_filesize()):
-        raise FileError(f"{where} is an array of {size:.3g} bytes, which a file of its size cannot hold: write it anew")
+        raise FileError(
+            f"{where} is an array of {size:.3g} bytes, which a file of its size cannot hold: write it again"
+        )
 
 
 def values(group: Any, name: str) -> AnyArray:
@@ -135,10 +139,10 @@ def values(group: Any, name: str) -> AnyArray:
 
     where = f"'{group.name}/{name}' of '{group.file.filename}'"
     if name not in group:
-        raise FileError(f"{where} is missing: the file is incomplete, write it anew")
+        raise FileError(f"{where} is missing: the file is incomplete, write it again")
     dataset = group[name]
     if not isinstance(dataset, h5py.Dataset) or dataset.dtype.base.kind not in PLAIN_KINDS:
-        raise FileError(f"{where} contains no plain numbers: the file is damaged, write it anew")
+        raise FileError(f"{where} contains no plain numbers: the file is damaged, write it again")
     return np.asarray(dataset[()])
 
 
@@ -150,7 +154,9 @@ def attribute(item: Any, name: str, default: Any = None) -> Any:
     if name not in item.attrs and default is not None:
         return default
     if item.attrs.get_id(name).dtype.base.kind not in PLAIN_KINDS:
-        raise FileError(f"'{name}' of '{item.name}' of '{item.file.filename}' is not a plain number: rewrite the file")
+        raise FileError(
+            f"'{name}' of '{item.name}' of '{item.file.filename}' is not a plain number: write the file again"
+        )
     return item.attrs[name]
 
 

@@ -74,5 +74,5 @@ def _only(text: str | None, option: str) -> str | None:
     """Return the name in a text, or None if there is no text; CaseError for several names."""
     names = _study.names(text) or []
     if len(names) > 1:
-        raise CaseError(f"adaptive meshes take one {option}, not {len(names)}: {text}")
+        raise CaseError(f"adaptive refinement takes one {option}, not {len(names)}: {text}")
     return names[0] if names else None

@@ -196,8 +196,8 @@ def _warn_of_steps_outside_ramp(case: Case, done: Sequence[float], output: Path)
     others = [factor for factor in done if not any(math.isclose(factor, t, rel_tol=1e-9) for t in instants)]
     if others:
         warn(
-            f"'{output}' contains {len(done)} steps, the case now has {len(instants)}: those in the file are kept, with that "
-            f"at load factor {others[0]:g}, which is not in the case; without --resume all steps are solved again"
+            f"'{output}' contains {len(done)} steps, the case now has {len(instants)}: those in the file are kept, including "
+            f"that at load factor {others[0]:g}, which is not in the case; without --resume all steps are solved again"
         )
 
 

@@ -104,7 +104,7 @@ def _open_lock_file(path: Path) -> IO[Any]:
     except OSError as error:
         if error.errno != errno.ELOOP:
             raise
-        raise FileError(f"'{path}' is a link, but a lock must be a regular file: remove it") from error
+        raise FileError(f"'{path}' is a link, but a lock file must be a regular file: remove it") from error
     status = os.fstat(descriptor)
     if (
         not stat.S_ISREG(status.st_mode)
@@ -112,7 +112,7 @@ def _open_lock_file(path: Path) -> IO[Any]:
         or (hasattr(os, "getuid") and status.st_uid != os.getuid())
     ):
         os.close(descriptor)
-        raise FileError(f"'{path}' is not a regular file of yours, as a lock must be: remove it or write elsewhere")
+        raise FileError(f"'{path}' locks the result file, and must be a regular file of yours: remove it")
     return os.fdopen(descriptor, "r+b", buffering=0)
 
 

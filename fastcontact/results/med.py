@@ -82,7 +82,7 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
         indices: set[int] = set()
         for step in steps:
             if step.index in indices:
-                raise FileError(f"two steps have the index {step.index}: give each its own to write '{path}'")
+                raise FileError(f"two steps have the index {step.index}: give them different ones to write '{path}'")
             indices.add(step.index)
             for name, (components, field) in _fields(mesh, step).items():
                 add_field(file, name, components, field, (step.index, step.load_factor), mesh_name)

@@ -122,7 +122,7 @@ class ResultWriter:
         cell_fields = dict.fromkeys((*getattr(mesh, "cell_fields", ()), *cell_fields))
         if not isinstance(mesh, Mesh):
             if not isinstance(getattr(mesh, "mesh", None), Mesh) or not hasattr(mesh, "kinematics"):
-                raise ModelError(f"results need a mesh or a model as a basis, not {type(mesh).__name__}")
+                raise ModelError(f"a result file needs a mesh or a model, not {type(mesh).__name__}")
             kinematics, self._material = mesh.kinematics, _materials_at_interfaces(mesh)
             case_text = case_text or getattr(mesh, "case_text", None) or ""
             mesh = mesh.mesh
@@ -427,7 +427,9 @@ def _steps_to_resume(
             raise FileError(f"'{path}' is damaged, it lacks '{missing[0]}': restore a copy, {start_anew}")
         if not _same_mesh(old.mesh, mesh) or old.kinematics != kinematics:
             difference = "kinematics" if _same_mesh(old.mesh, mesh) else "mesh"
-            raise FileError(f"'{path}' belongs to another {difference}: resume the case it was begun for, {start_anew}")
+            raise FileError(
+                f"'{path}' belongs to another {difference}: resume the case for which it was created, {start_anew}"
+            )
         names = sorted(old.cell_field_names)
         if names != sorted(cell_fields):
             raise FileError(
@@ -459,7 +461,7 @@ def _checked_names(cell_fields: Iterable[str], mesh: Mesh) -> tuple[str, ...]:
         reserved = {*layout.cell_fields(mesh), *layout.MATERIAL_FIELDS, "material"}
         if name in reserved or not name.isidentifier():
             raise FileError(
-                f"'{name}' cannot be the name of a cell field: it is taken or no plain word; choose another"
+                f"'{name}' cannot be the name of a cell field: it is reserved or not an identifier; choose another"
             )
     return names
 

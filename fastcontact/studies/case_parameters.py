@@ -72,7 +72,7 @@ def _keys(path: str) -> list[str | int]:
     for key in path.split("."):
         match = _PART.match(key)
         if match is None:
-            raise CaseError(f"'{path}' is not a path into a case file: write for example support[1].y")
+            raise CaseError(f"'{path}' is not a path in a case file: write for example support[1].y")
         keys.append(match[1])
         keys += [int(number) for number in re.findall(r"\d+", match[2])]
     return keys

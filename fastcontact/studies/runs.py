@@ -332,7 +332,7 @@ def parameter_sweep(
         return _sweep_of_function(case, parameters, quantities, options)
     if not isinstance(parameters, Mapping) or isinstance(quantities, Mapping):
         raise CaseError(
-            "values without a name and functions as quantities are only for Python models: give a case names of both"
+            "values without a name and functions as quantities are only for Python models: for a case, give names of both"
         )
     case = case if isinstance(case, Case) else read_case(case)
     choices = _choices(parameters)

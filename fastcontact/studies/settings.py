@@ -336,7 +336,7 @@ def make_mesh(recipe: Recipe, base: Mesh | None) -> Mesh:
         mesh = GENERATORS[recipe["generator"]](**arguments)
         return _refine_repeatedly(mesh, recipe["refinements"], circles(mesh) if recipe["refinements"] else [])
     if base is None:
-        raise FastcontactError("a mesh that is refined needs the mesh to start from")
+        raise FastcontactError("the refinement of a mesh needs the initial mesh")
     return _from_file(recipe, base)
 
 

@@ -78,7 +78,7 @@ def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None 
         return new_panels(1, 1, size, subplot_kw={"projection": projection})[0, 0]
     if not (hasattr(ax, "plot") and hasattr(ax, "figure")):
         raise FastcontactError(
-            f"pictures are drawn on axes of matplotlib, not on {ax!r}: leave the argument out for new ones"
+            f"pictures are drawn on axes of Matplotlib, not on {ax!r}: omit the argument for new axes"
         )
     return ax
 

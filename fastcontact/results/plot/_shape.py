@@ -59,7 +59,7 @@ def displaced_points(points: Array, scale: float, displacement: Array) -> Array:
         position = points + scale * displacement
         valid = np.isfinite(scale) and (np.abs(position) < LARGEST).all()
     if not valid:
-        raise FastcontactError(f"scale = {scale:g} must be a finite number, and not so large that nothing can be drawn")
+        raise FastcontactError(f"scale = {scale:g} must be a finite number, and not so large that coordinates overflow")
     return position
 
 
@@ -136,7 +136,9 @@ def deformed_shape(
     >>> ax.figure.savefig("shape.png")
     """
     if zoom is not None and (mesh.dim == 3 or not 0.0 < zoom < LARGEST):
-        raise FastcontactError(f"zoom = {zoom:g}: in the plane half a width > 0 can be drawn; in 3D draw a section")
+        raise FastcontactError(
+            f"zoom = {zoom:g}: it must be positive, and is only for plane meshes; in 3D draw a section"
+        )
     plotted_field, units = field_of(mesh, step, field), units_of(units, step)
     scale = scale_of(scale, mesh, [step])
     points = displaced_points(plotted_field.mesh.points, scale, step.displacement[plotted_field.node])

@@ -127,7 +127,7 @@ def _panels(axes: Sequence[Any] | None, two_maps: bool) -> list[Any]:
     if axes is not None:
         panels = list(np.atleast_1d(np.array(axes, dtype=object)))
         if len(panels) < 1 + two_maps:
-            raise FastcontactError(f"this contact has shear: it takes two axes, and {len(panels)} are given")
+            raise FastcontactError(f"a contact with shear needs two axes, and {len(panels)} are given")
         return panels[: 1 + two_maps]
     panels = list(new_panels(1, 1 + two_maps, (9.6 if two_maps else 5.6, 4.6))[0])
     panels[0].figure.set_layout_engine("compressed")  # places the colour bar next to a narrow map
@@ -160,7 +160,7 @@ def _projection(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Arr
         total, total_area = total + areas.sum(axis=0), total_area + float(np.linalg.norm(areas, axis=1).sum())
     if np.linalg.norm(total) < LEAST_MEAN * total_area:
         raise FastcontactError(
-            f"the surface of contact '{contact.name}' goes around its body: draw a section, or look at it with view"
+            f"the surface of contact '{contact.name}' surrounds its body: draw a section, or use view"
         )
     return view_axes(total / np.linalg.norm(total), 0.9)
 

@@ -131,7 +131,7 @@ def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
             curves[legend or curve.name] = curve
         elif candidate is not None and not is_dataclass(candidate):
             raise FastcontactError(
-                f"a theory needs a pressure, such as the results of fastcontact.analytic have, but {candidate!r} has none"
+                f"a theory needs a pressure, as the results of fastcontact.analytic have, but {candidate!r} has none"
             )
     return curves
 

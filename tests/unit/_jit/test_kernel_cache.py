@@ -160,7 +160,7 @@ def test_a_cache_that_others_may_write_to_is_not_used(written, inside, mode, use
         path.chmod(mode)
     with caplog.at_level(logging.INFO, "fastcontact"):
         assert asked(written, CALLED) == (2.0, int(used))
-    assert ("others may write to the folder of compiled kernels" in caplog.text) != used
+    assert ("other users may write to the folder of compiled kernels" in caplog.text) != used
 
 
 @jitted

@@ -581,7 +581,7 @@ def test_steps_that_do_not_fit(path: Path) -> None:
     with pytest.raises(FileError, match="is closed"):
         out.write(good)
     out.close()  # a second close does nothing
-    with pytest.raises(ModelError, match="need a mesh or a model as a basis, not str"):
+    with pytest.raises(ModelError, match="needs a mesh or a model, not str"):
         ResultWriter(path, "mesh.med")  # type: ignore[arg-type]
 
 

@@ -105,7 +105,9 @@ def test_texts_in_a_mesh_file_are_not_read(tmp_path):
     assert fc.read_mesh(path).n_points == MESH.n_points
     with h5py.File(path, "r+") as file:
         file["ENS_MAA/mesh"].attrs["TYP"] = "a text"
-    with pytest.raises(FileError, match=r"'TYP' of '/ENS_MAA/mesh' of '.*' is not a plain number: rewrite the file"):
+    with pytest.raises(
+        FileError, match=r"'TYP' of '/ENS_MAA/mesh' of '.*' is not a plain number: write the file again"
+    ):
         fc.read_mesh(path)
 
 
