@@ -49,9 +49,9 @@ def main() -> int:
             all_found[name] = killing.run(reference, count, options.seed, Path(folder), options.failures, signals)
         print(f"{name}: {all_found[name].kills}, {len(all_found[name].failures)} failures", file=sys.stderr, flush=True)
     print(f"{'':<20}" + "".join(f"{name[:11]:>12}" for name in all_found))
-    for row in zip(*(found.rows() for found in all_found.values()), strict=True):
+    for row in zip(*(outcomes.rows() for outcomes in all_found.values()), strict=True):
         print(f"{row[0][0]:<20}" + "".join(f"{text:>12}" for _, text in row))
-    failures = [text for found in all_found.values() for text in found.failures]
+    failures = [text for outcomes in all_found.values() for text in outcomes.failures]
     print("\n".join([*failures, f"seed {options.seed}, {time.perf_counter() - begin:.0f} s in all"]))
     return 1 if failures else 0
 

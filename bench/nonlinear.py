@@ -92,19 +92,19 @@ print(mesh.points.size, sum(len(s.iterations["history"]) for s in found), -found
 
 def deck(problem: Path, steps: int, path: Path) -> None:
     """Write the deck of CalculiX for the mesh that INDENTATION has saved in `problem`."""
-    given = np.load(problem)
-    cells = given["cells"]
-    ball = np.isin(np.arange(len(cells)), given["of_ball"])
+    arrays = np.load(problem)
+    cells = arrays["cells"]
+    ball = np.isin(np.arange(len(cells)), arrays["of_ball"])
     with path.open("w") as file:
         file.write("*NODE,NSET=ALL\n")
-        table(file, np.arange(1, len(given["points"]) + 1), given["points"], "%.16g")
+        table(file, np.arange(1, len(arrays["points"]) + 1), arrays["points"], "%.16g")
         for name, in_set in (("BLOCK", ~ball), ("BALLS", ball)):
             file.write(f"*ELEMENT,TYPE=CAX8R,ELSET={name}\n")
             table(file, np.flatnonzero(in_set) + 1, cells[in_set] + 1, "%d")
         for name in ("BOTTOM", "SYMMETRY_X", "BALL"):
-            node_set(file, name, given[name])
-        contact_surface(file, "TOP", cells[:, :4], given["top"][:, :2])
-        contact_surface(file, "ARC", cells[:, :4], given["arc"][:, :2])
+            node_set(file, name, arrays[name])
+        contact_surface(file, "TOP", cells[:, :4], arrays["top"][:, :2])
+        contact_surface(file, "ARC", cells[:, :4], arrays["arc"][:, :2])
         file.write(
             "*MATERIAL,NAME=STEEL\n*ELASTIC\n200000.,.3\n*SOLID SECTION,ELSET=BALLS,MATERIAL=STEEL\n"
             "*MATERIAL,NAME=YIELDS\n*ELASTIC\n200000.,.3\n*PLASTIC\n400.,0.\n1400.,1.\n"

@@ -260,9 +260,8 @@ def _sources(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
     yield _digest_of_file(code.co_filename)
     for name in code.co_names:
         value = function.__globals__.get(name)
-        called = getattr(value, "py_func", None) or getattr(
-            value, "_defn", None
-        )  # function of a kernel or an intrinsic
+        # `py_func` is the function of a kernel, and `_defn` that of an intrinsic.
+        called = getattr(value, "py_func", None) or getattr(value, "_defn", None)
         if called is not None:
             yield from _sources(called, seen)
         elif isinstance(value, CONSTANTS):

@@ -104,9 +104,8 @@ def _compile(function: Callable[..., Any], fastmath: set[str] = AS_WRITTEN, **in
     options["no_cfunc_wrapper"] = True  # an unused second entry point for C
     options |= inlining
     dispatcher = numba.njit(**options)(function)
-    reason = cache.attach_cache(
-        dispatcher, function, repr(options | {"fastmath": sorted(fastmath)})
-    )  # sets are unordered
+    # The flags are sorted, because the order of a set is arbitrary.
+    reason = cache.attach_cache(dispatcher, function, repr(options | {"fastmath": sorted(fastmath)}))
     global _cache_reported
     if reason and not _cache_reported:
         _cache_reported = True

@@ -74,9 +74,8 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
                 members = {key: value}
             for argument, member in members.items():
                 if is_masked(member) or not fits(member, annotation):
-                    check_type(
-                        f"the argument {argument} of {_public_name(call, name, args)}", member, annotation, error
-                    )
+                    called = _public_name(call, name, args)
+                    check_type(f"the argument {argument} of {called}", member, annotation, error)
         return call(*args, **kwargs)
 
     if any(str(annotation).startswith("Unpack[") for annotation in call.__annotations__.values()):
@@ -94,12 +93,8 @@ VECTORS = ("the argument motion ", "the argument force ")
 
 
 def _argument_error(
-    call: Callable[..., Any],
-    signature: inspect.Signature,
-    public_name: str,
-    args: tuple[Any, ...],
-    kwargs: dict[str, Any],
-) -> TypeError:
+    call: Callable[..., Any], signature: inspect.Signature, public_name: str, args: tuple[Any, ...], kwargs: dict[str, Any]
+) -> TypeError:  # fmt: skip
     """Return Python's error for missing, unknown and misplaced arguments, in which the function is called `public_name`.
 
     For an unknown argument, the message suggests similar ones.

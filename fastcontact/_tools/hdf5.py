@@ -88,9 +88,7 @@ def check_contents(file: Any, path: PathLike) -> None:
             elif isinstance(item, h5g.GroupID):
                 address = h5o.get_info(item).addr
                 if address in seen or depth >= DEEPEST:
-                    raise FileError(
-                        f"'{path}' has cyclic or too deeply nested groups, at '{name[:80]}': write it again"
-                    )
+                    raise FileError(f"'{path}' has cyclic or too deep groups, at '{name[:80]}': write it again")
                 seen.add(address)
                 waiting.append((item, name, depth + 1))
 
@@ -128,9 +126,7 @@ def check_size(where: str, shape: tuple[int, ...], file: Any) -> None:
     """Raise FileError if an array of doubles assembled from a file is too large for the size of the file."""
     size = 8 * int(np.prod(shape, dtype=object))
     if size > max(PLAUSIBLE_IN_ALL, PLAUSIBLE_EXPANSION_IN_ALL * file.id.get_filesize()):
-        raise FileError(
-            f"{where} is an array of {size:.3g} bytes, which a file of its size cannot hold: write it again"
-        )
+        raise FileError(f"{where} is an array of {size:.3g} bytes, too many for a file of its size: write it again")
 
 
 def values(group: Any, name: str) -> AnyArray:
@@ -154,9 +150,7 @@ def attribute(item: Any, name: str, default: Any = None) -> Any:
     if name not in item.attrs and default is not None:
         return default
     if item.attrs.get_id(name).dtype.base.kind not in PLAIN_KINDS:
-        raise FileError(
-            f"'{name}' of '{item.name}' of '{item.file.filename}' is not a plain number: write the file again"
-        )
+        raise FileError(f"'{name}' of '{item.name}' of '{item.file.filename}' is not a plain number: write it again")
     return item.attrs[name]
 
 

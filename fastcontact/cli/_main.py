@@ -173,9 +173,8 @@ def _run_with_exit_code(words: list[str], received_signals: list[int]) -> int:
 def _run(words: list[str]) -> int:
     """Parse the arguments, set up logging, and run the subcommand; return its exit code."""
     words = words or ["--help"]
-    arguments = parser(None if words[0] not in GLOBAL_OPTIONS and words[0].startswith("-") else words[0]).parse_args(
-        words
-    )
+    command = None if words[0] not in GLOBAL_OPTIONS and words[0].startswith("-") else words[0]
+    arguments = parser(command).parse_args(words)
     handler = _EscapingHandler()
     log.handlers[:] = [handler]
     log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)

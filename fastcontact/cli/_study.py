@@ -117,7 +117,7 @@ def names(text: str | None) -> list[str] | None:
     return [name.strip() for name in text.split(",") if name.strip()] if text else None
 
 
-def finished(options: Namespace, study: Callable[..., Any]) -> Any:
+def run_interruptibly(options: Namespace, study: Callable[..., Any]) -> Any:
     """Run a study on the executor of the options and return its result.
 
     After an interruption, FastcontactError is raised with a message on how to resume.

@@ -39,7 +39,7 @@ def run(options: Namespace) -> int:
     if options.adaptive:
         return _adaptive(options)
     elements, formulations, quantities = map(_study.names, (options.elements, options.formulations, options.quantities))
-    study = _study.finished(
+    study = _study.run_interruptibly(
         options,
         partial(convergence_study, options.case, options.levels, elements, formulations, quantities=quantities or ()),
     )

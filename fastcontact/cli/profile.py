@@ -64,7 +64,7 @@ def _print(table: Any) -> None:
 
 def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, PressureCurve]) -> None:
     """Write an XMGRACE project with the computed pressure and that of theories by label."""
-    from fastcontact.results.units import labelled
+    from fastcontact.results.units import axis_label
     from fastcontact.results.xmgrace import Curve, write_agr
 
     order = np.argsort(contact.place, kind="stable")
@@ -81,6 +81,6 @@ def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theorie
         curves,
         title=case["title"] or f"Contact '{contact.name}'",
         subtitle=f"load factor {step.load_factor:g}",
-        xlabel=labelled(f"distance from the {start}", contact.units, "length"),
-        ylabel=labelled("contact pressure", contact.units, "pressure"),
+        xlabel=axis_label(f"distance from the {start}", contact.units, "length"),
+        ylabel=axis_label("contact pressure", contact.units, "pressure"),
     )

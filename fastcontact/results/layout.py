@@ -43,7 +43,7 @@ from fastcontact.mesh.mesh import Mesh, starts_of
 from fastcontact.results.step import ContactResult, StepResult
 
 
-def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
+def cut_at_interfaces(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
     """Return the mesh cut along material interfaces, and the node (m,) and the stress (m, n_components) of each point.
 
     The first points of the cut mesh are those of `mesh`. The cut mesh has only solid cells and no groups. Stress components
@@ -66,7 +66,7 @@ def cells_by_element(mesh: Mesh, values: AnyArray) -> dict[str, AnyArray]:
 
 def mean_in_cells(mesh: Mesh, step: StepResult) -> Array:
     """Return the stress (n_solids, n_components) of each cell, the mean stress of its material at its nodes [pressure]."""
-    separate_mesh, _, stress = separated(mesh, step)
+    separate_mesh, _, stress = cut_at_interfaces(mesh, step)
     return np.concatenate([stress[block].mean(axis=1) for block in separate_mesh.solids.values()])
 
 
@@ -179,7 +179,7 @@ def material_row(dim: int) -> np.dtype[Any]:
 def material_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
     """Return the `MATERIAL_FIELDS`: stress (n_solids, 6) and von Mises stress (n_solids,) of cells [pressure]."""
     stress = mean_in_cells(mesh, step)
-    return {CELL_STRESS: padded(stress, 6), CELL_VON_MISES: von_mises(stress)}
+    return {CELL_STRESS: pad_columns(stress, 6), CELL_VON_MISES: von_mises(stress)}
 
 
 class SolidCells(NamedTuple):
@@ -213,7 +213,7 @@ def xdmf_topology(mesh: Mesh) -> Numbers | None:
     return np.concatenate(blocks).astype(np.int32)
 
 
-def padded(values: Array, width: int) -> Array:
+def pad_columns(values: Array, width: int) -> Array:
     """Return `values` (n, k) padded with zero columns to `width`; a width of 1 leaves a vector (n,) unchanged."""
     values = np.asarray(values, np.float64)
     if width == 1 or values.shape[1] == width:
@@ -260,7 +260,7 @@ def point_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
     """Return the point data of a step by name, padded to the components of `POINT_FIELDS`."""
     values = {name: getattr(step, name) for name in step_shapes(mesh) if getattr(step, name) is not None}
     values |= contact_fields(mesh, step)
-    return {name: padded(values[name], width) for name, width in POINT_FIELDS.items() if name in values}
+    return {name: pad_columns(values[name], width) for name, width in POINT_FIELDS.items() if name in values}
 
 
 def point_flags(mesh: Mesh) -> dict[str, Flags]:

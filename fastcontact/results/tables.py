@@ -311,7 +311,7 @@ def grid(mesh: Mesh, step: StepResult) -> Any:
     cells = layout.solid_cells(mesh)
     # The older layout of VTK, with the size of each cell before its nodes, is supported by all versions of PyVista.
     flat = np.insert(cells.connectivity, cells.offsets[:-1], np.diff(cells.offsets))
-    unstructured_grid = pyvista.UnstructuredGrid(flat, cells.types, layout.padded(mesh.points, 3))
+    unstructured_grid = pyvista.UnstructuredGrid(flat, cells.types, layout.pad_columns(mesh.points, 3))
     for name, values in (layout.point_fields(mesh, step) | layout.point_flags(mesh)).items():
         unstructured_grid.point_data[name] = values
     by_cell: dict[str, Any] = layout.cell_fields(mesh) | step.cell_fields

@@ -63,7 +63,7 @@ def column_units(columns: Iterable[str], units: Mapping[str, str]) -> dict[str, 
     return {name: units[kind] for name, kind in kinds.items() if units.get(kind)}
 
 
-def labelled(text: str, units: Mapping[str, str], quantity: str) -> str:
+def axis_label(text: str, units: Mapping[str, str], quantity: str) -> str:
     """Return a label with the unit of its quantity in brackets, if the unit is known."""
     unit = units.get(quantity, "")
     return f"{text} [{unit}]" if unit and unit != "-" else text

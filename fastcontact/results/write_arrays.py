@@ -40,7 +40,7 @@ def write_geometry(
     root["NumberOfPoints"] = np.array([mesh.n_points], np.int64)
     root["NumberOfCells"] = np.array([len(cells.types)], np.int64)
     root["NumberOfConnectivityIds"] = np.array([len(cells.connectivity)], np.int64)
-    _write_constant(root, "Points", layout.padded(mesh.points, 3))
+    _write_constant(root, "Points", layout.pad_columns(mesh.points, 3))
     _write_constant(root, "Connectivity", cells.connectivity)
     _write_constant(root, "Offsets", cells.offsets)
     _write_constant(root, "Types", cells.types)

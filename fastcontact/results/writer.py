@@ -427,9 +427,7 @@ def _steps_to_resume(
             raise FileError(f"'{path}' is damaged, it lacks '{missing[0]}': restore a copy, {start_anew}")
         if not _same_mesh(old.mesh, mesh) or old.kinematics != kinematics:
             difference = "kinematics" if _same_mesh(old.mesh, mesh) else "mesh"
-            raise FileError(
-                f"'{path}' belongs to another {difference}: resume the case for which it was created, {start_anew}"
-            )
+            raise FileError(f"'{path}' belongs to another {difference}: resume the case of the file, {start_anew}")
         names = sorted(old.cell_field_names)
         if names != sorted(cell_fields):
             raise FileError(

@@ -24,12 +24,12 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot.patches import outlines
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import structured
-from fastcontact.results.units import labelled
+from fastcontact.results.units import axis_label
 from fastcontact.studies import quantities
 from fastcontact.studies.error_norms import ErrorEstimate, estimate_error
 from fastcontact.studies.job import case_data, last_step
 from fastcontact.studies.quantities import column, title, unit
-from fastcontact.studies.report import Report, Rows, by_columns, frame, number, panels, report_fields
+from fastcontact.studies.report import Report, Rows, frame, number, panels, report_fields, rows_from_columns
 from fastcontact.studies.settings import Combination, Settings, make_mesh, one_combination, recipe, settings
 
 
@@ -188,7 +188,7 @@ class AdaptiveStudy(Report):
             (column(q, q, self.units), [number(round_.values[q], 8) for round_ in self.rounds]),
         ]
         columns += [(label, [number(v, 2) for v in errors[name]]) for label, name in headers.items()]
-        return [(self.combination, by_columns(columns))]
+        return [(self.combination, rows_from_columns(columns))]
 
     def sentences(self) -> list[str]:
         """See `Report`."""
@@ -230,7 +230,7 @@ class AdaptiveStudy(Report):
         ax.set_aspect("equal")
         bar = ax.figure.colorbar(polygons, ax=ax)
         bar.set_label("energy norm" + (f" [({work})$^{{1/2}}$]" if (work := self.units.get("moment")) else ""))
-        labels = labelled("x", self.units, "length"), labelled("y", self.units, "length")
+        labels = axis_label("x", self.units, "length"), axis_label("y", self.units, "length")
         frame(ax, f"Last mesh: {self.rounds[-1].n_cells} cells, estimated error", labels, grid=0.0)
 
 
@@ -314,7 +314,7 @@ def adaptive_study(
             started = time.perf_counter()
             linear, leaf = forest.mesh()
             solved = _case_on(linear, curves, case, setup, combination)
-            last, error = _solved(solved, quantity, setup.pair, rounds, started)
+            last, error = _solve_round(solved, quantity, setup.pair, rounds, started)
             round_ = rounds[-1]
             if on_round is not None:
                 on_round(round_)
@@ -322,9 +322,7 @@ def adaptive_study(
             reached = round_.estimate <= tolerance
             if reached or len(rounds) == max_rounds or round_.n_dofs > 0.6 * max_dofs:
                 break
-            forest.refine(
-                _leaves_to_refine(_indicator(solved, last, error, quantity, setup.pair), leaf, forest.n_leaves)
-            )
+            forest.refine(_refined_leaves(_indicator(solved, last, error, quantity, setup.pair), leaf, forest.n_leaves))
     return AdaptiveStudy(
         **report_fields(case), combination=str(combination), quantity=quantity, tolerance=tolerance, reached=reached,
         rounds=rounds, case=solved, last=last, error=error)  # fmt: skip
@@ -347,7 +345,7 @@ def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, setup: Settings, c
     return build_case(case_data(setup, combination), name=case.name, folder=case.folder, text=case.text, mesh=mesh)
 
 
-def _solved(
+def _solve_round(
     case: Case, quantity: str, pair: str | None, rounds: list[Round], started: float
 ) -> tuple[StepResult, ErrorEstimate]:
     """Return the last step of a case and the errors of its cells, and append the results of the round to `rounds`.
@@ -418,7 +416,7 @@ def _position(case: Case, last: StepResult, quantity: str, pair: str | None) -> 
     return None
 
 
-def _leaves_to_refine(indicator: Array, leaf: Indices, n_leaves: int) -> Mask:
+def _refined_leaves(indicator: Array, leaf: Indices, n_leaves: int) -> Mask:
     """Return the leaves to refine, as a mask (n_leaves,).
 
     They belong to the smallest set of cells that carries the fraction `BULK` of the sum of `indicator` (n_solids,). `leaf`

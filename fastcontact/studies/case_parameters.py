@@ -27,11 +27,11 @@ def substitute(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, 
         if parameter not in linked:
             _set(case, parameter, value, [*linked, *case])
         for path, law in linked.get(parameter, {}).items():
-            _set(case, path, by_law(law, value, f"study.parameters.{parameter}.'{path}'"), case)
+            _set(case, path, law_value(law, value, f"study.parameters.{parameter}.'{path}'"), case)
     return case
 
 
-def by_law(law: Any, value: Any, where: str) -> Any:
+def law_value(law: Any, value: Any, where: str) -> Any:
     """Return the value of a law ``"a*value^p"``. Raises CaseError if the law is invalid or cannot be applied to `value`."""
     match = _LAW.match(law) if isinstance(law, str) else None
     if match is None:

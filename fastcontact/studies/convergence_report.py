@@ -14,10 +14,10 @@ import numpy as np
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.cases.summary import finite
-from fastcontact.results.units import labelled
+from fastcontact.results.units import axis_label
 from fastcontact.studies.fit import CONFIDENCE, Limit
 from fastcontact.studies.quantities import column, title
-from fastcontact.studies.report import Report, Rows, by_columns, frame, marker, message, number, panels, percent
+from fastcontact.studies.report import Report, Rows, frame, marker, message, number, panels, percent, rows_from_columns
 from fastcontact.studies.series import Series, Split
 from fastcontact.studies.settings import FunctionCombination
 
@@ -134,14 +134,14 @@ def level_rows(series: Series, units: Mapping[str, str]) -> Rows:
     """Return a header and a row for each level with h, DOF and, for each quantity, its value, error and order."""
     columns = [
         ("level", [str(level.number) for level in series.levels]),
-        (labelled("h", units, "length"), [number(h, 4) for h in series.h]),
+        (axis_label("h", units, "length"), [number(h, 4) for h in series.h]),
         ("DOF", [str(level.n_dofs) for level in series.levels]),
     ]
     for name in series.shown(TABLE_QUANTITIES):
         orders = [f"{order:.2f}" if math.isfinite(order) else "-" for order in series.orders(name)]
         columns.append((column(name, name, units), [number(value, 8) for value in series.values(name)]))
         columns += [("error", list(map(percent, series.errors(name)))), ("order", orders)]
-    return by_columns(columns)
+    return rows_from_columns(columns)
 
 
 def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
@@ -272,7 +272,7 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
     for style, text in entries.items():
         ax.plot([], [], style, color="0.4", lw=1.0, label=text)
     _slope_triangles(ax, quantity, [series for _, series in fitted])
-    x_label = labelled("mesh size h" if of_function else "facet length at the contact h", units, "length")
+    x_label = axis_label("mesh size h" if of_function else "facet length at the contact h", units, "length")
     labels, size = (x_label, "|value - limit| / limit"), 8 if has_bars else 6.5
     frame(ax, f"Mesh error of the {title(quantity)}", labels, scales=("plain log", "log"), legend_size=size)
     ax.grid(which="minor", alpha=0.12)
@@ -316,8 +316,8 @@ def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]
         label = f"level {level.number}, {level.n_dofs} DOF"
         ax.plot(r[visible], pressure[visible], style, ms=3, lw=1.0, label=label, color=color)
     _draw_theory(ax, theory, series, np.linspace(low, reach, 600))
-    x_label = labelled("distance from the middle of the contact", units, "length")
-    labels = x_label, labelled("contact pressure", units, "pressure")
+    x_label = axis_label("distance from the middle of the contact", units, "length")
+    labels = x_label, axis_label("contact pressure", units, "pressure")
     frame(ax, f"Contact pressure, {series.combination}", labels, grid=0.3)
     ax.set_xlim(low, reach or None)
     top = float(ax.dataLim.y1)
@@ -358,7 +358,7 @@ def draw_differences(ax: Any, all_series: Sequence[Series], best: Series, units:
         ax.axhline(100 * at_force.model, color="tab:green", ls="--", lw=1.2, label=label)
     ax.axhline(0.0, color="black", lw=1.0, label="theory")
     y_label = "difference from theory [%]" if best.exact_theory else f"difference from theory {best.compared} [%]"
-    labels = labelled("facet length at the contact h", units, "length"), y_label
+    labels = axis_label("facet length at the contact h", units, "length"), y_label
     frame(ax, f"Model and mesh error of the {title(quantity)}", labels, scales=("plain log", "linear"))
 
 

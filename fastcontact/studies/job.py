@@ -55,19 +55,19 @@ class Run:
     marks: dict[str, Any]  # values that distinguish the run from other runs of the study, for example the level
     size: float = 0.0  # measure of the work; larger runs start first
 
-    def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
+    def solve_run(self) -> tuple[Case | None, Sequence[StepResult]]:
         """Solve the run. Returns its case, or None if it is unknown, and all steps of the solution or only the last one."""
         raise NotImplementedError
 
-    def measured(self) -> dict[str, Any]:
+    def evaluate(self) -> dict[str, Any]:
         """Solve the run and return its result, see `run`. Errors of the mesh, the model and the solution are raised."""
         started = time.perf_counter()
         with record_warnings() as texts:
-            case, steps = self.solved()
+            case, steps = self.solve_run()
         last = steps[-1]
         pair = self.pair_of(last)
         values = quantities.quantities_of_contacts(last) if case is None else quantities.measure(case, last, pair)
-        values = {name: value for name, value in values.items() if np.isfinite(value)} | self.further(steps)
+        values = {name: value for name, value in values.items() if np.isfinite(value)} | self.extra_quantities(steps)
         return {
             "h": math.nan if case is None else quantities.mesh_size(case, pair),
             "n_dofs": last.displacement.size,
@@ -84,7 +84,7 @@ class Run:
         """Return the name of the contact pair to evaluate, by default the first one; None if there is none."""
         return next(iter(last.contact), None)
 
-    def further(self, steps: Sequence[StepResult]) -> dict[str, float]:
+    def extra_quantities(self, steps: Sequence[StepResult]) -> dict[str, float]:
         """Return additional quantities of the steps."""
         return {}
 
@@ -113,7 +113,7 @@ class Job(Run):
         inputs["mesh"] = None if self.base is None else digest_of_mesh(self.base)
         return hashlib.sha256(json.dumps(inputs, sort_keys=True, default=str).encode()).hexdigest()[:32]
 
-    def solved(self) -> tuple[Case, list[StepResult]]:
+    def solve_run(self) -> tuple[Case, list[StepResult]]:
         """See `Run`."""
         case = build_case(self.data, name=self.name, folder=self.folder, mesh=make_mesh(self.recipe, self.base))
         return case, [last_step(case)]
@@ -140,7 +140,7 @@ class FunctionRun(Run):
     named: Mapping[str, Any]  # keyword arguments
     measures: Mapping[str, Measure]  # functions of additional quantities, by name
 
-    def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
+    def solve_run(self) -> tuple[Case | None, Sequence[StepResult]]:
         """See `Run`."""
         result = self._call()
         if isinstance(result, Model):
@@ -155,7 +155,7 @@ class FunctionRun(Run):
             "with 'return'"
         )
 
-    def further(self, steps: Sequence[StepResult]) -> dict[str, float]:
+    def extra_quantities(self, steps: Sequence[StepResult]) -> dict[str, float]:
         """See `Run`."""
         return {name: _number(name, measure, steps) for name, measure in self.measures.items()}
 
@@ -258,7 +258,7 @@ def run(job: Run, threads: int | None = None) -> dict[str, Any]:
     try:
         if threads is not None:
             _jit.set_threads(threads)
-        return job.measured()
+        return job.evaluate()
     except FastcontactError as error:
         return {"error": str(error), "kind": type(error).__name__}
     except Exception as error:

@@ -21,7 +21,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import quality
 from fastcontact.mesh.topology import bodies
 from fastcontact.results.step import ContactResult, StepResult
-from fastcontact.results.units import labelled
+from fastcontact.results.units import axis_label
 
 # Theories that are exact for the bodies of the model, unlike theories of half-spaces or beams.
 EXACT_THEORIES = (PressFit, HertzBox)
@@ -290,4 +290,4 @@ def _kind(quantity: str) -> str | None:
 def column(label: str, quantity: str, units: Mapping[str, str]) -> str:
     """Return the header of a column or an axis: a label with the unit of the quantity, if known, or ``[1]`` for a ratio."""
     kind = _kind(quantity)
-    return f"{label} [1]" if kind == "" else labelled(label, units, kind or "")
+    return f"{label} [1]" if kind == "" else axis_label(label, units, kind or "")

@@ -41,12 +41,12 @@ def percent(value: float | None, uncertainty: float | None = None) -> str:
     return f"{100 * value:+.{4 if uncertainty is not None and 0 < uncertainty < 1e-5 else 3}f} %"
 
 
-def by_columns(columns: Sequence[tuple[str, Sequence[str]]]) -> Rows:
+def rows_from_columns(columns: Sequence[tuple[str, Sequence[str]]]) -> Rows:
     """Return the rows of a table from its columns, which are pairs of header and entries; the first row is the header."""
     return [[name for name, _ in columns], *map(list, zip(*(texts for _, texts in columns), strict=True))]
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+def align_columns(rows: Sequence[Sequence[str]]) -> list[str]:
     """Return rows of strings as lines with right-aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  " + "  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)) for row in rows]
@@ -248,7 +248,7 @@ class Report:
         """Return the report as lines of text, as the command line prints it."""
         lines = [self.title]
         for caption, rows in self.tables():
-            lines += ["", *filter(None, [caption]), *aligned(rows)]
+            lines += ["", *filter(None, [caption]), *align_columns(rows)]
         lines += [f"  {text}" for text in self.remarks()]
         sentences = self.sentences()
         return [*lines, "", *sentences] if sentences else lines

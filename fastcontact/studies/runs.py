@@ -171,9 +171,8 @@ def _study_of_function(
     results = run_functions(runs, "no size could be solved", **options)
     solved = [(level, {**result, "h": descending[level], "theory": {**theory}}) for level, result in enumerate(results)]
     no_theory = None, 1.0, "under the given load"
-    series = _series(
-        FunctionCombination(None, None, name), solved, [*quantities], (), no_theory, asked=tuple(quantities)
-    )
+    member = FunctionCombination(None, None, name)
+    series = _series(member, solved, [*quantities], (), no_theory, asked=tuple(quantities))
     for coarse, fine in pairwise(series.levels):
         if fine.n_dofs <= coarse.n_dofs:
             warn(

@@ -12,7 +12,7 @@ import numpy as np
 
 from fastcontact.arrays import AnyArray
 from fastcontact.studies.quantities import column, title
-from fastcontact.studies.report import Report, Rows, by_columns, frame, marker, message, number, panels, percent
+from fastcontact.studies.report import Report, Rows, frame, marker, message, number, panels, percent, rows_from_columns
 from fastcontact.studies.series import Point, TheoryCurve, Value
 
 # Smallest ratio of the largest to the smallest value of a parameter for which its axis is logarithmic.
@@ -107,9 +107,7 @@ class Drawing:
         """Return a note if the theory does not depend on the parameter, and otherwise an empty string."""
         curves = [points for _, _, points in self._curves()]
         values = [{point.theory[quantity] for point in points if quantity in point.theory} for points in curves]
-        constant = all(len(values_of_curve) == 1 for values_of_curve in values) and any(
-            len(points) > 1 for points in curves
-        )
+        constant = all(len(entries) == 1 for entries in values) and any(len(points) > 1 for points in curves)
         return f"\n(the same for every {self.first})" if constant else ""
 
     def draw_ratios(self, ax: Any, quantity: str) -> None:
@@ -280,7 +278,7 @@ class Sweep(Report):
             columns.append((column(name, name, self.units), values))
             for other, label in compared.items():
                 columns.append((label, [percent(point.ratio(name, other) - 1.0) for point in self.points]))
-        return [(self.combination if self.combination != self.title else "", by_columns(columns))]
+        return [(self.combination if self.combination != self.title else "", rows_from_columns(columns))]
 
 
 def _point_dict(point: Point) -> dict[str, Any]:

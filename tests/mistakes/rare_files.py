@@ -173,7 +173,7 @@ CALLS = [
     ("a file that was never made", vanished, fc.errors.FileError, r"a\.txt' cannot be written \(No such file or directory\)"),
     ("an Abaqus file that cannot be read", lambda folder: abaqus.check_readable(folder), fc.errors.FileError, r"cannot read '.*': .*Is a directory"),
     ("coordinates in words", lambda: build_mesh([["a", "b"]], [], {}), fc.MeshError, r"its coordinates are not numbers: check that the file is complete"),
-    ("an HDF5 file with groups in a circle", lambda folder: opened(folder, circle), fc.errors.FileError, r"spoilt\.h5' has cyclic or too deeply nested groups, at '.*': write it again"),
+    ("an HDF5 file with groups in a circle", lambda folder: opened(folder, circle), fc.errors.FileError, r"spoilt\.h5' has cyclic or too deep groups, at '.*': write it again"),
     ("an HDF5 file with a strange filter", lambda folder: opened(folder, lzf), fc.errors.FileError, r"is packed by the filter 32000, which HDF5 may lack: use gzip"),
     ("an HDF5 file with texts for numbers", lambda folder: opened(folder, texts), fc.errors.FileError, r"contains no plain numbers: the file is damaged, write it again"),
     ("packed data without head", lambda: packing.unpack(np.zeros(300, np.uint8)), ValueError, r"no packed data"),

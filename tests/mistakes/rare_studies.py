@@ -18,7 +18,7 @@ from fastcontact.mesh.generate import block, box, half_spheres, merge_points
 from fastcontact.mesh.generate._refine import Circle, refined
 from fastcontact.studies import execute, fit
 from fastcontact.studies.adaptive import adaptive_study
-from fastcontact.studies.case_parameters import by_law
+from fastcontact.studies.case_parameters import law_value
 from fastcontact.studies.runs import convergence_study
 from fastcontact.studies.settings import combinations, make_mesh, settings
 
@@ -133,7 +133,7 @@ CALLS = [
     ("a study that is interrupted", lambda patch: interrupted(patch, "convergence_study"), fc.errors.FastcontactError, r"stopped; with --store DIR the same command would continue where it stopped"),
     ("a sweep that is interrupted", lambda patch: interrupted(patch, "parameter_sweep"), fc.errors.FastcontactError, r"stopped; with --store DIR the same command would continue where it stopped"),
     ("formulations without contact", lambda: combinations(replace(settings(read_case("forma04a")), pair=None), None, ["mortar"]), fc.errors.CaseError, r"this case has no contact pair, so there are no formulations to compare"),
-    ("a law beyond all numbers", lambda: by_law("value^400", 1e300, "study.parameters.a"), fc.errors.CaseError, r"study\.parameters\.a = 'value\^400' is too large a number for 1e\+300"),
+    ("a law beyond all numbers", lambda: law_value("value^400", 1e300, "study.parameters.a"), fc.errors.CaseError, r"study\.parameters\.a = 'value\^400' is too large a number for 1e\+300"),
     ("adaptive meshes in space", lambda: adaptive_study(solid_case(), tolerance=0.1), fc.errors.CaseError, r"adaptive refinement is for triangles and quadrangles in two dimensions; this case is in 3D"),
     ("sizes without values", lambda: fit.fit_limit([1.0, 0.5], [1.0]), fc.errors.CaseError, r"mesh sizes and values must be lists of equal length, not \(2,\) and \(1,\)"),
     ("a limit of two meshes", lambda: fit.fit_limit([1.0, 0.5], [1.0, 2.0]), fc.errors.CaseError, r"a limit needs the values of at least 3 meshes, not 2: compute more levels"),

@@ -16,7 +16,7 @@ from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError, check_known
 from fastcontact.results.plot.fields import Field
 from fastcontact.results.step import ContactResult, StepResult
-from fastcontact.results.units import labelled
+from fastcontact.results.units import axis_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -162,15 +162,15 @@ def zoom_window(centre: Array, half_width: float, points: Array) -> tuple[Array,
 
 
 def label_axes(
-    axes: Any, artist: Any, plotted_field: Field, heading: str, units: Mapping[str, str], labels: Sequence[str],
+    axes: Any, artist: Any, plot_field: Field, heading: str, units: Mapping[str, str], labels: Sequence[str],
     points: Array | None = None, *, alone: bool = True,
 ) -> Any:  # fmt: skip
     """Add a colour bar, a title, a label for each direction and a legend to axes, and return the axes.
 
-    `artist` has the colour scale of `plotted_field`. `points` (n, 2) are those of a plane body [length], and None for 3D
+    `artist` has the colour scale of `plot_field`. `points` (n, 2) are those of a plane body [length], and None for 3D
     axes. `alone` states that the figure has no other axes.
     """
-    caption, length, below = labelled(plotted_field.caption, units, plotted_field.quantity), 0.6, -0.02
+    caption, length, below = axis_label(plot_field.caption, units, plot_field.quantity), 0.6, -0.02
     if points is not None:
         width, height = np.ptp(points, axis=0)
         caption = textwrap.fill(caption, int(size_around(points)[1] / LETTER_WIDTH))
@@ -181,6 +181,6 @@ def label_axes(
         axes.locator_params(axis="x", nbins=6, steps=[1, 2, 5, 10])  # space for labels such as 0.0025
     axes.figure.colorbar(artist, ax=axes, label=caption, shrink=length)
     axes.set_title(heading, fontsize="medium", pad=18 if points is None else None)
-    axes.set(**{f"{axis}label": labelled(label, units, "length") for axis, label in zip("xyz", labels)})
+    axes.set(**{f"{axis}label": axis_label(label, units, "length") for axis, label in zip("xyz", labels)})
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))
     return axes

@@ -25,14 +25,7 @@ from fastcontact.results.plot import _axes
 from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, new_axes, position_text, units_of
 from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.patches import fill, fill_triangles, outlines
-from fastcontact.results.plot.solid import (
-    MOST_EDGES,
-    draw_solid,
-    is_extreme_visible,
-    show_box,
-    view_axes,
-    view_of_extreme,
-)
+from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, show_box, shows_extreme, view_axes, view_of_extreme
 from fastcontact.results.step import StepResult
 
 # Largest coordinate that can be plotted. Products of larger coordinates would overflow.
@@ -136,46 +129,44 @@ def deformed_shape(
     >>> ax.figure.savefig("shape.png")
     """
     if zoom is not None and (mesh.dim == 3 or not 0.0 < zoom < LARGEST):
-        raise FastcontactError(
-            f"zoom = {zoom:g}: it must be positive, and is only for plane meshes; in 3D draw a section"
-        )
-    plotted_field, units = field_of(mesh, step, field), units_of(units, step)
+        raise FastcontactError(f"zoom = {zoom:g}: it must be positive, and is for plane meshes; in 3D draw a section")
+    plot_field, units = field_of(mesh, step, field), units_of(units, step)
     scale = scale_of(scale, mesh, [step])
-    points = displaced_points(plotted_field.mesh.points, scale, step.displacement[plotted_field.node])
+    points = displaced_points(plot_field.mesh.points, scale, step.displacement[plot_field.node])
     heading = title or f"Deformed shape (displacements x {scale:g}), {step.instant}"
     if mesh.dim == 3:
         axes = new_axes(ax, (6.4, 6.6), "3d")
-        view = view or view_of_extreme(plotted_field, points)
-        artist = draw_solid(axes, plotted_field, points, edges, view, limits or plotted_field.range)
-        _mark(axes, plotted_field, points, mesh, units, hidden=not is_extreme_visible(plotted_field, points, view))
-        _axes.label_axes(axes, artist, plotted_field, heading, units, "xyz")
+        view = view or view_of_extreme(plot_field, points)
+        artist = draw_solid(axes, plot_field, points, edges, view, limits or plot_field.range)
+        _mark(axes, plot_field, points, mesh, units, hidden=not shows_extreme(plot_field, points, view))
+        _axes.label_axes(axes, artist, plot_field, heading, units, "xyz")
         return axes if ax is not None else _axes.lay_out(axes)
     images = [points, points * [-1.0, 1.0]] if mirrored else [points]
     extent = np.concatenate(images)
-    extent = extent if zoom is None else np.array(_axes.zoom_window(points[plotted_field.extreme], zoom, extent))
+    extent = extent if zoom is None else np.array(_axes.zoom_window(points[plot_field.extreme], zoom, extent))
     axes = new_axes(ax, _axes.size_around(extent))
     for image in images:
-        artist = _draw(axes, plotted_field, image, edges, limits or plotted_field.range, extent)
+        artist = _draw(axes, plot_field, image, edges, limits or plot_field.range, extent)
     if zoom is not None:
         axes.set(xlim=extent[:, 0], ylim=extent[:, 1])
-    _mark(axes, plotted_field, points, mesh, units)
-    return _axes.label_axes(axes, artist, plotted_field, heading, units, "xy", extent, alone=ax is None)
+    _mark(axes, plot_field, points, mesh, units)
+    return _axes.label_axes(axes, artist, plot_field, heading, units, "xy", extent, alone=ax is None)
 
 
 def _mark(
-    axes: Any, plotted_field: Field, points: Array, mesh: Mesh, units: Mapping[str, str], hidden: bool = False
+    axes: Any, plot_field: Field, points: Array, mesh: Mesh, units: Mapping[str, str], hidden: bool = False
 ) -> None:
     """Mark the extreme value; its label contains the position in the deformed and in the reference configuration."""
-    point, size = points[plotted_field.extreme], float(np.ptp(points, axis=0).max())
+    point, size = points[plot_field.extreme], float(np.ptp(points, axis=0).max())
     deformed = position_text(point, size)
-    undeformed = position_text(mesh.points[plotted_field.node[plotted_field.extreme]], size)
-    extreme = plotted_field.extreme_label(plotted_field.values[plotted_field.extreme], units)
+    undeformed = position_text(mesh.points[plot_field.node[plot_field.extreme]], size)
+    extreme = plot_field.extreme_label(plot_field.values[plot_field.extreme], units)
     label = f"{extreme} at {deformed}{', hidden' * hidden}"
     _axes.mark(axes, point, label + (f"\nundeformed at {undeformed}" if deformed != undeformed else ""))
 
 
 def _draw(
-    ax: Axes, plotted_field: Field, nodes: Array, edges: bool | None, limits: tuple[float, float], box: Array
+    ax: Axes, plot_field: Field, nodes: Array, edges: bool | None, limits: tuple[float, float], box: Array
 ) -> Any:  # fmt: skip
     """Draw the cells of a 2D mesh at the positions `nodes` (n_points, 2), and return the artist with the colour scale.
 
@@ -184,8 +175,8 @@ def _draw(
     """
     from matplotlib.collections import PolyCollection
 
-    artist = fill(ax, plotted_field.mesh.solids, nodes, plotted_field.values, plotted_field.colours, limits)
-    loops = [outlines(name, nodes[cells]) for name, cells in plotted_field.mesh.solids.items()]
+    artist = fill(ax, plot_field.mesh.solids, nodes, plot_field.values, plot_field.colours, limits)
+    loops = [outlines(name, nodes[cells]) for name, cells in plot_field.mesh.solids.items()]
     low, high = box.min(axis=0), box.max(axis=0)
     inside = [((loop.max(axis=1) >= low) & (loop.min(axis=1) <= high)).all(axis=1) for loop in loops]
     if edges if edges is not None else sum(int(mask.sum()) for mask in inside) <= MOST_EDGES:
@@ -262,8 +253,8 @@ def section(
     from matplotlib.collections import LineCollection
 
     origin, direction = _plane(mesh, point, normal)
-    plotted_field, units = field_of(mesh, step, field), units_of(units, step)
-    triangles, lines = _intersection(plotted_field, step, origin, direction)
+    plot_field, units = field_of(mesh, step, field), units_of(units, step)
+    triangles, lines = _intersection(plot_field, step, origin, direction)
     scale = scale_of(scale, mesh, [step])
     basis, labels = view_axes(direction, 1.0 - 1e-12)
     corners = displaced_points(triangles[..., :3], scale, triangles[..., 3:6])
@@ -273,15 +264,15 @@ def section(
     points = flat.reshape(-1, 2)
     points = points if zoom is None else np.array(_axes.zoom_window(flat[best], zoom, points))
     axes = new_axes(ax, _axes.size_around(points))
-    limits = plotted_field.range if plotted_field.signed else (float(values.min()), float(values.max()))
+    limits = plot_field.range if plot_field.signed else (float(values.min()), float(values.max()))
     corner_rows = np.arange(values.size).reshape(-1, 3)
-    artist = fill_triangles(axes, flat.reshape(-1, 2), corner_rows, values.ravel(), plotted_field.colours, limits)
+    artist = fill_triangles(axes, flat.reshape(-1, 2), corner_rows, values.ravel(), plot_field.colours, limits)
     strokes = displaced_points(lines[..., :3], scale, lines[..., 3:6]) @ basis.T - offset
     if edges if edges is not None else len(strokes) <= 4 * MOST_EDGES:
         axes.add_collection(LineCollection(list(strokes), colors="black", linewidths=0.2, alpha=0.6))
     undeformed = triangles[best][:3] - ((triangles[best][:3] - origin) @ direction) * direction
     size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
-    extreme = plotted_field.extreme_label(values[best], units, " on the section")
+    extreme = plot_field.extreme_label(values[best], units, " on the section")
     _axes.mark(axes, flat[best], f"{extreme}\nundeformed at {position_text(undeformed, size)}")
     if zoom is not None:
         axes.set(xlim=points[:, 0], ylim=points[:, 1])
@@ -290,7 +281,7 @@ def section(
     state = f"{step.instant}, displacements x {scale:g}"
     labels = labels or ("along the section", "across it")
     heading = title or f"{plane}\n{state}"
-    return _axes.label_axes(axes, artist, plotted_field, heading, units, labels, points, alone=ax is None)
+    return _axes.label_axes(axes, artist, plot_field, heading, units, labels, points, alone=ax is None)
 
 
 def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple[Array, Array]:
@@ -306,21 +297,20 @@ def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple
     return origin, direction / np.linalg.norm(direction)
 
 
-def _intersection(plotted_field: Field, step: StepResult, origin: Array, direction: Array) -> tuple[Array, Array]:
+def _intersection(plot_field: Field, step: StepResult, origin: Array, direction: Array) -> tuple[Array, Array]:
     """Return the section as triangles (n, 3, 7) and lines (m, 2, 7), with position, displacement and value at each corner.
 
     The plane is moved slightly along its normal, because it may coincide with facets, or in the opposite direction if it does
     not intersect the mesh then. Raises FastcontactError if neither plane intersects the mesh.
     """
-    size = float(np.ptp(plotted_field.mesh.points, axis=0).max())
-    data = np.column_stack([plotted_field.mesh.points, step.displacement[plotted_field.node], plotted_field.values])
+    size = float(np.ptp(plot_field.mesh.points, axis=0).max())
+    data = np.column_stack([plot_field.mesh.points, step.displacement[plot_field.node], plot_field.values])
     for shift in (PLANE_SHIFT, -PLANE_SHIFT):
-        triangles, lines = _cut_cells(
-            plotted_field.mesh, data, data[:, :3] @ direction - origin @ direction - shift * size
-        )
+        height = data[:, :3] @ direction - origin @ direction - shift * size
+        triangles, lines = _cut_cells(plot_field.mesh, data, height)
         if len(triangles):
             return triangles, lines
-    low, high = plotted_field.mesh.points.min(axis=0), plotted_field.mesh.points.max(axis=0)
+    low, high = plot_field.mesh.points.min(axis=0), plot_field.mesh.points.max(axis=0)
     raise FastcontactError(
         f"the plane through {position_text(origin, size)} with normal {position_text(direction, 1.0)} does not meet "
         f"the mesh, which lies between {position_text(low, size)} and {position_text(high, size)}"

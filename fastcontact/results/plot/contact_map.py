@@ -18,7 +18,7 @@ from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, new_pan
 from fastcontact.results.plot.patches import fill
 from fastcontact.results.plot.solid import view_axes
 from fastcontact.results.step import ContactResult
-from fastcontact.results.units import labelled, valued
+from fastcontact.results.units import axis_label, valued
 
 # Margin of the plotted region around the part of the surface that is in contact, relative to the half-width of that part.
 MARGIN = 0.15
@@ -107,9 +107,10 @@ def contact_map(
         artist = fill(ax, blocks, flat, values, "viridis", ends)
         high = _set_limits(ax, flat, _loaded_nodes(contact, blocks) & ~np.array(everything))
         bar = {"location": "bottom", "shrink": 0.6} if high == FLAT else {"shrink": 0.75 * high}
-        ax.figure.colorbar(artist, ax=ax, label=labelled(caption, units, quantity), **bar)
+        ax.figure.colorbar(artist, ax=ax, label=axis_label(caption, units, quantity), **bar)
         _mark_nodes(ax, flat, contact, two_maps)
-        ax.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"), aspect="equal")
+        x_label, y_label = (axis_label(label, units, "length") for label in labels)
+        ax.set(xlabel=x_label, ylabel=y_label, aspect="equal")
         ax.set_title(f"{caption}\nlargest {valued(float(values.max(initial=0.0)), units, quantity)}", fontsize="medium")
     if two_maps and beside_values.ndim == 2:
         large = size > 0.1 * size.max()  # the direction of small vectors is not shown

@@ -13,7 +13,7 @@ from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.plot._axes import LETTER_WIDTH, Axes, lay_out, new_axes, size_around
 from fastcontact.results.plot.patches import outlines, triangles_of
 from fastcontact.results.plot.solid import show_box
-from fastcontact.results.units import labelled
+from fastcontact.results.units import axis_label
 
 
 @typed(FastcontactError)
@@ -55,7 +55,7 @@ def contacts(
     else:
         _draw_3d(axes, found_contacts)
         show_box(axes, mesh.points.min(axis=0), mesh.points.max(axis=0), view)
-    axes.set(**{f"{axis}label": labelled(axis, found_contacts.units, "length") for axis in "xyz"[: mesh.dim]})
+    axes.set(**{f"{axis}label": axis_label(axis, found_contacts.units, "length") for axis in "xyz"[: mesh.dim]})
     axes.set_title("1 contact" if len(found_contacts) == 1 else f"{len(found_contacts)} contacts")
     if len(found_contacts):
         anchor = (1.02, 1.0) if mesh.dim == 2 else (0.0, 1.0)

@@ -17,7 +17,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot import _axes
 from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, contacts_of, new_axes, outer_legend, units_of
 from fastcontact.results.step import ContactResult, StepResult, half_width
-from fastcontact.results.units import labelled, units_of_results, valued
+from fastcontact.results.units import axis_label, units_of_results, valued
 
 
 @typed(FastcontactError)
@@ -109,8 +109,8 @@ def pressure_profile(
     _mark_edges(ax, contact, position, units, colour)
     start = "axis" if contact.measured_from_axis else "middle of the contact"
     distance = "distance along the surface" if flat and not contact.measured_from_axis else "distance"
-    ax.set(xlabel=labelled(f"{distance} from the {start}", units, "length"), xlim=(min(limits), max(limits)))
-    ax.set(ylabel=labelled("contact pressure", units, "pressure"))
+    ax.set(xlabel=axis_label(f"{distance} from the {start}", units, "length"), xlim=(min(limits), max(limits)))
+    ax.set(ylabel=axis_label("contact pressure", units, "pressure"))
     ax.set(title=title or ax.get_title() or f"Contact '{contact.name}'")
     ax.set_ylim(min(0.0, 1.05 * float(pressure.min(initial=0.0))), 1.05 * ax.dataLim.y1 or None)
     ax.grid(alpha=0.3)
@@ -251,13 +251,11 @@ def axis_stress(
     values = {caption: stress[:, component] for caption, component in COMPONENTS.items()}
     values["von Mises"] = von_mises(stress)
     for number, name in enumerate(bodies):
-        in_body = shown & (side == 1 - 2 * number)
+        rows = shown & (side == 1 - 2 * number)
         for (caption, value), colour, marker in zip(values.items(), COLOURS, "osD", strict=True):
-            if in_body.any():  # symbols of the second body are hollow, so that they do not hide those of the first body
+            if rows.any():  # symbols of the second body are hollow, so that they do not hide those of the first body
                 face, label = ("none" if number else colour), f"{caption}, {name}"
-                axes.plot(
-                    depth[in_body], value[in_body], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label
-                )
+                axes.plot(depth[rows], value[rows], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label)
     depths = np.linspace(0.0, reach, 400)
     for style, (label, theory) in zip(("-", "--", ":"), (theories or {}).items(), strict=False):
         exact = theory.stress_on_axis(depths)
@@ -266,7 +264,8 @@ def axis_stress(
             axes.plot(depths, curve, style, color=colour, lw=1.0)
         axes.plot([], [], f"k{style}", lw=1.0, label=label)
     title = title or f"Stresses on the axis, {step.instant}"
-    axes.set(xlabel=labelled("depth below the surface", units, "length"), ylabel=labelled("stress", units, "pressure"))
+    axes.set(xlabel=axis_label("depth below the surface", units, "length"))
+    axes.set(ylabel=axis_label("stress", units, "pressure"))
     axes.set_title(title, fontsize="medium")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
@@ -411,11 +410,11 @@ def history(
         lower.plot([0.0, *approaches], [0.0, *(t.radius for t in theory)], "k-", lw=1, label=name)
     if any(c.per_thickness for c in contacts):
         units = units_of_results(units, "plane_strain")
-    upper.set(ylabel=labelled("sum of the normal forces" if cancels else "contact force", units, "force"))
+    upper.set(ylabel=axis_label("sum of the normal forces" if cancels else "contact force", units, "force"))
     upper.set_title(title or f"Contact '{pair}' against the load", fontsize="medium")
-    abscissa = labelled("approach", units, "length") if approach else "load factor"
+    abscissa = axis_label("approach", units, "length") if approach else "load factor"
     extent = "contact radius" if contacts[-1].extent == "radius" else "half-width of the contact"
-    lower.set(xlabel=abscissa, ylabel=labelled(extent, units, "length"))
+    lower.set(xlabel=abscissa, ylabel=axis_label(extent, units, "length"))
     for ax in axes:
         ax.grid(alpha=0.3)
         entries = len(ax.get_legend_handles_labels()[0])
@@ -499,7 +498,7 @@ def contact_zones(
     top = reach if 0.0 < reach < farthest else None
     axes.set_ylim((-top if top else None) if y.min(initial=0.0) < 0 else 0.0, top)
     start = "axis" if first.measured_from_axis else "middle of the first contact"
-    distance = labelled(f"distance from the {start}", units, "length")
+    distance = axis_label(f"distance from the {start}", units, "length")
     axes.set(xlabel="load factor (above: closed nodes)", ylabel=distance)
     axes.set_title(title or f"Contact '{pair}' against the load", pad=16, fontsize="medium")
     _axes.outer_legend(axes, 3)

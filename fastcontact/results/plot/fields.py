@@ -12,7 +12,7 @@ from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity.recovery import principal_stress, tresca, von_mises, von_mises_signed
 from fastcontact.errors import FastcontactError, check_known
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.layout import CONTACT_FIELDS, cells_by_element, contact_fields, separated
+from fastcontact.results.layout import CONTACT_FIELDS, cells_by_element, contact_fields, cut_at_interfaces
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import AXES, STRESS_COMPONENTS
 from fastcontact.results.units import valued
@@ -79,7 +79,7 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     contact = contact_fields(mesh, step)
     check_known("field", name, [*names(mesh), *contact, *step.cell_fields, *heat], FastcontactError)
     if name in STRESS_FIELDS and name not in step.cell_fields:
-        separate_mesh, node, stress = separated(mesh, step)
+        separate_mesh, node, stress = cut_at_interfaces(mesh, step)
         caption, stress_measure = STRESS_FIELDS[name]
         values = step.von_mises if name == "von_mises" and separate_mesh is mesh else stress_measure(stress)
         return Field(separate_mesh, node, values, caption, "pressure")

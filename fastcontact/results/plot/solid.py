@@ -130,7 +130,7 @@ NUMBERS, NAMES, SHORTEST = 6.0, 17.0, 0.05
 
 
 def draw_solid(
-    ax: Any, plotted_field: Field, points: Array, edges: bool | None, view: tuple[float, float],
+    ax: Any, plot_field: Field, points: Array, edges: bool | None, view: tuple[float, float],
     colours: tuple[float, float],
 ) -> Any:  # fmt: skip
     """Draw the visible part of the outer surface, and return the mappable for a colour bar.
@@ -144,7 +144,7 @@ def draw_solid(
     from matplotlib.colors import Normalize
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    facing, screen = _facing(plotted_field, points, towards(view))
+    facing, screen = _facing(plot_field, points, towards(view))
     pieces, values, strokes = [], [], []
     for name, corners, field, flat in facing:
         weights = _subdivision(CUTS if elements.get(name).order == 1 else 1)
@@ -155,7 +155,7 @@ def draw_solid(
         values.append(visible_values.mean(axis=1))
         strokes.append(_visible_strokes(_outline(name, corners), screen))
     norm = Normalize(*colours)
-    faces = colormaps[plotted_field.colours](norm(np.concatenate(values)))
+    faces = colormaps[plot_field.colours](norm(np.concatenate(values)))
     polygons = list(np.concatenate(pieces))
     lines = faces.copy()  # lines in the colour of the face close hairline gaps between faces
     if edges if edges is not None else sum(len(corners) for _, corners, _, _ in facing) <= MOST_EDGES:
@@ -166,7 +166,7 @@ def draw_solid(
         lines = np.vstack([lines, np.tile([0.0, 0.0, 0.0, 0.6], (len(moved), 1))])
     ax.add_collection3d(Poly3DCollection(polygons, facecolors=faces, edgecolors=lines, linewidths=0.3))
     show_box(ax, points.min(axis=0), points.max(axis=0), view)
-    return ScalarMappable(norm, plotted_field.colours)
+    return ScalarMappable(norm, plot_field.colours)
 
 
 def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> None:
@@ -208,15 +208,15 @@ def _place_labels(ax: Any, size: Array, eye: Array, horizontal: Array) -> None:
         getattr(ax, f"{name}axis").labelpad = NAMES / reach - 21.0
 
 
-def is_extreme_visible(plotted_field: Field, points: Array, view: tuple[float, float]) -> bool:
+def shows_extreme(plot_field: Field, points: Array, view: tuple[float, float]) -> bool:
     """Return whether the extreme value of a field at the positions `points` (n_points, 3) is visible from `view`."""
-    _, screen = _facing(plotted_field, points, towards(view))
-    return not bool(screen.hidden(points[[plotted_field.extreme]])[0])
+    _, screen = _facing(plot_field, points, towards(view))
+    return not bool(screen.hidden(points[[plot_field.extreme]])[0])
 
 
-def view_of_extreme(plotted_field: Field, position: Array) -> tuple[float, float]:
+def view_of_extreme(plot_field: Field, position: Array) -> tuple[float, float]:
     """Return the first of VIEWS from which the extreme value of a field is visible, or the first one if there is none."""
-    return next((view for view in VIEWS if is_extreme_visible(plotted_field, position, view)), VIEWS[0])
+    return next((view for view in VIEWS if shows_extreme(plot_field, position, view)), VIEWS[0])
 
 
 def towards(view: tuple[float, float]) -> Array:
@@ -225,20 +225,20 @@ def towards(view: tuple[float, float]) -> Array:
     return np.array([np.cos(height) * np.cos(direction), np.cos(height) * np.sin(direction), np.sin(height)])
 
 
-def _facing(plotted_field: Field, points: Array, eye: Array) -> tuple[list[tuple[str, Array, Array, Indices]], Screen]:
+def _facing(plot_field: Field, points: Array, eye: Array) -> tuple[list[tuple[str, Array, Array, Indices]], Screen]:
     """Return the facets that face the viewer, and the screen with their triangles.
 
     For each element type of facets there are its name, the positions and values at the nodes of the facets, and the local
     nodes of the flat triangles of a facet.
     """
-    mesh, node = plotted_field.mesh, plotted_field.node
+    mesh, node = plot_field.mesh, plot_field.node
     cut = len(node) != node.max(initial=-1) + 1
     facing = []
     for name, facets in (_without_cuts(mesh, node) if cut else outer_facets(mesh)).items():
         flat = flat_triangles(facets.shape[1])
         a, b, c = np.moveaxis(points[facets][:, flat], -2, 0)
         visible = facets[np.cross(b - a, c - a).sum(axis=1) @ eye > 0]
-        facing.append((name, points[visible], plotted_field.values[visible], flat))
+        facing.append((name, points[visible], plot_field.values[visible], flat))
     triangles = [corners[:, flat].reshape(-1, 3, 3) for _, corners, _, flat in facing]
     return facing, Screen(np.concatenate(triangles), eye)
 

@@ -54,7 +54,7 @@ def test_an_interrupted_study_says_how_to_go_on(store, told):
 
     options = argparse.Namespace(store=store, quiet=True, executor="processes", workers=1)
     with pytest.raises(fc.FastcontactError, match=told):
-        _study.finished(options, interrupted)
+        _study.run_interruptibly(options, interrupted)
 
 
 @pytest.mark.parametrize(

@@ -291,9 +291,7 @@ def test_other_options_that_change_the_answer_are_refused(path: Path) -> None:
 def test_another_mesh_is_refused(path: Path) -> None:
     begun(path, (0.5,))
     before = path.read_bytes()
-    with pytest.raises(
-        FileError, match="belongs to another mesh: resume the case for which it was created, or start anew"
-    ):
+    with pytest.raises(FileError, match="belongs to another mesh: resume the case of the file, or start anew"):
         ResultWriter(path, spheres(arc=2.0), resume=True)
     with pytest.raises(FileError, match="belongs to another kinematics"):
         ResultWriter(path, spheres().mesh, kinematics="plane_strain", resume=True)
