@@ -175,7 +175,7 @@ def test_a_run_that_goes_wrong_in_any_way_is_a_result(monkeypatch):
     def wrong(_):
         raise ZeroDivisionError("by nothing")
 
-    monkeypatch.setattr(job.Job, "measured", wrong)
+    monkeypatch.setattr(job.Job, "evaluate", wrong)
     found = job.run(of())
     assert found["kind"] == "ZeroDivisionError"
     assert found["error"].startswith("by nothing (wrong, line ")
