@@ -2,10 +2,10 @@
 
 Usage: python bench/covered.py [--workers N] [--data FOLDER] [--again] [--missing]
 
-Runs the tests that `tests/modes/coverage.toml` names, including the commands that they start, and a second time without
-compilation (NUMBA_DISABLE_JIT=1) those that it names for the lines of kernels. Exit code 1 if less than 95 % is covered, or
-if a line or branch is uncovered that the same file does not list with its reason. `--missing` prints such lines in the
-format of that list; `--again` evaluates the data of the last run.
+The script runs the tests in `tests/modes/coverage.toml`, including the commands that they start. The tests in its list
+`interpreted` are run without compilation (NUMBA_DISABLE_JIT=1), for the lines of kernels. The exit code is 1 if less than 95
+% is covered, or if an uncovered line or branch is not listed in the same file with a reason. `--missing` prints such lines in
+the format of the file, and `--again` evaluates the data of the last run.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-LISTED = ROOT / "tests" / "modes" / "coverage.toml"
-ENOUGH = 95.0
+LIST_FILE = ROOT / "tests" / "modes" / "coverage.toml"
+LEAST_COVERAGE = 95.0
 Place = tuple[str, str, str]
 
 
 def measure(tests: dict[str, list[str]], workers: int, data: Path) -> int:
-    """Run the tests under coverage, compiled and not; return the largest exit code of pytest."""
+    """Run the tests under coverage, with and without compilation, and return the largest exit code of pytest."""
     data.mkdir(parents=True, exist_ok=True)
     for old in data.glob(".coverage*"):
         old.unlink()
@@ -38,10 +38,10 @@ def measure(tests: dict[str, list[str]], workers: int, data: Path) -> int:
 
 
 def _run(tests: list[str], workers: int, data: Path, disable: str, *options: str) -> int:
-    """Run tests under coverage, with `disable` for NUMBA_DISABLE_JIT; return the exit code of pytest."""
+    """Run tests under coverage with the value `disable` of NUMBA_DISABLE_JIT, and return the exit code of pytest."""
     environment = {
         "NUMBA_DISABLE_JIT": disable,
-        "PYTHONPATH": str(ROOT),  # commands, too, run what stands here, not what is installed
+        "PYTHONPATH": str(ROOT),  # commands use the package of this checkout instead of an installed one
         "OPENBLAS_NUM_THREADS": "1",
         "COVERAGE_CORE": "ctrace",
         "COVERAGE_FILE": f"{data}/.coverage",
@@ -58,7 +58,7 @@ def _coverage(data: Path, *arguments: str) -> None:
 
 
 def uncovered(report: dict) -> Iterator[Place]:
-    """Give file, function ("" outside of any) and text of every line not run, and of every branch not taken."""
+    """Yield file, function (empty outside functions) and text of all lines and branches that were not executed."""
     for name, file in sorted(report["files"].items()):
         text = (ROOT / name).read_text(encoding="utf-8").splitlines()
         for function, part in file["functions"].items():
@@ -71,7 +71,7 @@ def uncovered(report: dict) -> Iterator[Place]:
 
 
 def unlisted(places: list[Place], entries: list[dict]) -> list[Place]:
-    """Return the places that no entry with a reason stands for: some lines, a whole function, or a whole file."""
+    """Return the places that are not covered by an entry with a reason for lines, for a function or for a file."""
     known: set[tuple[str, ...]] = set()
     for entry in entries:
         if not entry.get("reason", "").strip():
@@ -84,41 +84,41 @@ def unlisted(places: list[Place], entries: list[dict]) -> list[Place]:
 
 
 def listing(places: list[Place]) -> str:
-    """Return the places as entries of the list."""
-    together = defaultdict(list)
+    """Return places in the format of the list of uncovered lines."""
+    by_function = defaultdict(list)
     for file, function, line in places:
-        together[file, function].append(line)
+        by_function[file, function].append(line)
     entries = []
-    for (file, function), lines in together.items():
+    for (file, function), lines in by_function.items():
         texts = "".join(f"  {json.dumps(line, ensure_ascii=False)},\n" for line in dict.fromkeys(lines))
         entries.append(f'[[uncovered]]\nfile = "{file}"\nfunction = "{function}"\nlines = [\n{texts}]\nreason = ""\n')
     return "\n".join(entries)
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, compare with the list, and say what is missing."""
+    """Measure the coverage, compare it with the list, and print unlisted places."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--workers", type=int, default=2, help="processes that run tests (2)")
-    parser.add_argument("--data", type=Path, default=ROOT / ".coverage-data", help="folder of what was measured")
-    parser.add_argument("--again", action="store_true", help="look at the data of the last run")
+    parser.add_argument("--workers", type=int, default=2, help="number of processes that run tests (2)")
+    parser.add_argument("--data", type=Path, default=ROOT / ".coverage-data", help="folder of the coverage data")
+    parser.add_argument("--again", action="store_true", help="evaluate the data of the last run")
     parser.add_argument("--missing", action="store_true", help="print unlisted lines as entries of the list")
-    given = parser.parse_args(arguments)
-    with LISTED.open("rb") as file:
+    options = parser.parse_args(arguments)
+    with LIST_FILE.open("rb") as file:
         listed = tomllib.load(file)
-    code = 0 if given.again else measure(listed["tests"], given.workers, given.data)
-    _coverage(given.data, "json", "-q", "-o", str(given.data / "report.json"))
-    report = json.loads((given.data / "report.json").read_text(encoding="utf-8"))
+    code = 0 if options.again else measure(listed["tests"], options.workers, options.data)
+    _coverage(options.data, "json", "-q", "-o", str(options.data / "report.json"))
+    report = json.loads((options.data / "report.json").read_text(encoding="utf-8"))
     covered = report["totals"]["percent_covered"]
     places = list(uncovered(report))
     missing = unlisted(places, listed.get("uncovered", []))
     print(
         f"statements and branches covered: {covered:.2f} %; lines not covered: {len(places)}, unlisted {len(missing)}"
     )
-    if given.missing:
+    if options.missing:
         print(listing(missing))
     else:
         print("\n".join(f"{file}: {function}: {line}" for file, function, line in missing))
-    return 1 if code or missing or covered < ENOUGH else 0
+    return 1 if code or missing or covered < LEAST_COVERAGE else 0
 
 
 if __name__ == "__main__":

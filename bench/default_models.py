@@ -1,4 +1,4 @@
-"""Models for `defaults.py`: every kind of contact that the mesh generators support, with reference results."""
+"""Contact models for `defaults.py`, which cover the mesh generators, with reference values of force and pressure."""
 
 from __future__ import annotations
 
@@ -21,22 +21,24 @@ Build = Callable[[dict[str, Any], int], fc.Model]
 
 @dataclass(frozen=True)
 class Problem:
-    """A contact problem on a mesh of a few cells.
+    """A contact problem on a coarse mesh.
 
     Attributes
     ----------
     name : str
+        Kind of problem, element, mesh and secondary side.
     build : callable
-        From options of the pair and a level to a model; each level halves the cells.
+        Function of the options of the contact pair and of the level that returns a model. Cells are halved on each level.
     force, pressure : float, optional
-        The truth by theory; without it, that of the refined mesh.
+        Values of the theory [force], [pressure]; without them, those of `reference` are used.
     uniform : bool
-        Every closed node has this pressure; otherwise the largest one counts. None: the pressure is singular, none counts.
+        Whether the pressure is the same at all closed nodes; otherwise it is the largest pressure. None if the pressure is
+        singular and is not evaluated.
     obstacle : bool
-        Against a rigid obstacle.
+        Whether the contact is with a rigid obstacle.
     reference : callable, optional
-        Makes the model on a refined mesh with quadratic cells, which tells the truth where theory does not; problems that
-        share it are solved once.
+        Function that returns the model on a refined mesh with quadratic cells, whose results are the reference values if
+        there is no theory. Problems with the same reference share its solution.
     """
 
     name: str
@@ -48,18 +50,18 @@ class Problem:
     reference: Callable[[], fc.Model] | None = None
 
 
-def material(mesh: fc.Mesh, kinematics: str, nu: float = NU) -> fc.Model:
+def elastic_model(mesh: fc.Mesh, kinematics: str, nu: float = NU) -> fc.Model:
     model = fc.Model(mesh, kinematics)
     model.add_material(fc.LinearElastic(E, nu))
     return model
 
 
-def named(mesh: fc.Mesh, prefix: str) -> fc.Mesh:
+def with_prefix(mesh: fc.Mesh, prefix: str) -> fc.Mesh:
     return generate.renamed(mesh, {group: f"{prefix}_{group}" for group in mesh.group_names})
 
 
 def stacked_blocks(element: str, widths: tuple[float, float], cells: tuple[int, int], shift: float = 0.0) -> fc.Mesh:
-    """Return a block of height 1 on another one, in the plane or in 3D; L_TOP and U_BOTTOM face each other."""
+    """Return the mesh of a block of height 1 on another one, in 2D or 3D. The groups L_TOP and U_BOTTOM face each other."""
     parts = []
     for name, width, n, x, z in (("L", widths[0], cells[0], 0.0, -1.0), ("U", widths[1], cells[1], shift, 0.0)):
         high = max(2, round(n / width))
@@ -68,7 +70,7 @@ def stacked_blocks(element: str, widths: tuple[float, float], cells: tuple[int, 
         else:
             part = generate.box((width, width, 1.0), (n, n, high), element, (x, x, z))
             part = generate.renamed(part, {"ZMIN": "BOTTOM", "ZMAX": "TOP"}.get)
-        parts.append(named(part, name))
+        parts.append(with_prefix(part, name))
     return generate.union(*parts)
 
 
@@ -76,20 +78,23 @@ def blocks(
     element: str, cells: tuple[int, int], swapped: bool, *, widths: tuple[float, float] = (2.0, 2.0), shift: float = 0.0,
     nu: float = 0.0, whole: bool = False, slide: float = 0.0,
 ) -> Build:  # fmt: skip
-    """Return blocks pressed together by 1 %, one slid on the other; `whole` names the punch's flanks as contact, too."""
+    """Return the builder of two blocks that are pressed together by 1 % and displaced tangentially by `slide`.
+
+    If `whole` is true, the flanks of the upper block belong to the contact surface.
+    """
 
     def build(options: dict[str, Any], level: int) -> fc.Model:
         mesh = stacked_blocks(element, widths, (cells[0] << level, cells[1] << level), shift)
         dim = mesh.dim
         up = "xyz"[dim - 1]
-        model = material(mesh, "plane_strain" if dim == 2 else "3d", nu)
+        model = elastic_model(mesh, "plane_strain" if dim == 2 else "3d", nu)
         model.fix("L_BOTTOM", "xyz"[:dim])
         model.prescribe("U_TOP", **{axis: slide if axis == "x" else 0.0 for axis in "xyz"[: dim - 1]}, **{up: -0.02})
         punch = "U_BOTTOM"
         if whole:
             sides = [mesh.cell_groups[group] for group in ("U_BOTTOM", "U_LEFT", "U_RIGHT")]
             mesh = mesh.with_groups(cells={"U_WHOLE": np.concatenate(sides)})
-            model, punch = on(mesh, model), "U_WHOLE"
+            model, punch = copy_on_mesh(mesh, model), "U_WHOLE"
         sides = ("L_TOP", punch) if swapped else (punch, "L_TOP")
         model.add_contact("c", secondary=sides[0], primary=sides[1], **options)
         return model
@@ -97,19 +102,19 @@ def blocks(
     return build
 
 
-def on(mesh: fc.Mesh, model: fc.Model) -> fc.Model:
-    """Return a model with the supports of another one on a mesh that has more groups."""
-    again = fc.Model(mesh, model.kinematics)
-    again.materials, again.supports = model.materials, model.supports
-    return again
+def copy_on_mesh(mesh: fc.Mesh, model: fc.Model) -> fc.Model:
+    """Return a copy of a model, with its materials and supports, on a mesh that has further groups."""
+    copied = fc.Model(mesh, model.kinematics)
+    copied.materials, copied.supports = model.materials, model.supports
+    return copied
 
 
 def rings(element: str, around: tuple[int, int], swapped: bool) -> Build:
-    """Return a press fit of two quarter rings."""
+    """Return the builder of a press fit of two quarter rings."""
 
     def build(options: dict[str, Any], level: int) -> fc.Model:
         divisions = [(6 << level, n << level) for n in around]
-        model = material(
+        model = elastic_model(
             generate.rings(element, divisions_inner=divisions[0], divisions_outer=divisions[1]), "plane_strain"
         )
         model.fix("SYMMETRY_X", "x")
@@ -121,8 +126,8 @@ def rings(element: str, around: tuple[int, int], swapped: bool) -> Build:
     return build
 
 
-def bent(element: str, radii: tuple[float, float], cells: tuple[int, int], begin: float, end: float) -> fc.Mesh:
-    """Return a block bent to a part of a ring between two angles: BOTTOM at the first radius, TOP at the second."""
+def bent_block(element: str, radii: tuple[float, float], cells: tuple[int, int], begin: float, end: float) -> fc.Mesh:
+    """Return the mesh of a ring segment between two angles, with BOTTOM at the first radius and TOP at the second."""
     mesh = generate.block((1.0, 1.0), cells, element)
     angle = begin + (end - begin) * mesh.points[:, 0]
     radius = radii[0] + (radii[1] - radii[0]) * mesh.points[:, 1]
@@ -130,14 +135,14 @@ def bent(element: str, radii: tuple[float, float], cells: tuple[int, int], begin
 
 
 def closed_rings(element: str, around: tuple[int, int], swapped: bool) -> Build:
-    """Return whole rings, the bore of the inner one pressed outward against the other, whose rim stands still."""
+    """Return the builder of two full rings, whose rim is fixed and whose bore is displaced outwards."""
 
     def build(options: dict[str, Any], level: int) -> fc.Model:
         parts = []
         for name, radii, n in (("I", (20.0, 50.0), around[0] << level), ("O", (50.0, 100.0), around[1] << level)):
-            whole = bent(element, radii, (n, 6 << level), 0.0, -2.0 * np.pi)
-            parts.append(named(generate.merge_points(whole, 1e-6), name))
-        model = material(generate.union(*parts), "plane_strain")
+            whole = bent_block(element, radii, (n, 6 << level), 0.0, -2.0 * np.pi)
+            parts.append(with_prefix(generate.merge_points(whole, 1e-6), name))
+        model = elastic_model(generate.union(*parts), "plane_strain")
         model.fix("O_TOP", "xy")
         model.prescribe("I_BOTTOM", **{a: lambda X, k=k: 0.02 * X[:, k] / np.hypot(*X.T) for k, a in enumerate("xy")})
         sides = ("O_BOTTOM", "I_TOP") if swapped else ("I_TOP", "O_BOTTOM")
@@ -148,13 +153,16 @@ def closed_rings(element: str, around: tuple[int, int], swapped: bool) -> Build:
 
 
 def saddle(element: str, cells: tuple[int, int], swapped: bool, slide: float) -> Build:
-    """Return a shoe in a longer hollow of the same radius 50, pressed outward and slid by a part of its facets' length."""
+    """Return the builder of a shoe in a longer hollow of the same radius 50.
+
+    The shoe is pressed outwards and turned by the fraction `slide` of the length of its facets.
+    """
 
     def build(options: dict[str, Any], level: int) -> fc.Model:
         n = [k << level for k in cells]
-        shoe = bent(element, (48.0, 50.0), (n[0], 2 << level), -0.4 * np.pi, -0.6 * np.pi)
-        hollow = bent(element, (50.0, 54.0), (n[1], 4 << level), -0.3 * np.pi, -0.7 * np.pi)
-        model = material(generate.union(named(shoe, "S"), named(hollow, "H")), "plane_strain")
+        shoe = bent_block(element, (48.0, 50.0), (n[0], 2 << level), -0.4 * np.pi, -0.6 * np.pi)
+        hollow = bent_block(element, (50.0, 54.0), (n[1], 4 << level), -0.3 * np.pi, -0.7 * np.pi)
+        model = elastic_model(generate.union(with_prefix(shoe, "S"), with_prefix(hollow, "H")), "plane_strain")
         angle = slide * 0.2 * np.pi / cells[0]
         model.fix("H_TOP", "xy")
 
@@ -171,14 +179,14 @@ def saddle(element: str, cells: tuple[int, int], swapped: bool, slide: float) ->
 
 
 def pin_in_hole(element: str, around: tuple[int, int], swapped: bool, clearance: float = 0.05) -> Build:
-    """Return half a pin of radius 10 in a hole with little clearance, pressed upward by its bore (Persson)."""
+    """Return the builder of half a pin in a hole of radius 10 with a clearance, loaded upwards at its bore (Persson)."""
 
     def build(options: dict[str, Any], level: int) -> fc.Model:
         sizes = [k << level for k in around]
-        pin = bent(element, (1.0, 10.0 - clearance), (sizes[0], 8 << level), 0.5 * np.pi, -0.5 * np.pi)
+        pin = bent_block(element, (1.0, 10.0 - clearance), (sizes[0], 8 << level), 0.5 * np.pi, -0.5 * np.pi)
         pin = generate.transformed(pin, translate=(0.0, clearance))
-        far = bent(element, (10.0, 120.0), (sizes[1], 16 << level), 0.5 * np.pi, -0.5 * np.pi)
-        model = material(generate.union(named(pin, "P"), named(graded(far), "H")), "plane_strain")
+        far = bent_block(element, (10.0, 120.0), (sizes[1], 16 << level), 0.5 * np.pi, -0.5 * np.pi)
+        model = elastic_model(generate.union(with_prefix(pin, "P"), with_prefix(graded_ring(far), "H")), "plane_strain")
         for group in ("P_LEFT", "P_RIGHT", "H_LEFT", "H_RIGHT"):
             model.fix(group, "x")
         model.fix("H_TOP", "y")
@@ -190,18 +198,20 @@ def pin_in_hole(element: str, around: tuple[int, int], swapped: bool, clearance:
     return build
 
 
-def graded(hole: fc.Mesh) -> fc.Mesh:
-    """Return a ring from 10 to 120 with cells that grow with the radius."""
+def graded_ring(hole: fc.Mesh) -> fc.Mesh:
+    """Return the mesh of a ring of radii 10 and 120 with cells whose size is proportional to the radius."""
     radius = np.hypot(*hole.points.T)
     return hole.replace(points=hole.points / radius[:, None] * (10.0 * 12.0 ** ((radius - 10.0) / 110.0))[:, None])
 
 
 def cylinder(element: str, swapped: bool) -> Build:
-    """Return half a cylinder of radius 50 pressed on a block by 0.5."""
+    """Return the builder of half a cylinder of radius 50 that is pressed onto a block by 0.5."""
 
     def build(options: dict[str, Any], level: int) -> fc.Model:
         size = 0.5**level
-        model = material(generate.cylinder_on_block(element, size=8.0 * size, contact_size=0.8 * size), "plane_strain")
+        model = elastic_model(
+            generate.cylinder_on_block(element, size=8.0 * size, contact_size=0.8 * size), "plane_strain"
+        )
         model.fix("AXIS", "x")
         model.fix("BLOCK_BOTTOM", "y")
         model.prescribe("CYLINDER_TOP", y=-0.5)
@@ -213,13 +223,13 @@ def cylinder(element: str, swapped: bool) -> Build:
 
 
 def half_spheres(element: str, swapped: bool, *, shifted: bool = False) -> Build:
-    """Return the half-spheres of the training case, pressed together by 4."""
+    """Return the builder of the half-spheres of FORMA04, which are pressed together by 4."""
 
     def build(options: dict[str, Any], level: int) -> fc.Model:
         size = 0.5**level
-        one, other = (generate.quarter_disc(element, body=body, size=8.0 * size, contact_size=finest * size) for body, finest
-                      in (("lower", 1.0), ("upper", 1.3 if shifted else 1.0)))  # fmt: skip
-        model = fc.Model(generate.union(one, other), "axisymmetric")
+        bodies = (generate.quarter_disc(element, body=body, size=8.0 * size, contact_size=finest * size) for body, finest
+                  in (("lower", 1.0), ("upper", 1.3 if shifted else 1.0)))  # fmt: skip
+        model = fc.Model(generate.union(*bodies), "axisymmetric")
         model.add_material(fc.LinearElastic(20_000.0, 0.3))
         model.fix("A1A2", "x")
         model.prescribe("A2B2", y=-2.0)
@@ -232,12 +242,12 @@ def half_spheres(element: str, swapped: bool, *, shifted: bool = False) -> Build
 
 
 def sphere(element: str, swapped: bool) -> Build:
-    """Return a quarter of half a sphere of radius 50 pressed on a block by 0.5."""
+    """Return the builder of a quarter of a half-sphere of radius 50 that is pressed onto a block by 0.5."""
 
     def build(options: dict[str, Any], level: int) -> fc.Model:
         size = 0.5**level
         mesh = generate.sphere_on_block(element, size=16 * size, contact_size=2.0 * size, contact_radius=5.0)
-        model = material(mesh, "3d")
+        model = elastic_model(mesh, "3d")
         model.fix("SYMMETRY_X", "x")
         model.fix("SYMMETRY_Z", "z")
         model.fix("BLOCK_BOTTOM", "y")
@@ -250,13 +260,13 @@ def sphere(element: str, swapped: bool) -> Build:
 
 
 def indented(element: str, shape: str) -> Build:
-    """Return a block under a rigid ball of radius 50, moved by 0.1, or under a rigid wall, moved by 0.02."""
+    """Return the builder of a block under a rigid ball of radius 50, displaced by 0.1, or a rigid wall, displaced by 0.02."""
 
     def build(options: dict[str, Any], level: int) -> fc.Model:
         size = 0.5**level
         mesh = generate.graded_block(element, width=10.0, contact_radius=2.5, contact_size=0.5 * size, size=2.5 * size)
         dim, up = mesh.dim, "xyz"[mesh.dim - 1]
-        model = material(mesh, "axisymmetric" if dim == 2 else "3d")
+        model = elastic_model(mesh, "axisymmetric" if dim == 2 else "3d")
         model.fix("BOTTOM", up)
         model.fix("SYMMETRY_X", "x")
         if dim == 3:
@@ -274,24 +284,24 @@ def indented(element: str, shape: str) -> Build:
 
 
 def lame(inner: float, rim: float, push: float) -> float:
-    """Return the interface pressure at radius 50 of a disc whose bore moves outward while its rim stands still."""
+    """Return the pressure at radius 50 in a disc whose bore is displaced outwards and whose rim is fixed (Lamé)."""
     c1, c2 = np.linalg.solve([[inner, 1 / inner], [rim, 1 / rim]], [push, 0.0])
     return float(E / (1 + NU) * (c2 / 50.0**2 - c1 / (1 - 2 * NU)))
 
 
-def two_ways(
+def both_sides(
     name: str, make: Any, elements: Any, meshes: Any, fine: int | None = None, same: str = "", **more: Any
 ) -> Iterator[Problem]:
-    """Yield a problem by element, mesh and secondary side.
+    """Yield a problem for each mesh, each element and both choices of the secondary side.
 
-    Its reference is `fine` levels finer, with quadratic cells, and without the option `same` of `make`, which must not
-    matter.
+    The mesh of the reference is `fine` levels finer and has quadratic cells. The reference does not use the option `same` of
+    `make`, on which results should not depend.
     """
     best = "hex20" if elements[0] in SOLIDS else "quad8"
     plain = {same: False} if same else {}
     for mesh in meshes:
-        given = [mesh] if mesh else []
-        reference = None if fine is None else partial(refined, make, best, given, plain, fine)
+        mesh_arguments = [mesh] if mesh else []
+        reference = None if fine is None else partial(reference_model, make, best, mesh_arguments, plain, fine)
         for element in elements:
             for swapped in (False, True):
                 words = [
@@ -300,12 +310,12 @@ def two_ways(
                     *([" on ".join(map(str, mesh))] if mesh else []),
                     *(["swapped"] if swapped else []),
                 ]
-                yield Problem(", ".join(words), make(element, *given, swapped), reference=reference, **more)
+                yield Problem(", ".join(words), make(element, *mesh_arguments, swapped), reference=reference, **more)
 
 
-def refined(make: Any, element: str, given: list[Any], plain: dict[str, Any], level: int) -> fc.Model:
-    """Return a model on a finer mesh by the method that has most digits on it."""
-    return make(element, *given, False, **plain)({"formulation": "mortar"}, level)
+def reference_model(make: Any, element: str, mesh_arguments: list[Any], plain: dict[str, Any], level: int) -> fc.Model:
+    """Return the model on a finer mesh with the most accurate formulation."""
+    return make(element, *mesh_arguments, False, **plain)({"formulation": "mortar"}, level)
 
 
 def plane_problems() -> Iterator[Problem]:
@@ -313,24 +323,26 @@ def plane_problems() -> Iterator[Problem]:
     fit = fc.analytic.press_fit_cylinders(E_inner=E, nu_inner=NU, E_outer=E, nu_outer=NU, inner_radius=20.0,
                                           interface_radius=50.0, outer_radius=100.0, interference=0.05)  # fmt: skip
     along = fit.pressure * 50.0 * np.sqrt(2.0)
-    # Chords must lie closer to their arcs than the bodies are pressed into each other.
+    # The sagitta of a facet must be smaller than the interference.
     for elements, n in (((*LINEAR, *QUADRATIC), ((16, 16),)), (LINEAR, ((64, 81),)), (QUADRATIC, ((16, 21),))):
-        yield from two_ways("rings", rings, elements, n, force=along, pressure=fit.pressure, uniform=True)
+        yield from both_sides("rings", rings, elements, n, force=along, pressure=fit.pressure, uniform=True)
     truth = lame(20.0, 100.0, 0.02)
     for elements, n in (((*LINEAR, *QUADRATIC), ((40, 40),)), (QUADRATIC, ((40, 54),))):
-        yield from two_ways("closed rings", closed_rings, elements, n, pressure=truth, uniform=True)
+        yield from both_sides("closed rings", closed_rings, elements, n, pressure=truth, uniform=True)
     for slide in (0.0, 0.1, 0.5):
         shoe = partial(_last, saddle, slide=slide)
         cells = ((16, 32), (16, 24))
-        yield from two_ways(
+        yield from both_sides(
             f"shoe slid by {slide} facets", shoe, ("quad4", "tri6", "quad8"), cells, fine=2, pressure=np.nan
         )
     pin = fc.analytic.persson_pin(E=E, nu=NU, R=10.0, clearance=0.05, force=2000.0)
-    yield from two_ways("pin in a hole", pin_in_hole, PLANE, ((90, 90), (90, 97)), pressure=pin.pressure_max)
+    yield from both_sides("pin in a hole", pin_in_hole, PLANE, ((90, 90), (90, 97)), pressure=pin.pressure_max)
     flat = partial(_last, blocks)
-    yield from two_ways("blocks", flat, PLANE, ((8, 8), (8, 11)), force=2.0 * 0.01 * E, pressure=0.01 * E, uniform=True)
+    yield from both_sides(
+        "blocks", flat, PLANE, ((8, 8), (8, 11)), force=2.0 * 0.01 * E, pressure=0.01 * E, uniform=True
+    )
     slid = partial(_last, blocks, nu=NU, slide=0.1)
-    yield from two_ways("blocks slid", slid, PLANE, ((8, 8), (8, 11)), fine=2, pressure=np.nan)
+    yield from both_sides("blocks slid", slid, PLANE, ((8, 8), (8, 11)), fine=2, pressure=np.nan)
     for name, more in {
         "punch": {"widths": (2.0, 1.0), "shift": 0.5},
         "punch beside the nodes": {"widths": (2.0, 1.0), "shift": 0.53},
@@ -339,13 +351,15 @@ def plane_problems() -> Iterator[Problem]:
         "blocks partly over each other with flanks": {"shift": 0.5, "whole": True},
     }.items():
         cells = ((8, 8), (8, 11)) if "partly" in name else ((8, 4), (8, 7))
-        yield from two_ways(
+        yield from both_sides(
             name, partial(_last, blocks, nu=NU, **more), PLANE, cells, fine=3, pressure=np.nan, same="whole"
         )
-    yield from two_ways("cylinder on block", cylinder, PLANE, (None,), fine=2)
-    yield from two_ways("half-spheres", half_spheres, ("tri3", "tri6"), (None,), force=659_773.142, pressure=2910.4071)
+    yield from both_sides("cylinder on block", cylinder, PLANE, (None,), fine=2)
+    yield from both_sides(
+        "half-spheres", half_spheres, ("tri3", "tri6"), (None,), force=659_773.142, pressure=2910.4071
+    )
     off = partial(half_spheres, shifted=True)
-    yield from two_ways(
+    yield from both_sides(
         "half-spheres that do not match", off, ("tri3", "tri6"), (None,), force=659_773.142, pressure=2910.4071
     )
 
@@ -353,15 +367,17 @@ def plane_problems() -> Iterator[Problem]:
 def space_problems() -> Iterator[Problem]:
     """Yield the problems in three dimensions."""
     flat = partial(_last, blocks)
-    yield from two_ways("blocks", flat, SOLIDS, ((4, 4), (4, 5)), force=4.0 * 0.01 * E, pressure=0.01 * E, uniform=True)
+    yield from both_sides(
+        "blocks", flat, SOLIDS, ((4, 4), (4, 5)), force=4.0 * 0.01 * E, pressure=0.01 * E, uniform=True
+    )
     for name, more in {
         "punch": {"widths": (2.0, 1.0), "shift": 0.5},
         "punch beside the nodes": {"widths": (2.0, 1.0), "shift": 0.53},
         "blocks partly over each other": {"shift": 0.5},
     }.items():
         cells = ((4, 4), (4, 5)) if "partly" in name else ((8, 4), (8, 5))
-        yield from two_ways(name, partial(_last, blocks, nu=NU, **more), SOLIDS, cells, fine=1, pressure=np.nan)
-    yield from two_ways("sphere on block", sphere, SOLIDS[:4], (None,), fine=1)
+        yield from both_sides(name, partial(_last, blocks, nu=NU, **more), SOLIDS, cells, fine=1, pressure=np.nan)
+    yield from both_sides("sphere on block", sphere, SOLIDS[:4], (None,), fine=1)
 
 
 def obstacle_problems() -> Iterator[Problem]:
@@ -371,8 +387,8 @@ def obstacle_problems() -> Iterator[Problem]:
         reference = partial(under_ball, *(("quad9", "continuous", 2) if plane else ("hex27", "node_to_segment", 1)))
         yield Problem(f"ball, {element}", indented(element, "ball"), obstacle=True, reference=reference)
         pressure, area = E * 0.02 / 10.0, 100.0 * (np.pi if plane else 1.0)
-        given = {"force": pressure * area, "pressure": pressure, "uniform": True}
-        yield Problem(f"wall, {element}", indented(element, "wall"), obstacle=True, **given)
+        theory = {"force": pressure * area, "pressure": pressure, "uniform": True}
+        yield Problem(f"wall, {element}", indented(element, "wall"), obstacle=True, **theory)
 
 
 def under_ball(element: str, formulation: str, level: int) -> fc.Model:

@@ -22,18 +22,18 @@ from defaults import AGAINST_OBSTACLES, CHOICES
 
 import fastcontact as fc
 
-OWN = aster_contact._formulation
-OTHERS = {"continuous": "continuous gauss"}
+RUNNER_FORMULATION = aster_contact._formulation
+OBSTACLE_CHOICES = {"continuous": "continuous gauss"}
 
 
-def told(path: Path, run: int, choice: str) -> str:
-    """Return how a run ends by a choice; "runner": by that which the runner itself makes."""
+def outcome(path: Path, run: int, choice: str) -> str:
+    """Return the outcome of a run with a formulation; for the choice "runner" it is the formulation of the test runner."""
 
     def formulation(contact: Any, zone: Any, mesh: fc.Mesh, *, against_obstacle: bool) -> dict[str, Any]:
         if choice == "runner":
-            return OWN(contact, zone, mesh, against_obstacle=against_obstacle)
+            return RUNNER_FORMULATION(contact, zone, mesh, against_obstacle=against_obstacle)
         if against_obstacle:
-            return {"formulation": "continuous", **AGAINST_OBSTACLES.get(OTHERS.get(choice, choice), {})}
+            return {"formulation": "continuous", **AGAINST_OBSTACLES.get(OBSTACLE_CHOICES.get(choice, choice), {})}
         return {"formulation": None, **CHOICES[choice]}
 
     aster_contact._formulation = formulation
@@ -50,12 +50,12 @@ def told(path: Path, run: int, choice: str) -> str:
         for test in problem.spec["tests"]:
             if test["run"] == run and test["value_reference"] is not None:
                 try:
-                    given = test_code_aster_cases.amended(test, problem)
-                    ratios.append(aster_values.verdict(*given, problem, steps).ratio)
+                    amended_test = test_code_aster_cases.amended(test, problem)
+                    ratios.append(aster_values.verdict(*amended_test, problem, steps).ratio)
                 except MissingError:
                     continue
-    wrong = sum(not ratio <= 1.0 for ratio in ratios)
-    return f"{wrong} of {len(ratios)}" + (f" ({max(ratios):.1f})" if wrong else "")
+    n_wrong = sum(not ratio <= 1.0 for ratio in ratios)
+    return f"{n_wrong} of {len(ratios)}" + (f" ({max(ratios):.1f})" if n_wrong else "")
 
 
 def main() -> None:
@@ -64,7 +64,8 @@ def main() -> None:
     for folder in sys.argv[1:]:
         for path, run in aster_spec.specs(Path(folder)):
             print(
-                f"| {path.stem}-{run} | " + " | ".join(told(path, run, choice) for choice in choices) + " |", flush=True
+                f"| {path.stem}-{run} | " + " | ".join(outcome(path, run, choice) for choice in choices) + " |",
+                flush=True,
             )
 
 

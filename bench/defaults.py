@@ -1,8 +1,9 @@
-"""The default formulation compared with all others: ``python bench/defaults.py [plane|space|obstacle ...] [--match TEXT]``.
+"""Comparison of the default formulation with others: ``python bench/defaults.py [plane|space|obstacle ...] [--match TEXT]``.
 
-Each formulation solves every problem of `default_models` on the same mesh. The table gives the errors of force and pressure
-(of its maximum; for a uniform pressure the largest error of any closed node) in percent and, in brackets, the geometry
-updates. ``error`` marks an exception, whose text follows. A final table counts failures by kind of problem.
+Each problem of `default_models` is solved with each formulation on the same mesh. The table contains the errors of the force
+and of the largest pressure in percent, followed by the number of geometry updates in parentheses. For problems with a uniform
+pressure, the error is the largest one of all closed nodes. ``error`` marks an exception, whose text follows. A final table
+counts the failures of each kind of problem.
 """
 
 from __future__ import annotations
@@ -38,8 +39,8 @@ AGAINST_OBSTACLES: dict[str, dict[str, Any]] = {
 }
 
 
-def solved(model: fc.Model) -> tuple[fc.ContactResult, int, float]:
-    """Return the contact, the number of geometry updates and CPU seconds of a model."""
+def solve(model: fc.Model) -> tuple[fc.ContactResult, int, float]:
+    """Solve a model; return the result of its contact pair, the number of geometry updates, and the CPU time [s]."""
     start = time.process_time()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -47,35 +48,35 @@ def solved(model: fc.Model) -> tuple[fc.ContactResult, int, float]:
     return step.contact["c"], int(step.iterations["geometry_updates"]), time.process_time() - start
 
 
-def truth_of(problem: Problem, known: dict[str, tuple[float, float]]) -> tuple[float, float]:
-    """Return force and pressure; those of a refined mesh are kept in `known`."""
+def reference_values(problem: Problem, known: dict[str, tuple[float, float]]) -> tuple[float, float]:
+    """Return the reference values of force and pressure. Values from refined meshes are cached in `known`."""
     force, pressure = problem.force, problem.pressure
     if problem.reference is not None:
         key = f"{problem.name.split(',')[0]} {problem.reference.args[1:]}"
         if key not in known:
-            found, _, _ = solved(problem.reference())
-            known[key] = float(np.linalg.norm(found.force)), found.pressure_max
+            contact, _, _ = solve(problem.reference())
+            known[key] = float(np.linalg.norm(contact.force)), contact.pressure_max
         force = known[key][0] if force is None else force
         pressure = known[key][1] if pressure is None else pressure
     return np.nan if force is None else force, np.nan if pressure is None else pressure
 
 
 def row(problem: Problem, options: dict[str, Any], truth: tuple[float, float]) -> dict[str, Any]:
-    """Return the figures of one choice."""
+    """Return the relative errors, the number of geometry updates and further data of a problem with one formulation."""
     try:
         model = problem.build(options, 0)
-        contact, updates, cpu = solved(model)
+        contact, updates, cpu = solve(model)
     except fc.FastcontactError as error:
         return {"error": f"{type(error).__name__}: {error}"}
-    except Exception as error:  # what must never come is counted, too
+    except Exception as error:  # an unexpected error is a failure of the formulation as well
         return {"error": f"RAW {type(error).__name__}: {error}"}
     force = float(np.linalg.norm(contact.force))
     if problem.uniform:
         closed = contact.pressure[contact.active]
-        apart = np.abs(closed / truth[1] - 1.0).max(initial=0.0) if len(closed) else np.nan
+        pressure_error = np.abs(closed / truth[1] - 1.0).max(initial=0.0) if len(closed) else np.nan
     else:
-        apart = contact.pressure_max / truth[1] - 1.0
-    return {"force": force / truth[0] - 1.0, "pressure": float(apart), "updates": updates, "cpu": cpu,
+        pressure_error = contact.pressure_max / truth[1] - 1.0
+    return {"force": force / truth[0] - 1.0, "pressure": float(pressure_error), "updates": updates, "cpu": cpu,
             "formulation": model.contact[0].formulation, "dofs": model.n_dofs}  # fmt: skip
 
 
@@ -84,25 +85,25 @@ def problems(kinds: list[str]) -> Iterator[Problem]:
         yield from getattr(default_models, f"{kind}_problems")()
 
 
-def text_of(found: dict[str, Any]) -> str:
-    if "error" in found:
+def entry_text(entry: dict[str, Any]) -> str:
+    if "error" in entry:
         return "error"
-    return f"{100 * found['force']:+.2f} / {100 * found['pressure']:+.1f} ({found['updates']})"
+    return f"{100 * entry['force']:+.2f} / {100 * entry['pressure']:+.1f} ({entry['updates']})"
 
 
-# An entry is wrong where it is off by more than twice the error of the best choice on the same mesh and this besides.
+# An entry is wrong if its error exceeds twice the error of the best choice on the same mesh by more than this amount.
 FORCE, PRESSURE = 0.01, 0.05
 
 
-def wrong(found: dict[str, Any], best: tuple[float, float]) -> bool:
-    """Return whether a choice fails, or is off by more than its mesh explains."""
-    if "error" in found:
+def is_wrong(entry: dict[str, Any], best: tuple[float, float]) -> bool:
+    """Return whether a choice fails, or whether its error is larger than the mesh explains."""
+    if "error" in entry:
         return True
-    return abs(found["force"]) > 2 * best[0] + FORCE or abs(found["pressure"]) > 2 * best[1] + PRESSURE
+    return abs(entry["force"]) > 2 * best[0] + FORCE or abs(entry["pressure"]) > 2 * best[1] + PRESSURE
 
 
 def summary(table: dict[str, Any]) -> str:
-    """Return a table in Markdown: by kind of problem and choice, wrong entries, the worst force and the worst pressure."""
+    """Return a table in Markdown with the number of wrong entries and the largest errors, by kind of problem and choice."""
     kinds: dict[str, list[dict[str, Any]]] = {}
     for name, entry in table.items():
         kinds.setdefault(name.split(",")[0], []).append(entry["choices"])
@@ -111,21 +112,21 @@ def summary(table: dict[str, Any]) -> str:
     for kind, rows in kinds.items():
         cells = []
         for choice in choices:
-            bad = sum(wrong(row[choice], best_of(row)) for row in rows)
-            right = [row[choice] for row in rows if "error" not in row[choice]]
-            worst = [np.nanmax([abs(one[what]) for one in right] + [0.0]) for what in ("force", "pressure")]
-            cells.append(f"{bad}: {100 * worst[0]:.1f}, {100 * worst[1]:.0f}")
+            n_wrong = sum(is_wrong(row[choice], best_of(row)) for row in rows)
+            entries = [row[choice] for row in rows if "error" not in row[choice]]
+            worst = [np.nanmax([abs(entry[key]) for entry in entries] + [0.0]) for key in ("force", "pressure")]
+            cells.append(f"{n_wrong}: {100 * worst[0]:.1f}, {100 * worst[1]:.0f}")
         lines.append(f"| {kind} | {len(rows)} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
 def best_of(row: dict[str, Any]) -> tuple[float, float]:
-    """Return the smallest errors of force and pressure of all choices; a second one must be near, lest chance decides."""
-    found = []
-    for what in ("force", "pressure"):
-        errors = sorted(abs(one[what]) for one in row.values() if "error" not in one)
-        found.append(errors[min(2, len(errors) - 1)] if errors else 0.0)
-    return found[0], found[1]
+    """Return the third smallest errors of force and pressure of all choices; a smaller error may be due to chance."""
+    best = []
+    for key in ("force", "pressure"):
+        errors = sorted(abs(entry[key]) for entry in row.values() if "error" not in entry)
+        best.append(errors[min(2, len(errors) - 1)] if errors else 0.0)
+    return best[0], best[1]
 
 
 def main() -> None:
@@ -133,22 +134,25 @@ def main() -> None:
     parser.add_argument("kinds", nargs="*", default=["plane", "space", "obstacle"])
     parser.add_argument("--match", default="")
     parser.add_argument("--json", type=Path)
-    given = parser.parse_args()
+    options = parser.parse_args()
     known: dict[str, tuple[float, float]] = {}
     table: dict[str, Any] = {}
-    for problem in problems(given.kinds):
-        if given.match not in problem.name:
+    for problem in problems(options.kinds):
+        if options.match not in problem.name:
             continue
-        truth = truth_of(problem, known)
+        truth = reference_values(problem, known)
         choices = AGAINST_OBSTACLES if problem.obstacle else CHOICES
-        found = {name: row(problem, options, truth) for name, options in choices.items()}
-        table[problem.name] = {"truth": truth, "choices": found}
-        print(f"{problem.name}: " + "; ".join(f"{name} {text_of(one)}" for name, one in found.items()), flush=True)
-        for name, one in found.items():
-            if "error" in one:
-                print(f"    {name}: {one['error'][:150]}", flush=True)
-        if given.json:
-            given.json.write_text(json.dumps(table, indent=1))
+        entries = {name: row(problem, choice, truth) for name, choice in choices.items()}
+        table[problem.name] = {"truth": truth, "choices": entries}
+        print(
+            f"{problem.name}: " + "; ".join(f"{name} {entry_text(entry)}" for name, entry in entries.items()),
+            flush=True,
+        )
+        for name, entry in entries.items():
+            if "error" in entry:
+                print(f"    {name}: {entry['error'][:150]}", flush=True)
+        if options.json:
+            options.json.write_text(json.dumps(table, indent=1))
     for obstacle in (False, True):
         part = {name: entry for name, entry in table.items() if ("nts" in entry["choices"]) == obstacle}
         if part:

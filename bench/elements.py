@@ -1,9 +1,10 @@
 """Assembly and stress recovery by element, with one and two threads: ``python bench/elements.py [ELEMENT ...] [--runs 9]``.
 
-Prints millions of cells per second, the best of alternating runs. Assembly fills a matrix of known pattern; recovery
-computes nodal stresses from displacements, averaging included. ``mean dilatation`` is the time of both with mean dilatation,
-as for nu = 0.4999, relative to the time without, with one thread. ``first touch`` is the time in which the operating system
-provides the memory of the matrix, relative to the assembly with one thread; more threads hardly reduce it.
+The script prints the largest rate of several alternating runs, in millions of cells per second. Assembly fills a matrix with
+a known pattern, and recovery computes averaged nodal stresses from displacements. ``mean dilatation`` is the time of both
+with mean dilatation, as for nu = 0.4999, relative to the time without it, with one thread. ``first touch`` is the time in
+which the operating system provides the memory of the matrix, relative to the assembly with one thread; more threads hardly
+reduce it.
 """
 
 from __future__ import annotations
@@ -42,25 +43,25 @@ def mesh_of(element: str) -> fc.Mesh:
     return fc.generate.box((1.0, 1.0, 1.0), (n, n, n), element)
 
 
-def works(mesh: fc.Mesh, averaged: bool = False) -> tuple[Callable[[], Any], Callable[[], Any]]:
-    """Return the assembly and the recovery of a mesh, with a mean dilatation or without."""
+def tasks(mesh: fc.Mesh, averaged: bool = False) -> tuple[Callable[[], Any], Callable[[], Any]]:
+    """Return functions that assemble the stiffness and recover the stress of a mesh, with or without mean dilatation."""
     kinematics = "axisymmetric" if mesh.dim == 2 else "3d"
     model = fc.Model(mesh, kinematics)
     model.add_material(fc.LinearElastic(E=1.0, nu=0.3, volumetric="mean_dilatation" if averaged else "plain"))
     moduli, material = model.material_numbers()
     pattern, u = sparsity(mesh), np.random.default_rng(0).normal(size=mesh.points.shape)
-    chosen = model.averaged_materials()
+    averaged_materials = model.averaged_materials()
     return (
-        lambda: stiffness(mesh, kinematics, moduli, material, pattern, chosen),
-        lambda: nodal_stress(mesh, kinematics, moduli, material, u, chosen),
+        lambda: stiffness(mesh, kinematics, moduli, material, pattern, averaged_materials),
+        lambda: nodal_stress(mesh, kinematics, moduli, material, u, averaged_materials),
     )
 
 
-def touched(nbytes: int) -> Any:
-    """Return fresh memory of so many bytes, written to once a page."""
-    room = np.zeros(nbytes // 8)
-    room[::512] = 1.0
-    return room
+def touch_memory(nbytes: int) -> Any:
+    """Return new memory of `nbytes` bytes, after writing to each page."""
+    memory = np.zeros(nbytes // 8)
+    memory[::512] = 1.0
+    return memory
 
 
 def seconds(work: Callable[[], Any]) -> float:
@@ -71,20 +72,20 @@ def seconds(work: Callable[[], Any]) -> float:
     return passed
 
 
-def measured(element: str, runs: int) -> tuple[str, ...]:
-    """Return a row of the table; both threads must give the same bits."""
+def measure(element: str, runs: int) -> tuple[str, ...]:
+    """Return a row of the table. The results with one and two threads must be bitwise identical."""
     mesh = mesh_of(element)
-    assemble, recover = works(mesh)
+    assemble, recover = tasks(mesh)
     set_threads(1)
-    alone = assemble().data, recover()
+    single = assemble().data, recover()
     set_threads(2)
-    if not (np.array_equal(assemble().data, alone[0]) and np.array_equal(recover(), alone[1])):
+    if not (np.array_equal(assemble().data, single[0]) and np.array_equal(recover(), single[1])):
         raise SystemExit(f"{element}: the number of threads changes the result")
-    with_mean = works(mesh, averaged=True)
+    with_mean = tasks(mesh, averaged=True)
     for work in with_mean:
         work()
-    nbytes, touch, best = alone[0].nbytes, np.inf, {}
-    del alone
+    nbytes, touch, best = single[0].nbytes, np.inf, {}
+    del single
     for _ in range(runs):
         for count in (1, 2):
             set_threads(count)
@@ -93,7 +94,7 @@ def measured(element: str, runs: int) -> tuple[str, ...]:
         set_threads(1)
         for name, work in zip(("assembly", "recovery"), with_mean):
             best[name, 0] = min(best.get((name, 0), np.inf), seconds(work))
-        touch = min(touch, seconds(lambda: touched(nbytes)))
+        touch = min(touch, seconds(lambda: touch_memory(nbytes)))
     cells = len(mesh.cells[element])
     a1, a2, r1, r2 = (best[key] for key in (("assembly", 1), ("assembly", 2), ("recovery", 1), ("recovery", 2)))
     rate = [f"{1e-6 * cells / value:.3g}" for value in (a1, a2, r1, r2)]
@@ -110,7 +111,7 @@ def main() -> None:
         parser.error(f"no mesh for {', '.join(sorted(unknown))}: expected one of {', '.join(MESHES)}")
     print(" | ".join(COLUMNS))
     for element in options.elements or MESHES:
-        print(" | ".join(measured(element, options.runs)), flush=True)
+        print(" | ".join(measure(element, options.runs)), flush=True)
 
 
 if __name__ == "__main__":

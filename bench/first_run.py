@@ -1,7 +1,7 @@
 """Compilation in a first run: ``python bench/first_run.py run data/cases/forma04a.toml`` runs a command with an empty cache.
 
-Prints CPU seconds of the process with one thread, and thus without helper processes, the compiled kernels, how many of them
-are called by other kernels, and those compiled for several sets of types.
+The script prints the CPU time of the process with one thread, and thus without helper processes, the number of compiled
+kernels, how many of these are called from Python, and the kernels that are compiled for several sets of argument types.
 """
 
 from __future__ import annotations
@@ -25,19 +25,20 @@ def main() -> int:
         started: list[float] = []
 
         class Compiled(event.Listener):  # type: ignore[misc]
-            def on_start(self, told: Any) -> None:
+            def on_start(self, raised_event: Any) -> None:
                 started.append(time.process_time())
 
-            def on_end(self, told: Any) -> None:
-                spent, of = time.process_time() - started.pop(), told.data["dispatcher"]
-                if of.__module__.startswith("fastcontact."):
-                    kernels.append((f"{of.__module__}.{of.__qualname__}", bool(started), spent))
+            def on_end(self, raised_event: Any) -> None:
+                seconds, dispatcher = time.process_time() - started.pop(), raised_event.data["dispatcher"]
+                if dispatcher.__module__.startswith("fastcontact."):
+                    kernels.append((f"{dispatcher.__module__}.{dispatcher.__qualname__}", bool(started), seconds))
 
         event.register("numba:compile", Compiled())
         code = int(run([*sys.argv[1:], "-q", "-o", f"{folder}/result.vtkhdf"]))
-    called = [spent for _, inside, spent in kernels if not inside]
+    outermost = [seconds for _, is_nested, seconds in kernels if not is_nested]
     print(
-        f"{time.process_time():.1f} CPU s, {sum(called):.1f} in {len(kernels)} kernels, {len(called)} called from Python"
+        f"{time.process_time():.1f} CPU s, {sum(outermost):.1f} in {len(kernels)} kernels, "
+        f"{len(outermost)} called from Python"
     )
     for name, count in Counter(name for name, _, _ in kernels).items():
         if count > 1:

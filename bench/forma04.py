@@ -1,4 +1,4 @@
-"""Whole-process cost of the training case: CPU seconds and peak memory of ``fastcontact run`` with cached kernels.
+"""Cost of the training case FORMA04: CPU time and peak memory of ``fastcontact run`` with cached kernels.
 
 Usage: python bench/forma04.py [--runs N] [CASE.toml ...]
 """
@@ -16,7 +16,7 @@ from pathlib import Path
 CASES = Path(__file__).resolve().parent.parent / "data" / "cases"
 
 
-def measured(command: list[str]) -> tuple[float, float]:
+def measure(command: list[str]) -> tuple[float, float]:
     """Run a command; return its CPU seconds (user and system) and peak memory [MB]."""
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)
@@ -28,14 +28,19 @@ def measured(command: list[str]) -> tuple[float, float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("cases", nargs="*", default=[str(CASES / f"forma04{letter}.toml") for letter in "abc"])
-    parser.add_argument("--runs", type=int, default=5, help="counted runs of each case, after one warm-up (default 5)")
+    parser.add_argument(
+        "--runs",
+        type=int,
+        default=5,
+        help="measured runs of each case, after a warm-up (default 5)",
+    )
     options = parser.parse_args()
     print(f"{'case':<24} {'CPU s (median)':>14} {'min':>8} {'max':>8} {'peak MB':>9}")
     with tempfile.TemporaryDirectory() as folder:
         for case in options.cases:
             command = [sys.executable, "-m", "fastcontact", "run", case, "-q", "-o", f"{folder}/result.vtkhdf"]
-            measured(command)
-            runs = [measured(command) for _ in range(options.runs)]
+            measure(command)
+            runs = [measure(command) for _ in range(options.runs)]
             seconds, memory = zip(*runs, strict=True)
             median = statistics.median(seconds)
             print(

@@ -1,13 +1,13 @@
-"""Read thousands of damaged files: each must give a correct result or one clear error.
+"""Reading of thousands of damaged files, each of which must give a correct result or a single clear error.
 
     python bench/fuzz.py [--count 10000] [--seed 1] [--workers 2] [--failures FOLDER]
         [--formats .deck .msh ...] [--only NUMBER ...]
 
-Starts from small valid files of every format (tests/fuzz/fuzz_seeds.py), damages them byte by byte or in their structure
-(HDF5, TOML), and reads them in processes with at most 1 GiB of additional memory and 10 s of CPU time. The same seed gives
-the same files. Prints a table with a line for each format: files read, files refused with a clear error, and failures: other
-errors, messages of several lines, more memory, other files touched, crashes, hangs. Failing files are kept; exit code 1 if
-there are any.
+The script damages small valid files of every format (tests/fuzz/fuzz_seeds.py), in single bytes or in their structure (HDF5,
+TOML), and reads them in processes with at most 1 GiB of additional memory and 10 s of CPU time. The same seed gives the same
+files. A table contains, for each format, the numbers of files that were read, of files that were refused with a clear error,
+and of failures. A failure is any other error, a message of several lines, an exceeded limit, access to other files, a crash
+or a hang. Files with failures are kept, and the exit code is then 1.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import fuzz_run
 
 
 def main() -> int:
-    """Fuzz and print."""
+    """Read the damaged files and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
@@ -32,22 +32,22 @@ def main() -> int:
     parser.add_argument("--failures", type=Path, default=Path("fuzz-failures"))
     parser.add_argument("--formats", nargs="+", metavar="SUFFIX", help="make and read only files of these formats")
     parser.add_argument("--only", type=int, nargs="+", help="make and read only the files of these numbers")
-    given = parser.parse_args()
+    options = parser.parse_args()
     started = time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
         fuzz_run.prepare(Path(name))
-        numbers = given.only or fuzz_run.numbers(Path(name), given.seed, given.count, given.formats)
-        found = fuzz_run.run(numbers, given.seed, Path(name), given.failures, given.workers)
-    print(found.table())
-    for entry in sorted(found.failures, key=lambda entry: (entry["kind"], entry["name"])):
+        numbers = options.only or fuzz_run.numbers(Path(name), options.seed, options.count, options.formats)
+        results = fuzz_run.run(numbers, options.seed, Path(name), options.failures, options.workers)
+    print(results.table())
+    for entry in sorted(results.failures, key=lambda entry: (entry["kind"], entry["name"])):
         print(f"{entry['kind']}: file {entry['number']} ({entry['name']}): {entry['message'][:200]}")
-    for entry in found.once:
-        print(
-            f"once and not again: {entry['kind']}: file {entry['number']} ({entry['name']}): {entry['message'][:200]}"
-        )
-    seconds, which = found.slowest
-    print(f"slowest: {which}, {seconds:.2f} s CPU; seed {given.seed}, {time.perf_counter() - started:.0f} s in all")
-    return 1 if found.failures else 0
+    for entry in results.once:
+        print(f"not reproduced: {entry['kind']}: file {entry['number']} ({entry['name']}): {entry['message'][:200]}")
+    seconds, slowest_file = results.slowest
+    print(
+        f"slowest: {slowest_file}, {seconds:.2f} s CPU; seed {options.seed}, {time.perf_counter() - started:.0f} s in all"
+    )
+    return 1 if results.failures else 0
 
 
 if __name__ == "__main__":

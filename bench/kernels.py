@@ -74,7 +74,7 @@ def octant(friction: float, formulation: str) -> fc.Model:
 
 
 def models() -> list[tuple[Callable[..., fc.Model], tuple[Any, ...], str]]:
-    """Return functions that make models, their arguments, and the linear solver."""
+    """Return a list of functions that return models, with their arguments and the linear solver of each run."""
     formulations = ("node_to_segment", "mortar", "continuous")
     return [
         *((spheres, ("tri3", formulation), "auto") for formulation in formulations),
@@ -87,43 +87,43 @@ def models() -> list[tuple[Callable[..., fc.Model], tuple[Any, ...], str]]:
     ]
 
 
-def entry(given: Any) -> Any:
+def type_entry(argument: Any) -> Any:
     """Return the type of an argument as `ahead.numba_type` reads it; None if the table cannot hold it."""
-    if isinstance(given, np.ndarray):
-        plain = given.flags.c_contiguous and given.flags.aligned and given.dtype.kind in "biuf"
-        return [given.dtype.str[1:], given.ndim, *([] if given.flags.writeable else ["r"])] if plain else None
-    if isinstance(given, tuple):
-        members, named = [entry(member) for member in given], hasattr(given, "_fields")
-        name = f"{type(given).__module__}.{type(given).__qualname__}" if named else ""
+    if isinstance(argument, np.ndarray):
+        plain = argument.flags.c_contiguous and argument.flags.aligned and argument.dtype.kind in "biuf"
+        return [argument.dtype.str[1:], argument.ndim, *([] if argument.flags.writeable else ["r"])] if plain else None
+    if isinstance(argument, tuple):
+        members, named = [type_entry(member) for member in argument], hasattr(argument, "_fields")
+        name = f"{type(argument).__module__}.{type(argument).__qualname__}" if named else ""
         return None if None in members else {name: members}
     for kind, scalar in ((bool | np.bool_, "b1"), (int | np.integer, "i8"), (float | np.floating, "f8")):
-        if isinstance(given, kind):
+        if isinstance(argument, kind):
             return scalar
     return None
 
 
-def noting(found: list[list[Any]], work: Counter[int]) -> Callable[..., Any]:
-    """Return what stands in for the compiler: kernels stay Python; those that no other one calls are noted, with their work.
+def recorder(kernels: list[list[Any]], work: Counter[int]) -> Callable[..., Any]:
+    """Return a replacement of the compiler that leaves kernels in Python and records their calls in `kernels` and `work`.
 
-    The work of a kernel is how many entries the arguments of all its calls have.
+    Calls by other kernels are not recorded. The work of a kernel is the number of entries of the arguments of all its calls.
     """
-    inside: list[str] = []
+    active: list[str] = []
 
     def plain(function: Callable[..., Any], **_: Any) -> Callable[..., Any]:
         @functools.wraps(function)
-        def called(*arguments: Any) -> Any:
-            kernel = [function.__module__, function.__qualname__, [entry(given) for given in arguments]]
-            if not inside and None not in kernel[2]:
-                if kernel not in found:
-                    found.append(kernel)
-                work[found.index(kernel)] += int(min(interpreting.entries(arguments), 1e9))
-            inside.append(function.__name__)
+        def recorded(*arguments: Any) -> Any:
+            kernel = [function.__module__, function.__qualname__, [type_entry(argument) for argument in arguments]]
+            if not active and None not in kernel[2]:
+                if kernel not in kernels:
+                    kernels.append(kernel)
+                work[kernels.index(kernel)] += int(min(interpreting.entries(arguments), 1e9))
+            active.append(function.__name__)
             try:
                 return function(*arguments)
             finally:
-                inside.pop()
+                active.pop()
 
-        return called
+        return recorded
 
     return plain
 
@@ -133,40 +133,40 @@ def is_interpretable(module: str, name: str) -> bool:
     return isinstance(getattr(importlib.import_module(module), name), interpreting.Interpretable)
 
 
-def called(number: int) -> dict[str, Any]:
-    """Solve a model; return the kind of run that it stands for, the kernels that it calls in their order, and their work."""
-    found: list[list[Any]] = []
+def kernels_of_model(number: int) -> dict[str, Any]:
+    """Solve a model; return its kind of run, the kernels that are called, in order, and their work."""
+    kernels: list[list[Any]] = []
     work: Counter[int] = Counter()
-    decorators._compile = noting(found, work)
+    decorators._compile = recorder(kernels, work)
     make, arguments, solver = models()[number]
     model = make(*arguments)
     model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Python's floating-point arithmetic tells what NumPy's does not
+        warnings.simplefilter("ignore")  # NumPy warns of operations for which compiled kernels give no warning
         fc.solve(model, 1, linear_solver=solver)
     kind = f"{model.mesh.dim}d{' amg' if solver == 'amg' else ''}"
-    return {"kind": kind, "kernels": found, "work": [work[number] for number in range(len(found))]}
+    return {"kind": kind, "kernels": kernels, "work": [work[number] for number in range(len(kernels))]}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--one", type=int, help="print what one model calls")
+    parser.add_argument("--one", type=int, help="print the kernels that the model with this number calls")
     options = parser.parse_args()
     if options.one is not None:
-        print(json.dumps(called(options.one)))
+        print(json.dumps(kernels_of_model(options.one)))
         return
     kernels: list[list[Any]] = []
     runs: dict[str, list[int]] = {}
     work: Counter[int] = Counter()
     for number, (make, arguments, solver) in enumerate(models()):
         plain = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-        given = [sys.executable, __file__, "--one", str(number)]
-        done = subprocess.run(given, stdout=subprocess.PIPE, check=True, env=plain)
-        said = json.loads(done.stdout)
-        kernels.extend(kernel for kernel in said["kernels"] if kernel not in kernels)
-        numbers = [kernels.index(kernel) for kernel in said["kernels"]]
-        work.update(dict(zip(numbers, said["work"], strict=True)))
-        runs[said["kind"]] = sorted({*runs.get(said["kind"], []), *numbers})
+        command = [sys.executable, __file__, "--one", str(number)]
+        done = subprocess.run(command, stdout=subprocess.PIPE, check=True, env=plain)
+        recorded = json.loads(done.stdout)
+        kernels.extend(kernel for kernel in recorded["kernels"] if kernel not in kernels)
+        numbers = [kernels.index(kernel) for kernel in recorded["kernels"]]
+        work.update(dict(zip(numbers, recorded["work"], strict=True)))
+        runs[recorded["kind"]] = sorted({*runs.get(recorded["kind"], []), *numbers})
         print(f"{make.__name__}{arguments} {solver}: {len(numbers)} kernels, {len(kernels)} in all", flush=True)
     lines = ",\n".join(json.dumps(kernel) for kernel in kernels)
     small = {number for number, (module, name, _) in enumerate(kernels) if is_interpretable(module, name)}

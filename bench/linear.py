@@ -1,13 +1,14 @@
-"""Multigrid and contact: cost of a linear solution, and of a contact analysis relative to it.
+"""Cost of a linear solution by multigrid, and of a contact analysis relative to it.
 
 Usage: python bench/linear.py [--problem box|blocks|sphere] [--dofs N ...] [--steps 20] [--pyamg] [--json FILE]
 
-``box``: a cube of hex8, fixed at its base and pressed at its top: set-up, linear solution, bandwidth. ``blocks``: two tied
-cubes with non-matching meshes. ``sphere``: a quarter of a half-sphere on a block, a cold step to the full load and 20 steps
-with converged geometry.
+The problem ``box`` is a cube of hex8 that is fixed at its base and compressed at its top; it measures set-up, linear solution
+and bandwidth. ``blocks`` are two tied cubes with non-matching meshes. ``sphere`` is a quarter of a half-sphere on a block,
+with a single step to the full load and with 20 steps, both with converged geometry.
 
-Times are CPU seconds of the process. L is a linear solution of the same mesh to the same tolerance, without set-up, measured
-in the same run; ``triad`` is the memory bandwidth of a core. A small problem runs first and compiles the kernels.
+Times are CPU times of the process. L is the cost of a linear solution on the same mesh to the same tolerance, without set-up,
+measured in the same run, and ``triad`` is the memory bandwidth of a core. A small problem runs first and compiles the
+kernels.
 """
 
 from __future__ import annotations
@@ -37,14 +38,14 @@ from fastcontact.linear.solvers.pyamg import Pyamg
 
 
 def timed(work: Any) -> tuple[Any, float, float]:
-    """Return the result, CPU and wall seconds of a call."""
+    """Return the result of a call, its CPU time [s] and its wall time [s]."""
     cpu, wall = time.process_time(), time.perf_counter()
     result = work()
     return result, time.process_time() - cpu, time.perf_counter() - wall
 
 
 def triad() -> float:
-    """Return the bandwidth of a core [GB per CPU second], ``p = z + beta p`` on long vectors, median of nine."""
+    """Return the memory bandwidth of a core [GB/s], the median of nine operations ``p = z + beta p`` on long vectors."""
     z, p = np.ones(20_000_000), np.ones(20_000_000)
     krylov_kernels.turn(0, len(p), 0.5, z, p)
     return float(
@@ -93,14 +94,14 @@ def sphere(dofs: int) -> fc.Model:
 
 def bytes_per_iteration(solver: Amg) -> int:
     """Return what one iteration must read of matrices at least: K once, levels and prolongators as the cycle does."""
-    own = 2 * DEGREE * sum(level.A.nbytes + level.inverse.nbytes for level in solver.hierarchy.levels[:-1])
-    across = 2 * sum(level.P.nbytes for level in solver.hierarchy.levels if level.P is not None)
+    cycle_bytes = 2 * DEGREE * sum(level.A.nbytes + level.inverse.nbytes for level in solver.hierarchy.levels[:-1])
+    transfer_bytes = 2 * sum(level.P.nbytes for level in solver.hierarchy.levels if level.P is not None)
     K = solver.K.scaled
-    return K.nbytes + (0 if K.low is None else K.low.nbytes) + own + across
+    return K.nbytes + (0 if K.low is None else K.low.nbytes) + cycle_bytes + transfer_bytes
 
 
 def linear_solution(problem: Problem, tolerance: float) -> dict[str, Any]:
-    """Solve for the full loads without contact; the second of two runs counts."""
+    """Solve for the full load without contact; return the cost of the second of two runs."""
     solver = problem.solver
     solver.tolerance = tolerance
     lift = problem.load_at(1.0).lift
@@ -112,7 +113,7 @@ def linear_solution(problem: Problem, tolerance: float) -> dict[str, Any]:
     return {"cpu_s": cpu, "wall_s": wall, "iterations": solver.counters.iterations - before}
 
 
-def peer(problem: Problem) -> dict[str, Any]:
+def pyamg_solution(problem: Problem) -> dict[str, Any]:
     """Return what preparation and solution cost with pyamg's multigrid and SciPy's conjugate gradients, one BLAS thread."""
     solver, lift = Pyamg(1e-8), problem.load_at(1.0).lift
     K, modes = problem.solver.K.restored(), problem.system.unknowns_of(near_nullspace(problem.model))
@@ -124,7 +125,7 @@ def peer(problem: Problem) -> dict[str, Any]:
 
 
 def steps(problem: Problem, count: int, tolerance: float, contact: dict[str, Any]) -> None:
-    """Run a problem on a prepared hierarchy and add its work to `contact`."""
+    """Solve a problem with an existing hierarchy and add its cost to `contact`."""
     solver, ramp = problem.solver, fc.linear_ramp(count)
     assert isinstance(solver, Amg)
     solver.tolerance = tolerance
@@ -134,12 +135,12 @@ def steps(problem: Problem, count: int, tolerance: float, contact: dict[str, Any
     inside = [0.0]
     solution = solver.solution
 
-    def measured(*arguments: Any) -> Any:
+    def timed_call(*arguments: Any) -> Any:
         result, seconds, _ = timed(lambda: solution(*arguments))
         inside[0] += seconds
         return result
 
-    solver.solution = measured
+    solver.solution = timed_call
     updates = 0
     for index, instant in enumerate(ramp.instants, start=1):
         (state, result), seconds, _ = timed(
@@ -152,18 +153,18 @@ def steps(problem: Problem, count: int, tolerance: float, contact: dict[str, Any
                 "pairings": updates, "active": int(state.active["c"].sum()), "setups": solver.counters.setups}  # fmt: skip
 
 
-def prepared(name: str, dofs: int) -> tuple[Problem, float]:
-    """Return a problem with its hierarchy, and the CPU seconds that took."""
+def prepare_problem(name: str, dofs: int) -> tuple[Problem, float]:
+    """Return a problem with its hierarchy, and the CPU time of the set-up of the hierarchy [s]."""
     model = {"box": box, "blocks": blocks, "sphere": sphere}[name](dofs)
     seconds: list[float] = []
     prepare_solver = Amg.prepare
 
-    def measured(*arguments: Any, **options: Any) -> Any:
+    def timed_call(*arguments: Any, **options: Any) -> Any:
         result, cpu, _ = timed(lambda: prepare_solver(*arguments, **options))
         seconds.append(cpu)
         return result
 
-    Amg.prepare = measured  # type: ignore[method-assign]
+    Amg.prepare = timed_call  # type: ignore[method-assign]
     try:
         problem = prepare(model, fc.linear_ramp(), Criteria(), linear_solver="amg", linear_tolerance=1e-8)
         return problem, seconds[-1]
@@ -173,21 +174,21 @@ def prepared(name: str, dofs: int) -> tuple[Problem, float]:
 
 def measure(name: str, dofs: int, count: int, with_pyamg: bool) -> dict[str, Any]:
     bandwidth = triad()
-    problem, setup = prepared(name, 5_000)  # compiles
-    problem, setup = prepared(name, dofs)
+    problem, setup = prepare_problem(name, 5_000)  # compiles
+    problem, setup = prepare_problem(name, dofs)
     solver, model = problem.solver, problem.model
     assert isinstance(solver, Amg)
     n = model.n_dofs
-    found: dict[str, Any] = {"problem": name, "n_dofs": n, "threads": decorators.threads()}
-    found |= {"triad_GB_per_cpu_s": bandwidth, "setup_cpu_s": setup}
+    results: dict[str, Any] = {"problem": name, "n_dofs": n, "threads": decorators.threads()}
+    results |= {"triad_GB_per_cpu_s": bandwidth, "setup_cpu_s": setup}
     if with_pyamg:
-        found["pyamg"] = peer(problem)
+        results["pyamg"] = pyamg_solution(problem)
     L = linear_solution(problem, 1e-8)
-    per = 1e9 / (n * L["iterations"])
-    L |= {"ns_per_dof_iteration_cpu": L["cpu_s"] * per, "ns_per_dof_iteration_wall": L["wall_s"] * per}
+    factor = 1e9 / (n * L["iterations"])
+    L |= {"ns_per_dof_iteration_cpu": L["cpu_s"] * factor, "ns_per_dof_iteration_wall": L["wall_s"] * factor}
     L["GB_per_cpu_s"] = 1e-9 * bytes_per_iteration(solver) * L["iterations"] / L["cpu_s"]
     L["part_of_triad"] = L["GB_per_cpu_s"] / bandwidth
-    found |= {"linear": L, "hierarchy": repr(solver)}
+    results |= {"linear": L, "hierarchy": repr(solver)}
     if name == "blocks":
         rows = problem.pairs["c"].constraints(Configuration.undeformed(model.mesh.points))
         lift = problem.load_at(1.0).lift
@@ -197,27 +198,29 @@ def measure(name: str, dofs: int, count: int, with_pyamg: bool) -> dict[str, Any
         for _ in range(2):
             before = solver.counters.iterations
             _, cpu, _ = timed(lambda: loaded.solve(B[use], -gap0[use]))
-        found["tied"] = {"cpu_s": cpu, "iterations": solver.counters.iterations - before, "equations": len(use)}
+        results["tied"] = {"cpu_s": cpu, "iterations": solver.counters.iterations - before, "equations": len(use)}
     if name == "sphere":
         steps(problem, 1, 1e-2, {})  # compiles
-        found["linear_1e-4"] = linear_solution(problem, 1e-4)
+        results["linear_1e-4"] = linear_solution(problem, 1e-4)
         for name, number, tolerance in (("cold", 1, 1e-8), ("steps", count, 1e-8), ("steps_1e-4", count, 1e-4)):
-            found[name] = {}
-            steps(problem, number, tolerance, found[name])
-            unit = found["linear_1e-4" if tolerance > 1e-6 else "linear"]
-            found[name] |= {
-                "iterations_in_L": found[name]["iterations"] / unit["iterations"],
-                "solver_cpu_in_L": found[name]["solver_cpu_s"] / unit["cpu_s"],
-                "cpu_in_L": found[name]["cpu_s"] / unit["cpu_s"],
+            results[name] = {}
+            steps(problem, number, tolerance, results[name])
+            unit = results["linear_1e-4" if tolerance > 1e-6 else "linear"]
+            results[name] |= {
+                "iterations_in_L": results[name]["iterations"] / unit["iterations"],
+                "solver_cpu_in_L": results[name]["solver_cpu_s"] / unit["cpu_s"],
+                "cpu_in_L": results[name]["cpu_s"] / unit["cpu_s"],
             }
-    found["peak_kB_per_dof"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / n
-    return found
+    results["peak_kB_per_dof"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / n
+    return results
 
 
-def told(found: dict[str, Any]) -> str:
-    """Return the figures as indented lines."""
-    lines = [f"{found['problem']}, {found['n_dofs']} unknowns, {found['threads']} threads: {found['hierarchy']}"]
-    for key, value in found.items():
+def report(results: dict[str, Any]) -> str:
+    """Return the results as indented lines."""
+    lines = [
+        f"{results['problem']}, {results['n_dofs']} unknowns, {results['threads']} threads: {results['hierarchy']}"
+    ]
+    for key, value in results.items():
         if isinstance(value, dict):
             value = ", ".join(f"{k} {v:.4g}" for k, v in value.items())
         lines.append(f"  {key:<20} {value:.4g}" if isinstance(value, float) else f"  {key:<20} {value}")
@@ -235,7 +238,7 @@ def main() -> None:
     results = []
     for dofs in options.dofs:
         results.append(measure(options.problem, dofs, options.steps, options.pyamg))
-        print(told(results[-1]), flush=True)
+        print(report(results[-1]), flush=True)
     if options.json:
         options.json.write_text(json.dumps(results, indent=1))
 

@@ -1,18 +1,17 @@
-"""A run of many steps, killed and resumed at random: same bits, constant memory, constant cost of a step.
+"""Run of many steps that is killed and resumed at random: identical results, constant memory and constant cost of a step.
 
     python bench/long_run.py [--steps 10000] [--kills 12] [--seed 1]
     python bench/long_run.py --unknowns 1e6 --hours 2 [--folder FOLDER]
 
-Two small blocks, or a quarter of a sphere on a block with about the given number of unknowns, are pressed together and half
-released again in cycles of 20 steps, so that every part of the run has the same work. The run is done once without
-interruption, in a process that records its resources every hundred steps (for the sphere, every cycle), and once by
-`fastcontact run --resume`, which is killed at random instants and restarted until it is complete. With `--hours`, the
-uninterrupted run does as many steps as it can in the first half of the time.
+Two small blocks, or a quarter of a sphere on a block with about the given number of unknowns, are loaded and partly unloaded
+in cycles of 20 steps, so that all parts of the run have the same cost. The analysis is run without interruption, in a process
+that records its resources every hundred steps (for the sphere, every cycle), and again by `fastcontact run --resume`, which
+is killed at random times and restarted until it is complete. With `--hours`, the uninterrupted run lasts half of this time.
 
-The files are compared bit by bit. The second and the last tenth of the uninterrupted run are compared in CPU time, bytes and
-calls of writing per step, objects and memory. Every step is on the disk before the next one begins. Prints a line for each
-criterion; exit code 1 if one is not met. The files of a million unknowns take tens of gigabytes: the run stops at once if
-the folder has too little space.
+The two result files are compared bit by bit. The second and the last tenth of the uninterrupted run are compared with respect
+to CPU time, written bytes and write calls per step, objects and memory. Each step is written to the disk before the next one
+begins. The script prints a line for each criterion; the exit code is 1 if a criterion is not met. Files for a million
+unknowns take tens of gigabytes, and the run stops after its first records if the disk has too little space.
 """
 
 from __future__ import annotations
@@ -95,16 +94,17 @@ secondary = "CONT_SPHERE"
 primary = "CONT_BLOCK"
 """
 CYCLE = 20  # steps
-FEWEST = 4 * CYCLE  # steps of a run that is judged
-FASTEST = {False: 100, True: 20}  # steps that a small and a large model can make in a second
-MOST = {"cpu": 1.15, "bytes": 1.05, "calls": 1.05}  # the last tenth of the steps against the second
-MOST_GROWTH = 1000.0  # of the memory, a thousand steps [kB], or
-MOST_SHARE = 0.01  # of the memory, in the whole run
+MIN_STEPS = 4 * CYCLE  # smallest number of steps that can be evaluated
+STEPS_PER_SECOND = {False: 100, True: 20}  # upper bounds for small and for large models
+MAX_RATIO = {"cpu": 1.15, "bytes": 1.05, "calls": 1.05}  # of the last tenth of the steps to the second
+# The memory may grow by the larger of this number [kB] per 1000 steps, and this fraction of it in the entire run.
+MAX_GROWTH = 1000.0
+MAX_SHARE = 0.01
 
 
 @dataclass
-class Asked:
-    """How large a model, how many steps or for how long [s], and how often what is used is noted."""
+class Settings:
+    """Number of unknowns, number of steps or duration [s], and number of steps between two records of the resources."""
 
     unknowns: float | None
     steps: int
@@ -112,19 +112,19 @@ class Asked:
     every: int
 
     @classmethod
-    def of(cls, given: argparse.Namespace) -> Asked:
-        large = given.unknowns is not None
-        seconds = None if given.hours is None else 3600 * given.hours
-        steps = given.steps if seconds is None else max(int(seconds / 2 * FASTEST[large]), FEWEST)
+    def of(cls, options: argparse.Namespace) -> Settings:
+        large = options.unknowns is not None
+        seconds = None if options.hours is None else 3600 * options.hours
+        steps = options.steps if seconds is None else max(int(seconds / 2 * STEPS_PER_SECOND[large]), MIN_STEPS)
         every = CYCLE if large or steps < 2000 else 5 * CYCLE
-        if steps < FEWEST:
-            raise SystemExit(f"{steps} steps are too few to judge: ask for {FEWEST} or more")
-        return cls(given.unknowns, steps, seconds, every)
+        if steps < MIN_STEPS:
+            raise SystemExit(f"{steps} steps are too few to judge: ask for {MIN_STEPS} or more")
+        return cls(options.unknowns, steps, seconds, every)
 
 
-def case_text(asked: Asked, steps: int) -> str:
-    """Return a case file of so many steps; the first ones of two of them are the same."""
-    model = BLOCKS if asked.unknowns is None else SPHERE.format(**sizes(asked.unknowns))
+def case_text(settings: Settings, steps: int) -> str:
+    """Return a case file with the given number of steps. Steps do not depend on the number of later steps."""
+    model = BLOCKS if settings.unknowns is None else SPHERE.format(**sizes(settings.unknowns))
     instants = [round(float(n), 1) for n in range(1, steps + 1)]
     turns = range(0, steps + CYCLE, CYCLE // 2)
     table = [[float(turn), 0.0 if not turn else 1.0 if turn % CYCLE else 0.5] for turn in turns]
@@ -132,18 +132,18 @@ def case_text(asked: Asked, steps: int) -> str:
 
 
 def sizes(unknowns: float) -> dict[str, float]:
-    """Return edges far from the contact and at it of a sphere on a block with about so many unknowns."""
+    """Return the edge lengths far from the contact and at it of a sphere on a block with about `unknowns` unknowns."""
     edge = 0.06 * (114_036 / unknowns) ** (1 / 3)
     while True:
         mesh = fc.generate.sphere_on_block("hex8", R=1.0, size=edge, contact_size=edge / 3, contact_radius=0.2)
-        found = 3 * mesh.n_points / unknowns
-        if 0.9 < found < 1.1:
+        ratio = 3 * mesh.n_points / unknowns
+        if 0.9 < ratio < 1.1:
             return {"size": edge, "contact_size": edge / 3}
-        edge *= found ** (1 / 3)
+        edge *= ratio ** (1 / 3)
 
 
-def used() -> dict[str, float]:
-    """Return what this process has used so far."""
+def resources_used() -> dict[str, float]:
+    """Return the CPU time [s], the written bytes, the write calls, the objects and the memory [kB] of this process."""
     gc.collect()
     counts = dict(line.split(": ") for line in Path("/proc/self/io").read_text(encoding="ascii").splitlines())
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
@@ -156,10 +156,13 @@ def used() -> dict[str, float]:
     }
 
 
-def measured(case_file: Path, path: Path, every: int, seconds: float | None) -> None:
-    """Run undisturbed, to the end or for so long, and print as JSON the steps and what was used at every so many of them."""
+def measure_run(case_file: Path, path: Path, every: int, seconds: float | None) -> None:
+    """Run without interruption, to the end or for some seconds, and print the resources as JSON.
+
+    They are recorded after every `every` steps.
+    """
     case = read_case(case_file)
-    notes: list[dict[str, float]] = []
+    records: list[dict[str, float]] = []
     begin = time.monotonic()
     with fc.ResultWriter(path, case.model, case_text=case.text, synchronise=True) as out:
         options = {
@@ -171,18 +174,18 @@ def measured(case_file: Path, path: Path, every: int, seconds: float | None) -> 
             out.write(step)
             if step.index % every:
                 continue
-            notes.append(used())
+            records.append(resources_used())
             passed = time.monotonic() - begin
-            if len(notes) == 1:
+            if len(records) == 1:
                 expected = len(case.ramp.instants) if seconds is None else seconds / passed * every
-                check_room(path, min(expected, len(case.ramp.instants)) / every)
-            if seconds is not None and passed > seconds and step.index >= FEWEST:
+                check_disk_space(path, min(expected, len(case.ramp.instants)) / every)
+            if seconds is not None and passed > seconds and step.index >= MIN_STEPS:
                 break
-    print(json.dumps({"steps": out.n_steps, "unknowns": case.model.n_dofs, "notes": notes}))
+    print(json.dumps({"steps": out.n_steps, "unknowns": case.model.n_dofs, "records": records}))
 
 
-def check_room(path: Path, times: float) -> None:
-    """Stop if the disk has no room for two files so many times as large as this one."""
+def check_disk_space(path: Path, times: float) -> None:
+    """Raise SystemExit if the disk has too little space for two files that are `times` times as large as this one."""
     needed, free = 2 * times * path.stat().st_size, shutil.disk_usage(path.parent).free
     if needed > 0.9 * free:
         raise SystemExit(
@@ -191,31 +194,33 @@ def check_room(path: Path, times: float) -> None:
         )
 
 
-def killed(case: kill_cases.KilledCase, path: Path, kills: int, seconds: float, seed: int) -> tuple[int, list[int]]:
-    """Run, kill and resume until all is done; return how often it was killed, and how many steps were there each time."""
-    random, times, found = np.random.default_rng(seed), 0, []
+def run_with_kills(
+    case: kill_cases.KilledCase, path: Path, kills: int, seconds: float, seed: int
+) -> tuple[int, list[int]]:
+    """Run, kill and resume a case until it is complete; return the number of kills and the number of steps after each."""
+    random, times, n_steps = np.random.default_rng(seed), 0, []
     while True:
         process = killing.started(case, path, resume=True)
         try:
-            # Starting, and reading what is there, take their time, too; after so many kills it may end.
+            # The start and the reading of existing steps take two seconds. After the last kill the run may complete.
             longest = 2.0 + 3.0 * random.random() * seconds / kills if times < kills else None
-            told = process.communicate(timeout=longest)[1]
+            errors = process.communicate(timeout=longest)[1]
         except subprocess.TimeoutExpired:
             process.send_signal(signal.SIGKILL)
             process.communicate()
             times += 1
             if path.exists():
                 with fc.open_results(path) as results:
-                    found.append(len(results))
+                    n_steps.append(len(results))
             continue
         if process.returncode:
-            raise SystemExit(f"the run ended with code {process.returncode}: {told}")
-        return times, found
+            raise SystemExit(f"the run ended with code {process.returncode}: {errors}")
+        return times, n_steps
 
 
-def different(one: Path, other: Path) -> list[int]:
-    """Return the numbers of the steps that differ in any bit; -1 if there are not as many."""
-    with fc.open_results(one) as first, fc.open_results(other) as second:
+def different_steps(path: Path, other: Path) -> list[int]:
+    """Return the numbers of the steps that differ in any bit, or [-1] if the numbers of steps differ."""
+    with fc.open_results(path) as first, fc.open_results(other) as second:
         if len(first) != len(second):
             return [-1]
         pairs = zip(first, second, strict=True)
@@ -223,33 +228,31 @@ def different(one: Path, other: Path) -> list[int]:
 
 
 def arguments() -> argparse.Namespace:
-    """Return what is asked for."""
+    """Return the arguments of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--steps", type=int, default=10_000)
+    parser.add_argument("--hours", type=float, help="total duration of both runs, instead of a number of steps")
     parser.add_argument(
-        "--hours", type=float, help="instead of a number of steps, how long both runs may take together"
-    )
-    parser.add_argument(
-        "--unknowns", type=float, help="a sphere on a block of about so many, instead of two small blocks"
+        "--unknowns", type=float, help="number of unknowns of a sphere on a block, instead of two small blocks"
     )
     parser.add_argument("--kills", type=int, default=12)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--folder", type=Path, help="where the result files are for the time being")
+    parser.add_argument("--folder", type=Path, help="folder of temporary result files")
     parser.add_argument("--measure", nargs=2, type=Path, metavar=("CASE", "FILE"), help=argparse.SUPPRESS)
     return parser.parse_args()
 
 
 def main() -> int:
-    """Run and judge."""
-    given = arguments()
-    asked = Asked.of(given)
-    if given.measure:
-        measured(*given.measure, asked.every, asked.seconds and asked.seconds / 2)
+    """Execute both runs, print the criteria and return the exit code."""
+    options = arguments()
+    settings = Settings.of(options)
+    if options.measure:
+        measure_run(*options.measure, settings.every, settings.seconds and settings.seconds / 2)
         return 0
-    with tempfile.TemporaryDirectory(dir=given.folder) as name:
+    with tempfile.TemporaryDirectory(dir=options.folder) as name:
         folder = Path(name)
         case = kill_cases.KilledCase(folder / "case.toml", 0.0)
-        case.path.write_text(case_text(asked, asked.steps), encoding="utf-8")
+        case.path.write_text(case_text(settings, settings.steps), encoding="utf-8")
         whole, path = folder / "whole.vtkhdf", folder / "killed.vtkhdf"
         begin = time.monotonic()
         command = [sys.executable, *sys.argv, "--measure", str(case.path), str(whole)]
@@ -257,35 +260,38 @@ def main() -> int:
         if done.returncode:
             return done.returncode
         seconds = time.monotonic() - begin
-        found = json.loads(done.stdout)
-        print(f"{found['steps']} steps of {found['unknowns']} unknowns in {seconds:.0f} s", flush=True)
-        case.path.write_text(case_text(asked, found["steps"]), encoding="utf-8")
-        times, left = killed(case, path, given.kills, seconds, given.seed)
-        kills = f"{times} kills, with {min(left, default=0)} to {max(left, default=0)} steps there: "
-        return judged(found, asked.every, kills, different(path, whole))
+        run = json.loads(done.stdout)
+        print(f"{run['steps']} steps of {run['unknowns']} unknowns in {seconds:.0f} s", flush=True)
+        case.path.write_text(case_text(settings, run["steps"]), encoding="utf-8")
+        times, n_steps = run_with_kills(case, path, options.kills, seconds, options.seed)
+        kills = f"{times} kills, after {min(n_steps, default=0)} to {max(n_steps, default=0)} steps: "
+        return print_criteria(run, settings.every, kills, different_steps(path, whole))
 
 
-def judged(found: dict[str, Any], every: int, kills: str, unlike: list[int]) -> int:
-    """Print the bars; return the exit code."""
-    notes, steps = found["notes"], found["steps"]
-    tenth = max(len(notes) // 10, 1)
-    bars = {f"{kills}{len(unlike)} of {steps} steps differ in any bit (0)": not unlike}
-    for what, most in MOST.items():
-        early = notes[2 * tenth - 1][what] - notes[tenth - 1][what]
-        late = notes[-1][what] - notes[-1 - tenth][what]
-        bars[f"{what} for a step: {late / tenth / every:.4g}, drift {late / early:.3f} (at most {most})"] = (
-            late <= most * early
+def print_criteria(run: dict[str, Any], every: int, kills: str, differing_steps: list[int]) -> int:
+    """Print the criteria and whether they are met; return the exit code."""
+    records, steps = run["records"], run["steps"]
+    tenth = max(len(records) // 10, 1)
+    criteria = {f"{kills}{len(differing_steps)} of {steps} steps differ in any bit (0)": not differing_steps}
+    for resource, limit in MAX_RATIO.items():
+        early = records[2 * tenth - 1][resource] - records[tenth - 1][resource]
+        late = records[-1][resource] - records[-1 - tenth][resource]
+        criteria[f"{resource} for a step: {late / tenth / every:.4g}, drift {late / early:.3f} (at most {limit})"] = (
+            late <= limit * early
         )
-    grown, thousands = notes[-1]["memory"] - notes[2 * tenth - 1]["memory"], (len(notes) - 2 * tenth) * every / 1000
-    allowed = max(MOST_GROWTH * thousands, MOST_SHARE * notes[-1]["memory"])
-    bars[
-        f"memory: {notes[-1]['memory']:.0f} kB, grows by {grown / thousands:.0f} kB in 1000 steps (at most "
+    grown, thousands = (
+        records[-1]["memory"] - records[2 * tenth - 1]["memory"],
+        (len(records) - 2 * tenth) * every / 1000,
+    )
+    allowed = max(MAX_GROWTH * thousands, MAX_SHARE * records[-1]["memory"])
+    criteria[
+        f"memory: {records[-1]['memory']:.0f} kB, grows by {grown / thousands:.0f} kB in 1000 steps (at most "
         f"{allowed / thousands:.0f})"
     ] = grown <= allowed
-    print(f"objects: {notes[-1]['objects'] - notes[2 * tenth - 1]['objects']:+.0f} from the second tenth on")
-    for text, kept in bars.items():
-        print(("kept:   " if kept else "MISSED: ") + text)
-    return 0 if all(bars.values()) else 1
+    print(f"objects: {records[-1]['objects'] - records[2 * tenth - 1]['objects']:+.0f} from the second tenth on")
+    for text, is_met in criteria.items():
+        print(("kept:   " if is_met else "MISSED: ") + text)
+    return 0 if all(criteria.values()) else 1
 
 
 if __name__ == "__main__":

@@ -1,13 +1,14 @@
-"""Cost of nonlinear bodies: user CPU seconds of whole processes, alternating with another program on the same machine.
+"""Cost of nonlinear bodies in comparison with other programs: user CPU time of processes, which run alternately.
 
-``python bench/nonlinear.py block PYTHON_WITH_FELUPE [N] [STEPS]``: a neo-Hookean block of N^3 hex8, stretched by a tenth of
-its height and sheared by as much. FElupe uses conjugate gradients with a Jacobi preconditioner, which are faster than its
-default, SuperLU. Both run in one thread; threads of BLAS would spin and add to FElupe's CPU time.
+``python bench/nonlinear.py block PYTHON_WITH_FELUPE [N] [STEPS]`` solves a neo-Hookean block of N^3 hex8, which is stretched
+and sheared by a tenth of its height. FElupe uses conjugate gradients with a Jacobi preconditioner, which are faster than its
+default, SuperLU. Both programs run in one thread, because threads of BLAS would spin and add to the CPU time of FElupe.
 
-``python bench/nonlinear.py indentation [SIZE] [STEPS] [RADIUS]``: a rigid ball of quad8 pressed into an elastic-plastic block
-of quad8, axisymmetric; SIZE is the length of the facets in contact, 0.02 by default, up to RADIUS, 0.6 by default. CalculiX
-(``ccx``) uses the same mesh (CAX8R), surface-to-surface penalty contact and the same number of fixed increments; fastcontact
-uses mortar. The ball has at most 20 cells along the arc: CalculiX 2.20 refuses thinner ones on the axis.
+``python bench/nonlinear.py indentation [SIZE] [STEPS] [RADIUS]`` solves an axisymmetric model in which a rigid ball is
+pressed into an elastic-plastic block, both with quad8. SIZE is the length of facets up to the radius RADIUS; the defaults are
+0.02 and 0.6. CalculiX (``ccx``) uses the same mesh (CAX8R), surface-to-surface penalty contact and the same number of fixed
+increments; fastcontact uses mortar. The ball has at most 20 cells along the arc, because CalculiX 2.20 rejects narrower cells
+on the axis.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from pathlib import Path
 import numpy as np
 from peers.calculix_deck import contact_surface, node_set, table
 
-OURS = """
+FASTCONTACT_BLOCK = """
 import sys, numpy as np, fastcontact as fc
 n, steps = map(int, sys.argv[1:])
 mesh = fc.generate.box((1.0, 1.0, 1.0), (n, n, n), element="hex8")
@@ -35,7 +36,7 @@ found = fc.solve(model, steps)
 force = found[-1].reaction[mesh.points_of("ZMAX")].sum(axis=0)
 print(mesh.points.size, sum(len(s.iterations["history"]) for s in found), *force)
 """
-THEIRS = """
+FELUPE_BLOCK = """
 import sys, numpy as np, felupe as fem
 from scipy.sparse import diags
 from scipy.sparse.linalg import cg
@@ -62,7 +63,7 @@ for part in np.linspace(0.0, 1.0, steps + 1)[1:]:
 force = found.fun.toarray() if hasattr(found.fun, "toarray") else np.asarray(found.fun)
 print(mesh.points.size, count, *force.reshape(-1, 3)[top].sum(axis=0))
 """
-INDENTED = """
+INDENTATION = """
 import sys, numpy as np, fastcontact as fc
 size, steps, radius = float(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
 block = fc.generate.graded_block("quad8", width=6.0, contact_radius=radius, contact_size=size)
@@ -90,20 +91,20 @@ print(mesh.points.size, sum(len(s.iterations["history"]) for s in found), -found
 
 
 def deck(problem: Path, steps: int, path: Path) -> None:
-    """Write the deck of CalculiX for the mesh that INDENTED has saved in `problem`."""
-    given = np.load(problem)
-    cells = given["cells"]
-    ball = np.isin(np.arange(len(cells)), given["of_ball"])
+    """Write the deck of CalculiX for the mesh that INDENTATION has saved in `problem`."""
+    arrays = np.load(problem)
+    cells = arrays["cells"]
+    ball = np.isin(np.arange(len(cells)), arrays["of_ball"])
     with path.open("w") as file:
         file.write("*NODE,NSET=ALL\n")
-        table(file, np.arange(1, len(given["points"]) + 1), given["points"], "%.16g")
-        for name, chosen in (("BLOCK", ~ball), ("BALLS", ball)):
+        table(file, np.arange(1, len(arrays["points"]) + 1), arrays["points"], "%.16g")
+        for name, in_set in (("BLOCK", ~ball), ("BALLS", ball)):
             file.write(f"*ELEMENT,TYPE=CAX8R,ELSET={name}\n")
-            table(file, np.flatnonzero(chosen) + 1, cells[chosen] + 1, "%d")
+            table(file, np.flatnonzero(in_set) + 1, cells[in_set] + 1, "%d")
         for name in ("BOTTOM", "SYMMETRY_X", "BALL"):
-            node_set(file, name, given[name])
-        contact_surface(file, "TOP", cells[:, :4], given["top"][:, :2])
-        contact_surface(file, "ARC", cells[:, :4], given["arc"][:, :2])
+            node_set(file, name, arrays[name])
+        contact_surface(file, "TOP", cells[:, :4], arrays["top"][:, :2])
+        contact_surface(file, "ARC", cells[:, :4], arrays["arc"][:, :2])
         file.write(
             "*MATERIAL,NAME=STEEL\n*ELASTIC\n200000.,.3\n*SOLID SECTION,ELSET=BALLS,MATERIAL=STEEL\n"
             "*MATERIAL,NAME=YIELDS\n*ELASTIC\n200000.,.3\n*PLASTIC\n400.,0.\n1400.,1.\n"
@@ -117,42 +118,46 @@ def deck(problem: Path, steps: int, path: Path) -> None:
 
 
 def indentation(size: str = "0.02", steps: str = "40", radius: str = "0.6") -> None:
-    """Print times, unknowns, iterations and forces of a pair of runs, after one of ours that compiles."""
-    timed([sys.executable, "-c", INDENTED, "0.1", "1", "0.6"])
-    ours = timed([sys.executable, "-c", INDENTED, size, steps, radius])
+    """Print times, unknowns, iterations and forces of a run with each program, after a run that compiles the kernels."""
+    timed([sys.executable, "-c", INDENTATION, "0.1", "1", "0.6"])
+    ours = timed([sys.executable, "-c", INDENTATION, size, steps, radius])
     print(
         f"fastcontact: user {ours[0]:.1f} s, wall {ours[1]:.1f} s; unknowns, iterations, force: {ours[2]}", flush=True
     )
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        timed([sys.executable, "-c", INDENTED, size, steps, radius, str(folder / "problem.npz")])
+        timed([sys.executable, "-c", INDENTATION, size, steps, radius, str(folder / "problem.npz")])
         deck(folder / "problem.npz", int(steps), folder / "deck.inp")
         theirs = timed(["ccx", "deck"], folder)
         totals = [line.split() for line in (folder / "deck.dat").read_text().splitlines() if line.strip()]
-    force = -180.0 * float(totals[-1][1])  # of a wedge of two degrees
+    force = -180.0 * float(totals[-1][1])  # CalculiX models a wedge of two degrees
     print(f"CalculiX: user {theirs[0]:.1f} s, wall {theirs[1]:.1f} s; force: {force}")
     print(f"CalculiX over fastcontact: {theirs[0] / ours[0]:.2f}")
 
 
 def timed(command: list[str], folder: Path | None = None) -> tuple[float, float, str]:
-    """Return user CPU and wall time [s] of a process in a folder, in one thread, and the last line that it prints."""
+    """Run a command in a folder with one thread; return its user CPU time [s], its wall time [s] and its last output line."""
     before, begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.perf_counter()
     threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
     done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder, env=os.environ | threads)
-    told = done.stdout.strip().splitlines()
+    output = done.stdout.strip().splitlines()
     after = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    return after - before, time.perf_counter() - begin, told[-1] if told else ""
+    return after - before, time.perf_counter() - begin, output[-1] if output else ""
 
 
 def block(theirs: str, n: str = "31", steps: str = "10") -> None:
-    """Print times, iterations and forces of three pairs of runs, after one of ours that compiles."""
-    timed([sys.executable, "-c", OURS, "2", "1"])
+    """Print times, iterations and forces of three runs with each program, after a run that compiles the kernels."""
+    timed([sys.executable, "-c", FASTCONTACT_BLOCK, "2", "1"])
     ratios = []
     for _ in range(3):
-        ours, peer = timed([sys.executable, "-c", OURS, n, steps]), timed([theirs, "-c", THEIRS, n, steps])
-        for name, (user, wall, told) in (("fastcontact", ours), ("FElupe", peer)):
+        ours, peer = (
+            timed([sys.executable, "-c", FASTCONTACT_BLOCK, n, steps]),
+            timed([theirs, "-c", FELUPE_BLOCK, n, steps]),
+        )
+        for name, (user, wall, output) in (("fastcontact", ours), ("FElupe", peer)):
             print(
-                f"{name}: user {user:.1f} s, wall {wall:.1f} s; unknowns, iterations, force on top: {told}", flush=True
+                f"{name}: user {user:.1f} s, wall {wall:.1f} s; unknowns, iterations, force on top: {output}",
+                flush=True,
             )
         ratios.append(peer[0] / ours[0])
     print(f"FElupe over fastcontact: {np.median(ratios):.2f}")

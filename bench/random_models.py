@@ -3,13 +3,13 @@
     python bench/random_models.py [--count 2000] [--first 0] [--workers 1] [--limit 120] [--json FILE]
     python bench/random_models.py --seed 137 --show
 
-Each seed is a model (tests/random_models): two- and three-dimensional, one to three contact pairs, any element, materials of
+Each seed determines a model (tests/random_models): in 2D or 3D, with one to three contact pairs, any element, materials of
 any contrast, moving and rotating rigid obstacles, clearances, friction, shifted, rotated, graded and partly covered meshes,
-cyclic sectors and periods, plates, orthotropic rings, bolts, couplings, heat. The invariants of any result are checked
-(tests/mechanics.py), and that an equivalent model (rotated, renumbered, with supports along normals, along axes, or as
-multi-point constraints) has the same result. "told" counts results that fail a check but carry a warning about it. Prints
-counts by dimension, formulation, equivalent model and outcome, errors by their first words, and the seeds of all findings;
-exit code 1 if there are any.
+cyclic sectors and periods, plates, orthotropic rings, bolts, couplings and heat. The script checks the invariants of each
+result (tests/mechanics.py), and compares it with the result of an equivalent model (rotated, renumbered, or with supports
+along normals, along axes, or as multi-point constraints). The outcome "told" is a result that fails a check and has a warning
+about it. The script prints the numbers of models by dimension, formulation, equivalent model and outcome, the errors by their
+first words, and the seeds of all findings; the exit code is 1 if there are findings.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ FINDINGS = ("failed check", "raw error", "too long", "process died")
 
 
 def work(pipe: Any) -> None:
-    """Answer seeds with rows until there are no more."""
+    """Receive seeds from a pipe and send the outcomes of their models, until None is received."""
     from outcome import outcome
 
     while (seed := pipe.recv()) is not None:
@@ -56,7 +56,7 @@ class Worker:
         self.pipe.send(seed)
 
     def answer(self, limit: float) -> dict[str, Any] | None:
-        """Return the row of the model, if it is there; a process that died or takes too long is one, too."""
+        """Return the outcome of the current model, also if the process has died or takes too long; None if it is running."""
         try:
             if self.pipe.poll(0.0):
                 return dict(self.pipe.recv())
@@ -72,7 +72,7 @@ class Worker:
 
 
 def rows(seeds: list[int], workers: int, limit: float) -> Iterator[dict[str, Any]]:
-    """Yield the rows of all seeds, in the order in which they are ready."""
+    """Yield the outcomes of all seeds, in the order in which the models are finished."""
     waiting = seeds[::-1]
     pool = [Worker() for _ in range(min(workers, len(seeds)))]
     for worker in pool:
@@ -96,11 +96,11 @@ def rows(seeds: list[int], workers: int, limit: float) -> Iterator[dict[str, Any
         time.sleep(0.01)
 
 
-def table(found: list[dict[str, Any]], key: str) -> str:
-    """Return counts of outcomes by a label in Markdown, with the part that ends in results."""
+def table(results: list[dict[str, Any]], key: str) -> str:
+    """Return a table in Markdown with the numbers of outcomes and the percentage of results, by the value of a key."""
     outcomes = ["result", "told", "own error", *FINDINGS]
     counts: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
-    for row in found:
+    for row in results:
         counts[str(row.get(key, "(not built)"))][row["outcome"]] += 1
         counts["all"][row["outcome"]] += 1
     lines = [f"| {key} | models | " + " | ".join(outcomes) + " | results |", "| --- " * (3 + len(outcomes)) + "|"]
@@ -112,15 +112,15 @@ def table(found: list[dict[str, Any]], key: str) -> str:
 
 
 def first_words(text: str) -> str:
-    """Return the beginning of a message without its numbers and names, for counting."""
+    """Return the beginning of a message with asterisks in place of numbers and names, so that equal messages are counted."""
     words = ["*" if any(sign.isdigit() or sign in "'\"" for sign in word) else word for word in text.split()]
     return " ".join(words[:14])
 
 
-def summary(found: list[dict[str, Any]]) -> str:
+def summary(results: list[dict[str, Any]]) -> str:
     """Return all tables, the errors by their first words, and the findings."""
-    parts = [table(found, key) for key in ("kinematics", "family", "formulation", "pairs", "words")]
-    errors = [row for row in found if row["outcome"] == "own error"]
+    parts = [table(results, key) for key in ("kinematics", "family", "formulation", "pairs", "words")]
+    errors = [row for row in results if row["outcome"] == "own error"]
     by_text: dict[str, list[int]] = collections.defaultdict(list)
     for row in errors:
         by_text[first_words(row["text"])].append(row["seed"])
@@ -142,16 +142,16 @@ def summary(found: list[dict[str, Any]]) -> str:
         "said again",
     )
     for name in names:
-        row = max(found, key=lambda one: one.get(name, 0.0))
+        row = max(results, key=lambda outcome: outcome.get(name, 0.0))
         worst.append(f"{name} {row.get(name, 0.0):.2g} (seed {row['seed']})")
     findings = [
-        f"seed {row['seed']}: {row['outcome']}: {row['text'][:300]}" for row in found if row["outcome"] in FINDINGS
+        f"seed {row['seed']}: {row['outcome']}: {row['text'][:300]}" for row in results if row["outcome"] in FINDINGS
     ]
     return "\n\n".join([*parts, "\n".join(lines), "largest: " + ", ".join(worst), "\n".join(findings)])
 
 
 def show(seed: int) -> None:
-    """Print one model in words, and how it ends."""
+    """Print the description of a model and its outcome."""
     from drawing import drawn
     from outcome import outcome
 
@@ -175,24 +175,25 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--limit", type=float, default=120.0, help="seconds for one model")
     parser.add_argument("--json", type=Path)
-    given = parser.parse_args()
-    seeds = given.seed or list(range(given.first, given.first + given.count))
-    if given.show:
+    options = parser.parse_args()
+    seeds = options.seed or list(range(options.first, options.first + options.count))
+    if options.show:
         for seed in seeds:
             show(seed)
         return 0
-    begin, found = time.perf_counter(), []
-    for row in rows(seeds, given.workers, given.limit):
-        found.append(row)
+    begin, results = time.perf_counter(), []
+    for row in rows(seeds, options.workers, options.limit):
+        results.append(row)
         if row["outcome"] in FINDINGS:
             print(f"seed {row['seed']}: {row['outcome']}: {row['text'][:200]}", flush=True)
-        if given.json and (len(found) % 20 == 0 or len(found) == len(seeds)):
-            given.json.write_text(json.dumps(found, indent=0, default=str))
-    print(summary(found))
+        if options.json and (len(results) % 20 == 0 or len(results) == len(seeds)):
+            options.json.write_text(json.dumps(results, indent=0, default=str))
+    print(summary(results))
     print(
-        f"{len(found)} models, {sum(row.get('seconds', 0.0) for row in found):.0f} CPU s, {time.perf_counter() - begin:.0f} s"
+        f"{len(results)} models, {sum(row.get('seconds', 0.0) for row in results):.0f} CPU s, "
+        f"{time.perf_counter() - begin:.0f} s"
     )
-    return 1 if any(row["outcome"] in FINDINGS for row in found) else 0
+    return 1 if any(row["outcome"] in FINDINGS for row in results) else 0
 
 
 if __name__ == "__main__":

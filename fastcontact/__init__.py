@@ -18,7 +18,7 @@ os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
 
 logging.getLogger(__name__).addHandler(logging.NullHandler())  # no output unless the user configures logging
 
-# Public modules, and public names by the module that defines them. Type checkers read `__init__.pyi`.
+# Modules by their public names, and public names by the module that defines them. Type checkers read `__init__.pyi`.
 _MODULES = {
     "analytic": "analytic",
     "generate": "mesh.generate",
@@ -63,19 +63,19 @@ _NAMES = {
     "studies.error_norms": ("ErrorEstimate", "ErrorNorms", "error_against", "estimate_error"),
     "studies.runs": ("convergence_study", "parameter_sweep"),
 }  # fmt: skip
-_HOME = {name: module for module, names in _NAMES.items() for name in names}
-__all__ = sorted([*_HOME, *_MODULES])
+_MODULE_OF = {name: module for module, names in _NAMES.items() for name in names}
+__all__ = sorted([*_MODULE_OF, *_MODULES])
 
 
 def __getattr__(name: str) -> Any:
-    if name in _HOME:
-        value = getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+    if name in _MODULE_OF:
+        value = getattr(importlib.import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
     elif name in _MODULES:
         value = importlib.import_module(f"{__name__}.{_MODULES[name]}")
     else:
-        from fastcontact.errors import names_of
+        from fastcontact.errors import getattr_and_dir
 
-        return names_of(__name__, __all__)[0](name)
+        return getattr_and_dir(__name__, __all__)[0](name)
     globals()[name] = value
     return value
 

@@ -1,4 +1,4 @@
-"""``python -m fastcontact``."""
+"""Entry point of ``python -m fastcontact``."""
 
 from fastcontact.cli import entry_point
 

@@ -1,4 +1,4 @@
-"""Types of arrays, their norm, and a test for masked entries, which most functions of NumPy would treat as valid numbers."""
+"""Types of arrays, the maximum norm, and a test for masked entries, which most functions of NumPy treat as valid numbers."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Numbers: TypeAlias = NDArray[np.int32]
 AnyArray: TypeAlias = NDArray[Any]
 
 # End of the error message about an argument with masked entries.
-REFUSAL = "has entries that are masked, and masks are not kept: fill them first, or leave them out"
+REFUSAL = "has masked entries, which are not supported: fill or remove them"
 
 
 def largest(x: Array) -> float:
-    """Return the largest ``|x|``, 0 for an empty array; NaN if an entry is NaN."""
+    """Return the maximum norm of an array: the largest ``|x|``, 0 for an empty array, and NaN if an entry is NaN."""
     return float(max(x.max(initial=0.0), -x.min(initial=0.0)))
 
 

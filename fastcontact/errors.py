@@ -99,10 +99,11 @@ def warn(text: str) -> None:
 
 
 LONGEST_NAME = 120  # largest number of characters of an unknown name in a message
-SHOWN = 20  # largest number of known names in the message about an unknown one
+MAX_SHOWN = 20  # largest number of known names in the message about an unknown one
 # Smallest similarity ratio (difflib) of a name that is suggested; that of "loads" and "nodes" is 0.6.
-SIMILAR = 0.65
-# Names in fastcontact, separated by blanks, by the names that other programs or other parts of fastcontact use.
+SIMILARITY = 0.65
+# Names in fastcontact, separated by blanks, by words that users may know from other programs or from other parts of
+# fastcontact.
 OTHER_WORDS = {
     "slave": "secondary", "master": "primary", "mu": "friction", "interference": "clearance", "gap": "clearance",
     "h": "coefficient", "k": "coefficient", "plane": "half_space", "circle": "sphere", "ball": "sphere",
@@ -141,14 +142,14 @@ def nearest(name: str, known: Collection[str]) -> list[str]:
     synonyms = OTHER_WORDS.get(name.rpartition(".")[2].casefold(), "").casefold().replace("_", "").split()
     without_underscores = {key.replace("_", ""): candidate for key, candidate in reversed(folded.items())}
     similar = [candidate for key, candidate in without_underscores.items() if key.rpartition(".")[2] in synonyms]
-    similar = similar or [exact[key] for key in difflib.get_close_matches(name, exact, n=3, cutoff=SIMILAR)]
+    similar = similar or [exact[key] for key in difflib.get_close_matches(name, exact, n=3, cutoff=SIMILARITY)]
     name = name.casefold()
-    similar = similar or [folded[key] for key in difflib.get_close_matches(name, folded, n=3, cutoff=SIMILAR)]
+    similar = similar or [folded[key] for key in difflib.get_close_matches(name, folded, n=3, cutoff=SIMILARITY)]
     return similar or [folded[key] for key in reversed(folded) if len(name) > 2 and name in key][:3]
 
 
 def no_attribute(owner: str, name: str, known: Collection[str]) -> AttributeError:
-    """Return the AttributeError for a name that an `owner`, such as "module 'x'", lacks, with similar known names."""
+    """Return the AttributeError for a missing attribute, with similar known names; `owner` is a text like "module 'x'"."""
     text = f"{owner} has no attribute '{name}'"
     public = {"fastcontact": "fastcontact", "fastcontact.mesh.generate": "fastcontact.generate"}
     owners = [public[module] for module in public if name in getattr(sys.modules.get(module), "__all__", ())]
@@ -165,20 +166,21 @@ class Suggesting:
     if not TYPE_CHECKING:  # hidden from type checkers, which report unknown names themselves
 
         def __getattr__(self, name: str) -> object:
-            # Tools such as IPython look up private names, and a name of the class is missing only if its property fails.
+            # Tools such as IPython look up private names. An attribute of the class is missing only if its property has
+            # raised an AttributeError, which the second lookup raises again.
             if name.startswith("_") or hasattr(type(self), name):
                 return object.__getattribute__(self, name)
             public = [attribute for attribute in dir(self) if not attribute.startswith("_")]
             raise no_attribute(f"'{type(self).__name__}' object", name, public)
 
 
-def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
+def getattr_and_dir(module: str, known: list[str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
     """Return ``__getattr__`` and ``__dir__`` for the module called `module` with the public names `known`."""
 
-    def missing(name: str) -> object:
+    def attribute(name: str) -> object:
         raise AttributeError(name) if name.startswith("_") else no_attribute(f"module '{module}'", name, known)
 
-    return missing, lambda: known
+    return attribute, lambda: known
 
 
 def check_known(
@@ -190,12 +192,12 @@ def check_known(
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    """Return the message about an unknown name, with similar known names or, if none is similar, the first known names."""
+    """Return the message about an unknown name, with similar known names or, if there are none, the first known names."""
     names, name = sorted(known), str(name)
     name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     if not names:
-        return f"unknown {kind} '{name}': there is none here"
+        return f"unknown {kind} '{name}': none is defined"
     if similar := nearest(name, names):
         return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in similar) + "?"
-    listed = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
+    listed = ", ".join(names[:MAX_SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > MAX_SHOWN else "")
     return f"unknown {kind} '{name}': expected one of {listed}"

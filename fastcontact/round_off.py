@@ -1,4 +1,4 @@
-"""Relative tolerances for round-off, up to which values are treated as zero, and related constants."""
+"""Relative tolerances for round-off, below which values are treated as zero, and related constants."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ def pytest_configure(config: pytest.Config) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
         prepare_workers(whole=config.args_source is pytest.Config.ArgsSource.TESTPATHS)
-    ahead.MOST = 0  # processes that compile ahead of a run would do so for each worker
+    ahead.MAX_HELPERS = 0  # processes that compile ahead of a run would do so for each worker
     interpreting.SECONDS = -1.0  # what is tested are compiled kernels
     if config.getoption("--linear-solver"):
         config.addinivalue_line("filterwarnings", "ignore:multigrid gave up")
@@ -62,7 +62,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def prepare_workers(whole: bool) -> None:
     """Give each worker one processor; where all tests run on an empty cache, compile kernels that all workers need."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    folder = cache.folder_of()
+    folder = cache.cache_folder()
     if whole and folder and decorators.compiled() and not any(folder.glob("*.nbc")):
         nonlinear = subprocess.Popen([sys.executable, "-c", NONLINEAR], cwd=ROOT)
         atexit.register(nonlinear.kill)

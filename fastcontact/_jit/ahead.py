@@ -1,10 +1,10 @@
 """Compilation of kernels ahead of the run that needs them, in parallel helper processes.
 
-`kernels.json`, which ``python bench/kernels.py`` writes, lists the kernels that the usual kinds of runs call, with the types
-of their arguments, in the order of the calls. Helpers begin with the kernels that cannot run in Python (`interpreting`), and
-report which kernel they are compiling. While a helper compiles a kernel that the run needs, the run compiles kernels that no
-helper has begun and reports them to the helpers, or waits. A kernel that is missing in the table, or listed with outdated
-types, is compiled in the run.
+`kernels.json`, which ``python bench/kernels.py`` writes, is a table of the kernels that the usual kinds of runs call, with
+the types of their arguments, in the order of the calls. Helpers begin with the kernels that cannot run in Python (see
+`interpreting`), and report which kernel they are compiling. If the run needs a kernel that a helper is compiling, it
+meanwhile compiles kernels that no helper has begun, and reports them to the helpers. If there are none, it waits. A kernel
+that is missing in the table, or listed with outdated types, is compiled by the run.
 """
 
 from __future__ import annotations
@@ -33,34 +33,34 @@ from fastcontact._jit import compiling, decorators
 TABLE = Path(__file__).with_name("kernels.json")
 ROOT = Path(__file__).resolve().parents[2]
 # Largest number of helpers of a run, each of which takes the memory of Python with Numba.
-MOST = 3
-# Largest number of uncompiled kernels for which no helpers start, because they would take longer.
-ALONE = 2
-# Kinds of runs whose kernels helpers of this process have compiled, so that later runs need no helpers.
-_helped: set[str] = set()
+MAX_HELPERS = 3
+# Largest number of uncompiled kernels that the run compiles without helpers, whose start would take longer.
+MAX_UNHELPED = 2
+# Kinds of runs for which this process has already started helpers, so that later runs need none.
+_runs_with_helpers: set[str] = set()
 
 
 @cache
 def table() -> dict[str, Any]:
-    """Return ``{"kernels": [[module, name, [type, ...]], ...], "runs": {name: [[number, ...], [number, ...]]}}``.
+    """Return the table ``{"kernels": [[module, name, [type, ...]], ...], "runs": {name: [[number, ...], [number, ...]]}}``.
 
-    The second list of a run contains the kernels that may run in Python instead.
+    The two lists of a run contain the numbers of the kernels that must be compiled and of those that may run in Python.
     """
     content: dict[str, Any] = json.loads(TABLE.read_text(encoding="utf-8"))
     return content
 
 
-def compiled_of(runs: Sequence[str]) -> list[int]:
+def required_kernels(runs: Sequence[str]) -> list[int]:
     """Return the numbers of the kernels that must be compiled for some kinds of runs, by default for all kinds."""
     by_run = table()["runs"]
     return list(dict.fromkeys(number for run in runs or by_run for number in by_run.get(run, [[]])[0]))
 
 
-def kernels_of(runs: Sequence[str]) -> list[int]:
-    """Return the numbers of `compiled_of`, followed by those of the kernels that may run in Python."""
+def kernel_numbers(runs: Sequence[str]) -> list[int]:
+    """Return the numbers of all kernels of some kinds of runs; those that may run in Python are last."""
     by_run = table()["runs"]
     others = [number for run in runs or by_run for number in by_run.get(run, [[], []])[1]]
-    return list(dict.fromkeys([*compiled_of(runs), *others]))
+    return list(dict.fromkeys([*required_kernels(runs), *others]))
 
 
 def numba_type(entry: Any) -> Any:
@@ -92,15 +92,15 @@ def compile_kernel(number: int) -> None:
     getattr(importlib.import_module(module), name).compile(tuple(map(numba_type, signature)))
 
 
-def _is_kept(number: int) -> bool:
-    """Return whether a compiled version of a kernel of the table, for any types of arguments, is on disk."""
+def _is_cached(number: int) -> bool:
+    """Return whether the disk cache contains a kernel of the table, for any types of arguments."""
     module, name, _ = table()["kernels"][number]
     files = kernel_files.files.get(getattr(importlib.import_module(module), name).py_func)
     return files is not None and files.exist()
 
 
 def _file_name(number: int) -> str:
-    """Return the beginning of the file name of a kernel of the table."""
+    """Return the beginning of the name of the cache file of a kernel of the table."""
     module, name, _ = table()["kernels"][number]
     return f"{module.rpartition('.')[2]}.{name}"
 
@@ -132,8 +132,8 @@ def _end(processes: list[subprocess.Popen[str]]) -> None:
         process.wait()
 
 
-class Help:
-    """Communication of a run with its helpers.
+class Helpers:
+    """Helper processes of a run, with the kernels that they are compiling and those that no process has begun.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class Help:
     """
 
     def __init__(self, runs: Sequence[str], processes: list[subprocess.Popen[str]]) -> None:
-        self._processes, self._left, self._needed = processes, kernels_of(runs), compiled_of(runs)
+        self._processes, self._not_begun, self._needed = processes, kernel_numbers(runs), required_kernels(runs)
         self._current: dict[int, int] = {}  # kernel being compiled by each helper
         self._changed = threading.Condition()
         for number in range(len(processes)):
@@ -154,16 +154,16 @@ class Help:
         """Record the reports of a helper until it ends."""
         lines = self._processes[number].stdout
         for line in lines or ():
-            self._note(number, int(line))
-        self._note(number, None)
+            self._record(number, int(line))
+        self._record(number, None)
 
-    def _note(self, helper: int, kernel: int | None) -> None:
+    def _record(self, helper: int, kernel: int | None) -> None:
         """Record the kernel that a helper has begun, or None for a helper that has ended."""
         with self._changed:
             self._current.pop(helper, None)
             if kernel is not None:
                 self._current[helper] = kernel
-                self._left = [other for other in self._left if other != kernel]
+                self._not_begun = [other for other in self._not_begun if other != kernel]
             self._changed.notify_all()
 
     def wait(self, name: str) -> bool:
@@ -175,52 +175,52 @@ class Help:
         with self._changed:
             in_progress = [(helper, kernel) for helper, kernel in self._current.items() if _file_name(kernel) == name]
         for helper, kernel in in_progress:
-            compiling.tell()
+            compiling.announce()
             while self._current.get(helper) == kernel and self._compile_next():
                 pass
             with self._changed:
                 while self._current.get(helper) == kernel:
                     self._changed.wait()
         if not in_progress:
-            self._take([number for number in self._left if _file_name(number) == name])
+            self._claim([number for number in self._not_begun if _file_name(number) == name])
         return bool(in_progress)
 
     def _compile_next(self) -> bool:
-        """Compile a needed kernel that no helper has begun; return whether there was one."""
-        numbers = [number for number in self._left if number in self._needed][:1]
-        self._take(numbers)
+        """Compile a required kernel that no helper has begun; return whether there was one."""
+        numbers = [number for number in self._not_begun if number in self._needed][:1]
+        self._claim(numbers)
         for number in numbers:
             compile_kernel(number)
         return bool(numbers)
 
-    def _take(self, numbers: list[int]) -> None:
+    def _claim(self, numbers: list[int]) -> None:
         """Report to the helpers which kernels this process compiles."""
         with self._changed:
-            self._left = [number for number in self._left if number not in numbers]
+            self._not_begun = [number for number in self._not_begun if number not in numbers]
         for process, number in itertools.product(self._processes, numbers):
             with contextlib.suppress(OSError):  # the helper has ended
                 print(number, file=process.stdin, flush=True)
 
 
 def expect(runs: Sequence[str]) -> None:
-    """Let helpers compile the kernels of some kinds of runs once this process has lacked more than `ALONE` kernels.
+    """Let helpers compile the kernels of some kinds of runs as soon as more than `MAX_UNHELPED` kernels were uncompiled.
 
     Helpers start only if one of the missing kernels cannot run in Python. There are no helpers in worker processes, with a
     single thread, without a kernel cache, or if the interpreter is embedded in another program.
     """
-    new, helpers = [run for run in runs if run not in _helped], min(decorators.threads() - 1, MOST)
+    new, helpers = [run for run in runs if run not in _runs_with_helpers], min(decorators.threads() - 1, MAX_HELPERS)
     is_python = Path(sys.executable or "").stem.startswith("python")
     if not new or helpers < 1 or compiling.in_worker() or not is_python or not kernel_files.files:
         return
 
     def begin() -> None:
-        if compiling.count > ALONE and begin in compiling.helpers:
+        if compiling.count > MAX_UNHELPED and begin in compiling.helpers:
             compiling.helpers.remove(begin)
-            _helped.update(new)
-            if all(map(_is_kept, compiled_of(new))):  # the other kernels may run in Python
+            _runs_with_helpers.update(new)
+            if all(map(_is_cached, required_kernels(new))):  # the other kernels may run in Python
                 return
             with contextlib.suppress(OSError):  # without helpers, the run compiles all kernels
-                compiling.waiters.append(Help(new, start(new, helpers)).wait)
+                compiling.waiters.append(Helpers(new, start(new, helpers)).wait)
 
     compiling.helpers[:] = [begin]
     begin()
@@ -233,18 +233,18 @@ def main(arguments: Sequence[str]) -> int:
     """
     n, first, *runs = arguments
     compiled_elsewhere: set[int] = set()
-    failed = 0
+    n_failures = 0
     threading.Thread(target=lambda: compiled_elsewhere.update(map(int, sys.stdin)), daemon=True).start()
-    for number in kernels_of(runs)[int(first) :: int(n)]:
+    for number in kernel_numbers(runs)[int(first) :: int(n)]:
         print(number, flush=True)
         if number not in compiled_elsewhere:
             try:
                 compile_kernel(number)
             except Exception as error:  # the run reports the failure if it needs the kernel
-                failed += 1
+                n_failures += 1
                 reason = f"{_file_name(number)}: {type(error).__name__}: {error}"
                 print(reason.split("\n")[0], file=sys.stderr, flush=True)
-    return failed
+    return n_failures
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""Cache of compiled kernels on disk, whose files are used only if they are intact, current and the user's own.
+"""Cache of compiled kernels on disk, whose files are used only if they are undamaged, current and protected from other users.
 
-Numba identifies a kernel by the time and the size of its source file alone, trusts any file in its cache, and fails if a file
-is damaged. Here the file name contains a digest of all sources on which the kernel depends, so that kernels stay valid when
-the same version is installed again. A file ends with its checksum, so that damage only costs a compilation.
+Numba identifies a kernel only by the time and the size of its source file, executes any file in its cache, and fails if a
+file is damaged. Here the file name contains a digest of all sources on which the kernel depends, so that kernels remain valid
+when the same version is installed again. A file ends with its checksum. If it is damaged, the kernel is compiled again.
 """
 
 from __future__ import annotations
@@ -55,19 +55,19 @@ class _Unpickler(pickle.Unpickler):
 
 
 def _environment(module: str, constants: list[Any], name: str) -> Any:
-    """Return the constants of a compiled function as Numba keeps them, by the name of the function."""
-    known = lookup_environment(name)
-    if known is None:
+    """Return the Numba environment of a compiled function, which contains its constants, by the name of the function."""
+    environment = lookup_environment(name)
+    if environment is None:
         names = {"__name__": module} if module.startswith("numba.") else vars(importlib.import_module(module))
-        known = Environment(names)
-        known.consts[:] = constants
-        known.env_name = name
-        Environment._memo[name] = known
-    return known
+        environment = Environment(names)
+        environment.consts[:] = constants
+        environment.env_name = name
+        Environment._memo[name] = environment
+    return environment
 
 
 class KernelFiles(_Cache):  # type: ignore[misc]
-    """Files of the compiled versions of a kernel, in place of Numba's cache, which searches a folder for each kernel.
+    """Files of the compiled versions of a kernel, which replace the cache of Numba.
 
     If a file cannot be used, the reason is logged once, in one line, and the kernel is compiled.
 
@@ -119,8 +119,8 @@ class KernelFiles(_Cache):  # type: ignore[misc]
             pass
         try:
             with open(path, "rb") as file:
-                if not _is_own(os.fstat(file.fileno())):
-                    _log_once(f"others may write to the compiled kernel '{path}'")
+                if not _is_protected(os.fstat(file.fileno())):
+                    _log_once(f"other users may write to the compiled kernel '{path}'")
                     return None
                 content = file.read()
             if _digest(content[:-DIGEST]).encode() == content[-DIGEST:]:
@@ -141,7 +141,7 @@ class KernelFiles(_Cache):  # type: ignore[misc]
             temporary.write_bytes(content + _digest(content).encode())
             os.replace(temporary, path)
         except OSError as error:
-            _log_once(f"compiled kernels cannot be kept in '{path.parent}' ({error.strerror or error})")
+            _log_once(f"compiled kernels cannot be stored in '{path.parent}' ({error.strerror or error})")
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
 
@@ -156,26 +156,29 @@ class KernelFiles(_Cache):  # type: ignore[misc]
 
     @cached_property
     def version(self) -> str:
-        """The name, with a digest of everything that determines the machine code except signature and processor."""
+        """Name of the kernel with a digest of everything except signature and processor that determines its machine code."""
         environment = {name: getattr(numba.config, name, None) for name in OPTIONS}
         settings = [__version__, numba.__version__, llvmlite.__version__, sys.version, self._options, repr(environment)]
         dependencies = "\n".join([*settings, *sorted(set(_sources(self._function, set())))])
         return f"{self._name}.{_digest(dependencies.encode())[:24]}"
 
 
-# Files of all cached kernels, by their Python functions.
+# Cache files of kernels, by their Python functions.
 files: dict[Any, KernelFiles] = {}
 
 
-def keep(kernel: Any, function: Callable[..., Any], options: str) -> str:
-    """Let a kernel, which is compiled with `options`, use `KernelFiles`; return the reason if this is impossible."""
+def attach_cache(kernel: Any, function: Callable[..., Any], options: str) -> str:
+    """Store the compiled versions of a kernel in `KernelFiles`.
+
+    Returns the reason if this is impossible, otherwise an empty string. `options` are those of the compilation.
+    """
     if not hasattr(kernel, "_cache"):
         return ""  # compilation is disabled
-    folder = folder_of()
+    folder = cache_folder()
     if folder is None:
         return "no writable folder for compiled kernels"
     if not is_trusted(folder):
-        return f"others may write to the folder of compiled kernels, {folder}"
+        return f"other users may write to the folder of compiled kernels, {folder}"
     name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
     files[function] = kernel._cache = KernelFiles(folder, name, function, options)
     return ""
@@ -188,7 +191,7 @@ def _versions(folder: Path, changed: int) -> set[str]:
 
 
 @cache
-def folder_of() -> Path | None:
+def cache_folder() -> Path | None:
     """Return the folder of compiled kernels in NUMBA_CACHE_DIR, in the user's cache or in the package; None if read-only."""
     configured = str(getattr(numba.config, "CACHE_DIR", ""))
     if configured:
@@ -212,16 +215,16 @@ def folder_of() -> Path | None:
 
 @cache
 def is_trusted(folder: Path) -> bool:
-    """Return whether only the user of this process and root can write to a folder, since its files are executed.
+    """Return whether only the user of this process and root can write to a folder, whose files are executed.
 
-    The group of the process, which on many systems contains its user only, may write as well.
+    The group of the process, which on many systems contains only its user, may also write.
     """
     folder.mkdir(parents=True, exist_ok=True)
     parent = os.stat(folder.parent)  # users who may write to it could replace the folder
-    return _is_own(os.stat(folder)) and (bool(parent.st_mode & stat.S_ISVTX) or _is_own(parent))
+    return _is_protected(os.stat(folder)) and (bool(parent.st_mode & stat.S_ISVTX) or _is_protected(parent))
 
 
-def _is_own(status: os.stat_result) -> bool:
+def _is_protected(status: os.stat_result) -> bool:
     """Return whether a file belongs to the user of this process or to root, and others cannot write to it."""
     if not hasattr(os, "getuid"):
         return True
@@ -245,9 +248,10 @@ def _digest_of_file(path: str) -> str:
 
 
 def _sources(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
-    """Yield the sources on which a function depends, with the kernels and intrinsics that it calls.
+    """Yield the sources on which the machine code of a function depends.
 
-    These are the digests of their files, and the constants that are compiled into them.
+    These are the digests of the files of the function and of the kernels and intrinsics that it calls, and the constants that
+    are compiled into them.
     """
     code = function.__code__
     if code in seen:
@@ -256,7 +260,8 @@ def _sources(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
     yield _digest_of_file(code.co_filename)
     for name in code.co_names:
         value = function.__globals__.get(name)
-        called = getattr(value, "py_func", None) or getattr(value, "_defn", None)  # of a kernel, of an intrinsic
+        # `py_func` is the function of a kernel, and `_defn` that of an intrinsic.
+        called = getattr(value, "py_func", None) or getattr(value, "_defn", None)
         if called is not None:
             yield from _sources(called, seen)
         elif isinstance(value, CONSTANTS):

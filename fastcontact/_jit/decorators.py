@@ -20,11 +20,12 @@ from fastcontact._jit import cache, compiling, interpreting
 
 log = logging.getLogger("fastcontact")
 
-# Arithmetic is done as written, without fused multiply-add. A kernel that others call is compiled once separately and once as
-# a part of each of them, with different optimisations, and which of the copies runs depends on what was compiled or loaded
-# before. Their results are bitwise identical only if the result of each operation is unique.
+# Operations are executed as written, without fused multiply-add. A kernel that is called by other kernels exists in several
+# copies, one compiled separately and one inside each caller, with different optimisations. Which copy runs depends on the
+# kernels that were compiled or loaded before. Without these flags, the results of all copies are bitwise identical.
 AS_WRITTEN: set[str] = set()
-# Flags that permit vectorised sums, for kernels that neither call others nor are called, so that only one copy exists.
+# Flags that permit vectorised sums, for kernels of which only one copy exists, because they neither call other kernels nor
+# are called by them.
 ANY_ORDER = {"contract", "reassoc"}
 
 _cache_reported = False
@@ -36,7 +37,7 @@ class _Compilations(event.Listener):  # type: ignore[misc]
     Garbage collection is suspended during a compilation, because 60 collections would take a tenth of its time.
     """
 
-    depth = 0  # of nesting, since the compilation of a kernel includes that of the kernels it calls
+    depth = 0  # nesting depth: the compilation of a kernel includes those of the kernels that it calls
     collects = True
 
     def on_start(self, raised_event: Any) -> None:
@@ -62,7 +63,7 @@ _threads = int(getattr(numba.config, "NUMBA_NUM_THREADS", 1))
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile `function` lazily in nopython mode, with the disk cache if available."""
+    """Compile `function` in nopython mode at its first call, with the disk cache if it is available."""
     return _compile(function)
 
 
@@ -103,7 +104,8 @@ def _compile(function: Callable[..., Any], fastmath: set[str] = AS_WRITTEN, **in
     options["no_cfunc_wrapper"] = True  # an unused second entry point for C
     options |= inlining
     dispatcher = numba.njit(**options)(function)
-    reason = cache.keep(dispatcher, function, repr(options | {"fastmath": sorted(fastmath)}))  # sets are unordered
+    # The flags are sorted, because the order of a set is arbitrary.
+    reason = cache.attach_cache(dispatcher, function, repr(options | {"fastmath": sorted(fastmath)}))
     global _cache_reported
     if reason and not _cache_reported:
         _cache_reported = True

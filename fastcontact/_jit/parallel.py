@@ -19,8 +19,8 @@ from fastcontact.arrays import AnyArray
 Result = TypeVar("Result")
 Item = TypeVar("Item")
 Parameters = ParamSpec("Parameters")
-# Work, counted in nodes, up to which waking other threads (0.03 ms) costs more than they save; default number of nodes of a
-# cell; and largest number of threads.
+# Largest amount of work, counted in nodes, that a single thread completes sooner than several, since waking them takes
+# 0.03 ms; default number of nodes of a cell; and largest number of threads.
 WORTHWHILE, NODES = 80_000, 4
 MOST = 255
 
@@ -36,14 +36,14 @@ if hasattr(os, "register_at_fork"):
 
 
 def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    """Return the results of a function for all items: the first in this thread, each other one in another thread."""
+    """Return the results of a function for all items, of which this thread computes the first and others one each."""
     if len(items) == 1:
         return [function(items[0])]
     others = [_pool().submit(function, item) for item in items[1:]]
     try:
         first = function(items[0])
     finally:
-        wait(others)  # they use the arguments of this call, also if the first item fails
+        wait(others)  # also after an error, because other threads still use the arguments of this call
     return [first, *(other.result() for other in others)]
 
 
@@ -69,8 +69,8 @@ def _libraries() -> Any:
 def on_one_blas_thread(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     """Limit BLAS to one thread while a function runs.
 
-    Further threads would spin between the small calls of a contact iteration. Besides, the number of threads determines the
-    order of summation and thus the round-off of results.
+    Further threads would spin between the small calls of a contact iteration. The number of threads would also determine the
+    order of summation, on which the round-off errors of results depend.
     """
 
     @wraps(function)

@@ -1,1 +1,1 @@
-"""Common tools: checks of arguments, tables for notebooks, paths, packed data, safe reading of HDF5 and TOML."""
+"""Common tools: checks of arguments, tables for notebooks, paths, serialisation, and safe reading of HDF5 and TOML."""

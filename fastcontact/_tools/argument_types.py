@@ -54,12 +54,12 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
     """Return a function that calls `call` after a check of the arguments; errors call it `name`."""
 
     @functools.wraps(call)
-    def checking(*args: Any, **kwargs: Any) -> Any:
+    def wrapper(*args: Any, **kwargs: Any) -> Any:
         signature = _signature(call)
         try:
             values, annotations = signature.bind(*args, **kwargs).arguments, types_of(call)
         except TypeError:
-            raise _refusal(call, signature, _called(call, name, args), args, kwargs) from None
+            raise _argument_error(call, signature, _public_name(call, name, args), args, kwargs) from None
         for key, value in values.items():
             parameter = signature.parameters[key]
             annotation = annotations.get(key, Any)
@@ -74,12 +74,13 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
                 members = {key: value}
             for argument, member in members.items():
                 if is_masked(member) or not fits(member, annotation):
-                    check_type(f"the argument {argument} of {_called(call, name, args)}", member, annotation, error)
+                    called = _public_name(call, name, args)
+                    check_type(f"the argument {argument} of {called}", member, annotation, error)
         return call(*args, **kwargs)
 
     if any(str(annotation).startswith("Unpack[") for annotation in call.__annotations__.values()):
-        checking.__signature__ = _named(_signature(call), call)  # type: ignore[attr-defined]
-    return checking
+        wrapper.__signature__ = _help_signature(_signature(call), call)  # type: ignore[attr-defined]
+    return wrapper
 
 
 _signature = functools.cache(inspect.signature)
@@ -91,10 +92,10 @@ COMPONENTS = {"components": ["x", "y"], "tensor_components": ["xx", "yy"], "mome
 VECTORS = ("the argument motion ", "the argument force ")
 
 
-def _refusal(
-    call: Callable[..., Any], signature: inspect.Signature, called: str, args: tuple[Any, ...], kwargs: dict[str, Any]
-) -> TypeError:
-    """Return Python's error for missing, unknown and misplaced arguments, with the public name `called` of the function.
+def _argument_error(
+    call: Callable[..., Any], signature: inspect.Signature, public_name: str, args: tuple[Any, ...], kwargs: dict[str, Any]
+) -> TypeError:  # fmt: skip
+    """Return Python's error for missing, unknown and misplaced arguments, in which the function is called `public_name`.
 
     For an unknown argument, the message suggests similar ones.
     """
@@ -106,25 +107,25 @@ def _refusal(
         components = next((COMPONENTS.get(p.name, []) for p in parameters if p.kind is p.VAR_KEYWORD), [])
         example = ", ".join(f"{key}=..." for key in (required or components or keywords)[:3])
         names = ", ".join([p.name for p in positional if p.name != "self"]) or "nothing"
-        return TypeError(f"{called} takes {names} by position and all other arguments by keyword: write {example}")
+        return TypeError(f"{public_name} takes {names} by position and all other arguments by keyword: write {example}")
     try:
         call(*args, **kwargs)
     except TypeError as failure:
-        text = str(failure).replace(f"{call.__qualname__}()", f"{called}()", 1)
+        text = str(failure).replace(f"{call.__qualname__}()", f"{public_name}()", 1)
         missing = [key for key in signature.parameters if f"'{key}'" in text]
         others = {key: nearest(key, missing) for key in kwargs if key not in signature.parameters}
-        meant = [f"{near[0]} instead of {key}" for key, near in others.items() if near]
-        text += f": write {' and '.join(meant)}" * bool(meant)
-        if wrong := text.partition("unexpected keyword argument '")[2].partition("'")[0]:
+        corrections = [f"{near[0]} instead of {key}" for key, near in others.items() if near]
+        text += f": write {' and '.join(corrections)}" * bool(corrections)
+        if unknown_key := text.partition("unexpected keyword argument '")[2].partition("'")[0]:
             text = text.partition(". Did you mean")[0]  # Python 3.13 suggests a name, too
             valid = [key for key in signature.parameters if key != "self"]
-            similar = " or ".join(map(repr, nearest(wrong, valid)))
+            similar = " or ".join(map(repr, nearest(unknown_key, valid)))
             text += f": did you mean {similar}?" if similar else f": expected one of {', '.join(valid)}"
         return TypeError(text)
-    raise AssertionError(called)
+    raise AssertionError(public_name)
 
 
-def _named(signature: inspect.Signature, call: Callable[..., Any]) -> inspect.Signature:
+def _help_signature(signature: inspect.Signature, call: Callable[..., Any]) -> inspect.Signature:
     """Return the signature for `help`, in which the keys of an unpacked `TypedDict` are keyword arguments."""
     parameters = list(signature.parameters.values())
     (keys,) = typing.get_args(types_of(call)[parameters[-1].name])
@@ -136,8 +137,8 @@ def _named(signature: inspect.Signature, call: Callable[..., Any]) -> inspect.Si
     return signature.replace(parameters=[*parameters[:-1], *named])
 
 
-def _called(call: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:
-    """Return the name of a function, of the class of a constructor, or of a method with that of its class."""
+def _public_name(call: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:
+    """Return the name of a function or a method in messages: for a constructor that of the class."""
     owner, _, method = name.rpartition(".")
     if call.__name__ == "__init__" and args:
         return type(args[0]).__name__
@@ -145,7 +146,10 @@ def _called(call: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:
 
 
 def check_fields(owner: str, values: abc.Mapping[str, Any], kind: type, error: type[FastcontactError]) -> None:
-    """Raise `error` if a value does not have the type of the field of its name in the class `kind`; messages name `owner`."""
+    """Raise `error` if a value does not have the type of the field of the same name in the class `kind`.
+
+    `owner` is the name of the object in the message.
+    """
     annotations = {name: annotation for base in reversed(kind.__mro__) for name, annotation in types_of(base).items()}
     for name, value in values.items():
         check_type(f"{name} of {owner}", value, annotations.get(name, Any), error)
@@ -214,7 +218,7 @@ def values_at(function: Callable[..., Any], points: Any, name: str, error: type[
 
 
 class Kind(NamedTuple):
-    """Test of values for an annotated type, which does not consume iterators, and the name of the type in messages."""
+    """Test whether values have an annotated type, without consuming iterators, and the name of the type in messages."""
 
     fits: Callable[[Any], bool]
     words: str
@@ -254,7 +258,7 @@ def kind_of(annotation: Any) -> Kind:
 def _simple_test(annotation: Any, kind: Any, members: tuple[Any, ...]) -> Callable[[Any], bool]:
     """Return the test of a type without member types."""
     if kind is typing.Literal:
-        are_strings = all(isinstance(member, str) for member in members)  # whose values the functions check
+        are_strings = all(isinstance(member, str) for member in members)  # functions check the values of strings
         return lambda value: isinstance(value, str) if are_strings else value in members
     if kind is os.PathLike:
         return lambda value: isinstance(value, os.PathLike) and isinstance(os.fspath(value), str)
@@ -278,7 +282,7 @@ def _union_kind(members: tuple[Any, ...]) -> Kind:
 
 
 def _sequence_kind(kind: Any, members: tuple[Any, ...]) -> Kind:
-    """Return the test and the name of a sequence; of an array the first member is tested, and of an iterator none."""
+    """Return the test and the name of a sequence. In an array only the first member is tested, in an iterator no member."""
     kinds = [kind_of(member) for member in members if member is not ...]
     if kind is tuple and members and members[-1] is not ...:
         count = {2: "two", 3: "three"}.get(len(members), str(len(members)))

@@ -1,8 +1,8 @@
-"""Safe reading of HDF5 files from untrusted sources, and writing of HDF5 files in which write errors are Python errors.
+"""Safe reading of HDF5 files from untrusted sources, and writing of HDF5 files with write errors that Python can handle.
 
-Nothing outside a file is read, and damage is reported. All groups and data sets are checked before anything is read. Only
-numbers and strings of fixed length are read, because strings of variable length are stored in a heap of the file, and on some
-damaged heaps HDF5 never returns.
+No data outside a file are read, and damage is reported. All groups and data sets are checked before any data are read. Only
+numbers and strings of fixed length are read: strings of variable length are stored in a heap of the file, and HDF5 does not
+terminate for some damaged heaps.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.arrays import AnyArray
 from fastcontact.errors import FastcontactError, FileError
 
-# Memory limit of a data set: this size [byte], or this multiple of the size of the file if that is more. Zeros compress by a
-# factor of a thousand, but meshes and results do not.
+# The memory limit of a data set is the larger of this size [byte] and this multiple of the size of the file. A data set of
+# zeros can be compressed by a factor of a thousand, but meshes and results cannot.
 PLAUSIBLE_BYTES = 1 << 28
 PLAUSIBLE_EXPANSION = 20
-# Limit of all data sets together, in which a data set counts once per link to it.
+# Limits of the total size of all data sets, in which a data set is counted once for each link to it.
 PLAUSIBLE_IN_ALL = 1 << 30
 PLAUSIBLE_EXPANSION_IN_ALL = 100
 # Number of strings or references that a data set may have in a file of any size.
 FEW_OBJECTS = 1000
-# Largest depth of nested groups, which HDF5 visits by recursion, so that deep nesting overflows its stack.
+# Largest depth of nested groups. HDF5 visits them by recursion, and deep nesting would overflow its stack.
 DEEPEST = 64
 # Allowed kinds of data: numbers and strings of fixed length.
 PLAIN_KINDS = "iufS"
 
 
 @contextmanager
-def opened(path: PathLike) -> Iterator[Any]:
+def open_hdf5(path: PathLike) -> Iterator[Any]:
     """Open an HDF5 file for reading in a ``with`` block; any error in the block due to damage becomes a FileError."""
     import h5py
 
@@ -49,14 +49,15 @@ def opened(path: PathLike) -> Iterator[Any]:
     except (FastcontactError, Warning):
         raise
     except Exception as error:  # damage can cause any exception
-        raise FileError(f"cannot read '{path}', it is damaged or incomplete: write it anew") from error
+        raise FileError(f"cannot read '{path}', it is damaged or incomplete: write it again") from error
 
 
 def check_contents(file: Any, path: PathLike) -> None:
     """Check an open HDF5 file before anything in it is read.
 
     Raises FileError if a link or the values of a data set refer to another file, if a data set needs an external filter, if
-    the data sets need more memory than plausible for a file of this size, or if groups are nested too deeply or cyclically.
+    the data sets need more memory than is plausible for a file of this size, or if groups are nested cyclically or too
+    deeply.
     """
     from h5py import h5d, h5g, h5o
     from h5py.h5l import TYPE_HARD, TYPE_SOFT
@@ -82,18 +83,18 @@ def check_contents(file: Any, path: PathLike) -> None:
                 if total > limit_in_all:
                     raise FileError(
                         f"'{path}' declares more than {limit_in_all:.3g} bytes in total, which a file of its size cannot "
-                        "hold: write it anew"
+                        "hold: write it again"
                     )
             elif isinstance(item, h5g.GroupID):
                 address = h5o.get_info(item).addr
                 if address in seen or depth >= DEEPEST:
-                    raise FileError(f"'{path}' has groups in a cycle or too deep, at '{name[:80]}': write it anew")
+                    raise FileError(f"'{path}' has cyclic or too deep groups, at '{name[:80]}': write it again")
                 seen.add(address)
                 waiting.append((item, name, depth + 1))
 
 
 def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
-    """Return the size of a data set [byte]; FileError if it is stored elsewhere or too large for its file."""
+    """Return the size of a data set [byte]. Raises FileError if it is in another file or implausibly large."""
     from h5py import h5d, h5z
 
     settings = dataset.get_create_plist()
@@ -104,20 +105,20 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
     size = count * item
     # Each string or reference becomes a Python object, and takes space in the file.
     if count > max(FEW_OBJECTS, file_size // 8) and dataset.dtype.hasobject:
-        raise FileError(f"{where} declares {count} texts or references, which its file cannot hold: write it anew")
+        raise FileError(f"{where} declares {count} texts or references, which its file cannot hold: write it again")
     if layout == h5d.CHUNKED:
         chunk = int(np.prod([int(n) for n in settings.get_chunk()], dtype=object)) * item
         built_in = (h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SZIP,
                h5z.FILTER_NBIT, h5z.FILTER_SCALEOFFSET)  # fmt: skip
         filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
-        # HDF5 would search for an unknown filter among the shared libraries of the system.
+        # HDF5 would search the shared libraries of the system for an unknown filter.
         if not set(filters) <= set(built_in):
             raise FileError(f"{where} is packed by the filter {filters[0]}, which HDF5 may lack: use gzip")
         if dataset.get_storage_size() > 2 * (size + chunk) + PLAUSIBLE_BYTES:
-            raise FileError(f"{where} is larger compressed than uncompressed: the file is damaged, write it anew")
+            raise FileError(f"{where} is larger compressed than uncompressed: the file is damaged, write it again")
         size = max(size, chunk)
     if size > limit:
-        raise FileError(f"{where} declares {size:.3g} bytes, which a file of its size cannot hold: write it anew")
+        raise FileError(f"{where} declares {size:.3g} bytes, which a file of its size cannot hold: write it again")
     return int(size)
 
 
@@ -125,7 +126,7 @@ def check_size(where: str, shape: tuple[int, ...], file: Any) -> None:
     """Raise FileError if an array of doubles assembled from a file is too large for the size of the file."""
     size = 8 * int(np.prod(shape, dtype=object))
     if size > max(PLAUSIBLE_IN_ALL, PLAUSIBLE_EXPANSION_IN_ALL * file.id.get_filesize()):
-        raise FileError(f"{where} is an array of {size:.3g} bytes, which a file of its size cannot hold: write it anew")
+        raise FileError(f"{where} is an array of {size:.3g} bytes, too many for a file of its size: write it again")
 
 
 def values(group: Any, name: str) -> AnyArray:
@@ -134,10 +135,10 @@ def values(group: Any, name: str) -> AnyArray:
 
     where = f"'{group.name}/{name}' of '{group.file.filename}'"
     if name not in group:
-        raise FileError(f"{where} is missing: the file is incomplete, write it anew")
+        raise FileError(f"{where} is missing: the file is incomplete, write it again")
     dataset = group[name]
     if not isinstance(dataset, h5py.Dataset) or dataset.dtype.base.kind not in PLAIN_KINDS:
-        raise FileError(f"{where} contains no plain numbers: the file is damaged, write it anew")
+        raise FileError(f"{where} contains no plain numbers: the file is damaged, write it again")
     return np.asarray(dataset[()])
 
 
@@ -149,16 +150,16 @@ def attribute(item: Any, name: str, default: Any = None) -> Any:
     if name not in item.attrs and default is not None:
         return default
     if item.attrs.get_id(name).dtype.base.kind not in PLAIN_KINDS:
-        raise FileError(f"'{name}' of '{item.name}' of '{item.file.filename}' is not a plain number: rewrite the file")
+        raise FileError(f"'{name}' of '{item.name}' of '{item.file.filename}' is not a plain number: write it again")
     return item.attrs[name]
 
 
 class DriverFile:
     """An existing file, with the methods that `h5py.File` calls.
 
-    The driver of HDF5 caches its output and can crash the process on a full disk, while here each write is a call of the
-    operating system. Since an exception cannot interrupt HDF5, the first error is stored, nothing is written after it, and
-    `check` raises it once HDF5 has returned.
+    The file driver of HDF5 caches its output and can crash the process on a full disk. Here each write calls the operating
+    system directly. Since an exception cannot interrupt HDF5, the first error is stored and nothing is written after it. The
+    method `check` raises the error after HDF5 has returned.
 
     Attributes
     ----------
@@ -178,7 +179,7 @@ class DriverFile:
 
     def _fail(self, error: BaseException) -> None:
         """Store the first error, without its traceback, whose frames would keep HDF5 objects open."""
-        error = error.with_traceback(None)  # also of later errors, which may be the same object
+        error = error.with_traceback(None)  # a later error may be the same object, and its traceback is removed, too
         self.failure = self.failure or error
 
     def fileno(self) -> int:

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-# Number of entries of the longest array that is shown in full.
-SHOWN = 9
+# Largest number of entries of an array that is shown in full.
+MAX_ENTRIES = 9
 
 
 def html_table(
@@ -44,6 +44,6 @@ def _text(value: Any) -> str:
     if isinstance(value, Mapping):
         return ", ".join(f"{' '.join(map(str, key))}: {number:.6g}" for key, number in value.items())
     numbers = np.atleast_1d(value)
-    if numbers.size > SHOWN:
+    if numbers.size > MAX_ENTRIES:
         return f"{numbers.size} numbers, {numbers.min():.6g} to {numbers.max():.6g}"
     return ", ".join(f"{number:.6g}" for number in numbers.ravel())

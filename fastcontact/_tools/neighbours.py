@@ -1,6 +1,6 @@
 """Nearest points and close pairs of points.
 
-SciPy's trees are used for many points only, because their import takes as long as a small run.
+The k-d trees of SciPy are used only for many points, because their import takes as long as a small run.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices
 
-# Largest number of pairs of points whose distances are all computed.
-FEW = 250_000
-# Vector of at most unit length that is parallel to no axis or diagonal of a structured mesh. The projections of two points on
-# it differ at most by the distance of the points.
-NO_AXIS = np.array([0.46, 0.5718, 0.6789])
+# Largest number of pairs of points for which all distances are computed.
+MAX_PAIRS = 250_000
+# Vector of at most unit length that is not parallel to an axis or a diagonal of a structured mesh. The projections of two
+# points onto this vector differ by at most the distance of the points.
+PROJECTION = np.array([0.46, 0.5718, 0.6789])
 
 
 def nearest(points: Array, positions: Array) -> tuple[Array, Indices]:
     """Return the distance (n,) [length] and the row (n,) of the nearest of `points` (m, dim) to `positions` (n, dim)."""
-    if len(points) * len(positions) <= FEW:
+    if len(points) * len(positions) <= MAX_PAIRS:
         squared = ((positions[:, None] - points) ** 2).sum(axis=2)
         rows = squared.argmin(axis=1)
         return np.sqrt(squared[np.arange(len(rows)), rows]), rows
@@ -32,7 +32,7 @@ def nearest(points: Array, positions: Array) -> tuple[Array, Indices]:
 
 def close_pairs(points: Array, within: float) -> Indices:
     """Return the pairs of rows (k, 2) of `points` (n, dim) [length] whose distance is at most `within` [length]."""
-    projection = points @ NO_AXIS[: points.shape[1]]
+    projection = points @ PROJECTION[: points.shape[1]]
     order = np.argsort(projection)
     near = np.diff(projection[order]) <= within
     if not near.any():
@@ -44,16 +44,17 @@ def close_pairs(points: Array, within: float) -> Indices:
 
 
 def pairs_within(points: Array, centres: Array, radii: Array) -> tuple[Indices, Indices]:
-    """Return the rows (k,) of `points` (n, dim) and of `centres` (m, dim) that are at most `radii` (m,) apart [length].
+    """Return the pairs of a point and a centre whose distance is at most the radius of the centre.
 
-    The pairs are in the order of the centres.
+    The result consists of the rows (k,) of `points` (n, dim) and the rows (k,) of `centres` (m, dim) [length], in the order
+    of the centres. `radii` (m,) are the radii [length].
     """
-    direction = NO_AXIS[: points.shape[1]]
-    of_points, of_centres = points @ direction, centres @ direction
-    order = np.argsort(of_points)
-    first = np.searchsorted(of_points[order], of_centres - radii)
-    end = np.searchsorted(of_points[order], of_centres + radii, "right")
-    if (end - first).sum() <= 8 * FEW:
+    direction = PROJECTION[: points.shape[1]]
+    point_projections, centre_projections = points @ direction, centres @ direction
+    order = np.argsort(point_projections)
+    first = np.searchsorted(point_projections[order], centre_projections - radii)
+    end = np.searchsorted(point_projections[order], centre_projections + radii, "right")
+    if (end - first).sum() <= 8 * MAX_PAIRS:
         centre = np.repeat(np.arange(len(centres)), end - first)
         point = order[np.arange(len(centre)) + np.repeat(end - np.cumsum(end - first), end - first)]
         for x, x_centre in zip(points.T, centres.T, strict=True):  # each coordinate excludes most of the other pairs

@@ -1,7 +1,7 @@
-"""Serialisation of plain data with arrays, which executes nothing on reading and detects damage.
+"""Serialisation of plain data with arrays. Reading executes no code and detects damage.
 
-The format is a line of ASCII JSON with sizes and a checksum, followed by the data as JSON with offsets in place of arrays,
-and then by the arrays.
+The format is a line of ASCII JSON with sizes and a checksum, followed by the data as JSON, with offsets in place of arrays,
+and by the arrays.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _ARRAY = "__array__"
 _KINDS = "biuf"
 
 
-def packed(data: Any) -> NDArray[np.uint8]:
+def pack(data: Any) -> NDArray[np.uint8]:
     """Return data as bytes (n,).
 
     The data consist of dictionaries with string keys, lists, strings, numbers, None and arrays of numbers.
@@ -32,10 +32,10 @@ def packed(data: Any) -> NDArray[np.uint8]:
     return np.frombuffer(head + b"\n" + body, np.uint8)
 
 
-def unpacked(values: NDArray[np.uint8]) -> Any:
-    """Return the data from the bytes (n,) that `packed` has returned; further bytes are ignored.
+def unpack(values: NDArray[np.uint8]) -> Any:
+    """Return the data from the bytes (n,) that `pack` has returned; further bytes are ignored.
 
-    Raises ValueError, LookupError or TypeError if the bytes are incomplete, or not from `packed`.
+    Raises ValueError, LookupError or TypeError if the bytes are incomplete, or not from `pack`.
     """
     buffer = np.ascontiguousarray(values, np.uint8).data
     line, separator, _ = bytes(buffer[:200]).partition(b"\n")

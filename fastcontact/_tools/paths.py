@@ -64,9 +64,9 @@ def checked_target(path: PathLike) -> Path:
 
 
 def descriptor(path: PathLike) -> int | None:
-    """Return the descriptor of this process that a path such as ``/dev/stdout`` names, or None for other paths.
+    """Return the file descriptor to which a path such as ``/dev/stdout`` refers, or None for other paths.
 
-    The path of the file behind it does not suffice, since a shell may have opened this file in append mode.
+    The path of the redirected file does not suffice, since a shell may have opened the file in append mode.
     """
     name = os.path.abspath(os.fspath(path))
     for _ in range(40):  # limit of the operating system
@@ -93,9 +93,9 @@ def _may_write(path: Path) -> bool:
 def replacing(path: PathLike) -> Iterator[Path]:
     """Yield the path of an empty temporary file beside `path`, which replaces it on success and is removed after a failure.
 
-    The file is new and its name unpredictable, so that no existing link is followed. It is synchronised to disk before it
-    replaces `path`. If `path` is a stream such as ``/dev/stdout``, the file is in a temporary folder instead, and is copied
-    to the stream. Errors of the operating system, except a broken pipe, are raised as FileError.
+    The file is new and its name is unpredictable, so that no existing link is followed. It is synchronised to disk before it
+    replaces `path`. If `path` is a stream such as ``/dev/stdout``, the file is created in a temporary folder and copied to
+    the stream. Errors of the operating system, except for a broken pipe, are raised as FileError.
     """
     if is_stream(path):
         with tempfile.TemporaryDirectory() as folder:
@@ -136,7 +136,7 @@ def _send(file: Path, stream: PathLike) -> None:
 
 
 def _synchronise(path: Path) -> None:
-    """Synchronise a file, or the entries of a folder, to disk; folders are ignored where they cannot be opened."""
+    """Synchronise a file or the entries of a folder to disk. On Windows, where folders cannot be opened, they are ignored."""
     if path.is_dir() and os.name == "nt":
         return
     descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)

@@ -1,6 +1,6 @@
 """Reading of TOML from untrusted sources in bounded time, and writing of TOML.
 
-The time of `tomllib` is quadratic in the number of parts of a dotted key, which is therefore limited.
+The number of parts of a dotted key is limited, because the time that `tomllib` takes is quadratic in this number.
 """
 
 from __future__ import annotations
@@ -10,33 +10,34 @@ import re
 import tomllib
 from typing import Any
 
-LARGEST = 1 << 23  # largest number of characters of a text
-PARTS = 50  # largest number of parts of a dotted key
+MAX_CHARACTERS = 1 << 23  # largest number of characters of a text
+MAX_PARTS = 50  # largest number of parts of a dotted key
 # Possessive quantifiers and the lookbehind avoid backtracking, so that the search is linear in the text.
-LONG_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{PARTS},}}""")
+LONG_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MAX_PARTS},}}""")
 
 
-def parsed(text: str) -> dict[str, Any]:
+def parse(text: str) -> dict[str, Any]:
     """Return the data of a text in TOML format.
 
     Raises
     ------
     ValueError
-        If the text is not TOML or longer than `LARGEST`, tables are nested too deeply, or a key has more than `PARTS` parts.
+        If the text is not TOML or longer than `MAX_CHARACTERS`, if tables are nested too deeply, or if a key has more than
+        `MAX_PARTS` parts.
     """
-    if len(text) > LARGEST:
-        raise ValueError(f"it is larger than {LARGEST >> 20} MB")
+    if len(text) > MAX_CHARACTERS:
+        raise ValueError(f"it is larger than {MAX_CHARACTERS >> 20} MB")
     if match := LONG_KEY.search(text):
         line = text.count("\n", 0, match.start()) + 1
-        raise ValueError(f"a key of more than {PARTS} parts in line {line}: no key is that long")
+        raise ValueError(f"a key of more than {MAX_PARTS} parts in line {line}: no key is that long")
     try:
         return tomllib.loads(text)
     except RecursionError:
         raise ValueError("tables or lists are nested too deeply") from None
 
 
-def written(data: Any) -> str:
-    """Return data as a text from which `parsed` recovers them; ValueError for data that TOML cannot represent."""
+def dump(data: Any) -> str:
+    """Return data as a text that `parse` can read. Raises ValueError for data that TOML cannot represent."""
     return "".join(f"{_key(name)} = {_value(value)}\n" for name, value in data.items())
 
 
@@ -54,7 +55,7 @@ def _value(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int | float):
-        return repr(value)  # with all digits, also inf and nan
+        return repr(value)  # has all digits, and is inf or nan as in TOML
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list | tuple):

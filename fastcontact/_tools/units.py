@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from fastcontact.errors import ModelError, check_known
 
-# Sizes of units in SI units, by quantity and name.
+# Values of units in SI units, by quantity and name.
 KNOWN: dict[str, dict[str, float]] = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254},
     "force": {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "lbf": 4.448222},
@@ -35,24 +35,24 @@ def named_units(units: str | Mapping[str, str]) -> dict[str, str]:
         units = dict(zip(KNOWN, names, strict=True))
     for kind, name in units.items():
         check_known("kind of unit", kind, KNOWN, ModelError)
-        for other, names_of in KNOWN.items():
-            if name in names_of and other != kind:
+        for other, known_units in KNOWN.items():
+            if name in known_units and other != kind:
                 raise ModelError(f"'{name}' is a unit of {other}, not of {kind}: give the {EXAMPLE}")
     return dict(units)
 
 
 def in_si(units: Mapping[str, str], kind: str) -> float | None:
-    """Return the size of the unit of quantity `kind` in SI units; None if the unit has no name or an unknown name."""
+    """Return the unit of the quantity `kind` in SI units; None if the unit has no name or an unknown name."""
     return KNOWN[kind].get(units.get(kind, ""))
 
 
-def misfit(units: Mapping[str, str]) -> str:
-    """Return a message if force / length^2 is not the unit of pressure.
+def inconsistency_message(units: Mapping[str, str]) -> str:
+    """Return a message if the unit of force divided by the square of the unit of length is not the unit of pressure.
 
-    The message is empty if the units are consistent, or if the size of a unit is unknown.
+    The message is empty if the units are consistent, or if one of them is unknown.
     """
-    metre, newton, pascal = (in_si(units, kind) for kind in KNOWN)
-    if metre is None or newton is None or pascal is None or 0.99 < (ratio := newton / metre**2 / pascal) < 1.01:
+    length, force, pressure = (in_si(units, kind) for kind in KNOWN)
+    if length is None or force is None or pressure is None or 0.99 < (ratio := force / length**2 / pressure) < 1.01:
         return ""
     return (
         f"the units are inconsistent: 1 {units['force']}/{units['length']}^2 is {ratio:.6g} {units['pressure']}; "

@@ -191,7 +191,7 @@ def _checked(normal: HertzLine | HertzPoint, friction: float, tangential_force: 
         raise ModelError(f"tangential_force is {T:g}: the bodies slide above friction times normal force, {limit:g}")
     beta = normal.bodies.dundurs
     if abs(beta) > 1e-12:
-        warn(f"Cattaneo-Mindlin is exact for like materials: Dundurs' beta is {beta:.4g}, not 0")
+        warn(f"Cattaneo-Mindlin theory is exact for elastically similar bodies: Dundurs' beta is {beta:.4g}, not 0")
     return f, T
 
 

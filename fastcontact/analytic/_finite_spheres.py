@@ -138,7 +138,7 @@ def finite_half_spheres(approach: float, *, R: float = 50.0, E: float = 20_000.0
     table, x = _table(), delta / R
     low, high = table[0, 0], table[-1, 0]
     if not low * (1.0 - 1e-12) <= x <= high * (1.0 + 1e-12):
-        remedy = "use hertz_point, which is close to it there" if x < low else "small strain ends about there"
+        remedy = "use hertz_point below that" if x < low else "strains are not small above that"
         raise ModelError(
             f"approach is {x:g} R: the table of finite half spheres runs from {low:g} to {high:g}; {remedy}"
         )

@@ -247,15 +247,16 @@ def _read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     try:
         if is_stream(path):
             raise CaseError(f"'{path}' is a pipe or a terminal, and a case is read more than once: save it in a file")
-        if path.stat().st_size > toml_text.LARGEST:
+        if path.stat().st_size > toml_text.MAX_CHARACTERS:
             raise CaseError(
-                f"the case file '{path}' is larger than {toml_text.LARGEST >> 20} MB: put its mesh into a separate file"
+                f"the case file '{path}' is larger than {toml_text.MAX_CHARACTERS >> 20} MB: put its mesh into a separate "
+                "file"
             )
         text = path.read_text(encoding="utf-8-sig")  # Windows editors begin files with a byte order mark
     except (OSError, ValueError) as error:  # ValueError: a null byte in the name, or text that is not UTF-8
         raise CaseError(f"cannot read the case file '{path}': {_reading_error(path, error)}") from error
     try:
-        return text, toml_text.parsed(text)
+        return text, toml_text.parse(text)
     except ValueError as error:
         raise CaseError(f"the case file '{path}' is not valid TOML: {error}") from error
 
@@ -323,7 +324,7 @@ def build_case(
 def _text(data: dict[str, Any]) -> str:
     """Return the data as the text of a case file, or an empty text if TOML cannot represent them."""
     try:
-        return toml_text.written(data)
+        return toml_text.dump(data)
     except ValueError:
         return ""
 

@@ -1,4 +1,4 @@
-"""Command line with a module for each subcommand; no other module of the package parses arguments."""
+"""Command line with one module per subcommand. No other module of the package parses arguments."""
 
 from __future__ import annotations
 
@@ -27,24 +27,24 @@ def main(argv: Sequence[str] | None = None) -> int:
 def entry_point() -> None:
     """Run the command line and exit with its code."""
     _open_standard_files()
-    # Almost all objects of a command live to its end, and their garbage collection would take a sixth of a short run.
+    # Almost all objects exist until the end of a command. Searching them for garbage would take a sixth of a short run.
     gc.set_threshold(50_000)
-    # The threads of BLAS would spin between the many small products, while the loops of the package use Numba threads.
+    # Further threads of BLAS would spin between many small products. Compiled loops have threads of their own.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         code = main()
     except SystemExit as exit_request:  # raised by --help and --version
         code = int(exit_request.code or 0)
-    from fastcontact.cli._terminal import flushed
+    from fastcontact.cli._terminal import flush_output
 
-    code = flushed(code)
+    code = flush_output(code)
     if code in STOPPED:
         for signal_code in STOPPED:  # further signals must not change the exit code
             with contextlib.suppress(ValueError):  # a platform without this signal
                 signal.signal(signal_code - 128, signal.SIG_IGN)
         sys.unraisablehook = lambda ignored: None  # hides errors in finalisers of partly created objects
     else:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # all output is written, so that Ctrl-C may end the process
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C may end the process now that all output is written
     gc.freeze()  # excludes all objects from the garbage collection at exit
     sys.exit(code)
 

@@ -1,4 +1,4 @@
-"""Declaration of command-line arguments by tables, which are converted to arguments of argparse."""
+"""Conversion of tables that declare command-line arguments to arguments of argparse."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 
-# A key is a usage, such as ``"-o --output FILE"``. Its value is the help, or a pair of the kind of the argument and the help,
-# where the kind is a type, a default value, or a dictionary of settings of argparse. A nested table is a group with its key
-# as title; the arguments of a group without a title are mutually exclusive.
+# A key of a table is the usage of an argument, such as ``"-o --output FILE"``. Its value is the help text, or a pair of the
+# kind of the argument and the help text. The kind is a type, a default value, or a dictionary of settings of argparse. A
+# nested table is a group of arguments, with its key as the title; the arguments of a group without a title are mutually
+# exclusive.
 def declare(parser: Any, table: Mapping[str, Any], **common: Any) -> None:
     """Add the arguments of a table to a parser or to an argument group; `common` are settings of all arguments."""
     for usage, entry in table.items():

@@ -1,4 +1,4 @@
-"""Handling of Ctrl-C, SIGTERM and SIGHUP, which are sent again if Python discards the exception that they raise.
+"""Handling of Ctrl-C, SIGTERM and SIGHUP, which are sent again if Python discards the exception that they cause.
 
 SIGTERM, which schedulers send, and SIGHUP, which a closing terminal sends, are handled like Ctrl-C, because by default they
 would end the process and leave incomplete files.
@@ -21,7 +21,7 @@ from types import FrameType
 from typing import Any
 
 DELAY = 0.05  # time after which a signal is sent again [s]
-# Time in which another signal is ignored as a repetition of the last one [s].
+# Time after a signal in which further signals are ignored as repetitions [s].
 REPETITION = 0.5
 HANDLERS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 if hasattr(signal, "SIGHUP"):
@@ -33,14 +33,14 @@ COMMAND_LINE = "fastcontact.cli._main"
 
 
 @contextlib.contextmanager
-def interruptible(raised: list[int] | None = None) -> Iterator[None]:
+def interruptible(received_signals: list[int] | None = None) -> Iterator[None]:
     """Let Ctrl-C, SIGTERM and SIGHUP interrupt a ``with`` block by KeyboardInterrupt, raised again if Python discards it.
 
-    The numbers of the signals received are appended to the list `raised`. Signals with a handler other than the default one
+    The numbers of the signals are appended to the list `received_signals`. Signals with a handler other than the default one
     keep it.
     """
-    times: list[float] = []  # of signals whose exception was not discarded [s]
-    raised = [] if raised is None else raised
+    times: list[float] = []  # times of the signals whose exception was not discarded [s]
+    received_signals = [] if received_signals is None else received_signals
     in_main_thread = threading.current_thread() is threading.main_thread()
     numbers = [number for number, default in HANDLERS.items() if in_main_thread and signal.getsignal(number) == default]
 
@@ -50,12 +50,12 @@ def interruptible(raised: list[int] | None = None) -> Iterator[None]:
         if _is_importing(frame):
             _send_later(number)
         else:
-            raised.append(number)
+            received_signals.append(number)
             times.append(time.monotonic())
             raise KeyboardInterrupt
 
     try:
-        with _discarded_interrupts_repeated(raised, times), restoring_interrupt(raised):
+        with _repeating_discarded_interrupts(received_signals, times), restoring_interrupt(received_signals):
             for number in numbers:
                 signal.signal(number, interrupt)
             yield
@@ -65,32 +65,32 @@ def interruptible(raised: list[int] | None = None) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def restoring_interrupt(raised: list[int]) -> Iterator[None]:
+def restoring_interrupt(received_signals: list[int]) -> Iterator[None]:
     """Raise KeyboardInterrupt if a C function has replaced the KeyboardInterrupt of a signal by another error.
 
-    `raised` contains the signals received. An error that is raised while KeyboardInterrupt is handled is genuine.
+    `received_signals` contains the numbers of signals. An error that is raised while KeyboardInterrupt is handled is genuine.
     """
     try:
         yield
     except Exception as error:
-        if raised and not isinstance(error.__context__, KeyboardInterrupt):
+        if received_signals and not isinstance(error.__context__, KeyboardInterrupt):
             raise KeyboardInterrupt from error
         raise
 
 
 @contextlib.contextmanager
-def _discarded_interrupts_repeated(raised: list[int], times: list[float]) -> Iterator[None]:
+def _repeating_discarded_interrupts(received_signals: list[int], times: list[float]) -> Iterator[None]:
     """Send a signal again if Python discards its KeyboardInterrupt; hide errors in finalisers after a signal.
 
-    `raised` contains the signals received, and `times` the times of those whose exception was not discarded.
+    `received_signals` contains the numbers of signals, and `times` the times of those whose exception was not discarded.
     """
     original = sys.unraisablehook
 
     def handle(unraisable: sys.UnraisableHookArgs) -> None:
         if issubclass(unraisable.exc_type, KeyboardInterrupt):
             times.clear()
-            _send_later(raised[-1] if raised else signal.SIGINT)
-        elif not raised:
+            _send_later(received_signals[-1] if received_signals else signal.SIGINT)
+        elif not received_signals:
             original(unraisable)
 
     sys.unraisablehook = handle
@@ -100,8 +100,8 @@ def _discarded_interrupts_repeated(raised: list[int], times: list[float]) -> Ite
         sys.unraisablehook = original
 
 
-def forget(error: BaseException | None) -> None:
-    """Release the objects that an interrupted command was creating, and hide the messages of failing finalisers."""
+def release_objects(error: BaseException | None) -> None:
+    """Release the objects that are referenced by the traceback of an error, and hide messages of failing finalisers."""
     original, sys.unraisablehook = sys.unraisablehook, lambda ignored: None
     try:
         while error is not None:

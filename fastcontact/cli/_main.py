@@ -23,14 +23,14 @@ from typing import Any
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
 from fastcontact.cli._arguments import add_verbosity, declare
-from fastcontact.cli._interrupts import EXIT_CODES, forget, interruptible, restoring_interrupt
+from fastcontact.cli._interrupts import EXIT_CODES, interruptible, release_objects, restoring_interrupt
 from fastcontact.cli._terminal import encodable, say, stderr_is_terminal, warnings_shown
 from fastcontact.errors import ConvergenceError, FastcontactError, printable, unknown
 
 SHELLS = ("bash", "zsh", "tcsh")
-# Options of the main command, for which the mesh generators need not be declared.
-BRIEF = ("-h", "--help", "--version")
-# Names and metavars of arguments whose values are file names.
+# Options of the main command. With them, the mesh generators need not be declared.
+GLOBAL_OPTIONS = ("-h", "--help", "--version")
+# Names and metavars of the arguments whose values are file names.
 FILES = ("case", "file", "output", "mesh", "FILE", "PNG", "FOLDER", "DIR")
 
 
@@ -66,8 +66,8 @@ _CHOICE = re.compile(r"argument (?P<kind>[\w-]+): invalid choice: '(?P<given>.*)
 _NAME = re.compile(r"[\w-]+")
 
 
-class _Printable(logging.StreamHandler[Any]):
-    """A log handler that escapes the control characters that names from files may contain."""
+class _EscapingHandler(logging.StreamHandler[Any]):
+    """A log handler that escapes control characters, which names from files may contain."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line of a record, which overwrites the progress bar on a terminal."""
@@ -79,7 +79,7 @@ class Parser(argparse.ArgumentParser):
     """An argument parser that reports errors as the package does, in one line and with exit code 1."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        """Raise FastcontactError, where argparse would exit with code 2. An invalid choice is reported with a similar one."""
+        """Raise FastcontactError instead of exiting with code 2. For an invalid choice, a similar valid one is suggested."""
         choice = _CHOICE.search(message)
         if choice:
             message = unknown(choice["kind"].lower(), choice["given"], _NAME.findall(choice["known"]))
@@ -96,7 +96,7 @@ class Parser(argparse.ArgumentParser):
             super().print_help(file)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Raise an error for an unknown flag or argument, for which argparse would state the usage of the parent parser."""
+        """Parse arguments. Raises FastcontactError for an unknown argument, with the usage of this parser, not its parent."""
         options, unparsed = super().parse_known_args(args, namespace)
         flags = [*_FLAG.findall(self.format_usage()), "--help"] if unparsed else []
         for flag in (text.partition("=")[0] for text in unparsed if _FLAG.match(text)):
@@ -108,7 +108,7 @@ class Parser(argparse.ArgumentParser):
 
 
 class PrintVersion(argparse.Action):
-    """Action of ``--version``: print the version and exit, with a report of write errors, which argparse ignores."""
+    """Action of ``--version``: print the version and exit. Write errors, which argparse ignores, are reported."""
 
     def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option_string: Any = None) -> None:
         """Print the version and exit."""
@@ -144,37 +144,38 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
-    raised: list[int] = []
-    with interruptible(raised):  # error messages are printed within the block as well
-        return _run_with_exit_code(sys.argv[1:] if argv is None else list(argv), raised)
+    received_signals: list[int] = []
+    with interruptible(received_signals):  # the block includes the printing of error messages
+        return _run_with_exit_code(sys.argv[1:] if argv is None else list(argv), received_signals)
 
 
-def _run_with_exit_code(words: list[str], raised: list[int]) -> int:
-    """Run a command, print its error and return the exit code; `raised` contains the signals received."""
+def _run_with_exit_code(words: list[str], received_signals: list[int]) -> int:
+    """Run a command, print its error and return the exit code; `received_signals` contains the numbers of signals."""
     try:
-        with restoring_interrupt(raised):
+        with restoring_interrupt(received_signals):
             return _run(words)
     except ConvergenceError as error:
         say("\n".join([f"no convergence: {error}", *history_lines(error.history), *_notes(error)]), error=True)
         return 2
     except FastcontactError as error:
         say(f"error: {error}", error=True)
-        forget(error)  # an interrupted study raises this error
-        return EXIT_CODES[raised[0]] if raised and raised[0] != signal.SIGINT else 1
+        release_objects(error)  # an interrupted study raises this error
+        return EXIT_CODES[received_signals[0]] if received_signals and received_signals[0] != signal.SIGINT else 1
     except BrokenPipeError:
         return 1
     except KeyboardInterrupt as error:
-        number = raised[0] if raised else signal.SIGINT
+        number = received_signals[0] if received_signals else signal.SIGINT
         say("\n".join(["interrupted" if number == signal.SIGINT else "terminated", *_notes(error)]), error=True)
-        forget(error)
+        release_objects(error)
         return EXIT_CODES[number]
 
 
 def _run(words: list[str]) -> int:
     """Parse the arguments, set up logging, and run the subcommand; return its exit code."""
     words = words or ["--help"]
-    arguments = parser(None if words[0] not in BRIEF and words[0].startswith("-") else words[0]).parse_args(words)
-    handler = _Printable()
+    command = None if words[0] not in GLOBAL_OPTIONS and words[0].startswith("-") else words[0]
+    arguments = parser(command).parse_args(words)
+    handler = _EscapingHandler()
     log.handlers[:] = [handler]
     log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
     notify = stderr_is_terminal() and not (arguments.quiet or arguments.verbose)  # -v writes this message to the log

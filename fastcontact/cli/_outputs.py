@@ -107,7 +107,10 @@ def save(axes: Any, path: str) -> None:
 
 
 def profile_picture(case: Any, step: StepResult, path: str) -> None:
-    """Plot the pressure of the first contact pair and its theories; FastcontactError if there is no contact pair."""
+    """Write a picture of the pressure of the first contact pair and its theories.
+
+    Raises FastcontactError if there is no contact pair.
+    """
     if not step.contact:
         raise FastcontactError("there is no contact pair whose pressure could be plotted")
     name, contact = next(iter(step.contact.items()))
@@ -117,7 +120,7 @@ def profile_picture(case: Any, step: StepResult, path: str) -> None:
 
 
 def draw_profile(contact: ContactResult, step: StepResult, theories: dict[str, Any], path: str, title: str) -> None:
-    """Plot the pressure of a contact pair and those of `theories`, which map labels in the legend to curves."""
+    """Write a picture of the pressure of a contact pair and of theories by label in the legend."""
     from fastcontact.results import plot
     from fastcontact.results.tables import normal_stress
 

@@ -21,8 +21,8 @@ ARGUMENTS = {
 }
 
 
-def chosen_step(results: Any, number: int) -> Any:
-    """Return the step with a number counted from 1, or the last step for -1; CaseError if it does not exist."""
+def select_step(results: Any, number: int) -> Any:
+    """Return the step with a number from 1, or the last step for -1. Raises CaseError if it does not exist."""
     if not len(results):
         raise CaseError(f"'{results.path}' contains no finished step yet")
     if number == -1:
@@ -32,7 +32,7 @@ def chosen_step(results: Any, number: int) -> Any:
     return results[number - 1]
 
 
-def chosen_contact(options: Namespace, step: Any) -> str:
+def select_contact(options: Namespace, step: Any) -> str:
     """Return the name of the contact pair that the options select, by default the first pair.
 
     If the first of several pairs is selected by default, the names of the others are printed. Raises CaseError if there is no
@@ -56,21 +56,21 @@ def case_data(results: Any) -> dict[str, Any]:
     from fastcontact.cases.case import stored_description
 
     try:
-        data = toml_text.parsed(results.case_text or "")
+        data = toml_text.parse(results.case_text or "")
     except ValueError:
         data = {}
     return stored_description(data)
 
 
 def load_multiplier(table: Sequence[tuple[float, float]], step: Any) -> float:
-    """Return the load multiplier at a step from the table of the ramp."""
+    """Return the load multiplier [-] at a step, which is interpolated in the table of the ramp."""
     return float(np.interp(step.load_factor, *np.transpose(table)))
 
 
 def pressure_curves(
     theories: Mapping[str, Any], contact: Any, *, approach: float | None = None, load: float = 1.0
 ) -> dict[str, Any]:
-    """Return theories at equal approach and at equal force, for comparison with the pressure of a contact.
+    """Return a theory at the same approach and at the same force as a contact, for comparison of the pressures.
 
     Parameters
     ----------
@@ -86,8 +86,8 @@ def pressure_curves(
     Returns
     -------
     dict
-        Theories by label in the legend; empty if no pressure curve of the theory is known. For finite half-spheres these are
-        solutions of Hertz's theory.
+        Theories by label in the legend; empty if the theory has no pressure curve. For finite half-spheres, the solutions are
+        those of Hertz's theory.
     """
     theory: Any = theories.get("theory")
     theory = theory if pressure_curve(theory) is not None else getattr(theory, "hertz", None)
@@ -96,13 +96,13 @@ def pressure_curves(
         return {}
     if approach is None and not hasattr(theory, "at_force"):
         return {curve.name: theory}
-    return compared(curve.name, theory, contact, theories["share"], approach=approach, load=load)
+    return theories_at_equal_load(curve.name, theory, contact, theories["share"], approach=approach, load=load)
 
 
-def compared(
+def theories_at_equal_load(
     name: str, theory: Any, contact: Any, share: float, *, approach: float | None, load: float
 ) -> dict[str, Any]:
-    """Return a theory at the approach and at the force of a contact, as far as these are known, by label in the legend.
+    """Return a theory at the approach and at the force of a contact, if these are known, by label in the legend.
 
     `share` [-] is the fraction of the contact that the model represents. The `approach` [length] is reached at load
     multiplier 1, and `load` [-] is the multiplier of the step.
@@ -117,8 +117,8 @@ def compared(
     return curves
 
 
-def law(theories: Mapping[str, Any]) -> Any:
-    """Return the theory if it provides force and radius as functions of the approach; otherwise None."""
+def approach_law(theories: Mapping[str, Any]) -> Any:
+    """Return the theory of a pair if its force and radius are functions of the approach; otherwise None."""
     theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
     return theory if hasattr(theory, "at_approach") else None

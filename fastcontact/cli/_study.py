@@ -48,10 +48,10 @@ def executor(where: str) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _mpi() -> Iterator[Any]:
-    """Yield the executor of MPI; CaseError if a process is lost.
+    """Yield the MPI executor of mpi4py. Raises CaseError if a process is lost.
 
-    Most launchers end all processes when one of them dies. With other launchers only the communication thread of mpi4py
-    fails, and without an interruption the main thread would wait for the remaining runs forever.
+    Most launchers end all processes when one of them dies. With other launchers, only the communication thread of mpi4py
+    fails. This failure interrupts the main thread, which would otherwise wait for the remaining runs forever.
     """
     try:
         from mpi4py.futures import MPIPoolExecutor
@@ -73,16 +73,16 @@ def _mpi() -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _failing_threads_interrupt() -> Iterator[list[BaseException]]:
-    """Interrupt the main thread when another thread fails; yield a list that collects the errors, which are not printed."""
+    """Interrupt the main thread when another thread fails. Yields the list of the errors, which are not printed."""
     failures: list[BaseException] = []
     original = threading.excepthook
 
-    def failed(arguments: threading.ExceptHookArgs) -> None:
+    def record_failure(arguments: threading.ExceptHookArgs) -> None:
         if arguments.exc_value is not None:
             failures.append(arguments.exc_value)
         to_main_thread(signal.SIGINT)
 
-    threading.excepthook = failed
+    threading.excepthook = record_failure
     try:
         yield failures
     finally:
@@ -117,14 +117,14 @@ def names(text: str | None) -> list[str] | None:
     return [name.strip() for name in text.split(",") if name.strip()] if text else None
 
 
-def finished(options: Namespace, study: Callable[..., Any]) -> Any:
-    """Return the result of a study, which runs on the executor of the options.
+def run_interruptibly(options: Namespace, study: Callable[..., Any]) -> Any:
+    """Run a study on the executor of the options and return its result.
 
-    An interruption raises FastcontactError with a message on how to resume.
+    After an interruption, FastcontactError is raised with a message on how to resume.
     """
-    from fastcontact.studies.execute import Runs
+    from fastcontact.studies.execute import StudyStatus
 
-    progress = Runs(show=stderr_is_terminal() and not options.quiet)
+    progress = StudyStatus(show=stderr_is_terminal() and not options.quiet)
     try:
         with executor(options.executor) as where:
             return study(executor=where, workers=options.workers, store=options.store, on_progress=progress)
@@ -140,8 +140,8 @@ def finished(options: Namespace, study: Callable[..., Any]) -> Any:
 def report(options: Namespace, result: Any, hint: str, failures: Sequence[str] = (), also: Sequence[str] = ()) -> int:
     """Write the files of the options, print the result and return the exit code.
 
-    The messages of failed runs (`failures`), the lines of the result and the names of the files are printed. `also` are the
-    names of files written earlier, and `hint` is printed if no file was written.
+    The function prints the messages of failed runs (`failures`), the lines of the result and the names of the files. `also`
+    contains the names of files that were written before, and `hint` is printed if no file was written.
     """
     if options.json:
         write_json(options.json, result.as_dict())

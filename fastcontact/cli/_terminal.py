@@ -29,7 +29,7 @@ def say(text: object, *, error: bool = False) -> None:
     Raises FileError if writing to standard output fails, and BrokenPipeError if the process that reads it has exited.
     """
     stream: TextIO | None = sys.stderr if error else sys.stdout
-    if stream is None:  # it was closed before the process started
+    if stream is None:  # the stream was closed before the process started
         return
     try:
         print(encodable(printable(str(text)), stream), file=stream)
@@ -37,10 +37,10 @@ def say(text: object, *, error: bool = False) -> None:
         raise
     except OSError as failure:
         if not error:
-            raise FileError(_unwritten(failure)) from failure
+            raise FileError(_write_error_message(failure)) from failure
 
 
-def flushed(code: int) -> int:
+def flush_output(code: int) -> int:
     """Flush standard output and return the exit code, or 1 in place of 0 if this fails.
 
     The error is reported if `code` is 0, except for a broken pipe.
@@ -49,15 +49,16 @@ def flushed(code: int) -> int:
         if sys.stdout is not None:
             sys.stdout.flush()
     except OSError as failure:
-        # At exit Python flushes once more and would print its own message: redirect the output to the null device.
+        # At exit Python flushes again and would print another message. Redirecting the output to the null device prevents
+        # this.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if not code and not isinstance(failure, BrokenPipeError):
-            say(f"error: {_unwritten(failure)}", error=True)
+            say(f"error: {_write_error_message(failure)}", error=True)
         return code or 1
     return code
 
 
-def _unwritten(error: OSError) -> str:
+def _write_error_message(error: OSError) -> str:
     """Return the message about a failed write to standard output, for example on a full disk."""
     return f"cannot write to standard output ({error.strerror}): redirect it"
 

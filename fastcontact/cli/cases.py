@@ -28,7 +28,7 @@ def run(options: Namespace) -> int:
     if options.output and not options.copy:
         raise FastcontactError("-o needs --copy NAME, the case to copy")
     if options.copy:
-        written = copied(ready_made_case(options.copy), Path(options.output or f"{options.copy}.toml"))
+        written = copy_case(ready_made_case(options.copy), Path(options.output or f"{options.copy}.toml"))
         say_written(options, *written)
     elif options.name:
         say(ready_made_case(options.name).read_text(encoding="utf-8").rstrip("\n"))
@@ -53,8 +53,8 @@ def _lines(path: Path) -> list[str]:
     ]
 
 
-def copied(case: Path, target: Path) -> list[Path]:
-    """Copy a case file and its mesh file, if it has one, and return the new paths; FileError if a path exists."""
+def copy_case(case: Path, target: Path) -> list[Path]:
+    """Copy a case file and its mesh file, if it has one, and return the new paths. Raises FileError if a path exists."""
     from fastcontact._tools.paths import replacing
 
     text = case.read_text(encoding="utf-8")

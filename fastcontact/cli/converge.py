@@ -39,7 +39,7 @@ def run(options: Namespace) -> int:
     if options.adaptive:
         return _adaptive(options)
     elements, formulations, quantities = map(_study.names, (options.elements, options.formulations, options.quantities))
-    study = _study.finished(
+    study = _study.run_interruptibly(
         options,
         partial(convergence_study, options.case, options.levels, elements, formulations, quantities=quantities or ()),
     )
@@ -74,5 +74,5 @@ def _only(text: str | None, option: str) -> str | None:
     """Return the name in a text, or None if there is no text; CaseError for several names."""
     names = _study.names(text) or []
     if len(names) > 1:
-        raise CaseError(f"adaptive meshes take one {option}, not {len(names)}: {text}")
+        raise CaseError(f"adaptive refinement takes one {option}, not {len(names)}: {text}")
     return names[0] if names else None

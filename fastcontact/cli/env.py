@@ -38,7 +38,7 @@ def _warm_up(show: bool) -> int:
     from fastcontact._jit import ahead, decorators
     from fastcontact.analysis.progress import StatusLine
 
-    total, reading_end, writing_end, done = len(ahead.kernels_of(())), *os.pipe(), 0
+    total, reading_end, writing_end, done = len(ahead.kernel_numbers(())), *os.pipe(), 0
     with tempfile.TemporaryFile("w+", encoding="utf-8") as errors:
         processes = ahead.start((), decorators.threads(), writing_end, errors.fileno())
         os.close(writing_end)

@@ -52,7 +52,7 @@ def run(options: Namespace) -> int:
         raise CaseError("--animate FILE names the file to write: leave out --png")
     plane = _plane(options.section) if options.section else None
     with open_results(options.file) as results:
-        step = _results.chosen_step(results, options.step)
+        step = _results.select_step(results, options.step)
         case = _results.case_data(results)
         if options.view:
             plot.view(results, step, scale=options.scale, title=case["title"], screenshot=options.png)
@@ -111,7 +111,7 @@ def _contact_plot(options: Namespace, results: Any, step: Any, case: dict[str, A
     from fastcontact.results import plot
 
     labels = {"title": case["title"]}
-    name = _results.chosen_contact(options, step)
+    name = _results.select_contact(options, step)
     theories = case["theories"].get(name, {})
     if options.map:
         labels["title"] = f"{case['title']}\ncontact '{name}', {step.instant}".strip()
@@ -121,7 +121,7 @@ def _contact_plot(options: Namespace, results: Any, step: Any, case: dict[str, A
         return plot.contact_zones(list(results), name, **labels)
     if options.history:
         reference = {"approach": case["approach"].get(name), "share": theories.get("share", 1.0)}
-        return plot.history(list(results), name, law=_results.law(theories), **reference, **labels)[0]
+        return plot.history(list(results), name, law=_results.approach_law(theories), **reference, **labels)[0]
     labels["title"] = f"{case['title']}\nstresses on the axis, {step.instant}".strip()
     return plot.axis_stress(results.mesh, step, name, _axis_curves(theories, step, name, case), **labels)
 
@@ -133,4 +133,6 @@ def _axis_curves(theories: dict[str, Any], step: Any, name: str, case: dict[str,
     if theory is None or not hasattr(theory, "stress_on_axis"):
         return {}
     state = {"approach": case["approach"].get(name), "load": _results.load_multiplier(case["ramp"], step)}
-    return _results.compared("theory", theory, step.contact[name], theories["share"], **state) or {"theory": theory}
+    return _results.theories_at_equal_load("theory", theory, step.contact[name], theories["share"], **state) or {
+        "theory": theory
+    }

@@ -29,8 +29,8 @@ def run(options: Namespace) -> int:
 
     check_outputs([options.file], [options.csv, options.agr], [options.png])
     with open_results(options.file) as results:
-        step = _results.chosen_step(results, options.step)
-        name = _results.chosen_contact(options, step)
+        step = _results.select_step(results, options.step)
+        name = _results.select_contact(options, step)
         case = _results.case_data(results)
     contact = step.contact[name]
     table = contact_table(contact, step)
@@ -64,7 +64,7 @@ def _print(table: Any) -> None:
 
 def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, PressureCurve]) -> None:
     """Write an XMGRACE project with the computed pressure and that of theories by label."""
-    from fastcontact.results.units import labelled
+    from fastcontact.results.units import axis_label
     from fastcontact.results.xmgrace import Curve, write_agr
 
     order = np.argsort(contact.place, kind="stable")
@@ -81,6 +81,6 @@ def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theorie
         curves,
         title=case["title"] or f"Contact '{contact.name}'",
         subtitle=f"load factor {step.load_factor:g}",
-        xlabel=labelled(f"distance from the {start}", contact.units, "length"),
-        ylabel=labelled("contact pressure", contact.units, "pressure"),
+        xlabel=axis_label(f"distance from the {start}", contact.units, "length"),
+        ylabel=axis_label("contact pressure", contact.units, "pressure"),
     )

@@ -58,7 +58,7 @@ def run(options: Namespace) -> int:
     with warnings_shown() as setup_warnings:
         case = read_case(options.case)
         read_end = time.perf_counter()
-        with in_file(case_path(options.case)):  # an invalid model must not replace existing results
+        with in_file(case_path(options.case)):  # checks the model before existing results are replaced
             new = None if options.resume else _new_steps(options, case)
             if new is None:
                 case.model.check(case.ramp)
@@ -68,7 +68,7 @@ def run(options: Namespace) -> int:
                 check_study(case)
     with warnings_shown() as caught:
         caught += setup_warnings
-        n_done, stored_warnings, last, steps = _solved(options, case, output, new)
+        n_done, stored_warnings, last, steps = _write_steps(options, case, output, new)
     texts = list(dict.fromkeys([*stored_warnings, *caught]))
     computed = _modes(options, case, last)
     timings = {"read": read_end - started, "solve": time.perf_counter() - read_end, "cpu": time.process_time()}
@@ -83,7 +83,7 @@ def run(options: Namespace) -> int:
     if not options.quiet:
         say("\n".join(summary.lines(numbers)))
         others = [path for path in (options.json, options.plot, options.modes) if path]
-        say(f"  {_written(output, n_done, len(steps), others)}")
+        say(f"  {_files_message(output, n_done, len(steps), others)}")
     failed = [check["name"] for check in numbers["checks"] if not check["passed"]]
     if options.strict and failed:
         say(f"{len(failed)} of {len(numbers['checks'])} checks of the case failed: {', '.join(failed)}", error=True)
@@ -119,17 +119,17 @@ def _diameters(text: str | None) -> dict[str, Any]:
 
 
 def _new_steps(options: Namespace, case: Case, done: Sequence[StepResult] = ()) -> Iterator[StepResult]:
-    """Check the model, and return the steps after the steps `done`, which are computed when they are requested."""
+    """Check the model, and return an iterator that computes the steps after the steps `done`."""
     from fastcontact.analysis.run import solve_steps
 
     settings = {**case.solve_arguments, "linear_solver": options.linear or case.linear_solver}
     return solve_steps(case.model, case.ramp, **settings, resume=done)
 
 
-def _solved(
+def _write_steps(
     options: Namespace, case: Case, output: Path, new: Iterator[StepResult] | None
 ) -> tuple[int, list[str], Any, list[dict[str, Any]]]:
-    """Write all steps: `new`, or those that remain of a resumed run.
+    """Compute and write all steps in `new`, or the remaining steps of a resumed run.
 
     Returns the number of earlier steps in a resumed file, their warnings, the last step, and the summaries of all steps.
     """
@@ -145,9 +145,9 @@ def _solved(
     with ResultWriter(output, case.model, case_text=case.text, **settings) as writer:
         _check_same(case, writer.done, output)
         last = writer.done[-1] if writer.done else None
-        done = [(of_step(step), step.warnings) for step in writer.done]  # each step, which may be large, is read once
+        done = [(of_step(step), step.warnings) for step in writer.done]  # reads each step only once
         steps = [summary for summary, _ in done]
-        _warn_of_other_steps(case, [summary["load_factor"] for summary in steps], output)
+        _warn_of_steps_outside_ramp(case, [summary["load_factor"] for summary in steps], output)
         total = len(steps) + len(remaining(case.ramp, last))
         progress = Progress(total, show=stderr_is_terminal() and not options.quiet, done=len(steps))
         try:
@@ -159,14 +159,14 @@ def _solved(
                 progress.step(last, writer.n_steps)  # n_steps excludes steps that are still being written
             writer.wait()
         except (ConvergenceError, KeyboardInterrupt) as error:
-            _stopped(error, writer, output, options.json)
+            _add_note(error, writer, output, options.json)
             raise
         finally:
             progress.close()
     return len(done), list(dict.fromkeys(text for _, texts in done for text in texts)), last, steps
 
 
-def _stopped(error: BaseException, writer: ResultWriter, output: Path, summary: str | None) -> None:
+def _add_note(error: BaseException, writer: ResultWriter, output: Path, summary: str | None) -> None:
     """Add a note on the number of complete steps to an error, and write both to the summary file."""
     try:
         writer.wait()
@@ -190,18 +190,18 @@ def _check_same(case: Any, done: Sequence[Any], output: Path) -> None:
             raise ModelError(f"'{output}' cannot be resumed: {error}") from error
 
 
-def _warn_of_other_steps(case: Case, done: Sequence[float], output: Path) -> None:
+def _warn_of_steps_outside_ramp(case: Case, done: Sequence[float], output: Path) -> None:
     """Warn if a step in the result file has a load factor that the ramp of the case does not contain."""
     instants = case.ramp.instants
     others = [factor for factor in done if not any(math.isclose(factor, t, rel_tol=1e-9) for t in instants)]
     if others:
         warn(
-            f"'{output}' contains {len(done)} steps, the case now has {len(instants)}: those in the file are kept, with that "
-            f"at load factor {others[0]:g}, which is not in the case; without --resume all steps are solved again"
+            f"'{output}' contains {len(done)} steps, the case now has {len(instants)}: those in the file are kept, including "
+            f"that at load factor {others[0]:g}, which is not in the case; without --resume all steps are solved again"
         )
 
 
-def _written(output: Path, done: int, total: int, others: list[str]) -> str:
+def _files_message(output: Path, done: int, total: int, others: list[str]) -> str:
     """Return a message on the files written, with the number of steps `done` before the run."""
     if done == total:
         message = f"{output} was complete with {total} steps, no step remained to be solved"

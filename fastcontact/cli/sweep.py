@@ -38,7 +38,7 @@ def run(options: Namespace) -> int:
             raise CaseError(f"--set {name} is given twice: give all its values at once, as in {name}=1,2,5")
         parameters[name] = parameter_values
     model = {"element": options.element, "formulation": options.formulation, "level": options.level}
-    sweep = _study.finished(options, partial(parameter_sweep, options.case, parameters, **model))
+    sweep = _study.run_interruptibly(options, partial(parameter_sweep, options.case, parameters, **model))
     return _study.report(options, sweep, "--png FILE writes a picture", [text for _, text in sweep.failed])
 
 
@@ -72,7 +72,7 @@ def _range(text: str, fields: list[str]) -> list[float]:
 
 
 def _value(text: str) -> Any:
-    """Return a text as a Boolean, an integer or a number if it represents one, otherwise unchanged."""
+    """Return the Boolean, integer or number that a text represents, or the text itself."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):

@@ -13,7 +13,7 @@ import numpy as np
 
 from fastcontact._jit.parallel import on_one_blas_thread
 from fastcontact._tools.neighbours import close_pairs
-from fastcontact._tools.units import in_si, misfit
+from fastcontact._tools.units import in_si, inconsistency_message
 from fastcontact.arrays import AnyArray, Array, Numbers
 from fastcontact.elasticity.energy import gradients_at, integration_rule
 from fastcontact.elasticity.loads import LOAD_POINTS, BodyForce, Load, Pressure, Traction, Value, evaluated
@@ -118,7 +118,7 @@ def _moduli(model: Model) -> Iterator[str]:
 def _units(model: Model) -> Iterator[str]:
     """Yield warnings about named units: if they are inconsistent, and for each modulus unlike those of solids."""
     units = model.units
-    yield misfit(units)
+    yield inconsistency_message(units)
     pascal = in_si(units, "pressure")
     if pascal is None:
         return

@@ -1,21 +1,21 @@
-"""An HDF5 file that is valid after each of its writes.
+"""HDF5 file that is valid after each write.
 
 HDF5 writes the records of its indices in no particular order. If a process is killed between two writes, an index may refer
-to addresses beyond the end of the file, or entries, and with them completed steps, may be lost. This file buffers writes in
-memory until HDF5 flushes, and then executes them in the following order (HDF5 File Format Specification 3.0, sections II.A
-and III.A):
+to addresses beyond the end of the file, or entries may be lost and with them completed steps. The class `CommittedFile`
+therefore buffers writes in memory until HDF5 flushes the file, and then executes them in the following order (HDF5 File
+Format Specification 3.0, sections II.A and III.A):
 
-1. new blocks, to which nothing refers yet;
+1. new blocks, to which no other block refers yet;
 2. the superblock with the end of the file;
 3. nodes of indices from the root down, so that entries are in their new node before they are removed from the old one;
 4. all other writes;
 5. name tables.
 
-HDF5 writes whole nodes of indices and parts of tables, of which a step changes a few bytes. Only the range from the first to
-the last changed byte is written.
+HDF5 writes entire nodes of indices and parts of tables, although a step changes only a few of their bytes. The class writes
+only the range from the first to the last changed byte.
 
-The order protects against the end of a process but not against a power loss, since disks reorder writes. Changes in place are
-therefore first written to a journal if the file is `synchronised`.
+The order protects the file if the process is killed, but not at a power loss, since disks reorder writes. If the file is
+`synchronised`, changes in place are therefore first written to a journal.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from fastcontact.results import journal
 
 # Signatures of the superblock, of nodes of indices and of name tables in HDF5.
 SUPERBLOCK, NODE, NAMES = b"\x89HDF\r\n\x1a\n", b"TREE", b"SNOD"
-# Longest write that is compared with the file [bytes]. Longer writes are data, of which all bytes change.
+# Longest write that is compared with the file [bytes]. In longer writes, which contain data, all bytes change.
 LONGEST_COMPARED = 1 << 16
 SIGNALS = tuple(map(int, signal.valid_signals()))
 
@@ -44,15 +44,15 @@ SIGNALS = tuple(map(int, signal.valid_signals()))
 class CommittedFile(DriverFile):
     """An existing HDF5 file whose writes are deferred to `flush`, with the methods that `h5py.File` calls.
 
-    Nothing is written after an error, so that the file remains as it was after the last successful write, and nothing after
-    another program has written to the file.
+    Nothing is written after an error, so that the file remains as it was after the last successful write. Nothing is written,
+    either, after another program has written to the file.
 
     Attributes
     ----------
     synchronised : bool
         Whether flushes are atomic on the disk. A flush with more than `journal.LARGEST` bytes of changes is divided into
         several atomic parts.
-    ours : bool
+    exclusive : bool
         False after another program has written to the file.
     end : int
         End of the contents [bytes]; the file may be longer.
@@ -65,15 +65,15 @@ class CommittedFile(DriverFile):
         for offset, data in interrupted:
             self._put(offset, data)
         self._pending: dict[int, bytes] = {}
-        self.ours = True
+        self.exclusive = True
         self._head = self._read_head()
-        self.end = self._contents()
+        self.end = self._end_of_contents()
         if interrupted:
             os.fsync(self.fileno())
-            self._cut(self.end)
+            self._set_size(self.end)
         self._starts, self._ends = [0], [self.end]  # disjoint written ranges in ascending order
 
-    def _contents(self) -> int:
+    def _end_of_contents(self) -> int:
         """Return the end of the contents of the file, which the superblock states [bytes]."""
         head, size = self._head, self._file.seek(0, os.SEEK_END)
         supported = head.startswith(SUPERBLOCK) and (head[8], head[13]) == (0, 8)  # version 0, addresses of eight bytes
@@ -83,16 +83,16 @@ class CommittedFile(DriverFile):
         self._file.seek(0)
         return self._file.read(48)
 
-    def intact(self) -> bool:
+    def is_intact(self) -> bool:
         """Return whether no other program has changed the superblock, which each flush changes, or truncated the file."""
         truncated = os.fstat(self.fileno()).st_size < self._ends[-1]
-        self.ours = self.ours and not truncated and self._read_head() == self._head
-        return self.ours
+        self.exclusive = self.exclusive and not truncated and self._read_head() == self._head
+        return self.exclusive
 
     @property
     def writable(self) -> bool:
         """Whether no error has occurred and no other program has written to the file."""
-        return self.ours and self.failure is None
+        return self.exclusive and self.failure is None
 
     def _size(self) -> int:
         pending_end = max((offset + len(data) for offset, data in self._pending.items()), default=0)
@@ -100,7 +100,7 @@ class CommittedFile(DriverFile):
 
     def _get(self, start: int, data: bytearray) -> None:
         super()._get(start, data)
-        journal.overlay(self._pending.items(), start, data)
+        journal.apply_writes(self._pending.items(), start, data)
 
     def write(self, data: bytes) -> int:
         """Buffer data for the current position, where they replace other pending data."""
@@ -117,7 +117,7 @@ class CommittedFile(DriverFile):
         return len(data)
 
     def truncate(self, size: int) -> int:
-        """Set the end of the contents; the file is truncated when it is closed."""
+        """Set the end of the contents; the file itself is truncated when it is closed."""
         self.end = size
         return size
 
@@ -135,7 +135,7 @@ class CommittedFile(DriverFile):
         pending = sorted(self._pending.items(), key=lambda write: self._order(*write))
         n_new = sum(not self._overlaps(offset, offset + len(data)) for offset, data in pending)
         new = pending[:n_new]
-        changes = [change for write in pending[n_new:] if (change := self._changed(*write))[1]]
+        changes = [change for write in pending[n_new:] if (change := self._changed_part(*write))[1]]
         for offset, data in new:
             self._put(offset, data)
         for batch in journal.batches(changes) if self.synchronised else [changes]:
@@ -150,7 +150,7 @@ class CommittedFile(DriverFile):
             self._record(offset, offset + len(data))
         self._pending.clear()
 
-    def _changed(self, offset: int, data: bytes) -> journal.Write:
+    def _changed_part(self, offset: int, data: bytes) -> journal.Write:
         """Return the part of a write from the first to the last byte that differs from the file."""
         if len(data) > LONGEST_COMPARED:
             return offset, data
@@ -162,14 +162,14 @@ class CommittedFile(DriverFile):
         return offset + int(differs[0]), data[differs[0] : differs[-1] + 1]
 
     def _synchronise(self, new: list[journal.Write], changes: list[journal.Write]) -> None:
-        """Synchronise the new blocks and a journal of the changes to old blocks."""
+        """Wait until the new blocks and a journal of the changes to old blocks are on the disk."""
         end = max([self.end, self._ends[-1], *(offset + len(data) for offset, data in new)])
-        log = journal.packed(new, changes)
+        log = journal.pack(new, changes)
         self._put(end, log)
-        self._cut(end + len(log))
+        self._set_size(end + len(log))
         os.fsync(self.fileno())
 
-    def _cut(self, size: int) -> None:
+    def _set_size(self, size: int) -> None:
         self._file.truncate(size)
 
     def _order(self, offset: int, data: bytes) -> tuple[int, int, int]:
@@ -201,9 +201,9 @@ class CommittedFile(DriverFile):
         try:
             if self.failure is not None:  # the end that HDF5 has set may lie beyond the file
                 self._head = self._read_head()
-                self.end = self._contents()
-            if self.ours:
-                self._cut(self.end)
+                self.end = self._end_of_contents()
+            if self.exclusive:
+                self._set_size(self.end)
                 os.fsync(self.fileno())
         finally:
             self._file.close()
@@ -218,17 +218,17 @@ def uninterrupted() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    arrived: list[tuple[int, FrameType | None]] = []
+    deferred_signals: list[tuple[int, FrameType | None]] = []
     handlers = {number: signal.getsignal(number) for number in SIGNALS}
     try:
         with contextlib.ExitStack() as restored:  # restores all handlers even after an error
             for number, handler in handlers.items():
                 if callable(handler):
                     restored.callback(signal.signal, number, handler)
-                    signal.signal(number, lambda *signal_and_frame: arrived.append(signal_and_frame))
+                    signal.signal(number, lambda *signal_and_frame: deferred_signals.append(signal_and_frame))
             yield
     finally:
-        for number, frame in arrived:
+        for number, frame in deferred_signals:
             handler = handlers[number]
             assert callable(handler)
             handler(number, frame)

@@ -39,10 +39,10 @@ def file_state(path: Path) -> tuple[int, ...] | None:
 
 
 class PathLock:
-    """Exclusive right to write to a path, represented by a locked file beside it.
+    """Exclusive lock on a path for writing, held by means of a lock file in the same folder.
 
-    The result file itself is not locked, since viewers may lock it. The operating system releases the lock at the end of the
-    process. The lock file is removed by `release`, or with the last reference to the lock.
+    The result file itself is not locked, since viewers may lock it. The operating system releases the lock when the process
+    ends. The lock file is removed by `release`, or when the last reference to this object disappears.
 
     Attributes
     ----------
@@ -72,10 +72,10 @@ class PathLock:
                 if os.path.samestat(os.fstat(file.fileno()), os.stat(self.path)):
                     break
             file.close()  # the previous holder removed the file between `open` and `lock`
-        with contextlib.suppress(OSError):  # information for other processes, if the disk has space for it
+        with contextlib.suppress(OSError):  # the process number is only information, for which a full disk has no space
             file.truncate(0)
             file.write(str(os.getpid()).encode("ascii"))
-        # The finalizer releases the lock if an interrupt prevents the caller from doing so.
+        # The finalizer also releases the lock if an interrupt prevents the caller from releasing it.
         self.release = weakref.finalize(self, _release, file, self.path, os.getpid())
 
 
@@ -98,13 +98,13 @@ def is_being_written(target: Path) -> bool:
 
 
 def _open_lock_file(path: Path) -> IO[Any]:
-    """Open or create a lock file. Raises FileError for a link or a file of another user, which would be modified."""
+    """Open or create a lock file. Raises FileError for links and files of other users, which must not be modified."""
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
     except OSError as error:
         if error.errno != errno.ELOOP:
             raise
-        raise FileError(f"'{path}' is a link, but a lock must be a regular file: remove it") from error
+        raise FileError(f"'{path}' is a link, but a lock file must be a regular file: remove it") from error
     status = os.fstat(descriptor)
     if (
         not stat.S_ISREG(status.st_mode)
@@ -112,7 +112,7 @@ def _open_lock_file(path: Path) -> IO[Any]:
         or (hasattr(os, "getuid") and status.st_uid != os.getuid())
     ):
         os.close(descriptor)
-        raise FileError(f"'{path}' is not a regular file of yours, as a lock must be: remove it or write elsewhere")
+        raise FileError(f"'{path}' locks the result file, and must be a regular file of yours: remove it")
     return os.fdopen(descriptor, "r+b", buffering=0)
 
 

@@ -1,10 +1,10 @@
 """Write-ahead journal at the end of a file, whose changes are executed again after a power loss (Mohan et al., 1992).
 
-At a power loss, the writes since the last synchronisation of a disk may have been executed in any order, in part, or not at
-all. Incomplete new data are harmless, since nothing refers to them yet, but incomplete changes in place damage the file.
-These changes are therefore first written to a journal beyond the end of the HDF5 contents, which HDF5 ignores, together with
-checksums of the new data. They are executed when the journal and the new data are on the disk. They are executed again when
-the file is opened after a power loss.
+After a power loss, any of the writes since the last synchronisation of the disk may be missing or incomplete. Incomplete new
+data are harmless, since no other data refer to them yet, but incomplete changes in place damage the file. These changes are
+therefore first written to a journal, together with checksums of the new data. The journal lies beyond the end of the HDF5
+contents, where HDF5 ignores it. The changes are executed when the journal and the new data are on the disk, and are executed
+again when the file is opened after a power loss.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LARGEST = 1 << 28
 PIECE = 1 << 20
 
 
-def packed(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
+def pack(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
     """Return a journal, which is appended to the file, with the changes and the checksums of the new data."""
     body = b"".join(
         [
@@ -41,9 +41,9 @@ def packed(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
 
 
 def batches(changes: Iterable[Write]) -> Iterator[list[Write]]:
-    """Yield changes in lists of at most LARGEST bytes, in order.
+    """Yield lists of at most LARGEST bytes of changes, in the order of the changes.
 
-    Changes longer than LARGEST are split. Without changes there is one empty list.
+    Changes longer than LARGEST are split. Without changes, a single empty list is yielded.
     """
     batch, size = [], 0  # type: tuple[list[Write], int]
     for offset, data in changes:
@@ -58,10 +58,10 @@ def batches(changes: Iterable[Write]) -> Iterator[list[Write]]:
 
 
 def pending(file: IO[bytes]) -> list[Write]:
-    """Return the changes in the journal of a file.
+    """Return the changes in the journal of a file, which an interruption may have prevented.
 
     The list is empty if there is no journal, or if the journal or the new data are incomplete. Raises FileError for a journal
-    with a valid checksum but invalid lengths or offsets, which are checked before the new data are read.
+    with a valid checksum but invalid lengths or offsets; these are checked before the new data are read.
     """
     size = file.seek(0, io.SEEK_END)
     if size < FOOTER.size:
@@ -71,8 +71,8 @@ def pending(file: IO[bytes]) -> list[Write]:
     if magic != MAGIC or length > size - FOOTER.size:
         return []
     end = size - FOOTER.size - length  # end of the contents before the journal
-    if length > 2 * LARGEST:  # an upper bound of the changes with their headers and of the checksums
-        raise _forged(file, f"declares {length:.3g} bytes")
+    if length > 2 * LARGEST:  # upper bound of the size of the changes, their headers and the checksums
+        raise _damage_error(file, f"declares {length:.3g} bytes")
     file.seek(end)
     body = file.read(length)
     if hashlib.sha256(body).digest() != digest:
@@ -80,25 +80,25 @@ def pending(file: IO[bytes]) -> list[Write]:
     records = list(_records(file, body))
     new = [(offset, count, checksum) for offset, count, is_new, checksum in records if is_new]
     if sum(count for _, count, _ in new) > end:
-        raise _forged(file, "counts data twice")
+        raise _damage_error(file, "counts data twice")
     if any(count and offset + count > end for offset, count, _, _ in records):
-        raise _forged(file, "leads beyond the contents")
+        raise _damage_error(file, "leads beyond the contents")
     if any(_digest(file, offset, count) != checksum for offset, count, checksum in new):
         return []
     return [(offset, data) for offset, _, is_new, data in records if not is_new]
 
 
 def _records(file: IO[bytes], body: bytes) -> Iterator[tuple[int, int, bool, bytes]]:
-    """Yield (offset, length, whether the write is new data, data or checksum) for each write in a journal."""
+    """Yield the offset, the length, whether the data are new, and the data or their checksum for each write in a journal."""
     position = 0
     while position < len(body):
         begin = position + HEADER.size
         if begin > len(body):
-            raise _forged(file, "is cut off")
+            raise _damage_error(file, "is cut off")
         offset, count, is_new = HEADER.unpack_from(body, position)
         position = begin + (DIGEST if is_new else count)
         if position > len(body):
-            raise _forged(file, "is cut off")
+            raise _damage_error(file, "is cut off")
         yield offset, count, is_new, body[begin:position]
 
 
@@ -112,13 +112,13 @@ def _digest(file: IO[bytes], offset: int, count: int) -> bytes:
     return digest.digest()
 
 
-def _forged(file: IO[bytes], reason: str) -> FileError:
+def _damage_error(file: IO[bytes], reason: str) -> FileError:
     """Return the error for an invalid journal."""
     name = getattr(file, "name", "the file")
     return FileError(f"the journal at the end of '{name}' {reason}: it is damaged, compute the file again")
 
 
-class Repeated:
+class JournalView:
     """A read-only view of a file with the writes of its journal applied."""
 
     def __init__(self, file: IO[bytes], writes: Sequence[Write]) -> None:
@@ -128,11 +128,11 @@ class Repeated:
     def read(self, size: int) -> bytes:
         """Return up to `size` bytes from the current position."""
         start, data = self._file.tell(), bytearray(self._file.read(size))
-        overlay(self._writes, start, data)
+        apply_writes(self._writes, start, data)
         return bytes(data)
 
 
-def overlay(writes: Iterable[Write], start: int, view: memoryview | bytearray) -> None:
+def apply_writes(writes: Iterable[Write], start: int, view: memoryview | bytearray) -> None:
     """Apply writes to `view`, which contains a part of a file that begins at `start`."""
     end = start + len(view)
     for offset, data in writes:

@@ -10,13 +10,13 @@ The second group contains the data that VTKHDF does not support:
 
     fastcontact/mesh                                points, cells of all dimensions, groups
     fastcontact/kinematics, case, versions, units   JSON texts; units if the model defines them
-    fastcontact/steps                               a row for each step (STEP_ROW), which locates its notes
+    fastcontact/steps                               a row for each step (STEP_ROW) with the position of its notes
     fastcontact/contact/0, 1, ...                   for each pair: its name, a row for each secondary node and step, a row for
                                                     each primary node and step, and a row for each step
-    fastcontact/materials                           material of each cell, nodal stress by material at interfaces, a row for
-                                                    each step (SIDES_STEP); only in models with material interfaces
+    fastcontact/materials                           material of each cell, nodal stress by material at interfaces, and a row
+                                                    for each step (MATERIAL_STEP_ROW); only with material interfaces
     fastcontact/notes                               JSON texts in sequence: iterations, warnings, ends of runs
-    fastcontact/runs                                a row for each run (RUN_ROW), which locates its record in the notes
+    fastcontact/runs                                a row for each run (RUN_ROW) with the position of its record in the notes
     fastcontact/restart0, restart1                  packed restart data of the last two steps
 
 A new nodal array needs an attribute of `step.StepResult`, its value in `analysis.load_step`, its name in POINT_FIELDS, a
@@ -43,11 +43,11 @@ from fastcontact.mesh.mesh import Mesh, starts_of
 from fastcontact.results.step import ContactResult, StepResult
 
 
-def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
-    """Return the mesh cut along material interfaces, and the node (m,) and the stress of each of its points [pressure].
+def cut_at_interfaces(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
+    """Return the mesh cut along material interfaces, and the node (m,) and the stress (m, n_components) of each point.
 
-    The first points of the cut mesh are those of `mesh`. It has only solid cells and no groups. The stress (m, n_components)
-    has the components of `StepResult.stress`. Without interfaces, `mesh` itself is returned.
+    The first points of the cut mesh are those of `mesh`. The cut mesh has only solid cells and no groups. Stress components
+    are those of `StepResult.stress` [pressure]. Without interfaces, `mesh` itself is returned.
     """
     material_stress = step.material_stress
     if material_stress is None:
@@ -65,18 +65,18 @@ def cells_by_element(mesh: Mesh, values: AnyArray) -> dict[str, AnyArray]:
 
 
 def mean_in_cells(mesh: Mesh, step: StepResult) -> Array:
-    """Return the nodal stress of the material of each cell, averaged over its nodes (n_solids, n_components) [pressure]."""
-    separate_mesh, _, stress = separated(mesh, step)
+    """Return the stress (n_solids, n_components) of each cell, the mean stress of its material at its nodes [pressure]."""
+    separate_mesh, _, stress = cut_at_interfaces(mesh, step)
     return np.concatenate([stress[block].mean(axis=1) for block in separate_mesh.solids.values()])
 
 
 Flags = NDArray[np.int8]
 
-# Version of the layout. Version 2 introduced the restart data and the records of runs, version 3 the middle of a contact,
-# and version 4 the slip.
+# Version of the layout. Version 2 added the restart data and the records of runs, version 3 the middle of a contact, and
+# version 4 the slip.
 SCHEMA = 4
 # Oldest version of files to which a resumed analysis can append steps.
-RESUMABLE = 2
+OLDEST_RESUMABLE = 2
 
 # Number of components of point data in files, by name: 3 for vectors and 6 for symmetric tensors, as viewers expect. 2D
 # models have 2 and 4 of these components, and the others are zero.
@@ -115,17 +115,17 @@ XDMF_TYPES = {
 STEP_ROW = np.dtype([("index", "<i8"), ("load_factor", "<f8"), ("notes_first", "<i8"), ("notes_count", "<i8")])
 
 # Columns that contain the first row and the number of rows of the secondary and of the primary nodes of a pair at a step.
-PLACES = ("first", "count", "primary_first", "primary_count")
+ROW_COLUMNS = ("first", "count", "primary_first", "primary_count")
 
 # Row of a step in the table of materials: the first row and the number of rows of its nodal stress by material.
-SIDES_STEP = np.dtype([("first", "<i8"), ("count", "<i8")])
+MATERIAL_STEP_ROW = np.dtype([("first", "<i8"), ("count", "<i8")])
 
 # Row of a run: number of completed steps, and the position of its record in the notes.
 RUN_ROW = np.dtype([("n_steps", "<i8"), ("first", "<i8"), ("count", "<i8")])
 
 
-# Objects, in addition to the steps, without which an analysis cannot be resumed from a file.
-CONTINUED = (
+# Objects of a file, in addition to the steps, that are needed to resume an analysis.
+NEEDED_TO_RESUME = (
     "fastcontact/runs", "fastcontact/notes", "fastcontact/contact", "VTKHDF/CellData", "VTKHDF/Types", "VTKHDF/Steps/Values",
     "VTKHDF/Steps/PointDataOffsets", "VTKHDF/Steps/CellDataOffsets",
 )  # fmt: skip
@@ -134,13 +134,14 @@ CONTINUED = (
 def restart_table(number: int) -> str:
     """Return the name of the table for the restart data of the step with a given number.
 
-    Two tables alternate, so that the table of the last step is complete while the other is written.
+    Steps use two tables alternately, so that the restart data of the previous step are complete while those of a step are
+    written.
     """
     return f"restart{number % 2}"
 
 
 def optional_columns(contact: ContactResult) -> tuple[str, ...]:
-    """Return the `OPTIONAL_COLUMNS` that a pair has."""
+    """Return the names of the `OPTIONAL_COLUMNS` for which a pair has values."""
     return tuple(name for name in OPTIONAL_COLUMNS if getattr(contact, name) is not None)
 
 
@@ -160,14 +161,14 @@ def primary_row(dim: int) -> np.dtype[Any]:
 def contact_step(dim: int) -> np.dtype[Any]:
     """Return the data type of the row of a contact pair at a step.
 
-    The row contains the columns PLACES, which locate the rows of its nodes, and attributes of `step.ContactResult`, with NaN
-    for None. Some files of schema 2 have neither the table with the type `primary_row` nor the columns that refer to it.
+    The row contains the ROW_COLUMNS, which locate the rows of its nodes, and attributes of `step.ContactResult`, with NaN for
+    None. Some files of schema 2 have neither the table with the type `primary_row` nor the columns that refer to it.
     """
     sums = [("force", "<f8", (dim,)), ("radius", "<f8", (2,)), ("dissipation", "<f8")]
     sums.append(("obstacle_displacement", "<f8", (dim,)))  # NaN for contact between bodies
     sums += [("obstacle_angle", "<f8"), ("torque", "<f8")]  # NaN without a rotation
     sums += [("middle", "<f8", (dim,)), ("tangent", "<f8", (dim,))]  # NaN without a tangent
-    return np.dtype([*((name, "<i8") for name in PLACES), *sums])
+    return np.dtype([*((name, "<i8") for name in ROW_COLUMNS), *sums])
 
 
 def material_row(dim: int) -> np.dtype[Any]:
@@ -178,7 +179,7 @@ def material_row(dim: int) -> np.dtype[Any]:
 def material_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
     """Return the `MATERIAL_FIELDS`: stress (n_solids, 6) and von Mises stress (n_solids,) of cells [pressure]."""
     stress = mean_in_cells(mesh, step)
-    return {CELL_STRESS: padded(stress, 6), CELL_VON_MISES: von_mises(stress)}
+    return {CELL_STRESS: pad_columns(stress, 6), CELL_VON_MISES: von_mises(stress)}
 
 
 class SolidCells(NamedTuple):
@@ -212,7 +213,7 @@ def xdmf_topology(mesh: Mesh) -> Numbers | None:
     return np.concatenate(blocks).astype(np.int32)
 
 
-def padded(values: Array, width: int) -> Array:
+def pad_columns(values: Array, width: int) -> Array:
     """Return `values` (n, k) padded with zero columns to `width`; a width of 1 leaves a vector (n,) unchanged."""
     values = np.asarray(values, np.float64)
     if width == 1 or values.shape[1] == width:
@@ -221,10 +222,10 @@ def padded(values: Array, width: int) -> Array:
 
 
 def contact_fields(mesh: Mesh, step: StepResult, names: Iterable[str] = tuple(CONTACT_FIELDS)) -> dict[str, Array]:
-    """Return those of the contact fields `names` that a step has: scalars (n_points,) and vectors (n_points, dim).
+    """Return the contact fields in `names` that a step has, as scalars (n_points,) and vectors (n_points, dim) by name.
 
-    They are zero outside the contact. At a point that belongs to several pairs, they are the largest of the scalars that is
-    not negative, or the vector with the largest component.
+    Fields are zero outside the contact. At a point that belongs to several pairs, a scalar is the largest value that is not
+    negative, and a vector is the one with the largest component.
     """
     fields = {}
     for name in names:
@@ -259,7 +260,7 @@ def point_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
     """Return the point data of a step by name, padded to the components of `POINT_FIELDS`."""
     values = {name: getattr(step, name) for name in step_shapes(mesh) if getattr(step, name) is not None}
     values |= contact_fields(mesh, step)
-    return {name: padded(values[name], width) for name, width in POINT_FIELDS.items() if name in values}
+    return {name: pad_columns(values[name], width) for name, width in POINT_FIELDS.items() if name in values}
 
 
 def point_flags(mesh: Mesh) -> dict[str, Flags]:
@@ -310,30 +311,30 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
             continue
         if np.ma.isMaskedArray(field):
             raise FileError(f"step {step.index}: {name} is a masked array, which files cannot store: fill it first")
-        shape_given = np.shape(field)
-        if shape_given != shape:
+        actual_shape = np.shape(field)
+        if actual_shape != shape:
             raise FileError(
-                f"step {step.index}: {name} has shape {shape_given}, but the mesh of the file needs {shape}"
+                f"step {step.index}: {name} has shape {actual_shape}, but the mesh of the file needs {shape}"
             )
     for name, contact in step.contact.items():
         check_contact(f"step {step.index}, contact '{name}'", contact, mesh)
     count = sum(map(len, mesh.solids.values()))
     for name in cell_fields:
-        shape_given = np.shape(step.cell_fields.get(name, ()))
-        if shape_given != (count,):
+        actual_shape = np.shape(step.cell_fields.get(name, ()))
+        if actual_shape != (count,):
             raise FileError(
-                f"step {step.index}: the declared cell field '{name}' has shape {shape_given}, but ({count},) is "
+                f"step {step.index}: the declared cell field '{name}' has shape {actual_shape}, but ({count},) is "
                 "needed, a number for each solid cell"
             )
 
 
 def check_contact(caption: str, contact: ContactResult, mesh: Mesh) -> None:
-    """Raise FileError, whose message begins with `caption`, if arrays of a pair are inconsistent or do not fit the mesh."""
+    """Raise FileError if arrays of a pair are inconsistent or do not fit the mesh; the message begins with `caption`."""
     row = contact_row(mesh.dim, optional_columns(contact))
     for name in row.names or ():
-        shape_given, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)
-        if shape_given != shape:
-            raise FileError(f"{caption}: {name} has shape {shape_given}, but {shape} is needed")
+        actual_shape, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)
+        if actual_shape != shape:
+            raise FileError(f"{caption}: {name} has shape {actual_shape}, but {shape} is needed")
     if np.shape(contact.primary_force_vectors) != (len(contact.primary_points), mesh.dim):
         raise FileError(
             f"{caption}: primary_force_vectors has shape {np.shape(contact.primary_force_vectors)}, but "

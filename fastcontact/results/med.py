@@ -1,4 +1,4 @@
-"""Write the results of all load steps as fields of a MED file, for Salome and code_aster."""
+"""Writing of the results of all load steps as fields of a MED file, for Salome and code_aster."""
 
 from __future__ import annotations
 
@@ -79,14 +79,14 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
     """
     with new_file(path, mesh) as file:
         add_mesh(file, mesh, mesh_name)
-        written: set[int] = set()
+        indices: set[int] = set()
         for step in steps:
-            if step.index in written:
-                raise FileError(f"two steps have the index {step.index}: give each its own to write '{path}'")
-            written.add(step.index)
+            if step.index in indices:
+                raise FileError(f"two steps have the index {step.index}: give them different ones to write '{path}'")
+            indices.add(step.index)
             for name, (components, field) in _fields(mesh, step).items():
                 add_field(file, name, components, field, (step.index, step.load_factor), mesh_name)
-        if not written:
+        if not indices:
             raise FileError(f"there is no step to write to '{path}': solve first, or use write_med_mesh")
 
 
@@ -94,20 +94,20 @@ def _fields(mesh: Mesh, step: StepResult) -> dict[str, tuple[tuple[str, ...], Ar
     """Return the names of the components and the values (n_points, n_components) of each field, by name."""
     directions = tuple(f"D{axis}" for axis in AXES[: mesh.dim])
     stresses = tuple(STRESSES)[: 4 if mesh.dim == 2 else 6]
-    stress = _checked(mesh, step, "stress")
-    equivalent = [_checked(mesh, step, name) for name in ("von_mises", "von_mises_signed")]
-    heated = step.temperature is not None
+    stress = _nodal_array(mesh, step, "stress")
+    equivalent = [_nodal_array(mesh, step, name) for name in ("von_mises", "von_mises_signed")]
+    has_temperature = step.temperature is not None
     return {
-        "DEPL": (directions, _checked(mesh, step, "displacement")),
+        "DEPL": (directions, _nodal_array(mesh, step, "displacement")),
         "SIEF_NOEU": (stresses, stress[:, [STRESSES[name] for name in stresses]]),
         "SIEQ_NOEU": (("VMIS", "VMIS_SG"), np.column_stack(equivalent)),
-        "REAC_NODA": (directions, _checked(mesh, step, "reaction")),
+        "REAC_NODA": (directions, _nodal_array(mesh, step, "reaction")),
         **{CONTACT[k][0]: (CONTACT[k][1:], v[:, None]) for k, v in contact_fields(mesh, step, CONTACT).items()},
-        **({"TEMP": (("TEMP",), _checked(mesh, step, "temperature")[:, None])} if heated else {}),
+        **({"TEMP": (("TEMP",), _nodal_array(mesh, step, "temperature")[:, None])} if has_temperature else {}),
     }
 
 
-def _checked(mesh: Mesh, step: StepResult, name: str) -> Array:
+def _nodal_array(mesh: Mesh, step: StepResult, name: str) -> Array:
     """Return the nodal array `name` of a step after a check of its shape."""
     field, shape = np.asarray(getattr(step, name), np.float64), step_shapes(mesh)[name]
     if field.shape != shape:

@@ -16,7 +16,7 @@ from fastcontact._tools import toml_text
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.hdf5 import check_contents
 from fastcontact._tools.html_table import html_table
-from fastcontact._tools.packing import unpacked
+from fastcontact._tools.packing import unpack
 from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.arrays import Array, Numbers
 from fastcontact.errors import FileError
@@ -27,8 +27,8 @@ from fastcontact.results.step import ContactResult, MaterialStress, StepResult, 
 from fastcontact.results.units import units_of_results
 
 # HDF5 stores strings of variable length in global heap collections (HDF5 File Format Specification 3.0, section III.E). A
-# collection consists of a header of 16 bytes, which contains its size, and a sequence of objects, each with a header of 16
-# bytes. Strings are read without the HDF5 library, which does not terminate for some damaged files.
+# collection consists of a header of 16 bytes with its size and a sequence of objects, each of which has a header of 16 bytes.
+# Strings are read without the HDF5 library, which does not terminate for some damaged files.
 SIGNATURE = b"GCOL\x01\0\0\0"  # with version and reserved bytes
 HEAD = struct.Struct("<8sQ")  # header of a collection: signature, size
 OBJECT = struct.Struct("<H6xQ")  # header of an object: number, size; free space at the end has the number 0
@@ -47,11 +47,11 @@ def read_text(dataset: Any, raw: Any) -> str:
     if dataset.shape != () or start is None or string_type is None or string_type.length is not None:
         raise ValueError(f"'{dataset.name}' is not a string")
     file_size = raw.seek(0, os.SEEK_END)
-    length, offset, object_number = _unpacked(REFERENCE, raw, start, file_size)
-    signature, size = _unpacked(HEAD, raw, offset, file_size)
+    length, offset, object_number = _unpack(REFERENCE, raw, start, file_size)
+    signature, size = _unpack(HEAD, raw, offset, file_size)
     position, end = offset + HEAD.size, min(offset + size, file_size)
     while signature == SIGNATURE and position + OBJECT.size <= end:
-        number, size = _unpacked(OBJECT, raw, position, end)
+        number, size = _unpack(OBJECT, raw, position, end)
         position += OBJECT.size
         if number == object_number and length <= size and position + length <= end:
             return raw.read(length).decode("utf-8")
@@ -61,7 +61,7 @@ def read_text(dataset: Any, raw: Any) -> str:
     raise ValueError(f"its strings are damaged at byte {position}")
 
 
-def _unpacked(kind: struct.Struct, raw: Any, offset: int, end: int) -> tuple[Any, ...]:
+def _unpack(kind: struct.Struct, raw: Any, offset: int, end: int) -> tuple[Any, ...]:
     if offset + kind.size > end:
         raise ValueError(f"its strings are damaged: byte {offset} lies beyond the end at {end}")
     raw.seek(offset)
@@ -71,8 +71,8 @@ def _unpacked(kind: struct.Struct, raw: Any, offset: int, end: int) -> tuple[Any
 if TYPE_CHECKING:
     import pandas
 
-# Columns of the row of a contact pair in which NaN represents None.
-NAN_IS_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent")
+# Columns of the row of a contact pair in which NaN stands for None.
+NAN_FOR_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent")
 
 
 @typed(FileError)
@@ -127,8 +127,8 @@ class Results(StepSequence):
     kinematics : str
         Kinematics of the analysis, see `Model`.
     case_text : str
-        Text of the case file, empty if there was none. If the run was resumed with a changed case file, the text is the
-        one with which the last steps were computed.
+        Text of the case file, empty if there was none. If the run was resumed with a changed case file, it is the text with
+        which the last steps were computed.
     versions : dict of str to str
         Versions of the packages that computed the results.
     load_factors : ndarray (n_steps,)
@@ -150,7 +150,8 @@ class Results(StepSequence):
         """Open the file.
 
         Changes in the journal, which a power loss may have interrupted, are applied to the data that are read, but not to the
-        file. While another program writes to the file they are ignored; `repeat` states that there is no such program.
+        file. They are ignored while another program writes to the file, unless `repeat` is true, which states that no other
+        program does.
         """
         import h5py
 
@@ -159,21 +160,21 @@ class Results(StepSequence):
             raise FileError(f"'{path}' is not readable: ask its owner for read permission")
         if not h5py.is_hdf5(self.path):
             raise FileError(f"'{path}' is not an HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
-        # Opened by a separate file object, because HDF5 would reuse an open file of the same name with its cached state.
+        # The file is opened by a separate file object. By name, HDF5 would reuse an open file with its cached state.
         self._raw: Any = open(path, "rb")  # noqa: SIM115
         self._file: Any = None
         try:
             writes = journal.pending(self._raw) if not is_being_written(self.path) or repeat else []
             if writes:
-                self._raw = journal.Repeated(self._raw, writes)
-            with self._explained():
+                self._raw = journal.JournalView(self._raw, writes)
+            with self._readable_errors():
                 self._file = h5py.File(self._raw, "r")
-                self._read_header(self._checked())
+                self._read_header(self._checked_group())
         except BaseException:
             self.close()
             raise
 
-    def _checked(self) -> Any:
+    def _checked_group(self) -> Any:
         """Return the HDF5 group of fastcontact after a check of the file and of its schema."""
         if self._file.userblock_size or self._file.id.get_create_plist().get_sizes() != (8, 8):
             raise ValueError("its superblock differs from that of result files")
@@ -237,7 +238,7 @@ class Results(StepSequence):
                 text = f"a step of '{self.path}' is selected by an integer or a slice, not {number!r}"
             raise FileError(text) from None
 
-    def lacks(self, names: Sequence[str]) -> list[str]:
+    def missing_paths(self, names: Sequence[str]) -> list[str]:
         """Return the HDF5 paths in `names` that the file does not contain."""
         return [name for name in names if name not in self._file]
 
@@ -327,7 +328,7 @@ class Results(StepSequence):
     def _units_of_case(self) -> dict[str, str]:
         """Return the names of units in the case text, for files of earlier versions."""
         try:
-            unit_names = toml_text.parsed(self.case_text or "").get("units", {})
+            unit_names = toml_text.parse(self.case_text or "").get("units", {})
         except ValueError:
             return {}
         return {key: str(value) for key, value in unit_names.items()} if isinstance(unit_names, dict) else {}
@@ -342,7 +343,7 @@ class Results(StepSequence):
     def _step(self, number: int) -> StepResult:
         if not self._file:
             raise FileError(f"'{self.path}' is closed: open it again to read more steps")
-        with self._explained():
+        with self._readable_errors():
             notes, stored = self._notes(number), self.point_field_names
             return StepResult(
                 index=int(self._rows["index"][number]),
@@ -365,7 +366,7 @@ class Results(StepSequence):
         """
         group, name = self._file["fastcontact"], layout.restart_table(number)
         try:
-            stored = unpacked(group[name][()]) if name in group else {}
+            stored = unpack(group[name][()]) if name in group else {}
         except (ValueError, LookupError, TypeError):
             return None
         return stored["restart"] if stored.get("step") == number else None
@@ -425,7 +426,7 @@ class Results(StepSequence):
         return contacts
 
     @contextlib.contextmanager
-    def _explained(self) -> Iterator[None]:
+    def _readable_errors(self) -> Iterator[None]:
         """Convert errors of HDF5, and errors due to damaged data, to a FileError."""
         try:
             yield
@@ -467,9 +468,10 @@ def _read_groups(group: Any, raw: Any) -> dict[str, Numbers]:
 
 
 def _rows(table: Any, step: Any, prefix: str, name: str) -> Any:
-    """Return the rows of table `name` that belong to a step; ValueError if rows are missing.
+    """Return the rows of the table called `name` that belong to a step. Raises ValueError if rows are missing.
 
-    The fields ``first`` and ``count`` of the step, with a prefix, contain the index of the first row and the number of rows.
+    The columns ``first`` and ``count`` of the row `step`, whose names begin with `prefix`, contain the index of the first row
+    and the number of rows.
     """
     first, count = int(step[f"{prefix}first"]), int(step[f"{prefix}count"])
     rows = table[first : first + count]
@@ -486,9 +488,9 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
         columns[mask] = columns[mask].astype(bool)
     # For data that files of earlier versions lack, the defaults of ContactResult apply.
     resultants: dict[str, Any] = {}
-    for column in set(step.dtype.names).difference(layout.PLACES):
+    for column in set(step.dtype.names).difference(layout.ROW_COLUMNS):
         value = step[column]
-        if column in NAN_IS_NONE and not np.isfinite(value).all():
+        if column in NAN_FOR_NONE and not np.isfinite(value).all():
             value = None
         resultants[column] = value.item() if isinstance(value, np.generic) else value
     resultants["radius"] = tuple(step["radius"].tolist())

@@ -88,20 +88,20 @@ def by_largest_von_mises(
     return stress, MaterialStress(cells, sides.points, sides.material, values)
 
 
-# The resultant of a contact is negligible below this fraction of the sum of the normal forces.
-CANCELLED = 1e-3
+# Fraction of the sum of the normal forces below which the resultant of a contact is negligible.
+NEGLIGIBLE = 1e-3
 
 
 def force_text(force: Sequence[float], parts: Sequence[float], normal_force: float, units: Mapping[str, str]) -> str:
-    """Return a contact force as text.
+    """Return the magnitude of a contact force as text, with further values in parentheses.
 
-    `parts` are `ContactResult.force_parts` [force]. The normal and tangential parts are included if there is friction,
-    otherwise the components of the vector `force` (dim,) [force] if it is not along an axis: in half of a symmetric model,
-    the other half balances the component across the plane of symmetry. The sum of the nodal normal forces, `normal_force`
-    [force], is included instead if these forces balance each other.
+    `parts` are `ContactResult.force_parts` [force]. With friction the further values are the normal and the tangential part.
+    Without friction they are the components of the vector `force` (dim,) [force], unless it is parallel to an axis: in a half
+    model, one of them is the component normal to the plane of symmetry, which the other half balances. If the nodal normal
+    forces balance each other, their sum `normal_force` [force] is appended instead.
     """
     total, normal, tangential, normal_sum = (valued(part, units, "force", 6) for part in (*parts, normal_force))
-    if parts[0] < CANCELLED * normal_force:
+    if parts[0] < NEGLIGIBLE * normal_force:
         return f"{total}, sum of normal forces {normal_sum}"
     if parts[2] > LENGTH_ROUND_OFF * parts[0]:
         return f"{total} (normal {normal}, tangential {tangential})"
@@ -113,11 +113,11 @@ def force_text(force: Sequence[float], parts: Sequence[float], normal_force: flo
 def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple[float, float]:
     """Return a lower and an upper bound of the half-width of a contact [length]; (NaN, NaN) if no node is closed.
 
-    `place` (n,) contains the positions of the nodes relative to the middle, with a sign if they lie on both sides of it
-    [length], and `closed` (n,) is the mask of closed nodes. The lower bound is half the distance between the two outermost
-    closed nodes, the upper bound half the distance between the next nodes beyond them. Distances are differences of
-    `across` (n,), by default `place` [length]. If all nodes lie on one side, the contact is assumed to be symmetric. The
-    upper bound is infinite if there is no node beyond the closed ones.
+    The lower bound is half the distance between the two outermost closed nodes, and the upper bound half the distance between
+    the next nodes beyond them, or infinite if there are no such nodes. If all nodes lie on one side of the middle, the
+    contact is assumed to be symmetric. `place` (n,) contains the positions of the nodes relative to the middle [length], with
+    a sign if nodes lie on both sides, and `closed` (n,) is the mask of closed nodes. Distances are differences of the
+    coordinate `across` (n,) [length], which is `place` by default.
     """
     if not closed.any():
         return float("nan"), float("nan")
@@ -171,11 +171,12 @@ class ContactResult(Suggesting):
     force : ndarray (dim,)
         Resultant contact force on the secondary side [force].
     radius : (float, float)
-        Lower and upper bound of the contact radius, in 2D of the half-width along the `tangent`: the distances from the
-        `middle` to the outermost closed node and to the first open node beyond it, in finite strain in the deformed
-        configuration [length]; NaN without contact. In 3D they are the smallest
-        distance of a closed node and the largest of an open one that have a facet in common, so that all semi-axes of an
-        elliptic contact are between the bounds. On a ring around an open middle, both belong to its outer edge.
+        Lower and upper bound of the contact radius, in 2D of the half-width along the `tangent` [length]; NaN without
+        contact. They are the distances from the `middle` to the outermost closed node and to the first open node beyond it,
+        in finite strain in the deformed configuration. In 3D, pairs of a closed and an open node with a common facet are
+        considered; the lower bound is the smallest distance of their closed nodes and the upper bound the largest distance of
+        their open nodes, so that all semi-axes of an elliptic contact lie between the bounds. If the contact is a ring around
+        an open middle, the bounds refer to its outer edge.
     shear : ndarray (m, dim)
         Tangential traction on the secondary side, zero in frictionless contact [pressure].
     sticking : ndarray of bool (m,)
@@ -367,7 +368,7 @@ class ContactResult(Suggesting):
     @property
     def cancels(self) -> bool:
         """Whether the normal forces balance each other, so that their resultant is negligible, as in a press fit."""
-        return bool(np.linalg.norm(self.force) < CANCELLED * self.normal_force)
+        return bool(np.linalg.norm(self.force) < NEGLIGIBLE * self.normal_force)
 
     @property
     def penetration(self) -> float:
@@ -581,8 +582,8 @@ class StepResult(Suggesting):
         return stress
 
 
-# Largest number of steps that the representation of a list shows.
-MOST_SHOWN = 30
+# Largest number of steps that the repr of a list shows.
+MAX_SHOWN = 30
 
 
 class _Steps(Suggesting):
@@ -618,7 +619,7 @@ class StepSequence(_Steps, Sequence[StepResult]):
 
 
 class Steps(_Steps, list[StepResult]):
-    """A list of `StepResult` that notebooks display as a table."""
+    """A list of `StepResult`, which notebooks display as a table."""
 
     @overload
     def __getitem__(self, index: SupportsIndex) -> StepResult: ...
@@ -631,22 +632,22 @@ class Steps(_Steps, list[StepResult]):
         return super().__getitem__(index)
 
     def __repr__(self) -> str:
-        lines = (f"  {step!r}" for step in _shown(self))
-        return "\n".join([f"{len(self)} steps", *(["  ..."] if len(self) > MOST_SHOWN else []), *lines])
+        lines = (f"  {step!r}" for step in _last_steps(self))
+        return "\n".join([f"{len(self)} steps", *(["  ..."] if len(self) > MAX_SHOWN else []), *lines])
 
     def _repr_html_(self) -> str:
         """Return an HTML table with a row for each contact pair of each step."""
-        rows = [row for step in _shown(self) for row in rows_of(step)]
-        left_out = f", {len(self) - MOST_SHOWN} of them not shown" if len(self) > MOST_SHOWN else ""
-        return html_table(rows, HEAD, f"{len(self)} steps{left_out}")
+        rows = [row for step in _last_steps(self) for row in rows_of(step)]
+        omitted = f", {len(self) - MAX_SHOWN} of them not shown" if len(self) > MAX_SHOWN else ""
+        return html_table(rows, HEAD, f"{len(self)} steps{omitted}")
 
 
 HEAD = ("step", "load factor", "geometry updates", "contact", "force", "largest pressure", "closed", "contact radius")
 
 
-def _shown(steps: Steps) -> Iterable[StepResult]:
-    """Return the last MOST_SHOWN steps, which the representation of a list shows."""
-    return list(steps)[-MOST_SHOWN:]
+def _last_steps(steps: Steps) -> Iterable[StepResult]:
+    """Return the last MAX_SHOWN steps, which the repr of a list shows."""
+    return list(steps)[-MAX_SHOWN:]
 
 
 def rows_of(step: StepResult) -> list[tuple[str, ...]]:

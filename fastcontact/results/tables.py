@@ -93,7 +93,7 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
     table = structured(columns)
     if contact.abscissa.any() or contact.coordinates.shape[1] == 3:
         return table
-    # A closed line and a line of several pieces have no abscissa.
+    # Without an abscissa, as on closed lines and lines of several pieces, the nodes are sorted by their position.
     return table[np.argsort(contact.place, kind="stable")]
 
 
@@ -290,7 +290,7 @@ if TYPE_CHECKING:
     import pandas
 
 # Columns that `contact_frame` places before those of contact tables.
-LEADING = ("step", "load_factor", "contact")
+STEP_COLUMNS = ("step", "load_factor", "contact")
 
 
 def library(name: str, title: str, install: str) -> Any:
@@ -311,7 +311,7 @@ def grid(mesh: Mesh, step: StepResult) -> Any:
     cells = layout.solid_cells(mesh)
     # The older layout of VTK, with the size of each cell before its nodes, is supported by all versions of PyVista.
     flat = np.insert(cells.connectivity, cells.offsets[:-1], np.diff(cells.offsets))
-    unstructured_grid = pyvista.UnstructuredGrid(flat, cells.types, layout.padded(mesh.points, 3))
+    unstructured_grid = pyvista.UnstructuredGrid(flat, cells.types, layout.pad_columns(mesh.points, 3))
     for name, values in (layout.point_fields(mesh, step) | layout.point_flags(mesh)).items():
         unstructured_grid.point_data[name] = values
     by_cell: dict[str, Any] = layout.cell_fields(mesh) | step.cell_fields
@@ -340,7 +340,7 @@ def data_frame(table: Any, units: Mapping[str, str], columns: Sequence[str] | No
 
 
 def contact_frame(steps: Iterable[StepResult], units: Mapping[str, str]) -> pandas.DataFrame:
-    """Return the contact tables of all steps as one ``pandas.DataFrame``, with the columns `LEADING` before the others."""
+    """Return the contact tables of all steps as one ``pandas.DataFrame``, in which the `STEP_COLUMNS` come first."""
     concat = library("pandas", "pandas", "'fastcontact[table]'").concat
     frames = []
     for step in steps:
@@ -351,7 +351,7 @@ def contact_frame(steps: Iterable[StepResult], units: Mapping[str, str]) -> pand
             frames.append(frame)
     combined = concat(frames, ignore_index=True) if frames else None
     columns = () if combined is None else combined.columns
-    return data_frame(combined, column_units(columns, units), None if frames else LEADING)
+    return data_frame(combined, column_units(columns, units), None if frames else STEP_COLUMNS)
 
 
 def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> Any:
@@ -360,7 +360,7 @@ def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> A
     pairs = list(dict.fromkeys(name for step in all_steps for name in step.contact))
     components = list(STRESS_COMPONENTS[: 4 if dim == 2 else 6])
 
-    def of_pairs(name: str, missing: Any) -> list[Any]:
+    def values_of_pairs(name: str, missing: Any) -> list[Any]:
         return [
             [getattr(c[pair], name) if pair in c else missing for pair in pairs] for c in (s.contact for s in all_steps)
         ]
@@ -374,17 +374,17 @@ def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> A
     }
     columns: dict[str, tuple[tuple[str, ...], str, list[Any]]]
     columns = {name: (*kind, [getattr(step, name) for step in all_steps]) for name, kind in fields.items()}
-    of_contact = [layout.contact_fields(mesh, step) for step in all_steps]
+    contact_values = [layout.contact_fields(mesh, step) for step in all_steps]
     for name, (_, quantity) in layout.CONTACT_FIELDS.items():
-        if all(name in contact for contact in of_contact):
+        if all(name in contact for contact in contact_values):
             dims: tuple[str, ...] = ("point",) if layout.POINT_FIELDS[name] == 1 else ("point", "axis")
-            columns[name] = dims, quantity, [contact[name] for contact in of_contact]
-    columns["contact_force"] = ("contact", "axis"), "force", of_pairs("force", np.full(dim, np.nan))
-    columns["contact_pressure_max"] = ("contact",), "pressure", of_pairs("pressure_max", np.nan)
+            columns[name] = dims, quantity, [contact[name] for contact in contact_values]
+    columns["contact_force"] = ("contact", "axis"), "force", values_of_pairs("force", np.full(dim, np.nan))
+    columns["contact_pressure_max"] = ("contact",), "pressure", values_of_pairs("pressure_max", np.nan)
     sizes = {"point": mesh.n_points, "axis": dim, "stress_component": len(components), "contact": len(pairs)}
     data = {}
-    for name, (dims, quantity, of_steps) in columns.items():
-        values = np.array(of_steps, np.float64)
+    for name, (dims, quantity, values_of_steps) in columns.items():
+        values = np.array(values_of_steps, np.float64)
         values = values.reshape(len(all_steps), *(sizes[name_of_dim] for name_of_dim in dims))
         data[name] = (("step", *dims), values, _unit(units, quantity))
     coordinates = {

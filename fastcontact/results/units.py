@@ -1,4 +1,4 @@
-"""Names of units in the labels and texts of results."""
+"""Units in labels, tables and texts of results."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ COLUMNS = {
 
 
 def known_units(units: Mapping[str, str]) -> dict[str, str]:
-    """Return the names of all units, which include those of length, force and pressure; unknown units and dashes are empty.
+    """Return the names of units, always including those of length, force and pressure. Unknown units and dashes are empty.
 
     Examples
     --------
@@ -63,14 +63,16 @@ def column_units(columns: Iterable[str], units: Mapping[str, str]) -> dict[str, 
     return {name: units[kind] for name, kind in kinds.items() if units.get(kind)}
 
 
-def labelled(text: str, units: Mapping[str, str], quantity: str) -> str:
+def axis_label(text: str, units: Mapping[str, str], quantity: str) -> str:
     """Return a label with the unit of its quantity in brackets, if the unit is known."""
     unit = units.get(quantity, "")
     return f"{text} [{unit}]" if unit and unit != "-" else text
 
 
 def valued(value: float, units: Mapping[str, str], quantity: str, digits: int = 4) -> str:
-    """Return a value as text with its unit, if the unit is known. Values from 1e`digits` to a million are rounded integers.
+    """Return a value as text, with its unit if the unit is known.
+
+    The text has `digits` significant digits, but values from ``10**digits`` to a million are rounded to integers.
 
     Examples
     --------

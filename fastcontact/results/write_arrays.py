@@ -1,6 +1,6 @@
 """Functions that write the arrays of a result file: groups and empty tables when it is created, and the data of each step.
 
-The data of a step become valid when the writer finally increments the number of steps.
+The data of a step become valid when the writer increments the number of steps, which is its last action.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from fastcontact.results.step import ContactResult, MaterialStress, StepResult
 # Sizes of the chunks of growing tables [rows] and of growing texts [bytes].
 ROWS, BYTES = 64, 4096
 # Largest size of a chunk that contains the fields of several steps [bytes].
-SHARED = 4096
+MAX_SHARED = 4096
 
 
 def write_geometry(
@@ -29,9 +29,9 @@ def write_geometry(
 ) -> None:
     """Write the group /VTKHDF with the solid cells, the constant arrays and empty tables for the steps.
 
-    `growing` are the names of the cell fields of steps, and `optional` those of their `layout.OPTIONAL_FIELDS`. `material`
-    (n_solids,) contains the material number of each cell of a model with material interfaces, whose steps also have the
-    `layout.MATERIAL_FIELDS`.
+    `growing` contains the names of the cell fields of steps, and `optional` those of their `layout.OPTIONAL_FIELDS`.
+    `material` (n_solids,) contains the material number of each cell, if the model has material interfaces. The steps of such
+    a model also have the `layout.MATERIAL_FIELDS`.
     """
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 0], np.int64)
@@ -40,22 +40,22 @@ def write_geometry(
     root["NumberOfPoints"] = np.array([mesh.n_points], np.int64)
     root["NumberOfCells"] = np.array([len(cells.types)], np.int64)
     root["NumberOfConnectivityIds"] = np.array([len(cells.connectivity)], np.int64)
-    _packed(root, "Points", layout.padded(mesh.points, 3))
-    _packed(root, "Connectivity", cells.connectivity)
-    _packed(root, "Offsets", cells.offsets)
-    _packed(root, "Types", cells.types)
+    _write_constant(root, "Points", layout.pad_columns(mesh.points, 3))
+    _write_constant(root, "Connectivity", cells.connectivity)
+    _write_constant(root, "Offsets", cells.offsets)
+    _write_constant(root, "Types", cells.types)
     point_data, cell_data = root.create_group("PointData"), root.create_group("CellData")
     names = [name for name in layout.POINT_FIELDS if name in optional or name not in layout.OPTIONAL_FIELDS]
     for name in names:
         _growing_field(point_data, name, mesh.n_points, layout.POINT_FIELDS[name])
     point_flags, cell_fields = layout.point_flags(mesh), layout.cell_fields(mesh)
     for name, values in point_flags.items():
-        _packed(point_data, name, values)
+        _write_constant(point_data, name, values)
     for name, values in cell_fields.items():
-        _packed(cell_data, name, values)
+        _write_constant(cell_data, name, values)
     widths = dict.fromkeys(growing, 1)
     if material is not None:
-        _packed(cell_data, "material", material)
+        _write_constant(cell_data, "material", material)
         cell_fields = {**cell_fields, "material": material}
         widths |= layout.MATERIAL_FIELDS
     for name, width in widths.items():
@@ -66,7 +66,7 @@ def write_geometry(
 def _write_steps_group(
     root: Any, point: Iterable[str], static_point: Iterable[str], static_cell: Iterable[str], growing: Iterable[str]
 ) -> None:
-    """Write the empty tables of steps; tables with equal contents are one data set with several names."""
+    """Write the empty tables of steps. Tables with equal contents are stored as one data set with several names."""
     steps = root.create_group("Steps")
     steps.attrs["NSteps"] = np.int64(0)
     growing_table(steps, "Values", np.float64)
@@ -98,18 +98,18 @@ def write_case(file: Any, mesh: Mesh, kinematics: str, case_text: str, units: Ma
     group["versions"] = as_json({**versions(), "hdf5": h5py.version.hdf5_version})
     if units:
         group["units"] = as_json(dict(units))
-    stored = group.create_group("mesh")
-    stored.attrs["dim"] = np.int64(mesh.dim)
-    stored["points"] = file["VTKHDF/Points"]
-    stored["elements"] = as_json(list(mesh.cells))
-    blocks = stored.create_group("cells")
+    mesh_group = group.create_group("mesh")
+    mesh_group.attrs["dim"] = np.int64(mesh.dim)
+    mesh_group["points"] = file["VTKHDF/Points"]
+    mesh_group["elements"] = as_json(list(mesh.cells))
+    blocks = mesh_group.create_group("cells")
     for name, block in mesh.cells.items():
-        _packed(blocks, name, block)
-    _write_groups(stored, "cell_groups", mesh.cell_groups)
-    _write_groups(stored, "point_groups", mesh.point_groups)
+        _write_constant(blocks, name, block)
+    _write_groups(mesh_group, "cell_groups", mesh.cell_groups)
+    _write_groups(mesh_group, "point_groups", mesh.point_groups)
     topology = layout.xdmf_topology(mesh)
     if topology is not None:
-        _packed(stored, "xdmf_topology", topology)
+        _write_constant(mesh_group, "xdmf_topology", topology)
     group.create_group("contact")
     growing_table(group, "steps", layout.STEP_ROW)
     growing_table(group, "notes", np.uint8, rows=BYTES)
@@ -123,10 +123,10 @@ def _write_groups(parent: Any, name: str, groups: Any) -> None:
     group = parent.create_group(name)
     group["names"] = as_json(list(groups))
     group["sizes"] = np.array([len(members) for members in groups.values()], np.int64)
-    _packed(group, "members", np.concatenate([np.empty(0, np.int32), *groups.values()]))
+    _write_constant(group, "members", np.concatenate([np.empty(0, np.int32), *groups.values()]))
 
 
-def _packed(parent: Any, name: str, values: AnyArray) -> None:
+def _write_constant(parent: Any, name: str, values: AnyArray) -> None:
     """Write a constant array, compressed with gzip, the only filter that all readers support."""
     if values.size:
         parent.create_dataset(name, data=values, compression="gzip", compression_opts=1, chunks=values.shape)
@@ -137,11 +137,11 @@ def _packed(parent: Any, name: str, values: AnyArray) -> None:
 def _growing_field(parent: Any, name: str, length: int, width: int) -> None:
     """Create an empty field.
 
-    Small fields of several steps share a chunk, because the chunk index would otherwise be larger than the fields. Only
-    chunks of a single step are compressed, because a compressed chunk moves in the file when data are added.
+    A chunk contains a small field at several steps, because the chunk index would otherwise be larger than the fields. Only
+    chunks of a single step are compressed, because a compressed chunk moves in the file when data are added to it.
     """
     tail, rows = () if width == 1 else (width,), max(length, 1)
-    steps = SHARED // (8 * rows * width)
+    steps = MAX_SHARED // (8 * rows * width)
     parent.create_dataset(
         name, shape=(0, *tail), maxshape=(None, *tail), chunks=(max(steps, 1) * rows, *tail), dtype=np.float64,
         **({} if steps > 1 else {"compression": "gzip", "compression_opts": 1}),
@@ -202,7 +202,7 @@ def append_tables(
     for name, pair in pairs.items():
         _append_contact(pair, number, step.contact.get(name))
     if step.material_stress is not None:
-        _append_sides(file["fastcontact"], mesh, number, step.material_stress)
+        _append_material_stress(file["fastcontact"], mesh, number, step.material_stress)
     contact = [[name, contact.formulation] for name, contact in step.contact.items()]
     text = as_json({**notes, "contact": contact, "iterations": step.iterations, "warnings": list(step.warnings)})
     table = file["fastcontact/notes"]
@@ -212,7 +212,7 @@ def append_tables(
 
 
 def append_offsets(file: OpenObjects, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
-    """Write the rows of step `number` in which viewers find the positions of fields."""
+    """Write the rows of step `number` that contain the positions of its fields, for viewers."""
     rows = {"Values": step.load_factor, "NumberOfParts": 1, "PartOffsets": 0, "CellOffsets": 0}
     for name, value in {**rows, "PointDataOffsets/displacement": number * mesh.n_points}.items():
         _set_row(file[f"VTKHDF/Steps/{name}"], number, value)
@@ -222,7 +222,10 @@ def append_offsets(file: OpenObjects, mesh: Mesh, number: int, step: StepResult,
 
 
 def append_run(file: OpenObjects, n_steps: int, run: Any, flush: Callable[[], None]) -> None:
-    """Write the record of a run that ended after `n_steps` steps as JSON; `flush` is called after its text and its row."""
+    """Write the record of a run that ended after `n_steps` steps as JSON.
+
+    `flush` is called after the text and after the row with its position have been written.
+    """
     notes, runs, text = file["fastcontact/notes"], file["fastcontact/runs"], as_json(run)
     row = np.array((n_steps, len(notes), len(text)), layout.RUN_ROW)
     _extend(notes, np.frombuffer(text.encode("ascii"), np.uint8))
@@ -232,7 +235,7 @@ def append_run(file: OpenObjects, n_steps: int, run: Any, flush: Callable[[], No
 
 
 def set_restart(file: OpenObjects, number: int, state: NDArray[np.uint8]) -> None:
-    """Write the packed restart data of step `number`. The table never shrinks: HDF5 could overwrite freed space."""
+    """Write the packed restart data of step `number`. The table never shrinks, because HDF5 could overwrite freed space."""
     table = file[f"fastcontact/{layout.restart_table(number)}"]
     if len(table) < len(state):
         table.resize(len(state), axis=0)
@@ -279,7 +282,7 @@ def _append_contact(pair: dict[str, Any], number: int, contact: ContactResult | 
     row = np.zeros((), steps.dtype)
     if contact is not None:
         row["first"], row["count"] = _append_rows(rows, contact)
-        for name in set(row.dtype.names or ()).difference(layout.PLACES):
+        for name in set(row.dtype.names or ()).difference(layout.ROW_COLUMNS):
             value = getattr(contact, name)
             row[name] = np.nan if value is None else value
         if "primary" in pair:  # files of earlier versions do not have this table
@@ -287,16 +290,16 @@ def _append_contact(pair: dict[str, Any], number: int, contact: ContactResult | 
     _set_row(steps, number, row)
 
 
-def _append_sides(parent: Any, mesh: Mesh, number: int, sides: MaterialStress) -> None:
+def _append_material_stress(parent: Any, mesh: Mesh, number: int, sides: MaterialStress) -> None:
     """Append the stress of each material at interfaces; the first call creates the tables."""
     if "materials" not in parent:
         group = parent.create_group(None)  # the group gets a name when it is complete, so that interrupts do no harm
-        _packed(group, "cells", np.asarray(sides.cells, np.int32))
+        _write_constant(group, "cells", np.asarray(sides.cells, np.int32))
         growing_table(group, "rows", layout.material_row(mesh.dim))
-        growing_table(group, "steps", layout.SIDES_STEP)
+        growing_table(group, "steps", layout.MATERIAL_STEP_ROW)
         parent["materials"] = group
     group = parent["materials"]
-    _set_row(group["steps"], number, np.array((len(group["rows"]), len(sides.points)), layout.SIDES_STEP))
+    _set_row(group["steps"], number, np.array((len(group["rows"]), len(sides.points)), layout.MATERIAL_STEP_ROW))
     _append_rows(group["rows"], sides)
 
 
@@ -322,12 +325,12 @@ def _set_row(table: Any, number: int, value: Any) -> None:
 
 
 def _write(table: Any, values: AnyArray, first: int) -> None:
-    """Write values to the rows from `first`. Indexing by h5py would take longer than the writing of small tables."""
+    """Write values to the rows from `first`, without the indexing of h5py, which would take longer for small tables."""
     from h5py import h5s
 
     if values.size:
         rows = table.id.get_space()
         rows.select_hyperslab((first, *[0] * (values.ndim - 1)), values.shape)
-        # The type in memory is that in the file. Without it, h5py would build it anew from the types of all columns.
+        # Without the type of the file, h5py would build the type in memory anew from the types of all columns.
         memory = np.ascontiguousarray(values, table.id.dtype), table.id.get_type()
         table.id.write(h5s.create_simple(values.shape), rows, *memory)

@@ -1,9 +1,9 @@
-"""Writing of result files in which a crash does not damage the steps that are complete.
+"""Writing of result files, in which a crash does not damage completed steps.
 
-The fields and tables of a step are written first, then the rows that locate its fields, and finally the number of steps, with
-a flush after each of the three. Uncompressed tables and small fields grow in place, and larger fields have a separate chunk
-for each step, so that data of a completed step are never moved. Disk space is reserved beforehand, because a failed write of
-HDF5 may damage the entire file.
+The fields and tables of a step are written first, then the rows with the positions of its fields, and finally the number of
+steps, with a flush after each of the three. Data of completed steps are never moved: uncompressed tables and small fields
+grow in place, and larger fields have a separate chunk for each step. Disk space is reserved beforehand, because a failed
+write of HDF5 may damage the entire file.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.hdf5 import new_hdf5
-from fastcontact._tools.packing import packed
+from fastcontact._tools.packing import pack
 from fastcontact._tools.paths import PathLike, checked_target, replacing
 from fastcontact.elasticity.material_sides import material_sides
 from fastcontact.errors import ConvergenceError, FastcontactError, FileError, ModelError
@@ -34,13 +34,13 @@ from fastcontact.results.file_lock import PathLock, file_state, reserve
 from fastcontact.results.reader import Results, StoredSteps, read_text
 from fastcontact.results.step import StepResult
 
-# Age of a file from which on each step is synchronised with the disk [s]. A shorter run is quickly repeated.
+# Age of a file [s] from which each step is synchronised to the disk. A run that is lost before takes less time to repeat.
 SYNCHRONISED_FROM = 10.0
 # Disk space that is reserved for the metadata of HDF5 [bytes].
 MARGIN = 1 << 19
 # Size in the file of the indices that HDF5 caches in memory [bytes].
 CACHED_INDICES = 1 << 18
-# Suffixes of formats in which results are not written.
+# Suffixes of other formats, in which results cannot be written.
 OTHER_FORMATS = {".vtu", ".vtk", ".pvd", ".med", ".rmed", ".xdmf"}
 
 
@@ -48,9 +48,9 @@ OTHER_FORMATS = {".vtu", ".vtk", ".pvd", ".med", ".rmed", ".xdmf"}
 class ResultWriter:
     """A result file to which steps are appended.
 
-    The constructor creates the file, so that errors of the path appear before any step is computed. From then on the file
-    can be opened at any time, also by viewers, and contains all steps written so far, even after an exception or a crash.
-    Several threads may share a writer.
+    The constructor creates the file, so that an invalid path is reported before any step is computed. From then on, viewers
+    and other programs can open the file at any time. It contains all steps that have been written, even after an exception or
+    a crash. Several threads may share a writer.
 
     Parameters
     ----------
@@ -122,8 +122,8 @@ class ResultWriter:
         cell_fields = dict.fromkeys((*getattr(mesh, "cell_fields", ()), *cell_fields))
         if not isinstance(mesh, Mesh):
             if not isinstance(getattr(mesh, "mesh", None), Mesh) or not hasattr(mesh, "kinematics"):
-                raise ModelError(f"results need a mesh or a model as a basis, not {type(mesh).__name__}")
-            kinematics, self._material = mesh.kinematics, _materials_that_meet(mesh)
+                raise ModelError(f"a result file needs a mesh or a model, not {type(mesh).__name__}")
+            kinematics, self._material = mesh.kinematics, _materials_at_interfaces(mesh)
             case_text = case_text or getattr(mesh, "case_text", None) or ""
             mesh = mesh.mesh
         self.path = checked_target(path)
@@ -155,7 +155,7 @@ class ResultWriter:
                     self.done, self._ended, text = _steps_to_resume(self.path, mesh, str(kinematics), self._cell_fields)
                 if self.done:
                     self._resumed_state, self.n_steps = state, len(self.done)
-                    self._last = self.done[-1].index, _case_of(self.done[-1])
+                    self._last = self.done[-1].index, _case_fingerprint(self.done[-1])
                     self._notes = {"case": case_text} if case_text not in ("", text) else {}
                 else:
                     _check_replaceable(self.path, overwrite or resume)
@@ -176,7 +176,7 @@ class ResultWriter:
         except FileError as failure:
             error.add_note(str(failure))
         if self._file is None and not isinstance(error, ConvergenceError):
-            self._give_up()  # no step was added, and the error does not concern the existing steps
+            self._abandon()  # no step was added, and the error does not concern the existing steps
             return
         with contextlib.suppress(FileError):  # only the first error is raised
             run: dict[str, Any] = {"error": f"{type(error).__name__}: {error}"}
@@ -232,10 +232,11 @@ class ResultWriter:
             self._check_in_place()
             by_default = time.monotonic() - self._started > SYNCHRONISED_FROM
             self._committed.synchronised = by_default if self._synchronise is None else self._synchronise
-            restart = packed({"step": self.n_steps, "restart": step.restart})
+            restart = pack({"step": self.n_steps, "restart": step.restart})
             size = write_arrays.step_size(self._mesh, step) + restart.nbytes
             self._reserve(2 * size if self._committed.synchronised else size)
-            # Fields, rows and the number of steps are flushed separately, unless a single journal contains all of them.
+            # Fields, rows and the number of steps are flushed one after the other, unless a single journal contains all of
+            # them.
             in_parts = not self._committed.synchronised or size > journal.LARGEST
             write_arrays.append_fields(self._objects, self._mesh, self.n_steps, step, self._cell_fields)
             write_arrays.append_tables(self._objects, self._mesh, self.n_steps, step, self._pairs, self._notes)
@@ -248,14 +249,14 @@ class ResultWriter:
             self._objects["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))
             self._flush()
             self.n_steps += 1
-            self._last = step.index, _case_of(step)
+            self._last = step.index, _case_fingerprint(step)
 
     def _check_next(self, step: StepResult) -> None:
         """Raise FileError unless the step follows the last one and was computed for the same case."""
         index, case = self._last
         if step.index <= index:
             raise FileError(f"step {step.index} cannot be written after step {index}: write each step once, in order")
-        if None not in (case, _case_of(step)) and case != _case_of(step):
+        if None not in (case, _case_fingerprint(step)) and case != _case_fingerprint(step):
             raise FileError(f"step {step.index} belongs to another case than step {index}: write it to a separate file")
 
     def close(self, log: Any = None, warnings: Iterable[str] = ()) -> None:
@@ -282,20 +283,20 @@ class ResultWriter:
 
     def _finish(self, run: dict[str, Any]) -> None:
         with self._access, contextlib.ExitStack() as closing:
-            closing.callback(self._give_up)
+            closing.callback(self._abandon)
             if self._closed or (self._file is None and self._ended and "error" not in run):
-                return  # a complete file is not changed
+                return  # closed, or a complete file to which no step was added
             self._release_done()
             closing.enter_context(self._explained("closed"))
             self._open()
             closing.callback(self._committed.close)
             closing.callback(self._file.close)
-            self._check_ours()
+            self._check_exclusive()
             if self._committed.writable:
                 self._reserve(len(write_arrays.as_json(run)))
                 write_arrays.append_run(self._objects, self.n_steps, run, self._flush)
 
-    def _give_up(self) -> None:
+    def _abandon(self) -> None:
         self._closed, self._file = True, None
         if self._background is not None:
             self._background.shutdown(wait=False)
@@ -313,7 +314,7 @@ class ResultWriter:
 
         if self._file is None:
             if self._resumed_state is not None and self._resumed_state != file_state(self.path):
-                raise FileError(self._gone())
+                raise FileError(self._moved_message())
             self._committed = CommittedFile(self.path)
             try:
                 self._file = h5py.File(self._committed, "r+")
@@ -332,21 +333,21 @@ class ResultWriter:
     def _check_in_place(self) -> None:
         """Raise FileError if the file is no longer at its path, or an earlier write has failed."""
         self._committed.check()
-        self._check_ours()
+        self._check_exclusive()
         with contextlib.suppress(OSError):
             if os.path.samestat(os.fstat(self._committed.fileno()), os.stat(self.path)):
                 return
-        raise FileError(self._gone())
+        raise FileError(self._moved_message())
 
-    def _check_ours(self) -> None:
+    def _check_exclusive(self) -> None:
         """Raise FileError if another program has changed the file."""
-        if not self._committed.intact():
+        if not self._committed.is_intact():
             raise FileError(
                 f"'{self.path}' was changed by another program after {self.n_steps} steps, its contents are left "
                 "unchanged: let no other program write to it, name another file and start again"
             )
 
-    def _gone(self) -> str:
+    def _moved_message(self) -> str:
         return (
             f"'{self.path}' is no longer there: the file or its folder was removed, moved or replaced after "
             f"{self.n_steps} steps. Put it back and resume, or start again"
@@ -393,7 +394,7 @@ class ResultWriter:
         self._open()
 
 
-def _materials_that_meet(model: Any) -> Any:
+def _materials_at_interfaces(model: Any) -> Any:
     """Return the numbers of the materials of all solid cells (n_solids,); None for a model without material interfaces."""
     if not getattr(model, "materials", None) or not hasattr(model, "material_numbers"):
         return None
@@ -417,16 +418,16 @@ def _steps_to_resume(
         if not len(old):
             return [], False, ""
         start_anew = "or start anew without resuming, which replaces the file"
-        if old.schema < layout.RESUMABLE:
+        if old.schema < layout.OLDEST_RESUMABLE:
             raise FileError(
                 f"'{path}' was written by an earlier fastcontact, which stored no data to resume from: name another file "
                 f"{start_anew}"
             )
-        if missing := old.lacks(layout.CONTINUED):
+        if missing := old.missing_paths(layout.NEEDED_TO_RESUME):
             raise FileError(f"'{path}' is damaged, it lacks '{missing[0]}': restore a copy, {start_anew}")
         if not _same_mesh(old.mesh, mesh) or old.kinematics != kinematics:
             difference = "kinematics" if _same_mesh(old.mesh, mesh) else "mesh"
-            raise FileError(f"'{path}' belongs to another {difference}: resume the case it was begun for, {start_anew}")
+            raise FileError(f"'{path}' belongs to another {difference}: resume the case of the file, {start_anew}")
         names = sorted(old.cell_field_names)
         if names != sorted(cell_fields):
             raise FileError(
@@ -438,7 +439,7 @@ def _steps_to_resume(
         return steps, old.complete, old.case_text
 
 
-def _case_of(step: StepResult) -> Any:
+def _case_fingerprint(step: StepResult) -> Any:
     """Return the fingerprint of the case for which a step was computed; None if it is unknown."""
     return (step.restart or {}).get("case", {}).get("parts")
 
@@ -458,7 +459,7 @@ def _checked_names(cell_fields: Iterable[str], mesh: Mesh) -> tuple[str, ...]:
         reserved = {*layout.cell_fields(mesh), *layout.MATERIAL_FIELDS, "material"}
         if name in reserved or not name.isidentifier():
             raise FileError(
-                f"'{name}' cannot be the name of a cell field: it is taken or no plain word; choose another"
+                f"'{name}' cannot be the name of a cell field: it is reserved or not an identifier; choose another"
             )
     return names
 

@@ -105,7 +105,7 @@ def write_agr(
     lines += ["@g0 on", "@g0 type XY", "@with g0"]
     lines.append(f"@    world {x_axis[0]:.12g}, {y_axis[0]:.12g}, {x_axis[1]:.12g}, {y_axis[1]:.12g}")
     lines.append("@    view 0.18, 0.15, 1.20, 0.85")
-    lines += [f'@    title "{escaped(title)}"', f'@    subtitle "{escaped(subtitle)}"']
+    lines += [f'@    title "{escape(title)}"', f'@    subtitle "{escape(subtitle)}"']
     lines += [*_axis("x", xlabel, x_axis), *_axis("y", ylabel, y_axis)]
     legend_state = "on" if any(curve.legend for curve in shown) else "off"
     lines += [f"@    legend {setting}" for setting in (legend_state, "loctype view", "0.82, 0.82", "char size 0.8")]
@@ -143,13 +143,13 @@ def round_axis(values: ArrayLike) -> tuple[float, float, float]:
     return first * spacing, last * spacing, spacing
 
 
-def escaped(text: str) -> str:
+def escape(text: str) -> str:
     """Return a Grace string that shows `text` literally, in Latin-1 with Greek letters from the Symbol font."""
     plain = " ".join(text.translate(_PLAIN).split())
-    return "".join(_MARKUP.get(letter, letter) for supported in map(_supported, plain) for letter in supported)
+    return "".join(_MARKUP.get(letter, letter) for text in map(_supported_text, plain) for letter in text)
 
 
-def _supported(letter: str) -> str:
+def _supported_text(letter: str) -> str:
     """Return a letter if Grace supports it, otherwise similar ASCII characters or a question mark."""
     if letter in _GREEK or (letter.isprintable() and ord(letter) < 256):
         return letter
@@ -158,7 +158,7 @@ def _supported(letter: str) -> str:
 
 
 def _axis(name: str, label: str, axis: tuple[float, float, float]) -> list[str]:
-    settings = [f'label "{escaped(label)}"', f"tick major {axis[2]:.12g}", "tick minor ticks 1", "tick major grid on"]
+    settings = [f'label "{escape(label)}"', f"tick major {axis[2]:.12g}", "tick minor ticks 1", "tick major grid on"]
     settings += ["tick major linestyle 2", "ticklabel format general", "ticklabel prec 6"]
     return [f"@    {name}axis  {setting}" for setting in settings]
 
@@ -169,4 +169,4 @@ def _style_lines(number: int, curve: Curve) -> list[str]:
     line = 1 + number // N_COLOURS % N_LINE_STYLES if "line" in curve.style else 0
     settings = ["type xy", f"symbol {symbol}", "symbol size 0.6", f"symbol color {colour}"]
     settings += [f"line type {min(line, 1)}", f"line linestyle {line}", "line linewidth 1.5", f"line color {colour}"]
-    return [f"@    s{number} {setting}" for setting in (*settings, f'legend "{escaped(curve.legend)}"')]
+    return [f"@    s{number} {setting}" for setting in (*settings, f'legend "{escape(curve.legend)}"')]

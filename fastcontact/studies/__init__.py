@@ -1,1 +1,1 @@
-"""Studies: mesh convergence, adaptive meshes, parameter sweeps, and the error of one solution."""
+"""Studies of mesh convergence, adaptive meshes, parameter sweeps, and errors of a solution."""

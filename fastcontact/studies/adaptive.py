@@ -1,4 +1,4 @@
-"""Adaptive mesh refinement: a case is solved on meshes that are refined where the error is large for a quantity."""
+"""Adaptive mesh refinement of a case, in regions where the error affects a quantity of interest most."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot.patches import outlines
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import structured
-from fastcontact.results.units import labelled
+from fastcontact.results.units import axis_label
 from fastcontact.studies import quantities
 from fastcontact.studies.error_norms import ErrorEstimate, estimate_error
 from fastcontact.studies.job import case_data, last_step
 from fastcontact.studies.quantities import column, title, unit
-from fastcontact.studies.report import Report, Rows, by_columns, frame, number, of_case, panels
+from fastcontact.studies.report import Report, Rows, frame, number, panels, report_fields, rows_from_columns
 from fastcontact.studies.settings import Combination, Settings, make_mesh, one_combination, recipe, settings
 
 
@@ -188,7 +188,7 @@ class AdaptiveStudy(Report):
             (column(q, q, self.units), [number(round_.values[q], 8) for round_ in self.rounds]),
         ]
         columns += [(label, [number(v, 2) for v in errors[name]]) for label, name in headers.items()]
-        return [(self.combination, by_columns(columns))]
+        return [(self.combination, rows_from_columns(columns))]
 
     def sentences(self) -> list[str]:
         """See `Report`."""
@@ -230,15 +230,15 @@ class AdaptiveStudy(Report):
         ax.set_aspect("equal")
         bar = ax.figure.colorbar(polygons, ax=ax)
         bar.set_label("energy norm" + (f" [({work})$^{{1/2}}$]" if (work := self.units.get("moment")) else ""))
-        labels = labelled("x", self.units, "length"), labelled("y", self.units, "length")
+        labels = axis_label("x", self.units, "length"), axis_label("y", self.units, "length")
         frame(ax, f"Last mesh: {self.rounds[-1].n_cells} cells, estimated error", labels, grid=0.0)
 
 
 # Fraction of the sum of the error indicators that the refined cells carry (Dörfler, 1996). With a larger fraction there are
 # fewer but larger meshes.
 BULK = 0.7
-# Factor by which the changes of a quantity decrease from mesh to mesh if the refinement converges.
-SHRINKING = 3.0
+# Expected factor by which the changes of a quantity decrease from mesh to mesh.
+REDUCTION = 3.0
 
 
 @typed(CaseError)
@@ -314,7 +314,7 @@ def adaptive_study(
             started = time.perf_counter()
             linear, leaf = forest.mesh()
             solved = _case_on(linear, curves, case, setup, combination)
-            last, error = _solved(solved, quantity, setup.pair, rounds, started)
+            last, error = _solve_round(solved, quantity, setup.pair, rounds, started)
             round_ = rounds[-1]
             if on_round is not None:
                 on_round(round_)
@@ -322,10 +322,10 @@ def adaptive_study(
             reached = round_.estimate <= tolerance
             if reached or len(rounds) == max_rounds or round_.n_dofs > 0.6 * max_dofs:
                 break
-            forest.refine(_marked(_indicator(solved, last, error, quantity, setup.pair), leaf, forest.n_leaves))
+            forest.refine(_refined_leaves(_indicator(solved, last, error, quantity, setup.pair), leaf, forest.n_leaves))
     return AdaptiveStudy(
-        **of_case(case), combination=str(combination), quantity=quantity, tolerance=tolerance, reached=reached, rounds=rounds,
-        case=solved, last=last, error=error)  # fmt: skip
+        **report_fields(case), combination=str(combination), quantity=quantity, tolerance=tolerance, reached=reached,
+        rounds=rounds, case=solved, last=last, error=error)  # fmt: skip
 
 
 def _first_mesh(case: Case, setup: Settings, combination: Combination) -> tuple[Forest, list[Any]]:
@@ -338,14 +338,14 @@ def _first_mesh(case: Case, setup: Settings, combination: Combination) -> tuple[
 
 
 def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, setup: Settings, combination: Combination) -> Case:
-    """Return the case on another mesh, given by linear cells, which are converted if the element type is quadratic."""
+    """Return the case on another mesh with the cells of `linear`, which become quadratic if the element type requires it."""
     element = combination.element
     quadratic = element is not None and elements.get(element).order == 2
     mesh = to_quadratic(linear, curves, centre_nodes=element == "quad9") if quadratic else linear
     return build_case(case_data(setup, combination), name=case.name, folder=case.folder, text=case.text, mesh=mesh)
 
 
-def _solved(
+def _solve_round(
     case: Case, quantity: str, pair: str | None, rounds: list[Round], started: float
 ) -> tuple[StepResult, ErrorEstimate]:
     """Return the last step of a case and the errors of its cells, and append the results of the round to `rounds`.
@@ -359,7 +359,7 @@ def _solved(
     error = estimate_error(case.model, last)
     values = quantities.measure(case, last, pair)
     check_known("quantity", quantity, values, CaseError)
-    exact, n_cells = quantities.by_theory(case, pair, 0.0), sum(map(len, case.mesh.solids.values()))
+    exact, n_cells = quantities.comparison_values(case, pair, 0.0), sum(map(len, case.mesh.solids.values()))
     estimate = _estimate([*(earlier.values[quantity] for earlier in rounds), values[quantity]])
     errors, seconds = (error.relative, estimate), time.perf_counter() - started
     rounds.append(Round(case.model.n_dofs, n_cells, values, exact["theory"], exact["reference"], *errors, seconds))
@@ -370,13 +370,13 @@ def _estimate(values: Sequence[float]) -> float:
     """Return the estimated relative error [-] of the last value of a quantity; NaN with fewer than three values.
 
     If changes decrease by a factor of at least two from mesh to mesh, the last change is an upper bound of the remaining
-    error. The previous change, divided by `SHRINKING`, is a lower limit of the estimate, because the last change may be small
-    by chance.
+    error. The estimate is at least the previous change divided by `REDUCTION`, because the last change may be small by
+    chance.
     """
     if len(values) < 3 or not values[-1]:
         return float("nan")
     first, second, last = values[-3:]
-    return max(abs(last - second), abs(second - first) / SHRINKING) / abs(last)
+    return max(abs(last - second), abs(second - first) / REDUCTION) / abs(last)
 
 
 def _indicator(case: Case, last: StepResult, error: ErrorEstimate, quantity: str, pair: str | None) -> Array:
@@ -416,7 +416,7 @@ def _position(case: Case, last: StepResult, quantity: str, pair: str | None) -> 
     return None
 
 
-def _marked(indicator: Array, leaf: Indices, n_leaves: int) -> Mask:
+def _refined_leaves(indicator: Array, leaf: Indices, n_leaves: int) -> Mask:
     """Return the leaves to refine, as a mask (n_leaves,).
 
     They belong to the smallest set of cells that carries the fraction `BULK` of the sum of `indicator` (n_solids,). `leaf`

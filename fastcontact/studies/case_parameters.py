@@ -15,7 +15,7 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LAW = re.compile(rf"\s*(?:({_NUMBER})\s*\*\s*)?value(?:\s*\^\s*({_NUMBER}))?\s*$")
 
 
-def substituted(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+def substitute(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
     """Return a copy of a parsed case file with new values of parameters.
 
     A parameter is a path, or a name in the table ``[study.parameters]``. A name sets several paths, each by a law
@@ -27,12 +27,12 @@ def substituted(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str,
         if parameter not in linked:
             _set(case, parameter, value, [*linked, *case])
         for path, law in linked.get(parameter, {}).items():
-            _set(case, path, by_law(law, value, f"study.parameters.{parameter}.'{path}'"), case)
+            _set(case, path, law_value(law, value, f"study.parameters.{parameter}.'{path}'"), case)
     return case
 
 
-def by_law(law: Any, value: Any, where: str) -> Any:
-    """Return ``a value^p`` for a law ``"a*value^p"``; CaseError if the law is invalid or cannot be applied to the value."""
+def law_value(law: Any, value: Any, where: str) -> Any:
+    """Return the value of a law ``"a*value^p"``. Raises CaseError if the law is invalid or cannot be applied to `value`."""
     match = _LAW.match(law) if isinstance(law, str) else None
     if match is None:
         raise CaseError(f"{where} = {law!r} must be 'value', 'a*value' or 'a*value^p' with numbers a and p")
@@ -72,7 +72,7 @@ def _keys(path: str) -> list[str | int]:
     for key in path.split("."):
         match = _PART.match(key)
         if match is None:
-            raise CaseError(f"'{path}' is not a path into a case file: write for example support[1].y")
+            raise CaseError(f"'{path}' is not a path in a case file: write for example support[1].y")
         keys.append(match[1])
         keys += [int(number) for number in re.findall(r"\d+", match[2])]
     return keys

@@ -1,4 +1,4 @@
-"""Checks before a study, of the table ``[study]`` of a case file and of the number and the size of the runs."""
+"""Checks of the table ``[study]`` of a case file, and of the number and the size of the runs, before a study."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from typing import Any
 
 from fastcontact.cases.case import Case, build_case
 from fastcontact.errors import CaseError, in_file
-from fastcontact.studies.case_parameters import substituted
+from fastcontact.studies.case_parameters import substitute
 from fastcontact.studies.job import job_of
 from fastcontact.studies.quantities import check_names
 from fastcontact.studies.settings import Combination, Settings, make_mesh, recipe, settings, shape_of
 
 log = logging.getLogger("fastcontact")
-# Largest number of runs of a study. A larger number is treated as an error.
+# Largest number of runs of a study; larger numbers are probably mistakes.
 MOST_RUNS = 100_000
-# Peak memory per unknown [byte] of a multigrid analysis with linear hexahedra, which need the least memory, measured with
-# `fastcontact bench contact`.
+# Peak memory per unknown [byte] of a multigrid analysis, measured with `fastcontact bench contact` for linear hexahedra,
+# which need the least memory.
 BYTES_PER_UNKNOWN = 2500
 
 
@@ -31,7 +31,7 @@ def check_runs(count: int) -> None:
 
 
 def check_levels(case: Case, setup: Settings, members: Sequence[Combination], levels: int) -> None:
-    """Raise CaseError if the analysis of the finest mesh of a study cannot fit into the memory of this machine."""
+    """Raise CaseError if the analysis of the finest mesh of a study needs more memory than this machine has."""
     memory = _memory()
     for member in members:
         coarsest = make_mesh(recipe(setup, member.element, 0), case.mesh if setup.generator is None else None)
@@ -57,8 +57,8 @@ def _memory() -> float:
 def check_study(case: Case) -> None:
     """Raise FastcontactError if a study of a case could not start.
 
-    Quadrangle meshes are generated for this check if ``[study]`` gives their arguments on level 0. Free triangle meshes are
-    not, since their generation takes as long as a short run.
+    If ``[study]`` contains the arguments of quadrangle meshes on level 0, these meshes are generated for the check. Free
+    triangle meshes are not generated, because this takes as long as a short run.
     """
     setup = settings(case)
     study = setup.data.get("study", {})
@@ -66,7 +66,7 @@ def check_study(case: Case) -> None:
     check_names(case, setup.quantities)
     with in_file("[study.parameters]"):
         for name in study.get("parameters", {}):
-            substituted(setup.data, {name: 1.0})
+            substitute(setup.data, {name: 1.0})
     for member in setup.combinations if study else ():
         with in_file(f"[study], {member}"):
             job = job_of(case, setup, member, 0, label="", marks={})

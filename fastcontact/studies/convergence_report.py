@@ -1,4 +1,4 @@
-"""Result of a mesh-convergence study, and its report as sentences, tables, dictionary and figure."""
+"""Result of a mesh-convergence study, and its report in the form of sentences, tables, a dictionary and a figure."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ import numpy as np
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.cases.summary import finite
-from fastcontact.results.units import labelled
+from fastcontact.results.units import axis_label
 from fastcontact.studies.fit import CONFIDENCE, Limit
 from fastcontact.studies.quantities import column, title
-from fastcontact.studies.report import Report, Rows, by_columns, frame, marker, message, number, panels, percent
+from fastcontact.studies.report import Report, Rows, frame, marker, message, number, panels, percent, rows_from_columns
 from fastcontact.studies.series import Series, Split
-from fastcontact.studies.settings import Named
+from fastcontact.studies.settings import FunctionCombination
 
-# Quantities on which there are sentences, in the order of the sentences.
+# Quantities that the report discusses in sentences, in this order.
 MAIN = ("pressure_max", "force")
 
 
 def sentences(series: Series) -> list[str]:
-    """Return sentences on the mesh errors of a combination of element and formulation, and on its difference from theory."""
+    """Return sentences on the mesh errors and the differences from theory of a combination of element and formulation."""
     if not series.limits:
         return [f"{series.combination}: {_without_limits(series)}."]
     names = [name for name in series.shown(MAIN) if name in series.limits]
@@ -122,26 +122,26 @@ def _equal_force_sentences(series: Series) -> list[str]:
     return [text + "."]
 
 
-# Standard quantities in the tables of levels, while the tables of limits contain all quantities.
+# Standard quantities in the tables of levels. The tables of limits contain all quantities.
 TABLE_QUANTITIES = ("force", "pressure_max", "contact_radius", "von_mises_max")
 # Columns of the tables of limits.
 LIMIT_COLUMNS = ("limit", "+-", "order", "theory", "model error", "mesh error", "at equal force")
 # Mark after the error bar of a limit to which the values do not converge.
-UNSETTLED = " (unsettled)"
+NOT_CONVERGED = " (unsettled)"
 
 
 def level_rows(series: Series, units: Mapping[str, str]) -> Rows:
     """Return a header and a row for each level with h, DOF and, for each quantity, its value, error and order."""
     columns = [
         ("level", [str(level.number) for level in series.levels]),
-        (labelled("h", units, "length"), [number(h, 4) for h in series.h]),
+        (axis_label("h", units, "length"), [number(h, 4) for h in series.h]),
         ("DOF", [str(level.n_dofs) for level in series.levels]),
     ]
     for name in series.shown(TABLE_QUANTITIES):
         orders = [f"{order:.2f}" if math.isfinite(order) else "-" for order in series.orders(name)]
         columns.append((column(name, name, units), [number(value, 8) for value in series.values(name)]))
         columns += [("error", list(map(percent, series.errors(name)))), ("order", orders)]
-    return by_columns(columns)
+    return rows_from_columns(columns)
 
 
 def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
@@ -174,7 +174,7 @@ def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
     order = f"{limit.order:.2f}"
     texts = {
         "limit": number(limit.value, 8),
-        "+-": number(limit.uncertainty, 2) + ("" if limit.converging else UNSETTLED),
+        "+-": number(limit.uncertainty, 2) + ("" if limit.converging else NOT_CONVERGED),
         "order": f"{order} +- {limit.order_uncertainty:.2f}" if math.isfinite(limit.order) else "-",
         "order alone": order,
         "theory": number(series.theory.get(quantity, math.nan), 8),
@@ -220,7 +220,7 @@ def series_dict(series: Series) -> dict[str, Any]:
 
 
 def _fields(values: Limit | Split | None, **names: str) -> dict[str, Any]:
-    """Return fields of `values` by key, with None in place of NaN, and for all fields if `values` is None."""
+    """Return the fields of `values` called `names`, by key. NaN, and all fields of None, are replaced by None."""
     fields = {key: getattr(values, name, None) for key, name in names.items()}
     return {key: finite(value) if isinstance(value, float) else value for key, value in fields.items()}
 
@@ -243,7 +243,7 @@ def _quantity_dict(series: Series, name: str) -> dict[str, Any]:
     return entry
 
 
-# Largest number of curves that are drawn with error bars, which would hide a larger number of curves.
+# Largest number of curves that are drawn with error bars. The bars of more curves would hide each other.
 MOST_CURVES_WITH_BARS = 3
 
 
@@ -252,8 +252,8 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
     fitted = [(k, series) for k, series in enumerate(all_series) if quantity in series.limits]
     if not fitted:
         return message(ax, f"no limit of the {title(quantity)}:\nit needs three levels")
-    of_function = isinstance(all_series[0].combination, Named)
-    with_bars = len(fitted) <= MOST_CURVES_WITH_BARS
+    of_function = isinstance(all_series[0].combination, FunctionCombination)
+    has_bars = len(fitted) <= MOST_CURVES_WITH_BARS
     for position, (k, series) in enumerate(fitted):
         limit, h = series.limits[quantity], np.array(series.h)
         error = np.abs(np.array(series.values(quantity)) - limit.value) / abs(limit.value)
@@ -261,22 +261,22 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
         color, positive = f"C{position}", error > 0
         label = f"{series.combination}: order {limit.order:.1f} $\\pm$ {limit.order_uncertainty:.1f}"
         ax.plot(h[positive], error[positive], f"{marker(k)}-", ms=5, lw=1.0, label=label, color=color)
-        if with_bars:
+        if has_bars:
             low, high = np.maximum(error - bar, 0.3 * error), error + bar
             ax.vlines(h[positive], low[positive], high[positive], colors=color, lw=0.7)
         if math.isfinite(limit.order) and positive.sum() >= 2:
             # The power law of the fitted order through the geometric mean of the errors.
             factor = np.exp(np.mean(np.log(error[positive] / h[positive] ** limit.order)))
             ax.plot(h, factor * h**limit.order, ":", lw=1.0, color=color)
-    entries = {":": "fit $C\\,h^{order}$"} | ({"|": f"error bar of the limit, {CONFIDENCE:.0%}"} if with_bars else {})
+    entries = {":": "fit $C\\,h^{order}$"} | ({"|": f"error bar of the limit, {CONFIDENCE:.0%}"} if has_bars else {})
     for style, text in entries.items():
         ax.plot([], [], style, color="0.4", lw=1.0, label=text)
     _slope_triangles(ax, quantity, [series for _, series in fitted])
-    x_label = labelled("mesh size h" if of_function else "facet length at the contact h", units, "length")
-    labels, size = (x_label, "|value - limit| / limit"), 8 if with_bars else 6.5
+    x_label = axis_label("mesh size h" if of_function else "facet length at the contact h", units, "length")
+    labels, size = (x_label, "|value - limit| / limit"), 8 if has_bars else 6.5
     frame(ax, f"Mesh error of the {title(quantity)}", labels, scales=("plain log", "log"), legend_size=size)
     ax.grid(which="minor", alpha=0.12)
-    if with_bars:  # Matplotlib ignores error bars when it places the legend
+    if has_bars:  # Matplotlib ignores error bars when it places the legend
         low, high = ax.get_ylim()
         ax.set_ylim(low, high * (high / low) ** (0.02 * size * (len(fitted) + len(entries)) / 2.2))
 
@@ -316,8 +316,8 @@ def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]
         label = f"level {level.number}, {level.n_dofs} DOF"
         ax.plot(r[visible], pressure[visible], style, ms=3, lw=1.0, label=label, color=color)
     _draw_theory(ax, theory, series, np.linspace(low, reach, 600))
-    x_label = labelled("distance from the middle of the contact", units, "length")
-    labels = x_label, labelled("contact pressure", units, "pressure")
+    x_label = axis_label("distance from the middle of the contact", units, "length")
+    labels = x_label, axis_label("contact pressure", units, "pressure")
     frame(ax, f"Contact pressure, {series.combination}", labels, grid=0.3)
     ax.set_xlim(low, reach or None)
     top = float(ax.dataLim.y1)
@@ -358,7 +358,7 @@ def draw_differences(ax: Any, all_series: Sequence[Series], best: Series, units:
         ax.axhline(100 * at_force.model, color="tab:green", ls="--", lw=1.2, label=label)
     ax.axhline(0.0, color="black", lw=1.0, label="theory")
     y_label = "difference from theory [%]" if best.exact_theory else f"difference from theory {best.compared} [%]"
-    labels = labelled("facet length at the contact h", units, "length"), y_label
+    labels = axis_label("facet length at the contact h", units, "length"), y_label
     frame(ax, f"Model and mesh error of the {title(quantity)}", labels, scales=("plain log", "linear"))
 
 
@@ -450,7 +450,7 @@ class Study(Report):
 
     def figure(self) -> Any:
         """Return a Matplotlib figure with the mesh errors, the contact pressure, and the differences from theory."""
-        of_case = not isinstance(self.best.combination, Named)
+        of_case = not isinstance(self.best.combination, FunctionCombination)
         names = COMPARED if of_case else self.best.shown(COMPARED) or self.best.quantities[:2]
         options: dict[str, Any] = {"all_series": self.series, "units": self.units}
         plots: list[Callable[[Any], None]] = [partial(draw_errors, quantity=name, **options) for name in names]

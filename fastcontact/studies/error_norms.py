@@ -1,11 +1,11 @@
 """Errors of a finite-element solution: norms of its difference from a theory, and estimates for each cell.
 
-The norms, which are computed by quadrature, serve convergence studies with exact solutions such as `analytic.hertz_box`.
-Errors at the nodes cannot replace them, because they often converge faster than errors within the cells.
+The norms are computed by quadrature, for convergence studies with exact solutions such as `analytic.hertz_box`. Errors at the
+nodes are not suitable, because they often converge faster than errors within the cells.
 
-Estimates need no theory: the smoothed stress is more accurate than the stress of the solution, so that their difference
-estimates the error (Zienkiewicz and Zhu, 1987). On the contact surface the difference between the smoothed normal stress
-and the contact pressure is added, as in residual-based estimates (for example Wriggers and Scherf, 1998).
+The estimates need no theory. The smoothed stress is more accurate than the stress of the solution, and the difference of the
+two is an estimate of the error (Zienkiewicz and Zhu, 1987). On the contact surface, the difference between the smoothed
+normal stress and the contact pressure is added, as in residual-based estimates (for example Wriggers and Scherf, 1998).
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from fastcontact.mesh.topology import same_facets
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
-# Number of quadrature points that are evaluated at a time, to limit the memory of intermediate arrays.
-AT_ONCE = 100_000
+# Largest number of quadrature points that are evaluated at a time, which limits the memory of intermediate arrays.
+POINTS_PER_BATCH = 100_000
 CellArrays = tuple[Array, Array, Array, Array]  # see `_stress_in_cells`
 
 
@@ -164,11 +164,11 @@ def error_against(
     offset = model.material_field().offset(rise, [(1.0, state) for state in model.initial_states], model.mesh.n_points)
     total = np.zeros(4)
     for name, rows in solid_rows(model.mesh, names).items():
-        n_cells = max(1, AT_ONCE // len(integration_rule(elements.get(name), n_points)[1]))
+        n_cells = max(1, POINTS_PER_BATCH // len(integration_rule(elements.get(name), n_points)[1]))
         for first in range(0, len(rows), n_cells):
-            portion = rows[first : first + n_cells]
-            in_cells = _stress_in_cells(model, name, portion, u, n_points, offset)
-            total += _squared_norms(theory, model.mesh.cells[name][portion], model.mesh.points, u, in_cells)
+            batch = rows[first : first + n_cells]
+            cell_arrays = _stress_in_cells(model, name, batch, u, n_points, offset)
+            total += _squared_norms(theory, model.mesh.cells[name][batch], model.mesh.points, u, cell_arrays)
     return ErrorNorms(*np.sqrt(total).tolist())
 
 
@@ -195,9 +195,9 @@ def _stress_in_cells(
     return N, stress, cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights, elastic
 
 
-def _squared_norms(theory: Theory, cells: Numbers, points: Array, u: Array, in_cells: CellArrays) -> Array:
+def _squared_norms(theory: Theory, cells: Numbers, points: Array, u: Array, cell_arrays: CellArrays) -> Array:
     """Return the squares (4,) of the norms over some cells, in the order of the attributes of `ErrorNorms`."""
-    N, stress, volume, elastic = in_cells
+    N, stress, volume, elastic = cell_arrays
     exact_u, exact_stress = _exact(theory, np.einsum("qa,cad->cqd", N, points[cells]), stress.shape[2])
     error_u = np.einsum("qa,cad->cqd", N, u[cells]) - exact_u
     densities = (
@@ -262,7 +262,7 @@ class ErrorEstimate:
 
 @typed(ModelError)
 def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
-    """Estimate the error of each cell in a step, as the module describes.
+    """Estimate the error of each cell in a step from the smoothed stress and, on contact surfaces, from the pressure.
 
     Parameters
     ----------
@@ -335,7 +335,7 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
 
 
 def _cells_of_facets(name: str, cells: Numbers, facets: Numbers) -> tuple[Indices, Indices, Indices]:
-    """Return the facets that belong to cells of one element type, these cells, and the local nodes of the facets."""
+    """Return, for each facet of a cell of one element type, the facet, the cell, and the local nodes of the facet."""
     adjacent = np.flatnonzero(np.isin(cells, facets).sum(axis=1) >= facets.shape[1])
     sides = [list(side) for side in elements.get(name).facets if len(side) == facets.shape[1]]
     rows = np.array([same_facets(facets, cells[adjacent][:, side]) for side in sides], np.intp)

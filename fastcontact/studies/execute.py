@@ -1,4 +1,4 @@
-"""Execution of runs in local processes or by any executor, with a status line and a store of finished runs."""
+"""Execution of runs in local processes or by an executor, with a status line and a store of finished runs."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from fastcontact.results.committed_file import uninterrupted
 from fastcontact.studies.job import QuantityError, Run, run
 
 
-class Runs(StatusLine):
+class StudyStatus(StatusLine):
     """Status line of a study: the last run, the number of remaining runs, and the estimated remaining time."""
 
     def __init__(self, show: bool) -> None:
         super().__init__(100, show)
         self._stored = 0
 
-    def __enter__(self) -> Runs:
+    def __enter__(self) -> StudyStatus:
         self.draw("the first runs")
         return super().__enter__()
 
@@ -50,7 +50,7 @@ class Runs(StatusLine):
 
 
 Result = dict[str, Any]
-# Environment variables that NumPy and Numba read on import, and which therefore must be set before a worker process starts.
+# Environment variables that must be set before a worker process starts, because NumPy and Numba read them on import.
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -93,7 +93,7 @@ def run_all(
     store: str | Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> list[Result]:
-    """Run jobs in parallel and return their results in the order of the jobs; options as in `convergence_study`.
+    """Run jobs in parallel and return their results in the order of the jobs; for options see `convergence_study`.
 
     Raises CaseError if the number of workers is invalid or if the function of a quantity fails before any run succeeds, and
     FastcontactError if no worker process can start.
@@ -124,11 +124,11 @@ def run_all(
 def run_study(
     jobs: Sequence[Run], name: str, *, on_progress: Callable[[Progress], None] | None, progress: bool, **options: Any
 ) -> list[Result]:
-    """Return the results of `run_all`, with a status line if `progress` is true.
+    """Run jobs by `run_all` and return their results, with a status line if `progress` is true.
 
     If all runs fail, the error of the first one is raised, with `name` before its message.
     """
-    with Runs(progress) as line:
+    with StudyStatus(progress) as line:
 
         def report(progress: Progress) -> None:
             line(progress)
@@ -178,20 +178,20 @@ class Store:
 def _run_jobs(
     jobs: Sequence[Run], indices: list[int], executor: Executor | None, workers: int | None
 ) -> Iterator[tuple[int, Result]]:
-    """Run the jobs with the given `indices`; yield the index and the result of each job as it ends."""
+    """Run the jobs with the given `indices`. Yields the index and the result of each job when it ends."""
     if workers is not None and workers < 1:
         raise CaseError(f"workers = {workers} must be at least 1, the number of processes")
     count = min(workers or _processors(), len(indices))
     if executor is not None:
-        yield from on_executor(executor, jobs, indices)
+        yield from run_on_executor(executor, jobs, indices)
     elif count <= 1:
         for index in indices:
             yield index, run(jobs[index])
     else:
-        yield from on_processes(count, jobs, indices)
+        yield from run_on_processes(count, jobs, indices)
 
 
-def on_processes(count: int, jobs: Sequence[Run], indices: list[int]) -> Iterator[tuple[int, Result]]:
+def run_on_processes(count: int, jobs: Sequence[Run], indices: list[int]) -> Iterator[tuple[int, Result]]:
     """Run jobs in `count` local processes; yield the index and the result of each job as it ends.
 
     If a worker process dies, each job that has not ended runs again in a separate process.
@@ -202,8 +202,8 @@ def on_processes(count: int, jobs: Sequence[Run], indices: list[int]) -> Iterato
         raise SystemExit(1)
     left = list(indices)
     try:
-        with started_pool(count) as pool:
-            for index, result in on_executor(pool, jobs, indices):
+        with process_pool(count) as pool:
+            for index, result in run_on_executor(pool, jobs, indices):
                 left.remove(index)
                 yield index, result
     except BrokenProcessPool:
@@ -212,7 +212,7 @@ def on_processes(count: int, jobs: Sequence[Run], indices: list[int]) -> Iterato
 
 
 class Worker(SpawnProcess):
-    """A process whose start cannot be interrupted, because a partly started process would print an error."""
+    """A process whose start cannot be interrupted. A partly started process would print an error."""
 
     def start(self) -> None:
         """Start the process, with signals deferred until it is started."""
@@ -220,8 +220,8 @@ class Worker(SpawnProcess):
             super().start()
 
 
-class Spawning(SpawnContext):
-    """A context that spawns processes and keeps a list of them."""
+class RecordingContext(SpawnContext):
+    """A multiprocessing context that spawns processes and records them in a list."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -237,12 +237,12 @@ class Workers(ProcessPoolExecutor):
     """A pool of processes that can be terminated during their work, and that end when this process ends."""
 
     def __init__(self, count: int) -> None:
-        self.context = Spawning()
+        self.context = RecordingContext()
         receiver, self.line = self.context.Pipe(duplex=False)
         super().__init__(count, self.context, initializer=end_with_parent, initargs=(receiver,))
 
     def end(self) -> None:
-        """Terminate the processes; otherwise Python would wait for their current work before it exits."""
+        """Terminate the processes. Otherwise Python would wait for the end of their current work before it exits."""
         self.line.close()
         for process in self.context.processes:
             if process.is_alive():  # a process that is still importing modules does not read from the pipe
@@ -250,7 +250,7 @@ class Workers(ProcessPoolExecutor):
 
 
 @contextlib.contextmanager
-def started_pool(count: int) -> Iterator[Workers]:
+def process_pool(count: int) -> Iterator[Workers]:
     """Yield a pool of processes, one of which has answered; an error in the ``with`` block terminates the processes.
 
     Raises FastcontactError if no process can start.
@@ -279,7 +279,7 @@ def started_pool(count: int) -> Iterator[Workers]:
 def _run_alone(job: Run) -> Result:
     """Return the result of a job that runs in a separate process, or an error if the process dies."""
     try:
-        with started_pool(1) as pool:
+        with process_pool(1) as pool:
             return pool.submit(run, job, 1).result()
     except BrokenProcessPool:
         text = "its worker process was killed, probably because the memory was full: use coarser meshes"
@@ -293,7 +293,7 @@ def _processors() -> int:
     return os.cpu_count() or 1
 
 
-def on_executor(executor: Executor, jobs: Sequence[Run], indices: list[int]) -> Iterator[tuple[int, Result]]:
+def run_on_executor(executor: Executor, jobs: Sequence[Run], indices: list[int]) -> Iterator[tuple[int, Result]]:
     """Run jobs on any executor; yield the index and the result of each job as it ends.
 
     If a job raises an exception, the other jobs are cancelled.
@@ -308,7 +308,7 @@ def on_executor(executor: Executor, jobs: Sequence[Run], indices: list[int]) -> 
         for future in as_completed(futures):
             yield futures[future], future.result()
     except BaseException as error:
-        # A pool that is broken or has been shut down sets its futures itself, which fails if they are cancelled.
+        # A pool that is broken or has been shut down sets the results of its futures, which fails for cancelled futures.
         if not isinstance(executor, Workers) and not isinstance(error, BrokenExecutor):
             for future in futures:
                 future.cancel()
@@ -329,9 +329,9 @@ def end_with_parent(line: Connection) -> None:
 
 @contextlib.contextmanager
 def _worker_settings() -> Iterator[None]:
-    """Let processes started in a ``with`` block use one thread each and ignore Ctrl-C, which this process handles.
+    """Let processes that are started in a ``with`` block use one thread each and ignore Ctrl-C.
 
-    A terminal sends Ctrl-C to all processes, each of which would print a traceback.
+    A terminal sends Ctrl-C to all processes, and each of them would print a traceback. Only this process handles it.
     """
     original = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))

@@ -8,9 +8,9 @@ with the limit L, the order p, a constant C and independent standard normal vari
 scatter of the mesh error. For each order p the parameters L, C and s are integrated out (Bayesian linear regression with
 weights :math:`h^{-2p}`; Zellner 1971, chapter 3), and the results are averaged with the evidence of the orders. The prior of
 p is log-normal. The prior of s^2 has the weight of one and a half meshes, so that a chance agreement of few meshes does not
-make the error bar too small. The first k meshes may be too coarse for a single power of h; each further mesh has the prior
-probability 1/2, as long as three meshes remain. The error bar is the distance from the median of L to the farther end of its
-95 % interval. The reasons for these choices are given in docs/theory/convergence.md.
+make the error bar too small. The first k meshes may be too coarse for a single power of h. The prior probability of k is
+proportional to (1/2)^k, and at least three meshes are not too coarse. The error bar is the distance from the median of L to
+the farther end of its 95 % interval. The reasons for these choices are given in docs/theory/convergence.md.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ ORDERS = np.geomspace(0.4, 6.0, 81)
 PRIOR_ORDER, PRIOR_SPREAD = 1.6, 0.35
 # Relative scatter in the prior, and its weight in meshes.
 PRIOR_NOISE, PRIOR_WEIGHT = 0.2, 1.5
-# Factor by which the scatter of meshes that are too coarse is larger, and the prior probability of each further such mesh.
+# Ratio of the scatter of meshes that are too coarse to that of other meshes, and factor of the prior probability for each
+# such mesh.
 COARSE_NOISE, COARSE_PROBABILITY = 10.0, 0.5
 
 
@@ -93,7 +94,7 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
     >>> limit.contains(1.0), round(limit.order)
     (True, 2)
     """
-    size, value = _checked(h, values)
+    size, value = _sorted_finite(h, values)
     changes = np.abs(np.diff(value))
     scale = float(changes.max())
     if scale <= ROUND_OFF * np.abs(value).max():
@@ -101,7 +102,8 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
     x = size / np.exp(np.log(size).mean())
     floor = (ROUND_OFF * np.abs(value).max() / scale) ** 2
     centre, width, evidence = np.concatenate(
-        [_regressions(x, (value - value[-1]) / scale, floor, coarse) for coarse in range(len(value) - 2)], axis=1
+        [_limit_distributions(x, (value - value[-1]) / scale, floor, coarse) for coarse in range(len(value) - 2)],
+        axis=1,
     )
     weight = np.exp(evidence - evidence.max())
     weight /= weight.sum()
@@ -118,8 +120,11 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
     )
 
 
-def _checked(h: ArrayLike, values: ArrayLike) -> tuple[Array, Array]:
-    """Return the mesh sizes in descending order with their finite values; CaseError if they are invalid or too few."""
+def _sorted_finite(h: ArrayLike, values: ArrayLike) -> tuple[Array, Array]:
+    """Return the mesh sizes with finite values in descending order, and these values.
+
+    Raises CaseError if sizes or values are invalid, or if there are fewer than three finite values.
+    """
     size, value = np.asarray(h, np.float64), np.asarray(values, np.float64)
     if size.shape != value.shape or size.ndim != 1:
         raise CaseError(f"mesh sizes and values must be lists of equal length, not {size.shape} and {value.shape}")
@@ -134,8 +139,8 @@ def _checked(h: ArrayLike, values: ArrayLike) -> tuple[Array, Array]:
     return size, value
 
 
-def _regressions(x: Array, y: Array, floor: float, coarse: int) -> Array:
-    """Return location and scale of the Student distribution of the limit, and the logarithm of the evidence (3, n_orders).
+def _limit_distributions(x: Array, y: Array, floor: float, coarse: int) -> Array:
+    """Return location and scale of the Student distribution of the limit, and the log evidence, for each order (3, n_orders).
 
     `x` (n,) and `y` (n,) are normalised mesh sizes and values [-], and `floor` is added to the sum of squares. The first
     `coarse` meshes are assumed to be too coarse for a single power of the mesh size.
@@ -172,9 +177,9 @@ def _quantiles(centre: Array, width: Array, weight: Array, dof: float) -> list[f
 
 
 def step_orders(h: Sequence[float], values: Sequence[float], limit: float) -> list[float]:
-    """Return the observed order of convergence (n,) [-] from the previous to each mesh; the first is NaN.
+    """Return the observed order of convergence (n,) [-] between each mesh and the previous one; the first is NaN.
 
-    `h` (n,) [length] contains the mesh sizes; `values` (n,) and `limit` are in the unit of the quantity. In contrast to the
+    `h` (n,) [length] contains the mesh sizes, and `values` (n,) and `limit` are in the unit of the quantity. Unlike the
     fitted order, these orders are sensitive to the scatter of the values.
     """
     error = np.abs(np.asarray(values, np.float64) - limit)

@@ -52,27 +52,27 @@ class Run:
 
     label: str  # for messages
     name: str  # name of the case or of the model function
-    marks: dict[str, Any]  # values that distinguish the runs of a study, for example the level
-    size: float = 0.0  # measure of the work by which the runs of a study are ordered
+    marks: dict[str, Any]  # values that distinguish the run from other runs of the study, for example the level
+    size: float = 0.0  # measure of the work; larger runs start first
 
-    def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
-        """Return the case of this run, or None if it is unknown, and all steps of its solution or only the last one."""
+    def solve_run(self) -> tuple[Case | None, Sequence[StepResult]]:
+        """Solve the run. Returns its case, or None if it is unknown, and all steps of the solution or only the last one."""
         raise NotImplementedError
 
-    def measured(self) -> dict[str, Any]:
-        """Return the result of `run`; errors of the mesh, the model and the solution are raised."""
+    def evaluate(self) -> dict[str, Any]:
+        """Solve the run and return its result, see `run`. Errors of the mesh, the model and the solution are raised."""
         started = time.perf_counter()
-        with recorded() as texts:
-            case, steps = self.solved()
+        with record_warnings() as texts:
+            case, steps = self.solve_run()
         last = steps[-1]
         pair = self.pair_of(last)
-        values = quantities.of_contacts(last) if case is None else quantities.measure(case, last, pair)
-        values = {name: value for name, value in values.items() if np.isfinite(value)} | self.further(steps)
+        values = quantities.quantities_of_contacts(last) if case is None else quantities.measure(case, last, pair)
+        values = {name: value for name, value in values.items() if np.isfinite(value)} | self.extra_quantities(steps)
         return {
             "h": math.nan if case is None else quantities.mesh_size(case, pair),
             "n_dofs": last.displacement.size,
             "values": values,
-            **quantities.by_theory(case, pair, values.get("force", 0.0)),
+            **quantities.comparison_values(case, pair, values.get("force", 0.0)),
             "profile": profile(last, pair),
             "iterations": {k: int(v) for k, v in last.iterations.items() if isinstance(v, int)},
             "seconds": time.perf_counter() - started,
@@ -84,13 +84,13 @@ class Run:
         """Return the name of the contact pair to evaluate, by default the first one; None if there is none."""
         return next(iter(last.contact), None)
 
-    def further(self, steps: Sequence[StepResult]) -> dict[str, float]:
+    def extra_quantities(self, steps: Sequence[StepResult]) -> dict[str, float]:
         """Return additional quantities of the steps."""
         return {}
 
     @property
     def key(self) -> str:
-        """Name of the run in a store, which is a hash of all its inputs; CaseError if the inputs are unknown."""
+        """Name of the run in a store, a hash of all its inputs. Raises CaseError if the inputs are unknown."""
         raise CaseError("a store is for case files, since the inputs of a function are not known: leave out 'store'")
 
 
@@ -113,7 +113,7 @@ class Job(Run):
         inputs["mesh"] = None if self.base is None else digest_of_mesh(self.base)
         return hashlib.sha256(json.dumps(inputs, sort_keys=True, default=str).encode()).hexdigest()[:32]
 
-    def solved(self) -> tuple[Case, list[StepResult]]:
+    def solve_run(self) -> tuple[Case, list[StepResult]]:
         """See `Run`."""
         case = build_case(self.data, name=self.name, folder=self.folder, mesh=make_mesh(self.recipe, self.base))
         return case, [last_step(case)]
@@ -123,11 +123,11 @@ class Job(Run):
         return self.pair
 
 
-# A function of the last step, or of the list of all steps if its argument is named `STEPS`.
+# A function of the last step, or of the list of all steps if its argument has the name `STEPS_ARGUMENT`.
 Measure = Callable[..., float]
 # Names of quantities, or functions by the name of their quantity.
 Quantities = Sequence[str] | Mapping[str, Measure]
-STEPS = "steps"
+STEPS_ARGUMENT = "steps"
 Function = Callable[..., Any]
 
 
@@ -140,7 +140,7 @@ class FunctionRun(Run):
     named: Mapping[str, Any]  # keyword arguments
     measures: Mapping[str, Measure]  # functions of additional quantities, by name
 
-    def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
+    def solve_run(self) -> tuple[Case | None, Sequence[StepResult]]:
         """See `Run`."""
         result = self._call()
         if isinstance(result, Model):
@@ -155,7 +155,7 @@ class FunctionRun(Run):
             "with 'return'"
         )
 
-    def further(self, steps: Sequence[StepResult]) -> dict[str, float]:
+    def extra_quantities(self, steps: Sequence[StepResult]) -> dict[str, float]:
         """See `Run`."""
         return {name: _number(name, measure, steps) for name, measure in self.measures.items()}
 
@@ -178,12 +178,12 @@ class QuantityError(CaseError):
 def _number(name: str, measure: Measure, steps: Sequence[StepResult]) -> float:
     """Return the value of a quantity that a function of the caller evaluates; QuantityError if the function fails."""
     try:
-        return float(measure(steps if first_parameter(measure) == STEPS else steps[-1]))
+        return float(measure(steps if first_parameter(measure) == STEPS_ARGUMENT else steps[-1]))
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
         raise QuantityError(
             f"the quantity '{name}' is a function that failed ({reason}): it must return a number of the last StepResult, "
-            f"or of the list of all if its argument is called '{STEPS}'"
+            f"or of the list of all if its argument is called '{STEPS_ARGUMENT}'"
         ) from error
 
 
@@ -196,8 +196,8 @@ def first_parameter(function: Function) -> str:
 
 
 @contextlib.contextmanager
-def recorded() -> Iterator[list[str]]:
-    """Yield a list to which the messages of the warnings of the package in a ``with`` block are added at its end."""
+def record_warnings() -> Iterator[list[str]]:
+    """Yield a list to which, at the end of a ``with`` block, the warnings of the package in this block are added."""
     texts: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FastcontactWarning)
@@ -258,7 +258,7 @@ def run(job: Run, threads: int | None = None) -> dict[str, Any]:
     try:
         if threads is not None:
             _jit.set_threads(threads)
-        return job.measured()
+        return job.evaluate()
     except FastcontactError as error:
         return {"error": str(error), "kind": type(error).__name__}
     except Exception as error:
@@ -279,7 +279,7 @@ def last_step(case: Case) -> StepResult:
 
 
 def profile(last: StepResult, pair: str | None) -> dict[str, list[float]]:
-    """Return ``r`` [length] and ``pressure`` [pressure] along the contact of a plane or axisymmetric model; else nothing."""
+    """Return the lists ``r`` [length] and ``pressure`` [pressure] along the contact of a 2D model; empty for other models."""
     if pair is None or last.displacement.shape[1] != 2:
         return {}
     contact = last.contact[pair]

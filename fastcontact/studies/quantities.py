@@ -21,7 +21,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import quality
 from fastcontact.mesh.topology import bodies
 from fastcontact.results.step import ContactResult, StepResult
-from fastcontact.results.units import labelled
+from fastcontact.results.units import axis_label
 
 # Theories that are exact for the bodies of the model, unlike theories of half-spaces or beams.
 EXACT_THEORIES = (PressFit, HertzBox)
@@ -39,14 +39,14 @@ LABELS = {
 
 
 def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
-    """Return the quantities of interest of a solved case, in its units; those of contact only if `pair` is given."""
+    """Return the quantities of interest of a solved case, in its units, with those of the contact pair if it is given."""
     quantities = {} if pair is None else _contact_quantities(case, last.contact[pair], pair)
     quantities["von_mises_max"], position = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
     if pair is not None:
         quantities["von_mises_depth"] = _depth(case, pair, position)
     for probe, point in case.probes.items():
-        of_probe = {f"{probe}.{kind}": OF_PROBES[kind][1](last, point) for kind in _kinds(case)}
-        quantities |= {name: float(v) for name, v in of_probe.items() if v is not None and np.isfinite(v)}
+        probe_values = {f"{probe}.{kind}": OF_PROBES[kind][1](last, point) for kind in _kinds(case)}
+        quantities |= {name: float(v) for name, v in probe_values.items() if v is not None and np.isfinite(v)}
     return quantities
 
 
@@ -58,11 +58,11 @@ def check_names(case: Case, names: Iterable[str]) -> None:
 
 
 def _kinds(case: Case) -> list[str]:
-    """Return the quantities of the probes of a case, without their probe."""
+    """Return the names of the quantities that can be evaluated at a probe of a case, such as ``"stress.yy"``."""
     return [kind for kind in OF_PROBES if kind != "shear" and (case.mesh.dim == 3 or kind not in ONLY_IN_SPACE)]
 
 
-def of_contacts(last: StepResult) -> dict[str, float]:
+def quantities_of_contacts(last: StepResult) -> dict[str, float]:
     """Return the quantities of the first contact pair of a step that can be evaluated without its model.
 
     They may be NaN if the pair is open, and the dictionary is empty if there is no pair.
@@ -150,9 +150,9 @@ def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
     """Return the maximum of a nodal field (n_points,), interpolated between nodes, and its position (dim,) [length].
 
     If the node with the largest value is on the axis, a quartic is fitted to the surrounding nodes of the axis with at least
-    97 % of this value, if there are at least eight. Otherwise, in 2D, a quadratic function, which on the axis is even in the
-    radius, is fitted to the nodes of the adjacent cells. The result is the maximum of the fitted function if it exists and is
-    close to these nodes, and otherwise the node.
+    97 % of this value, provided that there are at least eight of them. Otherwise, in 2D, a quadratic function is fitted to
+    the nodes of the adjacent cells; on the axis it is even in the radius. The result is the maximum of the fitted function.
+    If there is no such maximum close to these nodes, the result is the largest nodal value.
     """
     top = int(np.argmax(values))
     on_axis = axisymmetric and abs(mesh.points[top, 0]) <= 1e-9 * np.abs(mesh.points).max()
@@ -209,7 +209,7 @@ def _vertex(x: Array, v: Array, on_axis: bool) -> tuple[float, Array] | None:
     c = np.append(c, np.zeros(6 - len(c)))
     hessian = np.array([[2 * c[3], c[5]], [c[5], 2 * c[2]]])
     if on_axis:
-        hessian[0, 0] = -1.0  # the vertex is on the axis for any radial curvature
+        hessian[0, 0] = -1.0  # the vertex lies on the axis, whatever the radial curvature
     if not (np.linalg.eigvalsh(hessian) < 0).all():
         return None
     vertex = np.linalg.solve(hessian, -np.array([c[4], c[1]]))
@@ -238,7 +238,7 @@ def mesh_size(case: Case, pair: str | None) -> float:
     return shortest
 
 
-def of_theory(theory: Any, share: float = 1.0) -> dict[str, float]:
+def theory_quantities(theory: Any, share: float = 1.0) -> dict[str, float]:
     """Return the quantities of interest of a theory; `share` [-] is the fraction of its force in the model."""
     names = {"force": "force", "pressure_max": "pressure_max", "contact_radius": "radius"}
     quantities = {key: float(getattr(theory, name)) for key, name in names.items() if hasattr(theory, name)}
@@ -253,7 +253,7 @@ def of_theory(theory: Any, share: float = 1.0) -> dict[str, float]:
     return {quantity: value for quantity, value in quantities.items() if np.isfinite(value) and value > 0}
 
 
-def by_theory(case: Case | None, pair: str | None, force: float) -> dict[str, dict[str, float]]:
+def comparison_values(case: Case | None, pair: str | None, force: float) -> dict[str, dict[str, float]]:
     """Return the quantities of a pair in its theory and in its mesh-converged solution.
 
     The keys are ``theory`` for the theory at equal approach, ``reference`` for the mesh-converged solution, and
@@ -264,9 +264,9 @@ def by_theory(case: Case | None, pair: str | None, force: float) -> dict[str, di
     share = theories.get("share", 1.0)
     at_force = theory.at_force(force / share) if force > 0 and hasattr(theory, "at_force") else None
     return {
-        "theory": of_theory(theory, share),
-        "reference": of_theory(theories.get("mesh_converged"), share),
-        "equal_force": of_theory(at_force, share),
+        "theory": theory_quantities(theory, share),
+        "reference": theory_quantities(theories.get("mesh_converged"), share),
+        "equal_force": theory_quantities(at_force, share),
     }
 
 
@@ -290,4 +290,4 @@ def _kind(quantity: str) -> str | None:
 def column(label: str, quantity: str, units: Mapping[str, str]) -> str:
     """Return the header of a column or an axis: a label with the unit of the quantity, if known, or ``[1]`` for a ratio."""
     kind = _kind(quantity)
-    return f"{label} [1]" if kind == "" else labelled(label, units, kind or "")
+    return f"{label} [1]" if kind == "" else axis_label(label, units, kind or "")

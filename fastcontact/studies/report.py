@@ -1,4 +1,4 @@
-"""Reports of studies: tables of text, panels of axes, HTML pages, and the base class of results."""
+"""Reports of studies: text tables, figures with several panels, HTML pages, and the base class of results."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ def percent(value: float | None, uncertainty: float | None = None) -> str:
     return f"{100 * value:+.{4 if uncertainty is not None and 0 < uncertainty < 1e-5 else 3}f} %"
 
 
-def by_columns(columns: Sequence[tuple[str, Sequence[str]]]) -> Rows:
+def rows_from_columns(columns: Sequence[tuple[str, Sequence[str]]]) -> Rows:
     """Return the rows of a table from its columns, which are pairs of header and entries; the first row is the header."""
     return [[name for name, _ in columns], *map(list, zip(*(texts for _, texts in columns), strict=True))]
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+def align_columns(rows: Sequence[Sequence[str]]) -> list[str]:
     """Return rows of strings as lines with right-aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  " + "  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)) for row in rows]
@@ -73,7 +73,7 @@ def panels(
 
 
 def message(ax: Any, text: str) -> None:
-    """Replace axes without data by a message."""
+    """Show a message in place of axes that have no data."""
     ax.set_axis_off()
     ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, wrap=True)
 
@@ -191,8 +191,8 @@ if TYPE_CHECKING:
     import pandas
 
 
-def of_case(case: Case) -> dict[str, Any]:
-    """Return the fields of a `Report` that describe its case."""
+def report_fields(case: Case) -> dict[str, Any]:
+    """Return the arguments of `Report` that describe a case."""
     units = units_of_results(case.units, case.model.kinematics)
     return {"name": case.name, "title": case.title, "text": case.text, "units": units}
 
@@ -248,7 +248,7 @@ class Report:
         """Return the report as lines of text, as the command line prints it."""
         lines = [self.title]
         for caption, rows in self.tables():
-            lines += ["", *filter(None, [caption]), *aligned(rows)]
+            lines += ["", *filter(None, [caption]), *align_columns(rows)]
         lines += [f"  {text}" for text in self.remarks()]
         sentences = self.sentences()
         return [*lines, "", *sentences] if sentences else lines

@@ -1,4 +1,4 @@
-"""Studies of many runs: mesh convergence with extrapolated limits, and sweeps over values of parameters."""
+"""Studies with many runs: mesh convergence with extrapolated limits, and sweeps over values of parameters."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.cases.case import Case, build_case, read_case, stored_description
 from fastcontact.errors import CaseError, FastcontactError, check_known, unknown, warn
 from fastcontact.results.units import known_units
-from fastcontact.studies.case_parameters import substituted
+from fastcontact.studies.case_parameters import substitute
 from fastcontact.studies.checks import check_levels, check_runs
 from fastcontact.studies.convergence_report import Study
 from fastcontact.studies.execute import Progress, Result, run_study
 from fastcontact.studies.fit import Limit, fit_limit
 from fastcontact.studies.job import Function, FunctionRun, Job, Measure, Quantities, fields_of, first_parameter, job_of
-from fastcontact.studies.quantities import EXACT_THEORIES, LABELS, check_names, of_theory
-from fastcontact.studies.report import of_case
+from fastcontact.studies.quantities import EXACT_THEORIES, LABELS, check_names, theory_quantities
+from fastcontact.studies.report import report_fields
 from fastcontact.studies.series import Level, Point, Series, TheoryCurve, Value
 from fastcontact.studies.settings import (
     Combination,
-    Named,
+    FunctionCombination,
     Settings,
     combinations,
     data_of,
@@ -39,7 +39,7 @@ from fastcontact.studies.settings import (
     recipe,
     settings,
 )
-from fastcontact.studies.sweep_report import Sweep, drawn_over, label_of
+from fastcontact.studies.sweep_report import Sweep, abscissa_of, label_of
 
 
 @typed(CaseError)
@@ -129,7 +129,7 @@ def convergence_study(
     options |= {"on_progress": on_progress, "progress": progress}
     if callable(case):
         refuse_case_options({"elements": elements, "formulations": formulations})
-        return _of_function(case, levels, quantities, theory or {}, options)
+        return _study_of_function(case, levels, quantities, theory or {}, options)
     if not isinstance(levels, int | np.integer) or isinstance(quantities, Mapping) or theory is not None:
         raise CaseError(
             "mesh sizes, functions as quantities and 'theory' are only for Python models: give a case its number of levels, "
@@ -148,7 +148,7 @@ def convergence_study(
     return study_of_runs(case, jobs, results, [*setup.quantities, *quantities])
 
 
-def _of_function(
+def _study_of_function(
     function: Function, sizes: int | Sequence[float], quantities: Quantities, theory: Mapping[str, float], options: Any
 ) -> Study:
     """Return the convergence study of a function that returns models; `options` are passed to `run_functions`."""
@@ -171,7 +171,8 @@ def _of_function(
     results = run_functions(runs, "no size could be solved", **options)
     solved = [(level, {**result, "h": descending[level], "theory": {**theory}}) for level, result in enumerate(results)]
     no_theory = None, 1.0, "under the given load"
-    series = _series(Named(None, None, name), solved, [*quantities], (), no_theory, asked=tuple(quantities))
+    member = FunctionCombination(None, None, name)
+    series = _series(member, solved, [*quantities], (), no_theory, asked=tuple(quantities))
     for coarse, fine in pairwise(series.levels):
         if fine.n_dofs <= coarse.n_dofs:
             warn(
@@ -180,7 +181,7 @@ def _of_function(
                 "otherwise limits and orders of convergence are meaningless"
             )
             break
-    return Study(**of_function(function, results), series=[series], failed={}, theory=None)
+    return Study(**function_fields(function, results), series=[series], failed={}, theory=None)
 
 
 def level_job(case: Case, setup: Settings, member: Combination, level: int) -> Job:
@@ -208,7 +209,7 @@ def study_of_runs(case: Case, jobs: Sequence[Job], results: Sequence[Result], fu
             failed[str(member)] = str(runs[0][1]["error"])
         else:
             series.append(_series(member, runs, further, checked, (theory, share, compared)))
-    return Study(**of_case(case), series=series, failed=failed, theory=theory)
+    return Study(**report_fields(case), series=series, failed=failed, theory=theory)
 
 
 def _series(
@@ -242,7 +243,7 @@ def _theory_at_force(theory: Any, share: float, force: Limit | None) -> tuple[di
     if force is None or not force.value > force.uncertainty or not hasattr(theory, "at_force"):
         return {}, {}
     forces = force.value, force.value + force.uncertainty
-    values, upper = (of_theory(theory.at_force(value / share), share) for value in forces)
+    values, upper = (theory_quantities(theory.at_force(value / share), share) for value in forces)
     return values, {name: abs(upper[name] - value) for name, value in values.items()}
 
 
@@ -254,7 +255,8 @@ def _limit(levels: Sequence[Level], quantity: str) -> Limit | None:
     return fit_limit(*zip(*values, strict=True))
 
 
-# Default refinement level of the meshes of a sweep, whose mesh errors are usually smaller than the trends of interest.
+# Default refinement level of the meshes of a sweep. Mesh errors of this level are usually smaller than the trends of
+# interest.
 LEVEL = 2
 # Number of points of a curve of the theory.
 CURVE = 60
@@ -329,18 +331,18 @@ def parameter_sweep(
         return _sweep_of_function(case, parameters, quantities, options)
     if not isinstance(parameters, Mapping) or isinstance(quantities, Mapping):
         raise CaseError(
-            "values without a name and functions as quantities are only for Python models: give a case names of both"
+            "values without a name and functions as quantities are only for Python models: for a case, give names of both"
         )
     case = case if isinstance(case, Case) else read_case(case)
     choices = _choices(parameters)
     names = tuple(dict.fromkeys((*settings(case).quantities, *quantities)))
     check_names(case, names)
     jobs = [_job(case, choice, element, formulation, level) for choice in choices]
-    # The first case is built in advance, since an invalid key would cause every run to fail.
+    # The first case is built in advance, because an invalid key would make every run fail.
     build_case(jobs[0].data, name=case.name, folder=case.folder, mesh=case.mesh)
     results = run_study(jobs, "no point of the sweep could be solved", **options)
     return Sweep(
-        **of_case(case),
+        **report_fields(case),
         **_points(parameters, choices, results),
         combination=str(jobs[0].marks["combination"]),
         theories=_theory_curves(case, parameters, jobs[0].pair),
@@ -367,11 +369,11 @@ def _sweep_of_function(
     ]
     results = run_functions(runs, "no point of the sweep could be solved", **options)
     points = _points(values, choices, results)
-    return Sweep(**of_function(function, results), **points, combination=name, asked=tuple(quantities), compared="")
+    return Sweep(**function_fields(function, results), **points, combination=name, asked=tuple(quantities), compared="")
 
 
 def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]]:
-    """Return all combinations of the values, in which the last parameter varies fastest; CaseError for none or too many."""
+    """Return all combinations of the values; the last parameter varies fastest. Raises CaseError for none or too many."""
     if not parameters or not all(len(values) for values in parameters.values()):
         raise CaseError("a sweep needs at least one parameter with at least one value")
     check_runs(prod(len(values) for values in parameters.values()))
@@ -395,7 +397,7 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
 
     There are none if the values of this parameter are not numbers or are all equal.
     """
-    first, varied = drawn_over(parameters)
+    first, varied = abscissa_of(parameters)
     values, others = parameters[first], {name: parameters[name] for name in parameters if name != first}
     numbers = [float(value) for value in values if not isinstance(value, (str, bool))]
     if len(numbers) < len(values) or min(numbers) == max(numbers):
@@ -404,7 +406,7 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
     x = np.geomspace(low, high, CURVE) if low > 0 else np.linspace(low, high, CURVE)
     data, curves = data_of(case), []
     for choice in (dict(zip(others, combination, strict=True)) for combination in itertools.product(*others.values())):
-        rows = [_theory_at(substituted(data, {first: float(value), **choice}), pair) for value in x]
+        rows = [_theory_at(substitute(data, {first: float(value), **choice}), pair) for value in x]
         names = [name for name in rows[0] if all(name in row for row in rows)]
         theory = {name: np.array([row[name] for row in rows]) for name in names}
         curves.append(TheoryCurve(label_of(choice, varied), x, theory))
@@ -417,15 +419,15 @@ def _theory_at(data: dict[str, Any], pair: str | None) -> dict[str, float]:
         theories = stored_description(data)["theories"].get(pair or "", {})
     except FastcontactError:  # for example because Poisson's ratio is outside the range of the theory
         return {}
-    return of_theory(theories.get("theory"), theories.get("share", 1.0))
+    return theory_quantities(theories.get("theory"), theories.get("share", 1.0))
 
 
 def _job(case: Case, choice: dict[str, Value], element: str | None, formulation: str | None, level: int | None) -> Job:
     """Return the job that solves a case for one choice of parameter values."""
-    setup = settings(case, substituted(data_of(case), choice))
+    setup = settings(case, substitute(data_of(case), choice))
     member = one_combination(setup, element, formulation)
     level = (LEVEL if setup.by_shape else 0) if level is None else level
-    # Runs with the largest meshes start first, which the number of points on level 0 determines.
+    # Runs with the largest meshes start first, according to the number of points on level 0.
     size = make_mesh(recipe(setup, member.element, 0), None).n_points if setup.generator is not None else 0
     marks = {**choice, "combination": f"{member}, level {level}"}
     return job_of(case, setup, member, level, label=label_of(choice), marks=marks, size=size)
@@ -436,7 +438,7 @@ def function_name(function: Function) -> str:
     return str(getattr(function, "__name__", type(function).__name__))
 
 
-def of_function(function: Function, results: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def function_fields(function: Function, results: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return the fields of a `Report` that describe a function, whose text is its source, with the units of the `results`."""
     try:
         text = inspect.getsource(function)

@@ -13,7 +13,7 @@ from fastcontact.cases.summary import finite
 from fastcontact.studies.fit import Limit, step_orders
 from fastcontact.studies.settings import Combination
 
-# Relative difference [-] from an exact theory up to which it is attributed to straight facets and solver tolerances.
+# Largest relative difference [-] from an exact theory that is attributed to straight facets and solver tolerances.
 EXACT = 1e-4
 
 
@@ -67,8 +67,8 @@ def split(finest: float, limit: Limit, theory: float) -> Split:
 
     Examples
     --------
-    >>> found = split(104.5, Limit(104.0, 0.1, 1.0, 0.1, 5, True), 100.0)
-    >>> round(found.model, 12), round(found.mesh, 12)
+    >>> errors = split(104.5, Limit(104.0, 0.1, 1.0, 0.1, 5, True), 100.0)
+    >>> round(errors.model, 12), round(errors.mesh, 12)
     (0.04, 0.005)
     """
     errors = limit.value / theory - 1.0, (finest - limit.value) / theory
@@ -76,7 +76,7 @@ def split(finest: float, limit: Limit, theory: float) -> Split:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Measured:
+class RunResult:
     """Results of one run.
 
     Attributes
@@ -111,8 +111,8 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Level(Measured):
-    """Results of one mesh, see `Measured`; the coarsest mesh has the `number` 0."""
+class Level(RunResult):
+    """Results of one mesh, see `RunResult`; the coarsest mesh has the `number` 0."""
 
     number: int
 
@@ -189,7 +189,7 @@ class Series:
         return [value / limit.value - 1.0 if limit and limit.value else math.nan for value in self.values(quantity)]
 
     def orders(self, quantity: str) -> list[float]:
-        """Return the observed order of convergence from the previous to each level (n_levels,) [-]; the first is NaN."""
+        """Return the observed orders of convergence (n_levels,) [-] from level to level; the first one is NaN."""
         limit = self.limits.get(quantity)
         return step_orders(self.h, self.values(quantity), limit.value) if limit else [math.nan] * len(self.levels)
 
@@ -232,8 +232,8 @@ Value = float | int | str | bool
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Point(Measured):
-    """Results for one choice of the parameters, with the attributes of `Measured` and the following.
+class Point(RunResult):
+    """Results for one choice of the parameters, with the attributes of `RunResult` and the following.
 
     Attributes
     ----------

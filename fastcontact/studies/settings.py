@@ -1,4 +1,4 @@
-"""Settings of a study from the table ``[study]`` of its case file, and the recipes of its meshes on all levels."""
+"""Settings of a study from the table ``[study]`` of a case file, and recipes of its meshes on all levels."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fastcontact.mesh.mesh import Mesh
 
 # Elements by the shape of their cells.
 SHAPES = {"triangles": ("tri3", "tri6"), "quadrangles": ("quad4", "quad8", "quad9")}
-# Elements that "all" selects.
+# Elements that the name "all" selects.
 ALL_ELEMENTS = ("quad4", "quad8", "tri3", "tri6")
 
 
@@ -43,8 +43,8 @@ class Combination:
 
 
 @dataclass(frozen=True)
-class Named(Combination):
-    """Combination in a study that calls a function instead of solving a case; it has the name of the function."""
+class FunctionCombination(Combination):
+    """Combination in a study of a function instead of a case, with the name of the function."""
 
     name: str
 
@@ -107,7 +107,7 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
     for name in study.get("options", {}):
         check_known("formulation in study.options", name, FORMULATIONS, CaseError)
     curves = tuple(_circle(i, entry) for i, entry in enumerate(study.get("curves", ())))
-    combinations = tuple(_parsed_combination(entry) for entry in study.get("combinations", ())) or (combination,)
+    combinations = tuple(_parse_combination(entry) for entry in study.get("combinations", ())) or (combination,)
     return Settings(
         data, combination, pair, formulations, generator, arguments, curves=curves if "curves" in study else None,
         load_steps=study.get("load_steps"), options=study.get("options", {}), combinations=combinations,
@@ -141,15 +141,15 @@ def _circle(index: int, entry: Any) -> Circle:
         raise CaseError(f"study.curves[{index}] must be {form}, not {entry!r}") from error
 
 
-def _parsed_combination(entry: Any) -> Combination:
+def _parse_combination(entry: Any) -> Combination:
     """Return the combination that an entry such as ``"quad8 mortar"`` names; CaseError if it is invalid."""
     words = entry.split() if isinstance(entry, str) else list(entry)
     if len(words) != 2:
         raise CaseError(f"an entry of study.combinations must name an element and a formulation, not {entry!r}")
-    return _checked_combination(*words)
+    return _make_combination(*words)
 
 
-def _checked_combination(element: str | None, formulation: str | None) -> Combination:
+def _make_combination(element: str | None, formulation: str | None) -> Combination:
     """Return a combination, whose formulation may be written with hyphens; CaseError if one of the names is unknown."""
     if element is not None:
         check_known("element", element, elements.ELEMENTS, CaseError)
@@ -172,25 +172,25 @@ def combinations(
     if selected == ["all"]:
         selected = [name for name in ALL_ELEMENTS if can_make(settings, name)]
     if formulations is None:
-        return tuple(_checked_combination(element, settings.case_combination.formulation) for element in selected)
+        return tuple(_make_combination(element, settings.case_combination.formulation) for element in selected)
     if settings.pair is None:
         raise CaseError("this case has no contact pair, so there are no formulations to compare")
     formulations = list(formulations)
     compared = list(FORMULATIONS) if formulations == ["all"] else formulations
-    return tuple(_checked_combination(element, formulation) for element in selected for formulation in compared)
+    return tuple(_make_combination(element, formulation) for element in selected for formulation in compared)
 
 
 def one_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
-    """Return the last combination of ``[study]`` with an element and a formulation, of which None admits any.
+    """Return the last combination of ``[study]`` with the given element and formulation, where None matches any.
 
-    If there is none, return a new combination. It takes what is None from the last combination of ``[study]``.
+    If there is none, the result is a new combination, in which None is replaced by the value of the last combination.
     """
     formulation = formulation.replace("-", "_") if formulation else None
     for combination in reversed(settings.combinations):
         if element in (None, combination.element) and formulation in (None, combination.formulation):
             return combination
     last = settings.combinations[-1]
-    return _checked_combination(element or last.element, formulation or last.formulation)
+    return _make_combination(element or last.element, formulation or last.formulation)
 
 
 def can_make(settings: Settings, element: str) -> bool:
@@ -207,8 +207,8 @@ def shape_of(element: str) -> str:
 
 
 Arguments = dict[str, Any]
-# Data, in types of JSON, from which `make_mesh` makes a mesh: the number of refinements and either the generator with its
-# arguments, or the element and the curved boundaries if the mesh of the case is refined.
+# Data, in types of JSON, from which `make_mesh` makes a mesh. They contain the number of refinements, and either the
+# generator with its arguments or, if the mesh of the case is refined, the element and the curved boundaries.
 Recipe = dict[str, Any]
 
 
@@ -280,10 +280,10 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
         return {"refinements": level, "element": element, "curves": curves}
     element = element or str(inspect.signature(GENERATORS[settings.generator]).parameters["element"].default)
     shape = shape_of(element)
-    # Arguments on level 0 by shape are those of quadratic cells. Linear cells of half the size have the same nodes.
+    # The arguments on level 0 by shape are those of quadratic cells. Linear cells of half the size have the same nodes.
     n_halvings = level + int(settings.by_shape and elements.get(element).order == 1)
     level_0 = settings.arguments.get(shape, settings.arguments.get("", {}))
-    # Triangles are refined, because the pattern of a new free triangulation would change the largest pressure at random.
+    # Triangle meshes are refined, because a new free triangulation on each level would change the largest pressure at random.
     halvings, refinements = (0, n_halvings) if shape == "triangles" else (n_halvings, 0)
     arguments = _refined_arguments(settings, element, level_0, halvings)
     return {"generator": settings.generator, "arguments": arguments, "refinements": refinements}
@@ -311,7 +311,7 @@ def _refined_arguments(settings: Settings, element: str, level_0: Mapping[str, A
     for key in (*level_0, *settings.halve, *settings.double):
         check_known(f"argument of the generator {name} in [study]", key, signature, CaseError)
     rule = RULES[name](element, level_0) if name in RULES else Rule()
-    explicit = bool(settings.halve or settings.double)  # then the rule for `growth` may not apply
+    explicit = bool(settings.halve or settings.double)  # the rule for `growth` may not apply to explicit arguments
     halve, double = settings.halve or rule.halve, settings.double or rule.double
     if not (halve or double):
         raise CaseError(
@@ -334,9 +334,9 @@ def make_mesh(recipe: Recipe, base: Mesh | None) -> Mesh:
     if "generator" in recipe:
         arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in recipe["arguments"].items()}
         mesh = GENERATORS[recipe["generator"]](**arguments)
-        return _refined(mesh, recipe["refinements"], circles(mesh) if recipe["refinements"] else [])
+        return _refine_repeatedly(mesh, recipe["refinements"], circles(mesh) if recipe["refinements"] else [])
     if base is None:
-        raise FastcontactError("a mesh that is refined needs the mesh to start from")
+        raise FastcontactError("the refinement of a mesh needs the initial mesh")
     return _from_file(recipe, base)
 
 
@@ -346,13 +346,13 @@ def _from_file(recipe: Recipe, base: Mesh) -> Mesh:
     curves = circles(base) if entries is None else [Circle(tuple(c), radius, group) for c, radius, group in entries]
     order, orders = element and elements.get(element).order, {elements.get(name).order for name in base.solids}
     mesh = linearised(base) if order == 1 and orders != {1} else base
-    mesh = _refined(mesh, recipe["refinements"], curves)
+    mesh = _refine_repeatedly(mesh, recipe["refinements"], curves)
     if order == 2 and (orders == {1} or element not in mesh.solids):
         mesh = to_quadratic(linearised(mesh), curves, centre_nodes=element == "quad9")
     return mesh
 
 
-def _refined(mesh: Mesh, times: int, curves: list[Circle]) -> Mesh:
+def _refine_repeatedly(mesh: Mesh, times: int, curves: list[Circle]) -> Mesh:
     for _ in range(times):
         mesh = refined(mesh, curves)
     return mesh

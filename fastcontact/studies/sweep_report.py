@@ -1,4 +1,4 @@
-"""Result of a parameter sweep, and its report as tables, dictionary and figure."""
+"""Result of a parameter sweep, and its report in the form of tables, a dictionary and a figure."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import numpy as np
 
 from fastcontact.arrays import AnyArray
 from fastcontact.studies.quantities import column, title
-from fastcontact.studies.report import Report, Rows, by_columns, frame, marker, message, number, panels, percent
+from fastcontact.studies.report import Report, Rows, frame, marker, message, number, panels, percent, rows_from_columns
 from fastcontact.studies.series import Point, TheoryCurve, Value
 
-# Smallest ratio between the largest and the smallest value of a parameter for which axes are logarithmic.
+# Smallest ratio of the largest to the smallest value of a parameter for which its axis is logarithmic.
 WIDE = 9.0
-# Title and kind of unit, empty for ratios, by the last word of the path of a parameter.
+# Title and kind of unit (empty for ratios) of parameters, by the last word of their paths.
 MEANINGS = {
     "E": ("Young's modulus", "pressure"),
     "nu": ("Poisson's ratio", ""),
@@ -56,10 +56,11 @@ def parameter_label(parameter: str, units: Mapping[str, str]) -> str:
     return f"{label} [{unit}]" if unit else label
 
 
-def drawn_over(parameters: Mapping[str, Sequence[Value]]) -> tuple[str, list[str]]:
-    """Return the parameter over which a sweep is drawn, and the others with several values, which distinguish its curves.
+def abscissa_of(parameters: Mapping[str, Sequence[Value]]) -> tuple[str, list[str]]:
+    """Return the parameter on the x axis of a sweep, and the other parameters with several values, which distinguish curves.
 
-    It is the first one that takes several numbers, or several values, or the first one.
+    The parameter on the x axis is the first one with several numbers. If there is none, it is the first one with several
+    values, and otherwise the first one.
     """
     several = [name for name, values in parameters.items() if len(set(values)) > 1]
     numeric = [name for name in several if not any(isinstance(value, (str, bool)) for value in parameters[name])]
@@ -68,10 +69,10 @@ def drawn_over(parameters: Mapping[str, Sequence[Value]]) -> tuple[str, list[str
 
 
 class Drawing:
-    """Plots of a sweep over one parameter, with a curve for each choice of the others, see `drawn_over`."""
+    """Plots of a sweep over one parameter, with a curve for each choice of the others, see `abscissa_of`."""
 
     def __init__(self, sweep: Sweep) -> None:
-        self.first, self.others = drawn_over(sweep.parameters)
+        self.first, self.others = abscissa_of(sweep.parameters)
         self.points, self.theories, self.units = sweep.points, sweep.theories, sweep.units
         self.theory = f"theory {sweep.compared}".strip()
         values = sweep.parameters[self.first]
@@ -92,7 +93,7 @@ class Drawing:
     def _draw_theory(self, ax: Any, quantity: str, k: int) -> None:
         """Draw the theory for choice `k` of the other parameters, as a curve or at the points."""
         label, x, points = self._curves()[k]
-        name = (self.theory + self._unmoved(quantity)) if k == 0 else None
+        name = (self.theory + self._constant_note(quantity)) if k == 0 else None
         color = "black" if not self.others else f"C{k}"
         for curve in self.theories:
             if curve.label == label and quantity in curve.values:
@@ -102,11 +103,11 @@ class Drawing:
         if np.isfinite(exact).any():
             ax.plot(x, exact, "_", ms=9, label=name, color=color)
 
-    def _unmoved(self, quantity: str) -> str:
+    def _constant_note(self, quantity: str) -> str:
         """Return a note if the theory does not depend on the parameter, and otherwise an empty string."""
         curves = [points for _, _, points in self._curves()]
         values = [{point.theory[quantity] for point in points if quantity in point.theory} for points in curves]
-        constant = all(len(of_curve) == 1 for of_curve in values) and any(len(points) > 1 for points in curves)
+        constant = all(len(entries) == 1 for entries in values) and any(len(points) > 1 for points in curves)
         return f"\n(the same for every {self.first})" if constant else ""
 
     def draw_ratios(self, ax: Any, quantity: str) -> None:
@@ -124,7 +125,7 @@ class Drawing:
         if not n_lines:
             return message(ax, f"no theory of the {title(quantity)}")
         ax.axhline(1.0, color="black", lw=0.8)
-        self._frame(ax, f"{title(quantity)}: ratio to theory{self._unmoved(quantity)}", "computed / theory [-]")
+        self._frame(ax, f"{title(quantity)}: ratio to theory{self._constant_note(quantity)}", "computed / theory [-]")
 
     def _frame(self, ax: Any, heading: str, y_label: str, y_scale: str = "linear") -> None:
         """Set scales, title, labels and legend; the legend is beside the axes if there are several curves."""
@@ -154,7 +155,7 @@ def label_of(parameters: Mapping[str, Value], others: Sequence[str] | None = Non
 
 # Standard quantities in tables and figures.
 STANDARD = ("force", "pressure_max", "contact_radius")
-# Attributes of points with values for comparison, and the names of the relative differences in JSON and CSV.
+# Names of the relative differences in JSON and CSV files, by the attribute of a point with the values for comparison.
 DIFFERENCES = {"theory": "from_theory", "equal_force": "from_theory_at_equal_force", "reference": "from_reference"}
 
 
@@ -209,6 +210,7 @@ class Sweep(Report):
         """Return a structured array (n_points,) with a row for each solved point, as ``--csv`` writes it.
 
         Points that could not be solved are in `failed` and have no row, also in `to_pandas`.
+
         The fields are the parameters, ``h`` [length] if known, ``n_dofs``, ``seconds`` [s] and, for each quantity, its value
         [unit of the quantity] and, if known, the relative differences ``..._from_theory``, ``..._from_theory_at_equal_force``
         and ``..._from_reference`` [-]. A result that has the name of a parameter, such as ``force``, is in the field
@@ -276,7 +278,7 @@ class Sweep(Report):
             columns.append((column(name, name, self.units), values))
             for other, label in compared.items():
                 columns.append((label, [percent(point.ratio(name, other) - 1.0) for point in self.points]))
-        return [(self.combination if self.combination != self.title else "", by_columns(columns))]
+        return [(self.combination if self.combination != self.title else "", rows_from_columns(columns))]
 
 
 def _point_dict(point: Point) -> dict[str, Any]:

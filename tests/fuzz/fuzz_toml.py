@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact._tools.toml_text import written
+from fastcontact._tools.toml_text import dump
 
 WILD = [
     0, -1, 2**31, 2**63 - 1, 10**18, True, False, float("nan"), float("inf"), 1e308, 5e-324, -0.0, 1e-12, 1.5,
@@ -38,7 +38,7 @@ def damaged(text: str, random: np.random.Generator) -> str:
             holder[key] = json.loads(json.dumps(other[name])) if name in range(10**6) or name in other else 0
         elif isinstance(holder, dict):
             holder[KEYS[int(random.integers(len(KEYS)))]] = _wild(random)
-    return written(data)
+    return dump(data)
 
 
 def _wild(random: np.random.Generator) -> Any:

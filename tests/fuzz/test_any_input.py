@@ -11,8 +11,8 @@ from fuzz_readers import outcome
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fastcontact._tools.packing import packed, unpacked
-from fastcontact._tools.toml_text import written
+from fastcontact._tools.packing import pack, unpack
+from fastcontact._tools.toml_text import dump
 
 GOOD = ("read", "refused")
 few = settings(
@@ -63,7 +63,7 @@ def case(tmp_path_factory):
 @given(place=st.integers(0, 200), key=st.none() | st.text(max_size=8), value=VALUES)
 def test_any_value_at_any_place_of_a_case(case, place, key, value):
     folder, data = case
-    data = tomllib.loads(written(data))
+    data = tomllib.loads(dump(data))
     places = list(fuzz_toml._places(data))
     holder, name = places[place % len(places)]
     if key is None or isinstance(holder, list):
@@ -71,7 +71,7 @@ def test_any_value_at_any_place_of_a_case(case, place, key, value):
     else:
         holder[key] = value
     path = folder / "changed.toml"
-    text = written(data)
+    text = dump(data)
     path.write_text(text, encoding="utf-8", errors="replace")
     kind, message = outcome(path)
     assert kind in GOOD, message
@@ -100,14 +100,14 @@ def same(one, other):
 @few
 @given(data=PLAIN, more=st.binary(max_size=20), place=st.integers(0, 10_000), bit=st.integers(0, 7))
 def test_what_is_packed_comes_back_and_damage_is_noticed(data, more, place, bit):
-    raw = packed(data)
-    assert same(unpacked(np.concatenate([raw, np.frombuffer(more, np.uint8)])), data)
+    raw = pack(data)
+    assert same(unpack(np.concatenate([raw, np.frombuffer(more, np.uint8)])), data)
     changed = raw.copy()
     changed[place % len(raw)] ^= 1 << bit
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            found = unpacked(changed)
+            found = unpack(changed)
         except (ValueError, LookupError, TypeError, AttributeError):
             return
     assert same(found, data)  # a blank or a digit of the head that does not matter

@@ -9,7 +9,7 @@ import fuzz_toml
 import pytest
 
 import fastcontact as fc
-from fastcontact._tools.toml_text import written
+from fastcontact._tools.toml_text import dump
 from fastcontact.cases.case import read_case
 from fastcontact.errors import FastcontactError
 
@@ -67,7 +67,7 @@ study = { parameters = { size = { "mesh.size" = "1.5*value^0.5" } }, quantities 
 
 
 def text_of(data):
-    return written(data)
+    return dump(data)
 
 
 def changed(texts):

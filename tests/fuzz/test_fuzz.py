@@ -48,7 +48,7 @@ def test_damaged_files_are_read_or_refused_and_nothing_else(prepared, count):
     ("error", "kind"),
     [
         (None, "read"),
-        (fc.errors.FileError("'x' is damaged: write it anew"), "refused"),
+        (fc.errors.FileError("'x' is damaged: write it again"), "refused"),
         (fc.errors.FileError("x" * 3000), "refused"),  # cut
         (fc.errors.FileError(""), "many lines"),
         (RuntimeError("what"), "other error"),

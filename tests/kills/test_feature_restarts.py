@@ -29,7 +29,7 @@ def write(case, path, parts=None, stop=None):
         if stop is not None and step.index <= stop:
             killed.write(case.finished(step))
         if step.index == stop:
-            killed._committed.ours = False  # nothing more reaches the file
+            killed._committed.exclusive = False  # nothing more reaches the file
             killed._file.close()
             killed._committed.close()
             killed._lock.release()

@@ -119,7 +119,7 @@ CASES = [
      r"case\.toml: the key 'material' is missing"),
     ("theory of a missing contact pair",
      '[contact.hertz]\nsecondary = "CONT1"\nprimary = "CONT2"\nformulation = "node_to_segment"', "",
-     r"case\.toml: 'theory': unknown contact pair 'hertz': there is none here"),
+     r"case\.toml: 'theory': unknown contact pair 'hertz': none is defined"),
     ("two materials for one body", "[ramp]", '[[material]]\ngroups = ["SPHBAS"]\nE = 1000.0\nnu = 0.3\n[ramp]',
      r"1584 cells of 'SPHBAS' have two materials, E = 20000, nu = 0\.3 and E = 1000, nu = 0\.3: assign one to each group; a material of all other cells must come first, without groups"),
     ("no body with sufficient supports", '[[support]]\ngroup = "A2B2"\ny = -2.0\n\n[[support]]\ngroup = "A1B1"\ny = 2.0', "",

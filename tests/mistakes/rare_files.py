@@ -46,7 +46,7 @@ def full(patch, work):
 def opened(folder, change):
     with h5py.File(folder / "spoilt.h5", "w") as file:
         change(file)
-    with hdf5.opened(folder / "spoilt.h5") as file:
+    with hdf5.open_hdf5(folder / "spoilt.h5") as file:
         return hdf5.values(file, "a")
 
 
@@ -74,17 +74,17 @@ def vanished(folder):
 
 
 def packed_of_another_kind():
-    values = packing.packed({"a": np.arange(3.0)})
+    values = packing.pack({"a": np.arange(3.0)})
     raw = values.tobytes().replace(b"<f8", b"|O8")
     line, _, body = raw.partition(b"\n")
     old = b"%d" % zlib.crc32(body.replace(b"|O8", b"<f8"))
-    packing.unpacked(np.frombuffer(line.replace(old, b"%d" % zlib.crc32(body)) + b"\n" + body, np.uint8))
+    packing.unpack(np.frombuffer(line.replace(old, b"%d" % zlib.crc32(body)) + b"\n" + body, np.uint8))
 
 
 def packed_and_changed():
-    values = packing.packed({"a": np.arange(3.0)}).copy()
+    values = packing.pack({"a": np.arange(3.0)}).copy()
     values[-1] ^= 1
-    packing.unpacked(values)
+    packing.unpack(values)
 
 
 def resulting(folder, change):
@@ -127,14 +127,14 @@ def not_announced(folder):
 def changed_by_others(folder, patch):
     model = square(BOTTOM="xy")
     with fc.ResultWriter(folder / "a.vtkhdf", model) as out:
-        patch.setattr(type(out._committed), "intact", lambda self: False)
+        patch.setattr(type(out._committed), "is_intact", lambda self: False)
         fc.solve(model, fc.linear_ramp(1), on_step=out.write)
 
 
 def no_step_yet(folder):
     fc.ResultWriter(folder / "a.vtkhdf", square(BOTTOM="xy")).close()
     with fc.open_results(folder / "a.vtkhdf") as results:
-        _results.chosen_step(results, -1)
+        _results.select_step(results, -1)
 
 
 def unexpected(patch):
@@ -166,23 +166,23 @@ CALLS = [
     ("a picture on a full disk", picture_on_a_full_disk, fc.errors.FileError, r"'a\.png' cannot be written \(No space left on device\)"),
     ("a picture without contact", lambda: _outputs.profile_picture(None, SimpleNamespace(contact={}), "a.png"), fc.errors.FastcontactError, r"there is no contact pair whose pressure could be plotted"),
     ("a step of no steps", no_step_yet, fc.errors.CaseError, r"a\.vtkhdf' contains no finished step yet"),
-    ("a pair of a result without contact", lambda: _results.chosen_contact(SimpleNamespace(contact=None), SimpleNamespace(contact={})), fc.errors.CaseError, r"this result contains no contact pair"),
+    ("a pair of a result without contact", lambda: _results.select_contact(SimpleNamespace(contact=None), SimpleNamespace(contact={})), fc.errors.CaseError, r"this result contains no contact pair"),
     ("figures of benchmarks on a full disk", lambda patch: full(patch, write_json), fc.errors.FileError, r"'a\.json' cannot be written \(No space left on device\)"),
     ("a summary on a full disk", lambda patch: full(patch, write_json), fc.errors.FileError, r"'a\.json' cannot be written \(No space left on device\)"),
     ("a mesh from a pipe", pipe, fc.errors.FileError, r"pipe\.med' is a device or a pipe: name a regular file"),
     ("a file that was never made", vanished, fc.errors.FileError, r"a\.txt' cannot be written \(No such file or directory\)"),
     ("an Abaqus file that cannot be read", lambda folder: abaqus.check_readable(folder), fc.errors.FileError, r"cannot read '.*': .*Is a directory"),
     ("coordinates in words", lambda: build_mesh([["a", "b"]], [], {}), fc.MeshError, r"its coordinates are not numbers: check that the file is complete"),
-    ("an HDF5 file with groups in a circle", lambda folder: opened(folder, circle), fc.errors.FileError, r"spoilt\.h5' has groups in a cycle or too deep, at '.*': write it anew"),
+    ("an HDF5 file with groups in a circle", lambda folder: opened(folder, circle), fc.errors.FileError, r"spoilt\.h5' has cyclic or too deep groups, at '.*': write it again"),
     ("an HDF5 file with a strange filter", lambda folder: opened(folder, lzf), fc.errors.FileError, r"is packed by the filter 32000, which HDF5 may lack: use gzip"),
-    ("an HDF5 file with texts for numbers", lambda folder: opened(folder, texts), fc.errors.FileError, r"contains no plain numbers: the file is damaged, write it anew"),
-    ("packed data without head", lambda: packing.unpacked(np.zeros(300, np.uint8)), ValueError, r"no packed data"),
+    ("an HDF5 file with texts for numbers", lambda folder: opened(folder, texts), fc.errors.FileError, r"contains no plain numbers: the file is damaged, write it again"),
+    ("packed data without head", lambda: packing.unpack(np.zeros(300, np.uint8)), ValueError, r"no packed data"),
     ("packed data that were changed", packed_and_changed, ValueError, r"packed data are cut off or changed"),
     ("packed data of another kind", packed_of_another_kind, ValueError, r"an array of \|O8 is not a packed array"),
     ("a result whose kinematics are a number", lambda folder: resulting(folder, kinematics_in_numbers), fc.errors.FileError, r"its kinematics or its case is not text"),
     ("a result whose point numbers are broken", lambda folder: resulting(folder, broken_point_numbers), fc.errors.FileError, r"the contact table of 'pair' has the wrong shape or type"),
     ("a result with a cell field cut off", lambda folder: resulting(folder, cell_field_cut_off), fc.errors.FileError, r"error of step 0 is truncated, or has the wrong shape or type"),
-    ("a cell field with a name of two words", announced, fc.errors.FileError, r"'two words' cannot be the name of a cell field: it is taken or no plain word; choose another"),
+    ("a cell field with a name of two words", announced, fc.errors.FileError, r"'two words' cannot be the name of a cell field: it is reserved or not an identifier; choose another"),
     ("a cell field that never came", not_announced, fc.errors.FileError, r"step 1: the declared cell field 'error' has shape \(0,\), but \(4,\) is needed, a number for each solid cell"),
     ("a result file that others change", changed_by_others, fc.errors.FileError, r"a\.vtkhdf' was changed by another program after 0 steps, its contents are left unchanged: let no other program write to it"),
 ]  # fmt: skip

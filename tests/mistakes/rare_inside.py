@@ -105,7 +105,7 @@ def copied_to_a_full_disk(patch, folder):
     case = folder / "a.toml"
     case.write_text("title = 'a'\n")
     patch.setattr(Path, "write_bytes", refusing(errno.ENOSPC))
-    cases.copied(case, folder / "b.toml")
+    cases.copy_case(case, folder / "b.toml")
 
 
 def distorted_facets(patch):
@@ -163,7 +163,7 @@ def packed_beyond_its_size(folder, patch):
     with h5py.File(folder / "a.h5", "w") as file:
         file.create_dataset("a", data=np.random.default_rng(1).random(2000), chunks=(10,), compression="gzip")
     patch.setattr(hdf5, "PLAUSIBLE_BYTES", -(10**6))
-    with hdf5.opened(folder / "a.h5"):
+    with hdf5.open_hdf5(folder / "a.h5"):
         pass
 
 
@@ -224,7 +224,7 @@ CALLS = [
     ("an element on other corners", not_makeable, fc.errors.CaseError, r"meshes of tri3 cannot be made from the case's quad4: give a generator"),
     ("a study without a level", no_level, fc.MeshError, r"no level could be solved; .*: the mesh is folded"),
     ("a sweep without a point", no_point, fc.MeshError, r"no point of the sweep could be solved; .*: the mesh is folded"),
-    ("packed data larger than unpacked", packed_beyond_its_size, fc.errors.FileError, r"is larger compressed than uncompressed: the file is damaged, write it anew"),
+    ("packed data larger than unpacked", packed_beyond_its_size, fc.errors.FileError, r"is larger compressed than uncompressed: the file is damaged, write it again"),
     ("a file name beyond all limits", name_too_long, fc.errors.FileError, r"cannot be written \(File name too long\): name another file"),
     ("a table that a function cannot take", lambda: called("mesh", pair_of, {"size": 3}), fc.errors.CaseError, r"'mesh': size = 3 are invalid \(cannot unpack"),
     ("a table with a text for numbers", lambda: called("mesh", pair_of, {"size": "ab"}), fc.errors.CaseError, r"'mesh': size = 'ab' are invalid \(could not convert"),

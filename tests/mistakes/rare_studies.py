@@ -18,7 +18,7 @@ from fastcontact.mesh.generate import block, box, half_spheres, merge_points
 from fastcontact.mesh.generate._refine import Circle, refined
 from fastcontact.studies import execute, fit
 from fastcontact.studies.adaptive import adaptive_study
-from fastcontact.studies.case_parameters import by_law
+from fastcontact.studies.case_parameters import law_value
 from fastcontact.studies.runs import convergence_study
 from fastcontact.studies.settings import combinations, make_mesh, settings
 
@@ -44,7 +44,7 @@ CASES = [
 
 COMMANDS = [
     ("nothing to export", ["export", "run.vtkhdf"], r"nothing to export: give --med FILE or --xdmf FILE"),
-    ("two elements for adaptive meshes", ["converge", "case.toml", "--adaptive", "--elements", "tri3,quad4"], r"adaptive meshes take one element, not 2: tri3,quad4"),
+    ("two elements for adaptive meshes", ["converge", "case.toml", "--adaptive", "--elements", "tri3,quad4"], r"adaptive refinement takes one element, not 2: tri3,quad4"),
     ("unknown place to run", ["converge", "case.toml", "--executor", "grid"], r"--executor 'grid' must be processes, mpi, or the address of a Dask scheduler"),
     ("no worker", ["converge", "case.toml", "--levels", "1", "--workers", "0"], r"workers = 0 must be at least 1, the number of processes"),
 ]  # fmt: skip
@@ -87,7 +87,7 @@ def no_worker_starts(patch):
         end = shutdown
 
     patch.setattr(execute, "Workers", Pool)
-    with execute.started_pool(1):
+    with execute.process_pool(1):
         pass
 
 
@@ -133,12 +133,12 @@ CALLS = [
     ("a study that is interrupted", lambda patch: interrupted(patch, "convergence_study"), fc.errors.FastcontactError, r"stopped; with --store DIR the same command would continue where it stopped"),
     ("a sweep that is interrupted", lambda patch: interrupted(patch, "parameter_sweep"), fc.errors.FastcontactError, r"stopped; with --store DIR the same command would continue where it stopped"),
     ("formulations without contact", lambda: combinations(replace(settings(read_case("forma04a")), pair=None), None, ["mortar"]), fc.errors.CaseError, r"this case has no contact pair, so there are no formulations to compare"),
-    ("a law beyond all numbers", lambda: by_law("value^400", 1e300, "study.parameters.a"), fc.errors.CaseError, r"study\.parameters\.a = 'value\^400' is too large a number for 1e\+300"),
+    ("a law beyond all numbers", lambda: law_value("value^400", 1e300, "study.parameters.a"), fc.errors.CaseError, r"study\.parameters\.a = 'value\^400' is too large a number for 1e\+300"),
     ("adaptive meshes in space", lambda: adaptive_study(solid_case(), tolerance=0.1), fc.errors.CaseError, r"adaptive refinement is for triangles and quadrangles in two dimensions; this case is in 3D"),
     ("sizes without values", lambda: fit.fit_limit([1.0, 0.5], [1.0]), fc.errors.CaseError, r"mesh sizes and values must be lists of equal length, not \(2,\) and \(1,\)"),
     ("a limit of two meshes", lambda: fit.fit_limit([1.0, 0.5], [1.0, 2.0]), fc.errors.CaseError, r"a limit needs the values of at least 3 meshes, not 2: compute more levels"),
     ("one size twice", lambda: fit.fit_limit([1.0, 0.5, 0.5], [1.0, 2.0, 3.0]), fc.errors.CaseError, r"the mesh sizes must be positive and all different, not \[1\.0, 0\.5, 0\.5\]"),
-    ("refining nothing", lambda: make_mesh({"refinements": 1, "element": None, "curves": None}, None), fc.errors.FastcontactError, r"a mesh that is refined needs the mesh to start from"),
+    ("refining nothing", lambda: make_mesh({"refinements": 1, "element": None, "curves": None}, None), fc.errors.FastcontactError, r"the refinement of a mesh needs the initial mesh"),
     ("a maker without sizes", lambda: changed_settings(generator="block"), fc.errors.CaseError, r"'study\.generator' needs the arguments of level 0 in \[study\.triangles\] or \[study\.quadrangles\]"),
     ("Dask is not installed", lambda patch: without(patch, "dask", "distributed", "tcp://localhost:1"), fc.errors.CaseError, r"--executor tcp://localhost:1 needs Dask .*: pip install distributed"),
     ("mpi4py is not installed", lambda patch: without(patch, "mpi4py", "futures", "mpi"), fc.errors.CaseError, r"--executor mpi needs mpi4py .*: pip install mpi4py"),

@@ -109,7 +109,7 @@ def test_nothing_but_our_own_errors(name, tmp_path, monkeypatch):
         (lambda: fc.Criteria(max_active_set_iterations=9.5), "max_active_set_iterations = 9.5 must be a whole number >= 1"),
         (lambda: fc.Model("a.med", "3d"), "the argument mesh of Model must be a Mesh, not the string 'a.med'"),
         (lambda: fc.plot.pressure_profile(CONTACT, theory=5), "a theory needs a pressure, .* but 5 has none"),
-        (lambda: fc.plot.pressure_profile(CONTACT, ax="ax"), "drawn on axes of matplotlib, not on 'ax'"),
+        (lambda: fc.plot.pressure_profile(CONTACT, ax="ax"), "drawn on axes of Matplotlib, not on 'ax'"),
         (lambda: fc.write_csv("a.csv", np.zeros(3)), "a table is an array with named columns"),
         (lambda: fc.generate.union(fc.generate.block(), 3), r"argument meshes\[1\] of union must be a Mesh, not the int 3"),
     ],
@@ -197,7 +197,7 @@ MASKED = {
 @pytest.mark.parametrize("what", MASKED)
 def test_masks_are_not_lost_without_a_word(what):
     """NumPy hands on what lies behind a mask as if it were valid; a mask that hides nothing changes nothing."""
-    with pytest.raises(fc.FastcontactError, match="has entries that are masked, and masks are not kept: fill them"):
+    with pytest.raises(fc.FastcontactError, match="has masked entries, which are not supported: fill or remove them"):
         MASKED[what](masked)
     MASKED[what](lambda values: np.ma.array(values, mask=False))
 

@@ -28,7 +28,7 @@ RESULTS = (
     "StepResult",
 )  # fmt: skip
 MASK = np.ma.array([1.0, 2.0], mask=[False, True])
-REFUSED = "has entries that are masked, and masks are not kept: fill them first"
+REFUSED = "has masked entries, which are not supported: fill or remove them"
 
 
 def functions():

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact._tools.hdf5 import attribute, check_size, new_hdf5, opened, values
+from fastcontact._tools.hdf5 import attribute, check_size, new_hdf5, open_hdf5, values
 from fastcontact._tools.paths import PathLike, replacing
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
 from fastcontact.errors import FileError, MeshError, check_known, warn
@@ -58,7 +58,7 @@ def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
 
     If the file contains several meshes, `mesh_name` is read; if the mesh has several time steps, the first one is read.
     """
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         name = _chosen_mesh(file, path, mesh_name)
         try:
             mesh, n_vertices = _read_mesh(file, file["ENS_MAA"][name])
@@ -341,7 +341,7 @@ def read_field(path: PathLike, field: str, at_points: bool) -> tuple[Array, Arra
     another file, or the means of the nodes of each cell [length]. Raises FileError if the file cannot be read, has no such
     field, or the field does not have one value per point or cell.
     """
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         check_known("field", field, list(file["CHA"]) if "CHA" in file else [], FileError, f"'{path}': ")
         group = file["CHA"][field]
         name = decoded(bytes(attribute(group, "MAI")))

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact._tools.hdf5 import check_size, opened, values
+from fastcontact._tools.hdf5 import check_size, open_hdf5, values
 from fastcontact._tools.neighbours import nearest, pairs_within
 from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
@@ -271,7 +271,7 @@ def _read_vtkhdf(path: Path, name: str, at_points: bool) -> tuple[Array | None, 
     Fields at points are read at all steps, fields of cells only from files without steps.
     """
     required = {"Points", "NumberOfPoints"} if at_points else {"Points", "Connectivity", "Offsets", "NumberOfCells"}
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         grid = file.get("VTKHDF", {})
         if not required <= set(grid):
             raise FileError(f"'{path}' contains no unstructured grid of VTK")

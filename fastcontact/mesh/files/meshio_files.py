@@ -156,7 +156,7 @@ def _check_input(path: Path, file_format: str) -> None:
     if file_format == "abaqus":
         abaqus.check_readable(path)
     elif file_format in HDF5_FORMATS and (file_format != "exodus" or h5py.is_hdf5(path)):
-        with hdf5.opened(path):
+        with hdf5.open_hdf5(path):
             pass
     elif file_format == "xdmf":
         _check_references(path)
@@ -193,7 +193,7 @@ def _check_references(path: Path) -> None:
             raise _error("read", path, f"it refers to the file '{reference.resolve()}', which is not beside it")
         existing_file(reference)
         if kind == "HDF":
-            with hdf5.opened(reference):
+            with hdf5.open_hdf5(reference):
                 pass
 
 

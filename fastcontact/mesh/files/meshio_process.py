@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact._tools.packing import packed, unpacked
+from fastcontact._tools.packing import pack, unpack
 from fastcontact.arrays import AnyArray
 
 # Limits of computing time [s] and of memory [bytes] of the child process: a constant, and a term per byte of the file. meshio
@@ -73,7 +73,7 @@ def read_in_process(path: Path, file_format: str, field: str = "") -> dict[str, 
     if process.returncode < 0:
         return {"error": f"the reading process was ended by {signal.Signals(-process.returncode).name}"}
     try:
-        return dict(unpacked(np.frombuffer(process.stdout, np.uint8)))
+        return dict(unpack(np.frombuffer(process.stdout, np.uint8)))
     except (ValueError, LookupError, TypeError):
         lines = process.stderr.decode("utf-8", "replace").strip().splitlines()
         return {"error": f"the reading process failed: {lines[-1] if lines else 'no answer'}"}
@@ -161,9 +161,9 @@ def main() -> None:
         _limit(resource.RLIMIT_CORE, 0)
         _limit(resource.RLIMIT_CPU, int(time.process_time()) + 1 + seconds)
         _limit(resource.RLIMIT_AS, memory)
-    answer = packed(plain_content(Path(path), file_format, *sys.argv[6:7]))
+    answer = pack(plain_content(Path(path), file_format, *sys.argv[6:7]))
     if answer.nbytes > returned:
-        answer = packed({"error": "it contains more than is plausible for a file of its size"})
+        answer = pack({"error": "it contains more than is plausible for a file of its size"})
     sys.stdout.buffer.write(answer.tobytes())
 
 

@@ -16,7 +16,7 @@ from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError, check_known
 from fastcontact.results.plot.fields import Field
 from fastcontact.results.step import ContactResult, StepResult
-from fastcontact.results.units import labelled
+from fastcontact.results.units import axis_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -73,12 +73,12 @@ class Panels(tuple[Any, ...]):
 
 
 def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:
-    """Return `ax` or, if it is None, the axes of a new figure of `size` [inch], with ``projection="3d"`` in space."""
+    """Return `ax` or, if it is None, the axes of a new figure of `size` [inch]; ``projection="3d"`` gives 3D axes."""
     if ax is None:
         return new_panels(1, 1, size, subplot_kw={"projection": projection})[0, 0]
     if not (hasattr(ax, "plot") and hasattr(ax, "figure")):
         raise FastcontactError(
-            f"pictures are drawn on axes of matplotlib, not on {ax!r}: leave the argument out for new ones"
+            f"pictures are drawn on axes of Matplotlib, not on {ax!r}: omit the argument for new axes"
         )
     return ax
 
@@ -109,14 +109,14 @@ def new_panels(rows: int, columns: int, size: tuple[float, float], dpi: int = 15
 
 
 def outer_legend(ax: Any, columns: int) -> None:
-    """Add a legend below the label of the abscissa, where it does not hide data."""
+    """Add a legend below the label of the x axis, where it does not hide data."""
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns, fontsize=8)
 
 
-def laid_out(axes: Any, zoom: float | None = None) -> Any:
-    """Enlarge the box of axes in space by the factor `zoom`, lay out the figure and return the axes.
+def lay_out(axes: Any, zoom: float | None = None) -> Any:
+    """Enlarge the box of 3D axes by the factor `zoom`, lay out the figure, and return the axes.
 
-    By default the box with its labels has the size of the axes.
+    By default the box with its labels fills the axes.
     """
     axes.set_box_aspect(_box_size(axes), zoom=zoom_to_axes(axes) if zoom is None else zoom)
     axes.figure.draw_without_rendering()
@@ -124,12 +124,12 @@ def laid_out(axes: Any, zoom: float | None = None) -> Any:
 
 
 def _box_size(axes: Any) -> Array:
-    """Return the lengths (3,) of the edges of the box of axes in space, in the units of the data."""
+    """Return the lengths (3,) of the edges of the box of 3D axes, in the units of the data."""
     return np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
 
 
 def zoom_to_axes(axes: Any) -> float:
-    """Return the factor by which the box of axes in space with its labels can be enlarged to the size of the axes [-]."""
+    """Return the factor [-] by which the box of 3D axes with its labels can be enlarged until it fills the axes."""
     from mpl_toolkits.mplot3d.proj3d import proj_transform
 
     axes.set_box_aspect(_box_size(axes))
@@ -138,12 +138,12 @@ def zoom_to_axes(axes: Any) -> float:
     corners = np.transpose(proj_transform(*map(np.ravel, np.meshgrid(*limits)), axes.get_proj()))[:, :2]
     labels = [axis.get_tightbbox(axes.figure.canvas.get_renderer()) for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
     ends = np.concatenate([axes.transData.transform(corners), *(box.get_points() for box in labels)])
-    first, last = axes.get_window_extent().get_points()  # whose centre is that of the box
+    first, last = axes.get_window_extent().get_points()  # corners of the axes, which have the same centre as the box
     return float(((last - first) / 2.0 / np.abs(ends - (first + last) / 2.0).max(axis=0)).min())
 
 
 # Mean width of a letter of a label [inch].
-LETTER = 0.09
+LETTER_WIDTH = 0.09
 
 
 def size_around(points: Array, least: float = 3.2) -> tuple[float, float]:
@@ -155,25 +155,25 @@ def size_around(points: Array, least: float = 3.2) -> tuple[float, float]:
     return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, least)
 
 
-def zoomed(centre: Array, half_width: float, points: Array) -> tuple[Array, Array]:
+def zoom_window(centre: Array, half_width: float, points: Array) -> tuple[Array, Array]:
     """Return two corners of a square around `centre` (2,), clipped to the bounding box of `points` (n, 2) with a margin."""
     low, high = points.min(axis=0) - 0.05 * half_width, points.max(axis=0) + 0.05 * half_width
     return np.maximum(centre - half_width, low), np.minimum(centre + half_width, high)
 
 
-def labelled_axes(
-    axes: Any, artist: Any, shown: Field, heading: str, units: Mapping[str, str], labels: Sequence[str],
+def label_axes(
+    axes: Any, artist: Any, plot_field: Field, heading: str, units: Mapping[str, str], labels: Sequence[str],
     points: Array | None = None, *, alone: bool = True,
 ) -> Any:  # fmt: skip
     """Add a colour bar, a title, a label for each direction and a legend to axes, and return the axes.
 
-    `artist` has the colour scale of the field `shown`. `points` (n, 2) are those of a body in the plane, and None for axes in
-    space [length]. `alone` states whether the figure has no other axes.
+    `artist` has the colour scale of `plot_field`. `points` (n, 2) are those of a plane body [length], and None for 3D
+    axes. `alone` states that the figure has no other axes.
     """
-    caption, length, below = labelled(shown.caption, units, shown.quantity), 0.6, -0.02
+    caption, length, below = axis_label(plot_field.caption, units, plot_field.quantity), 0.6, -0.02
     if points is not None:
         width, height = np.ptp(points, axis=0)
-        caption = textwrap.fill(caption, int(size_around(points)[1] / LETTER))
+        caption = textwrap.fill(caption, int(size_around(points)[1] / LETTER_WIDTH))
         length = float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))  # shorter for flat bodies
         half_inch = -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
         below = half_inch if alone else -0.09
@@ -181,6 +181,6 @@ def labelled_axes(
         axes.locator_params(axis="x", nbins=6, steps=[1, 2, 5, 10])  # space for labels such as 0.0025
     axes.figure.colorbar(artist, ax=axes, label=caption, shrink=length)
     axes.set_title(heading, fontsize="medium", pad=18 if points is None else None)
-    axes.set(**{f"{axis}label": labelled(label, units, "length") for axis, label in zip("xyz", labels)})
+    axes.set(**{f"{axis}label": axis_label(label, units, "length") for axis, label in zip("xyz", labels)})
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))
     return axes

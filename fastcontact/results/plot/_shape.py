@@ -25,34 +25,34 @@ from fastcontact.results.plot import _axes
 from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, new_axes, position_text, units_of
 from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.patches import fill, fill_triangles, outlines
-from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, seen_along, show_box, view_of_extreme
+from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, show_box, shows_extreme, view_axes, view_of_extreme
 from fastcontact.results.step import StepResult
 
-# Largest coordinate that can be plotted without overflow in products of coordinates.
+# Largest coordinate that can be plotted. Products of larger coordinates would overflow.
 LARGEST = 1e30
-# Largest displacement with which vibration modes are drawn by default, relative to the size of the mesh.
-VIBRATION = 0.1
+# Largest displacement of a vibration mode in a plot by default, relative to the size of the mesh.
+MODE_AMPLITUDE = 0.1
 
 
 def scale_of(scale: float | None, mesh: Mesh, steps: Sequence[StepResult]) -> float:
-    """Return the factor on the displacements [-], which is `scale` if it is given.
+    """Return the factor by which displacements are multiplied [-], which is `scale` if it is not None.
 
-    The default is 1. The amplitude of vibration modes is arbitrary, and by default their largest displacement is a tenth of
-    the size of the mesh.
+    The default is 1. The amplitude of a vibration mode is arbitrary; by default its largest displacement is plotted as a
+    tenth of the size of the mesh.
     """
     largest = max(float(np.abs(step.displacement).max(initial=0.0)) for step in steps)
     if scale is not None or largest == 0.0 or "parameter" not in steps[0].iterations:
         return 1.0 if scale is None else scale
-    return float(f"{VIBRATION * float(np.ptp(mesh.points, axis=0).max()) / largest:.2g}")
+    return float(f"{MODE_AMPLITUDE * float(np.ptp(mesh.points, axis=0).max()) / largest:.2g}")
 
 
-def scaled(points: Array, scale: float, displacement: Array) -> Array:
+def displaced_points(points: Array, scale: float, displacement: Array) -> Array:
     """Return the displaced points (n, dim) [length]. Raises FastcontactError if they are too large to be plotted."""
     with np.errstate(all="ignore"):
         position = points + scale * displacement
         valid = np.isfinite(scale) and (np.abs(position) < LARGEST).all()
     if not valid:
-        raise FastcontactError(f"scale = {scale:g} must be a finite number, and not so large that nothing can be drawn")
+        raise FastcontactError(f"scale = {scale:g} must be a finite number, and not so large that coordinates overflow")
     return position
 
 
@@ -129,41 +129,44 @@ def deformed_shape(
     >>> ax.figure.savefig("shape.png")
     """
     if zoom is not None and (mesh.dim == 3 or not 0.0 < zoom < LARGEST):
-        raise FastcontactError(f"zoom = {zoom:g}: in the plane half a width > 0 can be drawn; in 3D draw a section")
-    shown, units = field_of(mesh, step, field), units_of(units, step)
+        raise FastcontactError(f"zoom = {zoom:g}: it must be positive, and is for plane meshes; in 3D draw a section")
+    plot_field, units = field_of(mesh, step, field), units_of(units, step)
     scale = scale_of(scale, mesh, [step])
-    points = scaled(shown.mesh.points, scale, step.displacement[shown.node])
+    points = displaced_points(plot_field.mesh.points, scale, step.displacement[plot_field.node])
     heading = title or f"Deformed shape (displacements x {scale:g}), {step.instant}"
     if mesh.dim == 3:
         axes = new_axes(ax, (6.4, 6.6), "3d")
-        view = view or view_of_extreme(shown, points)
-        artist = draw_solid(axes, shown, points, edges, view, limits or shown.range)
-        _mark(axes, shown, points, mesh, units, hidden=not is_seen(shown, points, view))
-        _axes.labelled_axes(axes, artist, shown, heading, units, "xyz")
-        return axes if ax is not None else _axes.laid_out(axes)
+        view = view or view_of_extreme(plot_field, points)
+        artist = draw_solid(axes, plot_field, points, edges, view, limits or plot_field.range)
+        _mark(axes, plot_field, points, mesh, units, hidden=not shows_extreme(plot_field, points, view))
+        _axes.label_axes(axes, artist, plot_field, heading, units, "xyz")
+        return axes if ax is not None else _axes.lay_out(axes)
     images = [points, points * [-1.0, 1.0]] if mirrored else [points]
     extent = np.concatenate(images)
-    extent = extent if zoom is None else np.array(_axes.zoomed(points[shown.extreme], zoom, extent))
+    extent = extent if zoom is None else np.array(_axes.zoom_window(points[plot_field.extreme], zoom, extent))
     axes = new_axes(ax, _axes.size_around(extent))
     for image in images:
-        artist = _draw(axes, shown, image, edges, limits or shown.range, extent)
+        artist = _draw(axes, plot_field, image, edges, limits or plot_field.range, extent)
     if zoom is not None:
         axes.set(xlim=extent[:, 0], ylim=extent[:, 1])
-    _mark(axes, shown, points, mesh, units)
-    return _axes.labelled_axes(axes, artist, shown, heading, units, "xy", extent, alone=ax is None)
+    _mark(axes, plot_field, points, mesh, units)
+    return _axes.label_axes(axes, artist, plot_field, heading, units, "xy", extent, alone=ax is None)
 
 
-def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Mapping[str, str], hidden: bool = False) -> None:
+def _mark(
+    axes: Any, plot_field: Field, points: Array, mesh: Mesh, units: Mapping[str, str], hidden: bool = False
+) -> None:
     """Mark the extreme value; its label contains the position in the deformed and in the reference configuration."""
-    point, size = points[shown.extreme], float(np.ptp(points, axis=0).max())
+    point, size = points[plot_field.extreme], float(np.ptp(points, axis=0).max())
     deformed = position_text(point, size)
-    undeformed = position_text(mesh.points[shown.node[shown.extreme]], size)
-    label = f"{shown.described(shown.values[shown.extreme], units)} at {deformed}{', hidden' * hidden}"
+    undeformed = position_text(mesh.points[plot_field.node[plot_field.extreme]], size)
+    extreme = plot_field.extreme_label(plot_field.values[plot_field.extreme], units)
+    label = f"{extreme} at {deformed}{', hidden' * hidden}"
     _axes.mark(axes, point, label + (f"\nundeformed at {undeformed}" if deformed != undeformed else ""))
 
 
 def _draw(
-    ax: Axes, shown: Field, nodes: Array, edges: bool | None, limits: tuple[float, float], box: Array
+    ax: Axes, plot_field: Field, nodes: Array, edges: bool | None, limits: tuple[float, float], box: Array
 ) -> Any:  # fmt: skip
     """Draw the cells of a 2D mesh at the positions `nodes` (n_points, 2), and return the artist with the colour scale.
 
@@ -172,8 +175,8 @@ def _draw(
     """
     from matplotlib.collections import PolyCollection
 
-    artist = fill(ax, shown.mesh.solids, nodes, shown.values, shown.colours, limits)
-    loops = [outlines(name, nodes[cells]) for name, cells in shown.mesh.solids.items()]
+    artist = fill(ax, plot_field.mesh.solids, nodes, plot_field.values, plot_field.colours, limits)
+    loops = [outlines(name, nodes[cells]) for name, cells in plot_field.mesh.solids.items()]
     low, high = box.min(axis=0), box.max(axis=0)
     inside = [((loop.max(axis=1) >= low) & (loop.min(axis=1) <= high)).all(axis=1) for loop in loops]
     if edges if edges is not None else sum(int(mask.sum()) for mask in inside) <= MOST_EDGES:
@@ -182,9 +185,9 @@ def _draw(
     return artist
 
 
-# Distance, relative to the size of the mesh, by which a plane is moved along its normal, because it may coincide with
+# Distance, relative to the size of the mesh, by which a section plane is moved along its normal, in case it coincides with
 # facets.
-INSIDE = 1e-7
+PLANE_SHIFT = 1e-7
 
 
 @typed(FastcontactError)
@@ -250,26 +253,26 @@ def section(
     from matplotlib.collections import LineCollection
 
     origin, direction = _plane(mesh, point, normal)
-    shown, units = field_of(mesh, step, field), units_of(units, step)
-    triangles, lines = _intersection(shown, step, origin, direction)
+    plot_field, units = field_of(mesh, step, field), units_of(units, step)
+    triangles, lines = _intersection(plot_field, step, origin, direction)
     scale = scale_of(scale, mesh, [step])
-    basis, labels = seen_along(direction, 1.0 - 1e-12)
-    corners = scaled(triangles[..., :3], scale, triangles[..., 3:6])
+    basis, labels = view_axes(direction, 1.0 - 1e-12)
+    corners = displaced_points(triangles[..., :3], scale, triangles[..., 3:6])
     offset = 0.0 if labels else origin @ basis.T
     flat, values = corners @ basis.T - offset, triangles[..., 6]
     best = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
     points = flat.reshape(-1, 2)
-    points = points if zoom is None else np.array(_axes.zoomed(flat[best], zoom, points))
+    points = points if zoom is None else np.array(_axes.zoom_window(flat[best], zoom, points))
     axes = new_axes(ax, _axes.size_around(points))
-    limits = shown.range if shown.signed else (float(values.min()), float(values.max()))
+    limits = plot_field.range if plot_field.signed else (float(values.min()), float(values.max()))
     corner_rows = np.arange(values.size).reshape(-1, 3)
-    artist = fill_triangles(axes, flat.reshape(-1, 2), corner_rows, values.ravel(), shown.colours, limits)
-    strokes = scaled(lines[..., :3], scale, lines[..., 3:6]) @ basis.T - offset
+    artist = fill_triangles(axes, flat.reshape(-1, 2), corner_rows, values.ravel(), plot_field.colours, limits)
+    strokes = displaced_points(lines[..., :3], scale, lines[..., 3:6]) @ basis.T - offset
     if edges if edges is not None else len(strokes) <= 4 * MOST_EDGES:
         axes.add_collection(LineCollection(list(strokes), colors="black", linewidths=0.2, alpha=0.6))
     undeformed = triangles[best][:3] - ((triangles[best][:3] - origin) @ direction) * direction
     size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
-    extreme = shown.described(values[best], units, " on the section")
+    extreme = plot_field.extreme_label(values[best], units, " on the section")
     _axes.mark(axes, flat[best], f"{extreme}\nundeformed at {position_text(undeformed, size)}")
     if zoom is not None:
         axes.set(xlim=points[:, 0], ylim=points[:, 1])
@@ -278,7 +281,7 @@ def section(
     state = f"{step.instant}, displacements x {scale:g}"
     labels = labels or ("along the section", "across it")
     heading = title or f"{plane}\n{state}"
-    return _axes.labelled_axes(axes, artist, shown, heading, units, labels, points, alone=ax is None)
+    return _axes.label_axes(axes, artist, plot_field, heading, units, labels, points, alone=ax is None)
 
 
 def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple[Array, Array]:
@@ -294,19 +297,20 @@ def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple
     return origin, direction / np.linalg.norm(direction)
 
 
-def _intersection(shown: Field, step: StepResult, origin: Array, direction: Array) -> tuple[Array, Array]:
+def _intersection(plot_field: Field, step: StepResult, origin: Array, direction: Array) -> tuple[Array, Array]:
     """Return the section as triangles (n, 3, 7) and lines (m, 2, 7), with position, displacement and value at each corner.
 
     The plane is moved slightly along its normal, because it may coincide with facets, or in the opposite direction if it does
     not intersect the mesh then. Raises FastcontactError if neither plane intersects the mesh.
     """
-    size = float(np.ptp(shown.mesh.points, axis=0).max())
-    data = np.column_stack([shown.mesh.points, step.displacement[shown.node], shown.values])
-    for shift in (INSIDE, -INSIDE):
-        triangles, lines = _cut_cells(shown.mesh, data, data[:, :3] @ direction - origin @ direction - shift * size)
+    size = float(np.ptp(plot_field.mesh.points, axis=0).max())
+    data = np.column_stack([plot_field.mesh.points, step.displacement[plot_field.node], plot_field.values])
+    for shift in (PLANE_SHIFT, -PLANE_SHIFT):
+        height = data[:, :3] @ direction - origin @ direction - shift * size
+        triangles, lines = _cut_cells(plot_field.mesh, data, height)
         if len(triangles):
             return triangles, lines
-    low, high = shown.mesh.points.min(axis=0), shown.mesh.points.max(axis=0)
+    low, high = plot_field.mesh.points.min(axis=0), plot_field.mesh.points.max(axis=0)
     raise FastcontactError(
         f"the plane through {position_text(origin, size)} with normal {position_text(direction, 1.0)} does not meet "
         f"the mesh, which lies between {position_text(low, size)} and {position_text(high, size)}"
@@ -400,13 +404,13 @@ def view(
         import pyvista
     except ImportError as error:
         raise FastcontactError("the interactive view needs PyVista: pip install 'fastcontact[view]'") from error
-    displayed = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    if screenshot is None and not displayed:
+    has_display = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if screenshot is None and not has_display:
         raise FastcontactError(
             "there is no display to open a window on: write a picture instead, with screenshot=FILE or --png FILE"
         )
     grid = results.to_pyvista(step)
-    grid.points = scaled(grid.points, scale_of(scale, results.mesh, [step]), grid.point_data["displacement"])
+    grid.points = displaced_points(grid.points, scale_of(scale, results.mesh, [step]), grid.point_data["displacement"])
     plotter: Any = pyvista.Plotter(off_screen=screenshot is not None)
     plotter.add_mesh(
         grid, scalars="von_mises", show_edges=grid.n_cells <= 5000, line_width=0.3, cmap="viridis",
@@ -512,8 +516,8 @@ def animate(
         size = _axes.size_around(mesh.points * [2.0 if mirrored else 1.0, 1.0], 3.8)
     figure = new_axes(None, size, projection).figure
     writer = writer_of(target, pictures_per_second)
-    limits, box = _over_all(mesh, steps, field, scale, mirrored)
-    zoom: float | None = None  # that of the first picture, so that the scale of all pictures is the same
+    limits, box = _limits_of_steps(mesh, steps, field, scale, mirrored)
+    zoom: float | None = None  # the zoom of the first frame is used for all frames
     with _failure_of_writer(target), replacing(target) as temporary, writer.saving(figure, temporary, RESOLUTION):
         for step in steps:
             figure.clear()
@@ -526,7 +530,7 @@ def animate(
             if mesh.dim == 3:
                 show_box(axes, *box, view)
                 zoom = zoom or _axes.zoom_to_axes(axes)
-                _axes.laid_out(axes, zoom)
+                _axes.lay_out(axes, zoom)
             else:
                 axes.set(**{f"{axis}lim": ends for axis, *ends in zip("xy", *box, strict=True)})
             writer.grab_frame()
@@ -563,11 +567,11 @@ def _failure_of_writer(path: Path) -> Iterator[None]:
         raise FastcontactError(
             f"'{path}' was not written, ffmpeg ended with code {reason}: write a .gif instead"
         ) from error
-    except IndexError as error:  # matplotlib cannot finish a .gif without frames
+    except IndexError as error:  # Matplotlib fails to finish a .gif without frames, which hides the original error
         raise error.__context__ or error from None
 
 
-def _over_all(
+def _limits_of_steps(
     mesh: Mesh, steps: Sequence[StepResult], field: str, scale: float, mirrored: bool
 ) -> tuple[tuple[float, float], tuple[Array, Array]]:
     """Return the limits of the colour scale and the corners of the bounding box of the bodies over all steps."""
@@ -576,7 +580,7 @@ def _over_all(
     for step in steps:
         smallest, largest = field_of(mesh, step, field).range
         limits = min(limits[0], smallest), max(limits[1], largest)
-        points = scaled(mesh.points, scale, step.displacement)
+        points = displaced_points(mesh.points, scale, step.displacement)
         low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
     if mirrored and mesh.dim == 2:
         low[0], high[0] = min(low[0], -high[0]), max(high[0], -low[0])

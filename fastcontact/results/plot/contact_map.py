@@ -16,18 +16,18 @@ from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.layout import CONTACT_FIELDS
 from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, new_panels, units_of
 from fastcontact.results.plot.patches import fill
-from fastcontact.results.plot.solid import seen_along
+from fastcontact.results.plot.solid import view_axes
 from fastcontact.results.step import ContactResult
-from fastcontact.results.units import labelled, valued
+from fastcontact.results.units import axis_label, valued
 
 # Margin of the plotted region around the part of the surface that is in contact, relative to the half-width of that part.
 MARGIN = 0.15
-# Smallest ratio of the heights of a figure and of a square one. The colour bars of flatter maps lie below the maps.
+# Smallest height of a figure relative to that of a square map. The colour bar of a flatter map lies below the map.
 FLAT = 0.55
-# Smallest magnitude of the mean unit normal for which a surface can be projected along this normal.
+# Smallest magnitude of the mean of the unit normals of a surface for which it can be projected along the mean normal.
 LEAST_MEAN = 0.3
-# Captions and quantities, which determine units, of the fields that can be plotted next to the pressure.
-BESIDE = {
+# Captions of the fields that can be plotted next to the pressure, and the quantities that determine their units.
+SECOND_FIELDS = {
     "shear": ("shear traction", "pressure"),
     **{name.removeprefix("contact_"): texts for name, texts in CONTACT_FIELDS.items() if name != "contact_pressure"},
 }
@@ -95,9 +95,9 @@ def contact_map(
     if labels is None:
         flat -= contact.middle @ basis.T
         labels = ("across the contact", "up the contact")
-    known = [name for name in BESIDE if getattr(contact, name) is not None]
+    known = [name for name in SECOND_FIELDS if getattr(contact, name) is not None]
     check_known("field beside the pressure", beside, known, FastcontactError)
-    caption, quantity, beside_values = *BESIDE[beside], getattr(contact, beside)
+    caption, quantity, beside_values = *SECOND_FIELDS[beside], getattr(contact, beside)
     size = np.linalg.norm(beside_values.reshape(len(flat), -1), axis=1)
     two_maps = bool(size.max(initial=0.0) > (1e-9 * contact.pressure_max if beside == "shear" else 0.0) >= 0.0)
     panels = _panels(axes, two_maps)
@@ -105,11 +105,12 @@ def contact_map(
     for ax, (values, caption, quantity) in zip(panels, fields, strict=False):
         ends = min(0.0, float(values.min(initial=0.0))), float(values.max(initial=0.0)) or 1.0
         artist = fill(ax, blocks, flat, values, "viridis", ends)
-        high = _limit(ax, flat, _carrying(contact, blocks) & ~np.array(everything))
+        high = _set_limits(ax, flat, _loaded_nodes(contact, blocks) & ~np.array(everything))
         bar = {"location": "bottom", "shrink": 0.6} if high == FLAT else {"shrink": 0.75 * high}
-        ax.figure.colorbar(artist, ax=ax, label=labelled(caption, units, quantity), **bar)
+        ax.figure.colorbar(artist, ax=ax, label=axis_label(caption, units, quantity), **bar)
         _mark_nodes(ax, flat, contact, two_maps)
-        ax.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"), aspect="equal")
+        x_label, y_label = (axis_label(label, units, "length") for label in labels)
+        ax.set(xlabel=x_label, ylabel=y_label, aspect="equal")
         ax.set_title(f"{caption}\nlargest {valued(float(values.max(initial=0.0)), units, quantity)}", fontsize="medium")
     if two_maps and beside_values.ndim == 2:
         large = size > 0.1 * size.max()  # the direction of small vectors is not shown
@@ -127,7 +128,7 @@ def _panels(axes: Sequence[Any] | None, two_maps: bool) -> list[Any]:
     if axes is not None:
         panels = list(np.atleast_1d(np.array(axes, dtype=object)))
         if len(panels) < 1 + two_maps:
-            raise FastcontactError(f"this contact has shear: it takes two axes, and {len(panels)} are given")
+            raise FastcontactError(f"a contact with shear needs two axes, and {len(panels)} are given")
         return panels[: 1 + two_maps]
     panels = list(new_panels(1, 1 + two_maps, (9.6 if two_maps else 5.6, 4.6))[0])
     panels[0].figure.set_layout_engine("compressed")  # places the colour bar next to a narrow map
@@ -160,9 +161,9 @@ def _projection(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Arr
         total, total_area = total + areas.sum(axis=0), total_area + float(np.linalg.norm(areas, axis=1).sum())
     if np.linalg.norm(total) < LEAST_MEAN * total_area:
         raise FastcontactError(
-            f"the surface of contact '{contact.name}' goes around its body: draw a section, or look at it with view"
+            f"the surface of contact '{contact.name}' surrounds its body: draw a section, or use view"
         )
-    return seen_along(total / np.linalg.norm(total), 0.9)
+    return view_axes(total / np.linalg.norm(total), 0.9)
 
 
 def _mark_nodes(ax: Any, flat: Array, contact: ContactResult, friction: bool) -> None:
@@ -175,7 +176,7 @@ def _mark_nodes(ax: Any, flat: Array, contact: ContactResult, friction: bool) ->
             ax.plot(*flat[nodes].T, "o", ms=3, mfc=colour, mec="black", mew=0.4, label=state)
 
 
-def _carrying(contact: ContactResult, blocks: dict[str, Indices]) -> Mask:
+def _loaded_nodes(contact: ContactResult, blocks: dict[str, Indices]) -> Mask:
     """Return the mask (m,) of nodes that are closed or belong to a facet with pressure."""
     mask = contact.active.copy()
     for facets in blocks.values():
@@ -183,7 +184,7 @@ def _carrying(contact: ContactResult, blocks: dict[str, Indices]) -> Mask:
     return mask
 
 
-def _limit(ax: Any, flat: Array, closed: Mask) -> float:
+def _set_limits(ax: Any, flat: Array, closed: Mask) -> float:
     """Set the limits of the axes to the closed part with a margin, or to the entire surface if no node is closed.
 
     Returns the height of the figure relative to that of a square map, from FLAT to 1 [-].

@@ -1,4 +1,4 @@
-"""Plots of the two sides of each contact pair that was detected in a mesh."""
+"""Plots of the contact pairs that `find_contacts` detects in a mesh."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.contact.found_contacts import FoundContacts
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import LETTER, Axes, laid_out, new_axes, size_around
+from fastcontact.results.plot._axes import LETTER_WIDTH, Axes, lay_out, new_axes, size_around
 from fastcontact.results.plot.patches import outlines, triangles_of
 from fastcontact.results.plot.solid import show_box
-from fastcontact.results.units import labelled
+from fastcontact.results.units import axis_label
 
 
 @typed(FastcontactError)
@@ -45,7 +45,7 @@ def contacts(
     mesh = found_contacts.mesh
     width, height = size_around(mesh.points) if mesh.dim == 2 else (6.4, 6.2)
     if mesh.dim == 2:  # the legend is beside the axes
-        legend = LETTER * max((len(f"{pair.name}, secondary") for pair in found_contacts), default=0)
+        legend = LETTER_WIDTH * max((len(f"{pair.name}, secondary") for pair in found_contacts), default=0)
         width = max(width, 4.2 * float(np.ptp(mesh.points[:, 0]) / np.ptp(mesh.points, axis=0).max()) + 1.1 + legend)
     axes = new_axes(ax, (width, height), "3d" if mesh.dim == 3 else None)
     if mesh.dim == 2:
@@ -55,12 +55,12 @@ def contacts(
     else:
         _draw_3d(axes, found_contacts)
         show_box(axes, mesh.points.min(axis=0), mesh.points.max(axis=0), view)
-    axes.set(**{f"{axis}label": labelled(axis, found_contacts.units, "length") for axis in "xyz"[: mesh.dim]})
+    axes.set(**{f"{axis}label": axis_label(axis, found_contacts.units, "length") for axis in "xyz"[: mesh.dim]})
     axes.set_title("1 contact" if len(found_contacts) == 1 else f"{len(found_contacts)} contacts")
     if len(found_contacts):
         anchor = (1.02, 1.0) if mesh.dim == 2 else (0.0, 1.0)
         axes.legend(loc="upper left", bbox_to_anchor=anchor, fontsize="small")
-    return axes if mesh.dim == 2 or ax is not None else laid_out(axes)
+    return axes if mesh.dim == 2 or ax is not None else lay_out(axes)
 
 
 def _sides(found_contacts: FoundContacts) -> list[tuple[str, str, Any, float]]:

@@ -17,7 +17,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot import _axes
 from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, contacts_of, new_axes, outer_legend, units_of
 from fastcontact.results.step import ContactResult, StepResult, half_width
-from fastcontact.results.units import labelled, units_of_results, valued
+from fastcontact.results.units import axis_label, units_of_results, valued
 
 
 @typed(FastcontactError)
@@ -85,13 +85,13 @@ def pressure_profile(
             f"stress has the shape {np.shape(stress)}, not {np.shape(contact.place)}: give one value for each secondary node"
         )
     ax, units = new_axes(ax, (6.4, 5.0)), units_of(units, contact)
-    earlier = sum(line.get_marker() == "o" for line in ax.lines)
-    colour = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:pink")[earlier % 6]
+    n_profiles = sum(line.get_marker() == "o" for line in ax.lines)
+    colour = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:pink")[n_profiles % 6]
     order = np.argsort(contact.place, kind="stable")
     position, flat = contact.place[order], contact.coordinates.shape[1] == 2
     curves = _curves(theory, other_theories or {})
     low, high = _shown_range(contact, curves)
-    limits = (low, high, *(ax.get_xlim() if earlier else ()))
+    limits = (low, high, *(ax.get_xlim() if n_profiles else ()))
     shown = (position >= low) & (position <= high)
     for style, (legend, curve) in zip(("-", "--", ":", "-."), curves.items(), strict=False):
         end = min(curve.radius, high)
@@ -109,8 +109,8 @@ def pressure_profile(
     _mark_edges(ax, contact, position, units, colour)
     start = "axis" if contact.measured_from_axis else "middle of the contact"
     distance = "distance along the surface" if flat and not contact.measured_from_axis else "distance"
-    ax.set(xlabel=labelled(f"{distance} from the {start}", units, "length"), xlim=(min(limits), max(limits)))
-    ax.set(ylabel=labelled("contact pressure", units, "pressure"))
+    ax.set(xlabel=axis_label(f"{distance} from the {start}", units, "length"), xlim=(min(limits), max(limits)))
+    ax.set(ylabel=axis_label("contact pressure", units, "pressure"))
     ax.set(title=title or ax.get_title() or f"Contact '{contact.name}'")
     ax.set_ylim(min(0.0, 1.05 * float(pressure.min(initial=0.0))), 1.05 * ax.dataLim.y1 or None)
     ax.grid(alpha=0.3)
@@ -131,16 +131,16 @@ def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
             curves[legend or curve.name] = curve
         elif candidate is not None and not is_dataclass(candidate):
             raise FastcontactError(
-                f"a theory needs a pressure, such as the results of fastcontact.analytic have, but {candidate!r} has none"
+                f"a theory needs a pressure, as the results of fastcontact.analytic have, but {candidate!r} has none"
             )
     return curves
 
 
 def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) -> tuple[float, float]:
-    """Return the limits of the abscissa, which exceed the extent of the contact and of the theories by about one third.
+    """Return the limits of the x axis, which exceed the extent of the contact and of the theories by about one third.
 
-    They exceed the farthest node and theory by at most 2 %. Both sides of the middle are included if the surface has nodes on
-    both sides.
+    The limits exceed the farthest node and the radii of the theories by at most 2 %. They include both sides of the middle if
+    the surface has nodes on both sides.
     """
     closed = np.abs(contact.place[contact.active]).max(initial=0.0)
     radii = [value for value in (*contact.radius, *(c.radius for c in curves.values())) if np.isfinite(value)]
@@ -251,11 +251,11 @@ def axis_stress(
     values = {caption: stress[:, component] for caption, component in COMPONENTS.items()}
     values["von Mises"] = von_mises(stress)
     for number, name in enumerate(bodies):
-        here = shown & (side == 1 - 2 * number)
+        rows = shown & (side == 1 - 2 * number)
         for (caption, value), colour, marker in zip(values.items(), COLOURS, "osD", strict=True):
-            if here.any():  # symbols of the second body are hollow, so that they do not hide those of the first body
+            if rows.any():  # symbols of the second body are hollow, so that they do not hide those of the first body
                 face, label = ("none" if number else colour), f"{caption}, {name}"
-                axes.plot(depth[here], value[here], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label)
+                axes.plot(depth[rows], value[rows], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label)
     depths = np.linspace(0.0, reach, 400)
     for style, (label, theory) in zip(("-", "--", ":"), (theories or {}).items(), strict=False):
         exact = theory.stress_on_axis(depths)
@@ -264,7 +264,8 @@ def axis_stress(
             axes.plot(depths, curve, style, color=colour, lw=1.0)
         axes.plot([], [], f"k{style}", lw=1.0, label=label)
     title = title or f"Stresses on the axis, {step.instant}"
-    axes.set(xlabel=labelled("depth below the surface", units, "length"), ylabel=labelled("stress", units, "pressure"))
+    axes.set(xlabel=axis_label("depth below the surface", units, "length"))
+    axes.set(ylabel=axis_label("stress", units, "pressure"))
     axes.set_title(title, fontsize="medium")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
@@ -295,7 +296,7 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
         raise FastcontactError(
             f"the mesh has no nodes on the axis of contact '{pair}', along which stresses could be plotted"
         )
-    # Both bodies have a node at the intersection with the surface. The positions of its cells show to which body it belongs.
+    # Both bodies have a node where the axis intersects the surface. The side of the cells of such a node determines its body.
     body_side = _sides(mesh, nodes, origin, direction)
     side = np.where(np.abs(height) > tolerance, np.sign(height), body_side).astype(np.int64)
     order = np.lexsort((np.abs(height), side))
@@ -330,7 +331,7 @@ def _sides(mesh: Mesh, nodes: AnyArray, origin: Array, direction: Array) -> Arra
     return np.asarray(np.sign(total[nodes]))
 
 
-# Largest number of steps at which `contact_zones` shows the number of closed nodes.
+# Largest number of steps for which `contact_zones` shows the number of closed nodes.
 MOST_COUNTS = 20
 STATES = {"open": "0.85", "closed": "C0", "sticking": "C0", "sliding": "C1"}
 
@@ -409,11 +410,11 @@ def history(
         lower.plot([0.0, *approaches], [0.0, *(t.radius for t in theory)], "k-", lw=1, label=name)
     if any(c.per_thickness for c in contacts):
         units = units_of_results(units, "plane_strain")
-    upper.set(ylabel=labelled("sum of the normal forces" if cancels else "contact force", units, "force"))
+    upper.set(ylabel=axis_label("sum of the normal forces" if cancels else "contact force", units, "force"))
     upper.set_title(title or f"Contact '{pair}' against the load", fontsize="medium")
-    abscissa = labelled("approach", units, "length") if approach else "load factor"
+    abscissa = axis_label("approach", units, "length") if approach else "load factor"
     extent = "contact radius" if contacts[-1].extent == "radius" else "half-width of the contact"
-    lower.set(xlabel=abscissa, ylabel=labelled(extent, units, "length"))
+    lower.set(xlabel=abscissa, ylabel=axis_label(extent, units, "length"))
     for ax in axes:
         ax.grid(alpha=0.3)
         entries = len(ax.get_legend_handles_labels()[0])
@@ -429,12 +430,12 @@ def history(
 def _plot_bounds(ax: Any, x: Array, bounds: Array) -> None:
     """Draw a bar between the bounds (n, 2) of the radius at each step, or a tick if there is no upper bound."""
     low, high = bounds.T
-    both = np.isfinite(low) & np.isfinite(high)
-    all_closed = np.isfinite(low) & ~both
-    if both.any():
+    bounded = np.isfinite(low) & np.isfinite(high)
+    all_closed = np.isfinite(low) & ~bounded
+    if bounded.any():
         label = "computed: outermost closed node to first open one"
-        ax.vlines(x[both], low[both], high[both], lw=4, alpha=0.5, color="tab:blue", label=label)
-        ax.plot([x[both], x[both]], [low[both], high[both]], "_", ms=6, color="tab:blue")
+        ax.vlines(x[bounded], low[bounded], high[bounded], lw=4, alpha=0.5, color="tab:blue", label=label)
+        ax.plot([x[bounded], x[bounded]], [low[bounded], high[bounded]], "_", ms=6, color="tab:blue")
     if all_closed.any():
         ax.plot(x[all_closed], low[all_closed], "_", ms=9, color="tab:blue", label="computed: all nodes closed")
 
@@ -497,7 +498,7 @@ def contact_zones(
     top = reach if 0.0 < reach < farthest else None
     axes.set_ylim((-top if top else None) if y.min(initial=0.0) < 0 else 0.0, top)
     start = "axis" if first.measured_from_axis else "middle of the first contact"
-    distance = labelled(f"distance from the {start}", units, "length")
+    distance = axis_label(f"distance from the {start}", units, "length")
     axes.set(xlabel="load factor (above: closed nodes)", ylabel=distance)
     axes.set_title(title or f"Contact '{pair}' against the load", pad=16, fontsize="medium")
     _axes.outer_legend(axes, 3)

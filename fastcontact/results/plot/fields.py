@@ -12,7 +12,7 @@ from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity.recovery import principal_stress, tresca, von_mises, von_mises_signed
 from fastcontact.errors import FastcontactError, check_known
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.layout import CONTACT_FIELDS, cells_by_element, contact_fields, separated
+from fastcontact.results.layout import CONTACT_FIELDS, cells_by_element, contact_fields, cut_at_interfaces
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import AXES, STRESS_COMPONENTS
 from fastcontact.results.units import valued
@@ -61,7 +61,7 @@ class Field:
         low, high = float(self.values.min()), float(self.values.max())
         return low < 0.0 < high and min(-low, high) > 0.1 * max(-low, high)
 
-    def described(self, value: float, units: Mapping[str, str], region: str = "") -> str:
+    def extreme_label(self, value: float, units: Mapping[str, str], region: str = "") -> str:
         """Return a label for an extreme value of the field, or of a `region` such as ``" on the section"``."""
         kind = "maximum" if value >= 0.0 else "minimum"
         return f"{kind}{region} {valued(float(value), units, self.quantity, 5)}"
@@ -78,10 +78,10 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     heat = [*["temperature"] * (step.temperature is not None), *["heat_flux"] * bool(fluxes)]
     contact = contact_fields(mesh, step)
     check_known("field", name, [*names(mesh), *contact, *step.cell_fields, *heat], FastcontactError)
-    if name in OF_STRESS and name not in step.cell_fields:
-        separate_mesh, node, stress = separated(mesh, step)
-        caption, of_stress = OF_STRESS[name]
-        values = step.von_mises if name == "von_mises" and separate_mesh is mesh else of_stress(stress)
+    if name in STRESS_FIELDS and name not in step.cell_fields:
+        separate_mesh, node, stress = cut_at_interfaces(mesh, step)
+        caption, stress_measure = STRESS_FIELDS[name]
+        values = step.von_mises if name == "von_mises" and separate_mesh is mesh else stress_measure(stress)
         return Field(separate_mesh, node, values, caption, "pressure")
     caption, quantity = name, ""
     if name in DISPLACEMENTS:
@@ -96,14 +96,14 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     elif name == "heat_flux":
         caption, values = "heat flux", _nodal_mean(mesh, np.linalg.norm(fluxes, axis=0))
     else:
-        caption, values = CELLS.get(name, name), _nodal_mean(mesh, step.cell_fields[name])
+        caption, values = CELL_CAPTIONS.get(name, name), _nodal_mean(mesh, step.cell_fields[name])
     return Field(mesh, np.arange(mesh.n_points, dtype=np.int32), values, caption, quantity)
 
 
 def names(mesh: Mesh) -> list[str]:
     """Return the names of the fields of bodies that each step on a mesh has."""
     missing = ("stress.yz", "stress.xz", "displacement.z") if mesh.dim == 2 else ()
-    return [name for name in (*OF_STRESS, *DISPLACEMENTS) if name not in missing]
+    return [name for name in (*STRESS_FIELDS, *DISPLACEMENTS) if name not in missing]
 
 
 def _nodal_mean(mesh: Mesh, values: Array) -> Array:
@@ -116,7 +116,7 @@ def _nodal_mean(mesh: Mesh, values: Array) -> Array:
 
 
 # Captions of fields, and functions from stresses (n, 4) or (n, 6) to values (n,) [pressure].
-OF_STRESS: dict[str, tuple[str, Callable[[Array], Array]]] = {
+STRESS_FIELDS: dict[str, tuple[str, Callable[[Array], Array]]] = {
     "von_mises": ("von Mises stress", von_mises),
     "von_mises_signed": ("von Mises stress with the sign of the trace", von_mises_signed),
     "tresca": ("Tresca stress (largest minus smallest principal stress)", tresca),
@@ -128,7 +128,7 @@ OF_STRESS: dict[str, tuple[str, Callable[[Array], Array]]] = {
         for k, name in enumerate(STRESS_COMPONENTS)
     },
 }
-CELLS = {
+CELL_CAPTIONS = {
     "plastic_strain": "equivalent plastic strain",
     "yield_ratio": "equivalent stress over yield stress",
     **{f"heat_flux_{axis}": f"heat flux along {axis}" for axis in AXES},

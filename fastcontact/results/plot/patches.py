@@ -1,4 +1,4 @@
-"""Cells in the plane: colours of a field and outlines, with the curved sides of quadratic cells."""
+"""Drawing of plane cells with the colours of a field, and their outlines, with curved sides of quadratic cells."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fastcontact.arrays import AnyArray, Array
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 
-# Number of subdivisions of each side of a cell, which show curved sides and nonlinear fields.
+# Number of subdivisions of each side of a cell, for curved sides and for fields that are not linear within the cell.
 CUTS = 4
 # Largest number of cells that are subdivided. With more cells, subdivisions would not be visible.
 MOST_SUBDIVIDED = 5000
@@ -20,7 +20,7 @@ MOST_SUBDIVIDED = 5000
 def fill(
     ax: Any, blocks: Mapping[str, AnyArray], points: Array, values: Array, colours: str, ends: tuple[float, float]
 ) -> Any:
-    """Fill cells with the colours of a field that their shape functions interpolate.
+    """Fill cells with the colours of a field that is interpolated by their shape functions.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def outlines(name: str, corners: Array) -> Array:
 
 
 def lattice(triangle: bool, n: int) -> tuple[Array, AnyArray]:
-    """Return points (k, 2) [-] and triangles (m, 3) that divide the unit triangle or square, `n` intervals on each side."""
+    """Return points (k, 2) [-] and triangles (m, 3) that divide the unit triangle or square, with `n` intervals per side."""
     points = [(i, j) for i in range(n + 1) for j in range(n + 1) if not triangle or i + j <= n]
     number = {point: k for k, point in enumerate(points)}
     squares = [((i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)) for i in range(n) for j in range(n)]

@@ -14,7 +14,7 @@ from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.plot.fields import Field
 from fastcontact.results.plot.patches import lattice
 
-# Distance behind a triangle, relative to the total size, up to which a point is regarded as a point of the triangle.
+# Largest distance behind a triangle, relative to the total size, at which a point still counts as a point of the triangle.
 ON_TRIANGLE = 1e-4
 
 
@@ -30,7 +30,7 @@ class Screen:
     """
 
     def __init__(self, triangles: Array, eye: Array) -> None:
-        self.axes = across(eye)
+        self.axes = screen_axes(eye)
         flat = triangles @ self.axes.T
         self.corners, self.origin = flat[..., :2], flat[..., :2].reshape(-1, 2).min(axis=0)
         self.depth = flat[..., 2]
@@ -44,7 +44,7 @@ class Screen:
         """List the triangles of each square of the screen, in the order of the squares."""
         low, high = self._square(self.corners.min(axis=1)), self._square(self.corners.max(axis=1))
         n_columns, n_rows = (high - low + 1).T
-        number, within = _counted(n_columns * n_rows)
+        number, within = _entry_members(n_columns * n_rows)
         column, row = within % n_columns[number], within // n_columns[number]
         square = (low[number, 0] + column) * self.n_bins + low[number, 1] + row
         order = np.argsort(square, kind="stable")
@@ -61,7 +61,7 @@ class Screen:
         column, row = self._square(flat[:, :2]).T
         square = column * self.n_bins + row
         first, count = self.starts[square], self.starts[square + 1] - self.starts[square]
-        index, within = _counted(count)
+        index, within = _entry_members(count)
         triangle = self.members[first[index] + within]
         behind = self._behind(flat[index], triangle)
         return np.asarray(np.bincount(index[behind], minlength=len(flat)).astype(bool).reshape(positions.shape[:-1]))
@@ -77,12 +77,12 @@ class Screen:
         return np.asarray((weights > 0.0).all(axis=1) & (depth > flat[:, 2] + self.tolerance))
 
 
-def _counted(count: Indices) -> tuple[Indices, Indices]:
-    """Return, for entries with `count` (n,) members each, the entry of each member and its number within the entry."""
+def _entry_members(count: Indices) -> tuple[Indices, Indices]:
+    """Return the entry of each member, and the number of the member within its entry, if entry i has ``count[i]`` members."""
     return np.repeat(np.arange(len(count)), count), np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
 
 
-def across(eye: Array) -> Array:
+def screen_axes(eye: Array) -> Array:
     """Return three orthonormal vectors (3, 3) [-]: two normal to the line of sight, and `eye`, the vector to the viewer."""
     helper = np.eye(3)[int(np.argmin(np.abs(eye)))]
     first = np.cross(helper, eye)
@@ -90,15 +90,15 @@ def across(eye: Array) -> Array:
     return np.stack([first, np.cross(eye, first), eye])
 
 
-def seen_along(direction: Array, aligned: float) -> tuple[Array, tuple[str, str] | None]:
-    """Return two axes (2, 3) [-] for a view along a unit vector (3,) [-].
+def view_axes(direction: Array, aligned: float) -> tuple[Array, tuple[str, str] | None]:
+    """Return two axes (2, 3) [-] for a view along a unit vector (3,) [-], and their names if they are coordinate axes.
 
-    If the magnitude of a component of the vector is at least `aligned`, they are the other coordinate axes and their names
-    are returned; otherwise they are normal to the vector and the names are None.
+    If the magnitude of a component of the vector is at least `aligned`, the axes are the other two coordinate axes. Otherwise
+    they are normal to the vector, and None is returned in place of the names.
     """
     k = int(np.argmax(np.abs(direction)))
     if abs(direction[k]) < aligned:
-        return across(direction)[:2], None
+        return screen_axes(direction)[:2], None
     first, second = [axis for axis in range(3) if axis != k]
     return np.eye(3)[[first, second]], ("xyz"[first], "xyz"[second])
 
@@ -109,28 +109,30 @@ def _cross(a: Array, b: Array) -> Array:
 
 # Largest number of cells or facets whose edges are drawn by default. More edges would blacken the plot.
 MOST_EDGES = 5000
-# Number of subdivisions of the sides of each flat triangle of a linear facet, which show nonlinear fields.
+# Number of subdivisions of the sides of each flat triangle of a linear facet, for fields that are not linear within it.
 CUTS = 2
 # Largest number of recursive subdivisions of partly hidden triangles into four.
 SUBDIVISIONS = 4
-# Size of solids relative to the axes, which leaves space for labels.
+# Size of solids relative to the axes, smaller than 1 to leave space for labels.
 ROOM = 0.9
-# Largest ratio of the longer visible extent of a box to its diagonal. Slender boxes are drawn smaller.
+# Largest ratio of the longer extent of a box on the screen to its diagonal. Boxes with a larger ratio are drawn smaller.
 WIDEST = 0.8
 # Elevations and azimuths of the viewer [degree], from above and from below at each of the four corners.
 VIEWS = [(height, direction) for height in (25.0, -25.0) for direction in (-60.0, 30.0, 120.0, -150.0)]
 # Number of ticks on an axis that is as long as the diagonal of the box in the plot.
 TICKS = 14
-# Part of the y axis at each end without ticks, whose labels would overlap those of other axes, relative to its length.
+# Length of the part without ticks at each end of the y axis, relative to the axis. The labels of ticks there would overlap
+# those of other axes.
 NEAR_END = 0.1
-# Distances of tick labels and axis labels from the axes in 3D, in the unit of Matplotlib for a box of size 1, and the
-# smallest size for which they are computed.
+# Distances of tick labels and of axis labels from the axes in 3D, in the unit of Matplotlib and for a box of size 1, and the
+# smallest size of a box for which distances are computed.
 NUMBERS, NAMES, SHORTEST = 6.0, 17.0, 0.05
 
 
 def draw_solid(
-    ax: Any, shown: Field, points: Array, edges: bool | None, view: tuple[float, float], colours: tuple[float, float]
-) -> Any:
+    ax: Any, plot_field: Field, points: Array, edges: bool | None, view: tuple[float, float],
+    colours: tuple[float, float],
+) -> Any:  # fmt: skip
     """Draw the visible part of the outer surface, and return the mappable for a colour bar.
 
     `points` (n_points, 3) are the positions of the points [length], and `colours` are the values of the first and the last
@@ -142,7 +144,7 @@ def draw_solid(
     from matplotlib.colors import Normalize
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    facing, screen = _facing(shown, points, towards(view))
+    facing, screen = _facing(plot_field, points, towards(view))
     pieces, values, strokes = [], [], []
     for name, corners, field, flat in facing:
         weights = _subdivision(CUTS if elements.get(name).order == 1 else 1)
@@ -153,24 +155,24 @@ def draw_solid(
         values.append(visible_values.mean(axis=1))
         strokes.append(_visible_strokes(_outline(name, corners), screen))
     norm = Normalize(*colours)
-    faces = colormaps[shown.colours](norm(np.concatenate(values)))
+    faces = colormaps[plot_field.colours](norm(np.concatenate(values)))
     polygons = list(np.concatenate(pieces))
     lines = faces.copy()  # lines in the colour of the face close hairline gaps between faces
     if edges if edges is not None else sum(len(corners) for _, corners, _, _ in facing) <= MOST_EDGES:
-        # Nearer objects are drawn later. Moving strokes towards the viewer does not change their parallel projection.
+        # Matplotlib draws nearer objects later. Strokes are moved towards the viewer, which does not change their projection.
         moved = np.concatenate(strokes) + 4.0 * np.ptp(points, axis=0).max() * towards(view)
         polygons += list(moved)
         faces = np.vstack([faces, np.zeros((len(moved), 4))])
         lines = np.vstack([lines, np.tile([0.0, 0.0, 0.0, 0.6], (len(moved), 1))])
     ax.add_collection3d(Poly3DCollection(polygons, facecolors=faces, edgecolors=lines, linewidths=0.3))
     show_box(ax, points.min(axis=0), points.max(axis=0), view)
-    return ScalarMappable(norm, shown.colours)
+    return ScalarMappable(norm, plot_field.colours)
 
 
 def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> None:
     """Show the box between two corners (3,) [length] in true proportions in 3D axes, seen from `view` [degree].
 
-    All changes of limits must use this function, because with other proportions strokes would not lie on their faces.
+    Limits must be changed only by this function. With other proportions, strokes would not lie on their faces.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -206,15 +208,15 @@ def _place_labels(ax: Any, size: Array, eye: Array, horizontal: Array) -> None:
         getattr(ax, f"{name}axis").labelpad = NAMES / reach - 21.0
 
 
-def is_seen(shown: Field, points: Array, view: tuple[float, float]) -> bool:
+def shows_extreme(plot_field: Field, points: Array, view: tuple[float, float]) -> bool:
     """Return whether the extreme value of a field at the positions `points` (n_points, 3) is visible from `view`."""
-    _, screen = _facing(shown, points, towards(view))
-    return not bool(screen.hidden(points[[shown.extreme]])[0])
+    _, screen = _facing(plot_field, points, towards(view))
+    return not bool(screen.hidden(points[[plot_field.extreme]])[0])
 
 
-def view_of_extreme(shown: Field, position: Array) -> tuple[float, float]:
+def view_of_extreme(plot_field: Field, position: Array) -> tuple[float, float]:
     """Return the first of VIEWS from which the extreme value of a field is visible, or the first one if there is none."""
-    return next((view for view in VIEWS if is_seen(shown, position, view)), VIEWS[0])
+    return next((view for view in VIEWS if shows_extreme(plot_field, position, view)), VIEWS[0])
 
 
 def towards(view: tuple[float, float]) -> Array:
@@ -223,19 +225,20 @@ def towards(view: tuple[float, float]) -> Array:
     return np.array([np.cos(height) * np.cos(direction), np.cos(height) * np.sin(direction), np.sin(height)])
 
 
-def _facing(shown: Field, points: Array, eye: Array) -> tuple[list[tuple[str, Array, Array, Indices]], Screen]:
+def _facing(plot_field: Field, points: Array, eye: Array) -> tuple[list[tuple[str, Array, Array, Indices]], Screen]:
     """Return the facets that face the viewer, and the screen with their triangles.
 
     For each element type of facets there are its name, the positions and values at the nodes of the facets, and the local
     nodes of the flat triangles of a facet.
     """
-    cut = len(shown.node) != shown.node.max(initial=-1) + 1
+    mesh, node = plot_field.mesh, plot_field.node
+    cut = len(node) != node.max(initial=-1) + 1
     facing = []
-    for name, facets in (_without_cuts(shown.mesh, shown.node) if cut else outer_facets(shown.mesh)).items():
+    for name, facets in (_without_cuts(mesh, node) if cut else outer_facets(mesh)).items():
         flat = flat_triangles(facets.shape[1])
         a, b, c = np.moveaxis(points[facets][:, flat], -2, 0)
         visible = facets[np.cross(b - a, c - a).sum(axis=1) @ eye > 0]
-        facing.append((name, points[visible], shown.values[visible], flat))
+        facing.append((name, points[visible], plot_field.values[visible], flat))
     triangles = [corners[:, flat].reshape(-1, 3, 3) for _, corners, _, flat in facing]
     return facing, Screen(np.concatenate(triangles), eye)
 
@@ -246,18 +249,18 @@ def _visible(triangles: Array, values: Array, screen: Screen) -> tuple[Array, Ar
     Partly hidden triangles are divided recursively into four. The smallest triangles are kept if their centre is visible.
     """
     visible: list[tuple[Array, Array]] = []
-    for left in range(SUBDIVISIONS, -1, -1):
+    for n_subdivisions in range(SUBDIVISIONS, -1, -1):
         centre = triangles.mean(axis=1, keepdims=True)
         tests = np.concatenate([centre, centre + 0.98 * (triangles - centre)], axis=1)
         hidden = screen.hidden(tests)
-        shown = ~hidden[:, 0] if left == 0 else ~hidden.any(axis=1)
-        visible.append((triangles[shown], values[shown]))
-        rest = ~shown & ~hidden.all(axis=1)
-        if left == 0 or not rest.any():
+        is_visible = ~hidden[:, 0] if n_subdivisions == 0 else ~hidden.any(axis=1)
+        visible.append((triangles[is_visible], values[is_visible]))
+        partly_hidden = ~is_visible & ~hidden.all(axis=1)
+        if n_subdivisions == 0 or not partly_hidden.any():
             break
         weights = _subdivision(2)
-        triangles = np.einsum("pcw,nwd->npcd", weights, triangles[rest]).reshape(-1, 3, 3)
-        values = np.einsum("pcw,nw->npc", weights, values[rest]).reshape(-1, 3)
+        triangles = np.einsum("pcw,nwd->npcd", weights, triangles[partly_hidden]).reshape(-1, 3, 3)
+        values = np.einsum("pcw,nw->npc", weights, values[partly_hidden]).reshape(-1, 3)
     return np.concatenate([block for block, _ in visible]), np.concatenate([block for _, block in visible])
 
 

@@ -21,7 +21,7 @@ jitted = pytest.mark.skipif(not decorators.compiled(), reason="kernels are not c
 
 @pytest.mark.parametrize("run", ["2d", "3d", "3d amg"])
 def test_the_table_tells_kernels_as_they_are(run):
-    numbers = ahead.kernels_of([run])
+    numbers = ahead.kernel_numbers([run])
     assert len(numbers) > 15
     for module, name, given in (ahead.table()["kernels"][number] for number in numbers):
         kernel = getattr(importlib.import_module(module), name)
@@ -32,8 +32,8 @@ def test_the_table_tells_kernels_as_they_are(run):
 
 
 def test_all_kinds_of_runs_together_are_the_whole_table():
-    assert sorted(ahead.kernels_of([])) == list(range(len(ahead.table()["kernels"])))
-    assert ahead.kernels_of(["no such kind"]) == []
+    assert sorted(ahead.kernel_numbers([])) == list(range(len(ahead.table()["kernels"])))
+    assert ahead.kernel_numbers(["no such kind"]) == []
 
 
 def test_types_are_those_of_arguments():
@@ -53,7 +53,7 @@ def test_a_helper_leaves_kernels_on_disk_and_tells_each(tmp_path):
     number = next(number for number, (_, name, _) in enumerate(ahead.table()["kernels"]) if name == "work_sizes")
     code = (
         "import sys; from fastcontact._jit import ahead\n"
-        f"ahead.kernels_of = lambda runs: [{number}]\n"
+        f"ahead.kernel_numbers = lambda runs: [{number}]\n"
         "ahead.main(['1', '0'])"
     )
     assert printed(code, NUMBA_CACHE_DIR=tmp_path) == f"{number}\n"
@@ -65,20 +65,20 @@ def started(monkeypatch):
     """What `expect` starts, in a process that has two threads and has compiled nothing yet."""
     found = []
     monkeypatch.setattr(ahead, "start", lambda runs, helpers: found.append((runs, helpers)) or [])
-    monkeypatch.setattr(ahead, "MOST", 3)
+    monkeypatch.setattr(ahead, "MAX_HELPERS", 3)
     monkeypatch.setattr(ahead.decorators, "threads", lambda: 2)
     monkeypatch.setattr(ahead.kernel_files, "files", {len: None})
     monkeypatch.setattr(compiling, "count", 0)
     monkeypatch.setattr(compiling, "helpers", [])
     monkeypatch.setattr(compiling, "waiters", [])
     monkeypatch.setattr(compiling, "listeners", [])
-    monkeypatch.setattr(ahead, "_helped", set())
+    monkeypatch.setattr(ahead, "_runs_with_helpers", set())
     return found
 
 
 def test_help_comes_when_more_than_a_few_kernels_are_compiled(started):
     ahead.expect(["2d"])
-    for _ in range(ahead.ALONE):
+    for _ in range(ahead.MAX_UNHELPED):
         compiling.notify()
     assert started == []
     compiling.notify()
@@ -87,7 +87,7 @@ def test_help_comes_when_more_than_a_few_kernels_are_compiled(started):
 
 
 def test_help_comes_at_once_where_many_were_compiled_before(started, monkeypatch):
-    monkeypatch.setattr(compiling, "count", ahead.ALONE + 1)
+    monkeypatch.setattr(compiling, "count", ahead.MAX_UNHELPED + 1)
     ahead.expect(["3d"])
     assert started == [(["3d"], 1)]
 
@@ -102,11 +102,11 @@ def test_help_comes_once_for_each_kind_of_runs(started, monkeypatch):
 
 def test_no_help_where_python_may_run_all_that_is_not_kept(started, monkeypatch):
     numbers = []
-    monkeypatch.setattr(ahead, "_is_kept", lambda number: numbers.append(number) or True)
+    monkeypatch.setattr(ahead, "_is_cached", lambda number: numbers.append(number) or True)
     monkeypatch.setattr(compiling, "count", 100)
     ahead.expect(["2d"])
     assert started == []
-    assert numbers == ahead.compiled_of(["2d"])
+    assert numbers == ahead.required_kernels(["2d"])
 
 
 @pytest.mark.parametrize("spoilt", ["one thread", "works for another", "not kept", "part of a program"])
@@ -144,12 +144,12 @@ class Process:
 def helped(monkeypatch):
     """A helper, its run, and what the run compiles itself; the file of kernel n is called "kernel n"."""
     process, compiled = Process(), []
-    monkeypatch.setattr(ahead, "compiled_of", lambda runs: [1, 2])
-    monkeypatch.setattr(ahead, "kernels_of", lambda runs: [1, 2, 3])
+    monkeypatch.setattr(ahead, "required_kernels", lambda runs: [1, 2])
+    monkeypatch.setattr(ahead, "kernel_numbers", lambda runs: [1, 2, 3])
     monkeypatch.setattr(ahead, "_file_name", lambda number: f"kernel {number}")
     monkeypatch.setattr(ahead, "compile_kernel", compiled.append)
     monkeypatch.setattr(compiling, "listeners", [])
-    return process, ahead.Help(["2d"], [process]), compiled
+    return process, ahead.Helpers(["2d"], [process]), compiled
 
 
 def begun(run, number):
@@ -192,7 +192,7 @@ def test_a_helper_that_ends_keeps_nobody_waiting(helped):
 def test_a_helper_leaves_out_what_the_run_compiles(tmp_path):
     code = (
         "from fastcontact._jit import ahead\n"
-        "ahead.kernels_of = lambda runs: [0, 1]\n"
+        "ahead.kernel_numbers = lambda runs: [0, 1]\n"
         "ahead.compile_kernel = lambda number: (time.sleep(2.0), done.append(number))\n"
         "import time; done = []\n"
         "ahead.main(['1', '0']); print(done)"

@@ -155,7 +155,7 @@ def test_the_time_of_earlier_runs_counts(tmp_path):
         return printed(short, NUMBA_CACHE_DIR=tmp_path, NUMBA_DISABLE_JIT=0)
 
     assert ask() == "0\n"
-    (path,) = tmp_path.rglob(interpreting.SPENT)
+    (path,) = tmp_path.rglob(interpreting.TIMES_FILE)
     ((version, seconds),) = json.loads(path.read_text()).items()
     assert version.startswith("factorisation_kernels.work_sizes.")
     assert 0.0 < seconds < 1.0

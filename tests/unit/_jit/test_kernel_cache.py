@@ -88,7 +88,7 @@ def forget():
     """Forget what a process remembers of modules and of the cache."""
     for name in ("caller", "callee", "constants"):
         sys.modules.pop(name, None)
-    for remembered in (cache.folder_of, cache.is_trusted, cache._log_once, cache._digest_of_file):
+    for remembered in (cache.cache_folder, cache.is_trusted, cache._log_once, cache._digest_of_file):
         remembered.cache_clear()
     decorators._cache_reported = False
 
@@ -160,7 +160,7 @@ def test_a_cache_that_others_may_write_to_is_not_used(written, inside, mode, use
         path.chmod(mode)
     with caplog.at_level(logging.INFO, "fastcontact"):
         assert asked(written, CALLED) == (2.0, int(used))
-    assert ("others may write to the folder of compiled kernels" in caplog.text) != used
+    assert ("other users may write to the folder of compiled kernels" in caplog.text) != used
 
 
 @jitted
@@ -214,7 +214,7 @@ class Terminal(io.StringIO):
 def told(monkeypatch):
     """What a process that has compiled nothing yet says when two kernels are compiled, given its error output."""
     monkeypatch.setattr(compiling, "_reported", False)
-    monkeypatch.setattr(compiling, "listeners", [compiling.tell_who_waits])
+    monkeypatch.setattr(compiling, "listeners", [compiling.print_announcement])
     monkeypatch.setattr(compiling.log, "handlers", [])  # those of other tests may be closed
     monkeypatch.setattr(compiling.log, "propagate", False)
     level = compiling.log.level
@@ -247,7 +247,7 @@ def test_nothing_where_nobody_waits(told, monkeypatch):
 def test_nothing_without_error_output(told, monkeypatch):
     told(io.StringIO())
     monkeypatch.setattr(sys, "stderr", None)
-    monkeypatch.setattr(compiling, "listeners", [compiling.tell_who_waits])
+    monkeypatch.setattr(compiling, "listeners", [compiling.print_announcement])
     compiling.notify()
     assert compiling.listeners == []
 

@@ -307,9 +307,9 @@ NO_QUANTITIES = [
 NO_PARAMETERS = [
     (("g", 0), "unknown parameter 'g'"),
     (("G", 0, "12"), "the material 0 has no constant G: its sensitivity is not available"),
-    (("E", 0, "1"), "unknown component of E '1': there is none here"),
+    (("E", 0, "1"), "unknown component of E '1': none is defined"),
     (("friction", "c"), "no sensitivity to friction: if all nodes stick"),
-    (("speed", "UPPER"), "unknown group with a centrifugal force 'UPPER': there is none here"),
+    (("speed", "UPPER"), "unknown group with a centrifugal force 'UPPER': none is defined"),
     (("temperature", "UPPER"), "unknown group with a temperature 'UPPER'"),
     (("pretension", "bolt"), "unknown pretension 'bolt'"),
     (("E",), r"must have the form \(\"E\", material\)"),

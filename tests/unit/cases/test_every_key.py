@@ -11,7 +11,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact import cli
-from fastcontact._tools.toml_text import written
+from fastcontact._tools.toml_text import dump
 from fastcontact.cases import checks, keys
 from fastcontact.cases.case import read_case
 from fastcontact.cases.model_tables import LISTS, keys_of_list
@@ -99,7 +99,7 @@ def wrong_of(label: str, place, value: object, folder) -> str | None:
     data, path = copy.deepcopy(CASE), folder / "wrong.toml"
     holder, key = place(data)
     holder[key] = value
-    path.write_text(written(data), encoding="utf-8")
+    path.write_text(dump(data), encoding="utf-8")
     try:
         read_case(path)
     except fc.FastcontactError as error:
@@ -126,7 +126,7 @@ def test_entries_are_right(tmp_path):
         entry = ENTRIES[kind]
         data, path = copy.deepcopy(CASE), tmp_path / f"{kind}.toml"
         appended(data, kind, entry)
-        path.write_text(written(data), encoding="utf-8")
+        path.write_text(dump(data), encoding="utf-8")
         assert read_case(path).name == kind
 
 
@@ -157,7 +157,7 @@ BLOCKS = {"generator": "block-on-block"}
 def test_a_wrong_study_stops_a_run(study, said, tmp_path, capsys):
     data, path = copy.deepcopy(CASE), tmp_path / "study.toml"
     data["study"] = study
-    path.write_text(written(data), encoding="utf-8")
+    path.write_text(dump(data), encoding="utf-8")
     assert cli.main(["run", str(path), "-o", str(tmp_path / "out.vtkhdf")]) == 1
     told = capsys.readouterr().err
     assert told.count("\n") == 1

@@ -328,13 +328,13 @@ def test_a_warm_up_tells_what_failed(helper, end, monkeypatch, capsys):
 
     monkeypatch.setattr(ahead, "start", start)
     assert main(["env", "--warmup"]) == 1
-    total = len(ahead.kernels_of(()))
+    total = len(ahead.kernel_numbers(()))
     assert capsys.readouterr().err == f"error: a process that compiles kernels ended {end.format(total)}\n"
 
 
 def test_a_kernel_that_cannot_be_compiled_is_told_by_the_helper(monkeypatch, capsys):
     monkeypatch.setattr(sys, "stdin", io.StringIO())
-    monkeypatch.setattr(ahead, "kernels_of", lambda runs: [0])
+    monkeypatch.setattr(ahead, "kernel_numbers", lambda runs: [0])
     monkeypatch.setattr(ahead, "compile_kernel", lambda number: {}[number])
     assert ahead.main(["1", "0"]) == 1
     module, name, _ = ahead.table()["kernels"][0]

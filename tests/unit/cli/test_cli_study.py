@@ -12,7 +12,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.cli import _study, main, sweep
-from fastcontact.studies.execute import Progress, Runs, run_study
+from fastcontact.studies.execute import Progress, StudyStatus, run_study
 from fastcontact.studies.job import Run
 
 
@@ -25,7 +25,7 @@ from fastcontact.studies.job import Run
     ],
 )
 def test_progress_is_one_line_that_is_drawn_anew(left, seconds, error, stored, told, capsys):
-    lines = Runs(show=True)
+    lines = StudyStatus(show=True)
     lines(Progress("level 2", 2, 3, left, seconds, error, stored))
     shown = capsys.readouterr().err
     assert shown.startswith(f"\r{told}")
@@ -36,12 +36,12 @@ def test_progress_is_one_line_that_is_drawn_anew(left, seconds, error, stored, t
 
 
 def test_what_the_store_holds_says_nothing_about_the_time_left(capsys):
-    Runs(show=True)(Progress("level 1", 1, 3, ("level 2", "level 3"), 0.0, "", True))
+    StudyStatus(show=True)(Progress("level 1", 1, 3, ("level 2", "level 3"), 0.0, "", True))
     assert capsys.readouterr().err.rstrip() == "\r1/3 level 1 found in the store"
 
 
 def test_nothing_is_drawn_where_nobody_looks(capsys):
-    lines = Runs(show=False)
+    lines = StudyStatus(show=False)
     lines(Progress("level 1", 1, 3, ("level 2", "level 3"), 1.0, "", False))
     lines.close()
     assert capsys.readouterr().err == ""
@@ -54,7 +54,7 @@ def test_an_interrupted_study_says_how_to_go_on(store, told):
 
     options = argparse.Namespace(store=store, quiet=True, executor="processes", workers=1)
     with pytest.raises(fc.FastcontactError, match=told):
-        _study.finished(options, interrupted)
+        _study.run_interruptibly(options, interrupted)
 
 
 @pytest.mark.parametrize(
@@ -97,10 +97,10 @@ def test_a_study_that_nobody_could_wait_for_is_refused_at_once(command, told, ca
 
 WORKING = """
 import os, sys, time
-from fastcontact.studies.execute import started_pool
+from fastcontact.studies.execute import process_pool
 
 if __name__ == "__main__":
-    with started_pool(2) as pool:
+    with process_pool(2) as pool:
         print(*{pool.submit(os.getpid).result() for _ in range(20)}, flush=True)
         running = [pool.submit(time.sleep, 600) for _ in range(2)]
         time.sleep(600)
@@ -124,7 +124,7 @@ def test_workers_end_with_their_parent(number, tmp_path):
 
 STOPPED = """
 import time
-from fastcontact.studies.execute import on_processes, started_pool
+from fastcontact.studies.execute import run_on_processes, process_pool
 from fastcontact.studies import execute
 
 def endless(job, threads):
@@ -137,7 +137,7 @@ class Sized(float):
 execute.run = endless
 if __name__ == "__main__":
     print("begun", flush=True)
-    for _ in on_processes(2, [Sized(0.0), *[Sized(600.0)] * 20], [*range(21)]):
+    for _ in run_on_processes(2, [Sized(0.0), *[Sized(600.0)] * 20], [*range(21)]):
         raise KeyboardInterrupt
 """
 

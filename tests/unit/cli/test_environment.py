@@ -150,7 +150,7 @@ def test_a_scale_that_cannot_be_drawn(results, scale, capsys):
     picture = results.with_name("a.png")
     assert main(["plot", str(results), f"--scale={scale}", "--png", str(picture)]) == 1
     assert capsys.readouterr().err == (
-        f"error: scale = {float(scale):g} must be a finite number, and not so large that nothing can be drawn\n"
+        f"error: scale = {float(scale):g} must be a finite number, and not so large that coordinates overflow\n"
     )
     assert not picture.exists()
 

@@ -68,14 +68,14 @@ def little_garbage() -> Iterator[None]:
 
 @pytest.mark.each_value
 @pytest.mark.usefixtures("little_garbage")
-@pytest.mark.parametrize("shared", [write_arrays.SHARED, 0], ids=["steps share a chunk", "a chunk a step"])
+@pytest.mark.parametrize("shared", [write_arrays.MAX_SHARED, 0], ids=["steps share a chunk", "a chunk a step"])
 @pytest.mark.parametrize("error", [OSError(errno.EIO, "Input/output error"), KeyboardInterrupt()], ids=["disk", "user"])
 @pytest.mark.parametrize("apart", [9, pytest.param(1, marks=pytest.mark.slow)])
 def test_any_write_may_fail(
     apart: int, error: BaseException, shared: int, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """HDF5, which does not take exceptions well, never sees one."""
-    monkeypatch.setattr(write_arrays, "SHARED", shared)
+    monkeypatch.setattr(write_arrays, "MAX_SHARED", shared)
     with monkeypatch.context() as patch:
         total, lengths = len(write_until(path, lambda: failing_after(10**9, error, patch, "_put"))), set()
     assert total > 60
@@ -410,7 +410,7 @@ def test_a_journal_of_gigabytes(sound, tmp_path):
         fc.open_results(path)
 
 
-@pytest.mark.parametrize("name", layout.CONTINUED)
+@pytest.mark.parametrize("name", layout.NEEDED_TO_RESUME)
 def test_files_that_lack_what_is_written_on(name, sound, tmp_path):
     path = tmp_path / "parts.vtkhdf"
     shutil.copy(sound, path)

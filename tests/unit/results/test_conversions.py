@@ -12,7 +12,7 @@ import fastcontact as fc
 from fastcontact.cli import main
 from fastcontact.elasticity.material_sides import material_sides
 from fastcontact.results import layout
-from fastcontact.results.layout import mean_in_cells, separated
+from fastcontact.results.layout import cut_at_interfaces, mean_in_cells
 
 CASE = 'title = "small"\nunits = { length = "mm", force = "N", pressure = "MPa" }\n'
 
@@ -311,7 +311,7 @@ def test_no_stress_is_averaged_across_a_border(element, first):
     # every cell has its own side's stress, and the mesh that is cut along the border has twice the nodes there
     cells = mean_in_cells(model.mesh, step)[:, up]
     np.testing.assert_allclose(cells, np.where(found.cells == first, soft, stiff), rtol=1e-8)
-    apart, node, stress = separated(model.mesh, step)
+    apart, node, stress = cut_at_interfaces(model.mesh, step)
     assert apart.n_points == model.mesh.n_points + border.sum()
     assert {float(np.round(v, 6)) for v in stress[:, up]} == {stiff, soft}
     assert np.array_equal(apart.points, model.mesh.points[node])
@@ -321,7 +321,7 @@ def test_equal_materials_and_bodies_apart_have_no_border():
     model, _ = bars("quad4", softer=7.0)
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     assert step.material_stress is None
-    assert separated(model.mesh, step)[0] is model.mesh
+    assert cut_at_interfaces(model.mesh, step)[0] is model.mesh
     mesh = fc.generate.block_on_block("quad4")
     numbers = {"quad4": (mesh.points[mesh.cells["quad4"]].mean(axis=1)[:, 1] > 0).astype(np.int32)}
     assert not len(material_sides(mesh, numbers).points)

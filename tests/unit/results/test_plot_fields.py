@@ -547,7 +547,7 @@ def test_a_contact_map_is_seen_along_what_carries():
     assert areas(ax).sum() == pytest.approx(1.0)
     assert ax.get_xlabel() == "across the contact"
     around = mesh.with_groups(points={"ALL": np.flatnonzero((np.abs(mesh.points - 0.5) > 0.49).any(axis=1))})
-    with pytest.raises(FastcontactError, match="goes around its body"):
+    with pytest.raises(FastcontactError, match="surrounds its body"):
         fc.plot.contact_map(around, made_contact(around, "ALL", lambda x: np.ones(len(x))))
 
 

@@ -76,9 +76,9 @@ def recorded(largest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> t
             events.append(("size", max(os.fstat(self.fileno()).st_size, place + len(data))))
             super()._put(place, data)
 
-        def _cut(self, size: int) -> None:
+        def _set_size(self, size: int) -> None:
             events.append(("size", size))
-            super()._cut(size)
+            super()._set_size(size)
 
     def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
         events.append(("size", max(os.fstat(descriptor).st_size, start + size)))
@@ -171,7 +171,7 @@ def test_a_run_goes_on_after_a_loss_of_power(recorded, tmp_path: Path) -> None:
 @pytest.mark.parametrize("damage", ["cut", "changed", "data", "none"])
 def test_a_journal_counts_whole_or_not_at_all(tmp_path: Path, damage: str) -> None:
     writes = [(5, b"abc"), (40, b"")]
-    log = journal.packed([(0, b"contents")], writes)
+    log = journal.pack([(0, b"contents")], writes)
     path = tmp_path / "file"
     data = b"CONTENTS" if damage == "data" else b"contents"
     path.write_bytes(data + {"cut": log[:-1], "changed": log[:3] + b"x" + log[4:]}.get(damage, log))

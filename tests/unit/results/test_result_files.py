@@ -581,7 +581,7 @@ def test_steps_that_do_not_fit(path: Path) -> None:
     with pytest.raises(FileError, match="is closed"):
         out.write(good)
     out.close()  # a second close does nothing
-    with pytest.raises(ModelError, match="need a mesh or a model as a basis, not str"):
+    with pytest.raises(ModelError, match="needs a mesh or a model, not str"):
         ResultWriter(path, "mesh.med")  # type: ignore[arg-type]
 
 
@@ -651,7 +651,7 @@ def test_the_file_is_what_the_standard_says(path: Path) -> None:
 
 
 def test_larger_fields_are_compressed_step_by_step(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(write_arrays, "SHARED", 2 * 8 * MESH.n_points - 1)
+    monkeypatch.setattr(write_arrays, "MAX_SHARED", 2 * 8 * MESH.n_points - 1)
     write(path, 3)
     with h5py.File(path) as file:
         for name, width in layout.POINT_FIELDS.items():

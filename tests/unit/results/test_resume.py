@@ -14,7 +14,7 @@ from test_result_files import MESH, assert_holds, assert_same, nth_step, step_re
 
 import fastcontact as fc
 from fastcontact import ConvergenceError, FileError, ModelError, ResultWriter, open_results
-from fastcontact._tools.packing import packed, unpacked
+from fastcontact._tools.packing import pack, unpack
 from fastcontact.results import committed_file, reader, write_arrays, writer
 from fastcontact.results.committed_file import CommittedFile
 
@@ -291,7 +291,7 @@ def test_other_options_that_change_the_answer_are_refused(path: Path) -> None:
 def test_another_mesh_is_refused(path: Path) -> None:
     begun(path, (0.5,))
     before = path.read_bytes()
-    with pytest.raises(FileError, match="belongs to another mesh: resume the case it was begun for, or start anew"):
+    with pytest.raises(FileError, match="belongs to another mesh: resume the case of the file, or start anew"):
         ResultWriter(path, spheres(arc=2.0), resume=True)
     with pytest.raises(FileError, match="belongs to another kinematics"):
         ResultWriter(path, spheres().mesh, kinematics="plane_strain", resume=True)
@@ -346,8 +346,8 @@ def test_a_folder_that_vanishes_is_told_at_the_next_step(tmp_path: Path) -> None
 def test_packed_data_come_back() -> None:
     arrays = [np.arange(6.0).reshape(2, 3), np.array([True, False]), np.empty((0, 2)), np.arange(3, dtype=np.int32).T]
     data = {"a": [1, 2.5, None, True, "é", float("inf")], "b": {"c": arrays, "": {}}, "n": np.float64(0.1)}
-    raw = packed(data)
-    found = unpacked(np.concatenate([raw, np.zeros(9, np.uint8)]))
+    raw = pack(data)
+    found = unpack(np.concatenate([raw, np.zeros(9, np.uint8)]))
     assert found["a"] == data["a"]
     assert found["n"] == 0.1
     for one, other in zip(found["b"]["c"], arrays, strict=True):
@@ -356,21 +356,21 @@ def test_packed_data_come_back() -> None:
 
 
 def test_damaged_packed_data_are_noticed() -> None:
-    raw, harmless = packed({"a": np.arange(20.0)}), 0
+    raw, harmless = pack({"a": np.arange(20.0)}), 0
     random = np.random.default_rng(1)
     for _ in range(200):
         changed = raw.copy()
         changed[random.integers(0, len(raw))] ^= np.uint8(1 << random.integers(0, 8))
         with contextlib.suppress(ValueError, LookupError, TypeError):
-            found = unpacked(changed)  # blanks, or the number of a name that nobody asks for
+            found = unpack(changed)  # blanks, or the number of a name that nobody asks for
             np.testing.assert_array_equal(found["a"], np.arange(20.0))
             harmless += 1
     assert harmless < 20
     for size in (0, 10, len(raw) - 1):
         with pytest.raises((ValueError, LookupError, TypeError)):
-            unpacked(raw[:size])
+            unpack(raw[:size])
     with pytest.raises(ValueError, match="is not a packed array"):
-        unpacked(packed({"a": np.array(["text"])}))
+        unpack(pack({"a": np.array(["text"])}))
 
 
 def test_a_damaged_state_is_no_state(path: Path) -> None:
@@ -411,10 +411,10 @@ def test_a_step_writes_what_it_adds_and_little_more(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shared", [pytest.param(write_arrays.SHARED, marks=pytest.mark.slow), 0])
+@pytest.mark.parametrize("shared", [pytest.param(write_arrays.MAX_SHARED, marks=pytest.mark.slow), 0])
 def test_indices_do_not_gather_in_memory(shared: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """However little HDF5 may keep, the file holds every step."""
-    monkeypatch.setattr(write_arrays, "SHARED", shared)
+    monkeypatch.setattr(write_arrays, "MAX_SHARED", shared)
     monkeypatch.setattr(writer, "CACHED_INDICES", 1 << 13)
     path, kept = tmp_path / "run.vtkhdf", []
     with ResultWriter(path, MESH) as out:

@@ -28,7 +28,7 @@ from fastcontact._tools.html_table import html_table
 from fastcontact.analysis.progress import Progress, StatusLine
 from fastcontact.errors import CaseError, FileError, MeshError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.step import HEAD, MOST_SHOWN, ContactResult, MaterialStress, StepResult, Steps, phases
+from fastcontact.results.step import HEAD, MAX_SHOWN, ContactResult, MaterialStress, StepResult, Steps, phases
 from fastcontact.results.tables import contact_table, line_table, with_column, write_csv
 
 # Longest repr of anything [characters]: a screen.
@@ -73,11 +73,11 @@ def test_answers_and_estimates_show_tables(model, steps):
 
 
 def test_a_long_analysis_shows_its_last_steps(steps):
-    many = Steps([steps[0]] * (MOST_SHOWN + 9) + [steps[2]])
-    assert len(many) == MOST_SHOWN + 10
+    many = Steps([steps[0]] * (MAX_SHOWN + 9) + [steps[2]])
+    assert len(many) == MAX_SHOWN + 10
     assert len(repr(many)) < 3 * SCREEN
-    assert f"{MOST_SHOWN + 10} steps, 10 of them not shown" in many._repr_html_()
-    assert many._repr_html_().count("<tr>") == MOST_SHOWN + 1
+    assert f"{MAX_SHOWN + 10} steps, 10 of them not shown" in many._repr_html_()
+    assert many._repr_html_().count("<tr>") == MAX_SHOWN + 1
     first, *_, last = repr(many).splitlines()[1:]
     assert first == "  ..."
     assert "StepResult(3" in last

@@ -24,7 +24,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import layout
 from fastcontact.results.step import StepResult
 from fastcontact.results.xdmf import write_xdmf
-from fastcontact.results.xmgrace import STYLES, Curve, escaped, round_axis, write_agr
+from fastcontact.results.xmgrace import STYLES, Curve, escape, round_axis, write_agr
 
 N_STEPS = 3
 
@@ -304,25 +304,25 @@ def test_grace_takes_whatever_comes(curves: list[Curve], text: str, tmp_path: Pa
     picture = draw(tmp_path / "a.agr", "-saveall", str(tmp_path / "saved.agr"))
     assert len(picture.read_bytes()) > 2000
     saved = (tmp_path / "saved.agr").read_text("latin-1")
-    assert f'@    title "{escaped(text)}"' in saved
+    assert f'@    title "{escape(text)}"' in saved
     assert len(sets_of(saved)) == len(curves)
 
 
 def test_text_is_shown_as_it_stands() -> None:
-    assert escaped(r"a\b") == r"a\\b"
-    assert escaped('"x"') == r"\"x\""
-    assert escaped("two\nlines\tand\x00 more") == "two lines and? more"
-    assert escaped("r² é µ") == "r² é µ"
-    assert escaped("π") == r"\f{Symbol}p\f{}"
-    assert escaped("\u0391") == r"\f{Symbol}A\f{}", "a capital that looks like a Latin one"
-    assert escaped("a \u2212 b") == "a - b"
-    assert escaped("\uff02\uff3c") == r"\"\\", "also where a letter turns into markup only here"
-    assert escaped("x₁ 日") == "x1 ?"
+    assert escape(r"a\b") == r"a\\b"
+    assert escape('"x"') == r"\"x\""
+    assert escape("two\nlines\tand\x00 more") == "two lines and? more"
+    assert escape("r² é µ") == "r² é µ"
+    assert escape("π") == r"\f{Symbol}p\f{}"
+    assert escape("\u0391") == r"\f{Symbol}A\f{}", "a capital that looks like a Latin one"
+    assert escape("a \u2212 b") == "a - b"
+    assert escape("\uff02\uff3c") == r"\"\\", "also where a letter turns into markup only here"
+    assert escape("x₁ 日") == "x1 ?"
 
 
 @given(st.text())
 def test_any_text_fits_one_line_of_latin_1(text: str) -> None:
-    line = escaped(text)
+    line = escape(text)
     line.encode("latin-1")
     assert len(line.splitlines()) <= 1
     assert not re.search(r'(?<!\\)(\\\\)*"', line), "a bare quote would end the string"

@@ -193,7 +193,7 @@ def test_only_entries_with_a_reason_count(covered, places):
 
 
 def test_the_list_is_of_lines_that_are_there(covered, root):
-    listed = tomllib.loads(covered.LISTED.read_text(encoding="utf-8"))
+    listed = tomllib.loads(covered.LIST_FILE.read_text(encoding="utf-8"))
     for entry in listed.get("uncovered", []):
         text = (root / entry["file"]).read_text(encoding="utf-8")
         assert entry["reason"].strip(), entry

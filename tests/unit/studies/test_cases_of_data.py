@@ -9,7 +9,7 @@ import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
 from fastcontact.errors import CaseError
 from fastcontact.mesh.generate import block
-from fastcontact.studies.case_parameters import substituted
+from fastcontact.studies.case_parameters import substitute
 from fastcontact.studies.quantities import contact_radius, peak
 
 DATA = {
@@ -159,7 +159,7 @@ def linked(parameters):
     ],
 )
 def test_a_path_sets_one_value_and_leaves_the_case_alone(path, value, where):
-    found = substituted(PARSED, {path: value})
+    found = substitute(PARSED, {path: value})
     assert where(found) == value
     assert PARSED["material"][1]["E"] == 2.0
     assert PARSED["mesh"]["arc_sizes"] == [1.0, 2.0]
@@ -167,7 +167,7 @@ def test_a_path_sets_one_value_and_leaves_the_case_alone(path, value, where):
 
 
 def test_a_name_sets_several_paths_by_their_laws():
-    found = substituted(linked(LINKED), {"size": 3.0})
+    found = substitute(linked(LINKED), {"size": 3.0})
     assert found["mesh"]["arc_sizes"] == [4.5, 3.0]
     assert found["contact"]["pair"]["friction"] == pytest.approx(-0.3)
 
@@ -188,15 +188,15 @@ def test_a_name_sets_several_paths_by_their_laws():
 )
 def test_a_wrong_path_is_told(path, words):
     with pytest.raises(CaseError, match=words):
-        substituted(linked(LINKED), {path: 1.0})
+        substitute(linked(LINKED), {path: 1.0})
 
 
 @pytest.mark.parametrize("law", ["2*valve", "value+1", "__import__('os')", 3.0, "value^x"])
 def test_a_law_is_a_power_of_the_value_and_nothing_else(law):
     with pytest.raises(CaseError, match=r"a\*value\^p"):
-        substituted(linked({"n": {"contact.pair.friction": law}}), {"n": 2.0})
+        substitute(linked({"n": {"contact.pair.friction": law}}), {"n": 2.0})
 
 
 def test_a_power_of_a_negative_number_is_refused():
     with pytest.raises(CaseError, match=r"cannot be evaluated for -2\.0"):
-        substituted(linked({"n": {"contact.pair.friction": "value^0.5"}}), {"n": -2.0})
+        substitute(linked({"n": {"contact.pair.friction": "value^0.5"}}), {"n": -2.0})

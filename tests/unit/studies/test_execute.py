@@ -40,7 +40,7 @@ def test_no_worker_is_left_half_started(monkeypatch):
     before = signal.signal(signal.SIGTERM, heard)
     try:
         with pytest.raises(KeyboardInterrupt):
-            execute.Spawning().Process(target=print).start()
+            execute.RecordingContext().Process(target=print).start()
     finally:
         signal.signal(signal.SIGTERM, before)
     assert len(begun) == 1
@@ -59,7 +59,7 @@ def jobs(monkeypatch):
 
 
 def test_a_run_that_kills_its_worker_is_reported_and_the_others_end(jobs):
-    found = dict(execute.on_processes(2, jobs, [0, 1, 2]))
+    found = dict(execute.run_on_processes(2, jobs, [0, 1, 2]))
     assert sorted(found) == [0, 1, 2]
     assert found[0] == {"label": "first", "threads": 1}
     assert found[2] == {"label": "last", "threads": 1}
@@ -80,7 +80,7 @@ def test_what_has_not_begun_is_called_off_where_a_study_stops(jobs):
 
     executor = Slow()
     with pytest.raises(KeyboardInterrupt):
-        list(execute.on_executor(executor, jobs, [0, 1, 2]))
+        list(execute.run_on_executor(executor, jobs, [0, 1, 2]))
     assert [future.cancelled() for future in executor.futures] == [False, True, True]
 
 
@@ -175,7 +175,7 @@ def test_a_run_that_goes_wrong_in_any_way_is_a_result(monkeypatch):
     def wrong(_):
         raise ZeroDivisionError("by nothing")
 
-    monkeypatch.setattr(job.Job, "measured", wrong)
+    monkeypatch.setattr(job.Job, "evaluate", wrong)
     found = job.run(of())
     assert found["kind"] == "ZeroDivisionError"
     assert found["error"].startswith("by nothing (wrong, line ")
@@ -332,5 +332,5 @@ def test_threads_keep_the_environment_of_the_process(case, monkeypatch):
     )
     before = dict(os.environ)
     with ThreadPoolExecutor(1) as pool:
-        assert list(execute.on_executor(pool, [SimpleNamespace(size=1)], [0])) == [(0, {"error": ""})]
+        assert list(execute.run_on_executor(pool, [SimpleNamespace(size=1)], [0])) == [(0, {"error": ""})]
     assert seen == [before]

@@ -118,7 +118,7 @@ def test_a_rigid_surface_from_a_file_is_found_beside_the_case(tmp_path):
 
 def test_the_theory_counts_for_the_share_that_the_model_holds(root):
     case = read_case(root / "data/cases/cylinder-on-block.toml")
-    found = quantities.by_theory(case, "line", 10_000.0)
+    found = quantities.comparison_values(case, "line", 10_000.0)
     assert found["theory"]["force"] == pytest.approx(10_000.0)
     assert found["equal_force"]["pressure_max"] == pytest.approx(3832.9, rel=1e-4)
 
