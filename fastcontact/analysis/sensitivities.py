@@ -167,13 +167,13 @@ def check_labels(model: Model, quantity: Sequence[str | int], parameters: Sequen
 
 def _derivatives(contact: MovingContact, gradient: Gradient, changes: Sequence[Change]) -> tuple[Array, int]:
     """Return the derivatives of a quantity with respect to parameters, and the number of linear solutions."""
-    forward, backward = contact.derivatives()
+    forward, backward = contact.derivatives([change.lift for change in changes])
     adjoint = Adjoint(contact, gradient, csr_array(0.5 * (forward + backward)))
-    values = np.array([adjoint.derivative(change) for change in changes])
+    values = adjoint.derivatives(changes)
     kinks = contact.kinks(forward, backward)
     if kinks.nnz:
         with_kinks = Adjoint(contact, gradient, csr_array(0.5 * (forward + backward) + kinks))
-        jumps = np.abs([with_kinks.derivative(change) for change in changes] - values)
+        jumps = np.abs(with_kinks.derivatives(changes) - values)
         # One-sided derivatives differ where points project onto edges between facets.
         if (jumps > SINGLE_PRECISION * np.abs(values)).any():
             raise ModelError(_kink_message(contact, kinks, float((jumps / np.maximum(np.abs(values), TINY)).max())))
