@@ -24,7 +24,7 @@ from fastcontact.analysis.load_step import prepare_start
 from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, prepare
 from fastcontact.analysis.sensitivity.adjoint import Adjoint, Change, Gradient
-from fastcontact.analysis.sensitivity.moving_contact import REMEDY, MovingContact
+from fastcontact.analysis.sensitivity.moving_contact import OPPOSITE_NODES, REMEDY, MovingContact
 from fastcontact.analysis.sensitivity.parameters import KINDS, check_parameter
 from fastcontact.analysis.sensitivity.quantities import check_quantity, with_gradient
 from fastcontact.analysis.solution import Solution
@@ -188,8 +188,7 @@ def _kink_message(contact: MovingContact, kinks: csr_array, jump: float) -> str:
     rest = f" and {len(points) - 3} more" if len(points) > 3 else ""
     return (
         f"points {named}{rest} lie opposite nodes of the other side, between two of its facets: the one-sided derivatives "
-        f"differ by a fraction of {jump:.1e}. {REMEDY}; or keep the pairing (Criteria(keep_pairing=True)), mesh both sides "
-        "differently, or use the default formulation"
+        f"differ by a fraction of {jump:.1e}. {OPPOSITE_NODES}"
     )
 
 

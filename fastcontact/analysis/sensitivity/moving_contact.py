@@ -29,6 +29,10 @@ from fastcontact.linear.sparse_rows import entry_rows
 from fastcontact.round_off import DIFFERENCES
 
 REMEDY = "Change the load slightly, or use one-sided finite differences between two solutions"
+OPPOSITE_NODES = (
+    f"{REMEDY}; or keep the pairing (Criteria(keep_pairing=True)), mesh both sides differently, or use the default "
+    "formulation (omit formulation and multipliers)"
+)
 # Increment of finite differences, relative to the admissible range of a constant or to the largest force. One-sided
 # differences of smooth functions have errors of this order, and central differences have errors of the order of its square.
 CHANGED = 1e-3
@@ -109,7 +113,7 @@ class MovingContact:
         if len(constraints) != len(multiplier):
             raise ModelError(
                 f"contact has {len(multiplier)} constraints, but {len(constraints)} if nodes move: nodes of both sides "
-                f"coincide, and the one-sided derivatives differ there. {REMEDY}"
+                f"coincide, and the one-sided derivatives differ there. {OPPOSITE_NODES}"
             )
         gap = constraints.gap0 + constraints.B @ self.u
         if constraints.normal_compliance is not None:
