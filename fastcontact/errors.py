@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 import sys
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -11,10 +12,13 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 LONGEST = 1500  # largest number of characters of a message
+# NumPy scalars in the representation of a list, dictionary or other object, such as np.float64(0.5) and np.True_.
+NUMPY_SCALAR = re.compile(r"\bnp\.(?:(?:float|int|uint|complex|str)\d*_?\(([^()]*)\)|(True|False)_)")
 
 
 def printable(text: str) -> str:
-    """Return a string in which escapes replace control and format characters, except line ends and tabs."""
+    """Return a string with NumPy scalars as plain numbers, and escapes for control characters, except line ends and tabs."""
+    text = NUMPY_SCALAR.sub(lambda scalar: scalar[1] or scalar[2] or "", text)
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text)

@@ -107,6 +107,8 @@ def test_nothing_but_our_own_errors(name, tmp_path, monkeypatch):
         (lambda: fc.Criteria(max_geometry_updates=2.5), "max_geometry_updates = 2.5 must be a whole number >= 0"),
         (lambda: fc.Criteria(geometry_updates=1.5), "geometry_updates = 1.5 must be None or a whole number >= 0"),
         (lambda: fc.Criteria(max_active_set_iterations=9.5), "max_active_set_iterations = 9.5 must be a whole number >= 1"),
+        (lambda: fc.Ramp([np.float64(0.5), np.float64(0.2)]), r"must ascend, not \[0\.5, 0\.2\]"),
+        (lambda: fc.generate.block({"on": np.True_, "x": np.float64(1.5)}), r"the dict {'on': True, 'x': 1\.5}"),
         (lambda: fc.Model("a.med", "3d"), "the argument mesh of Model must be a Mesh, not the string 'a.med'"),
         (lambda: fc.plot.pressure_profile(CONTACT, theory=5), "a theory needs a pressure, .* but 5 has none"),
         (lambda: fc.plot.pressure_profile(CONTACT, ax="ax"), "drawn on axes of Matplotlib, not on 'ax'"),

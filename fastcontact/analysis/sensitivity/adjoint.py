@@ -8,6 +8,7 @@ bodies. GMRES solves ``s + E.T J0^-T s = E.T J0^-T q`` for ``s = E.T y``.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, largest
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import TOLERANCE
 
@@ -74,15 +75,16 @@ class Adjoint:
     contact : MovingContact
     gradient : Gradient
     moving : csr_array
-        Derivative of `Sample.all` with respect to the displacements at which surfaces are paired.
+        Derivative of `Sample.all` with respect to the configuration at which surfaces are paired; see
+        `MovingContact.derivatives`.
     """
 
     def __init__(self, contact: MovingContact, gradient: Gradient, moving: csr_array) -> None:
         self._contact, self._gradient = contact, gradient
         self._system, self._solver = contact.problem.system, contact.problem.solver
         n, k = len(contact.u), len(contact.active)
-        self._force, self._gap = csr_array(moving[:n]), csr_array(moving[n : n + k])
-        self._moving, self._k = moving, k
+        self._moving, self._lifted, self._k = csr_array(moving[:, :n]), csr_array(moving[:, n:]), k
+        self._force, self._gap = csr_array(self._moving[:n]), csr_array(self._moving[n : n + k])
         self.solutions = 0
         self._B, self._rows, self._C = csr_array((0, n)), csr_array((0, n)), None
         if k:
@@ -93,10 +95,14 @@ class Adjoint:
             self._C = None if compliance is None else compliance.block(contact.active)
         self._w, self._mu = self._solve()
 
-    def derivative(self, change: Change) -> float:
-        """Return the derivative of the quantity with respect to a parameter."""
+    def derivatives(self, changes: Sequence[Change]) -> Array:
+        """Return the derivatives (q,) of the quantity with respect to parameters, whose lifts are those of `moving`."""
+        lifted = self._lifted.toarray().T
+        return np.array([self._derivative(change, column) for change, column in zip(changes, lifted, strict=True)])
+
+    def _derivative(self, change: Change, lifted: Array) -> float:
         gradient, n = self._gradient, len(self._contact.u)
-        sample = change.sample + self._moving @ change.lift
+        sample = change.sample + largest(change.lift) * lifted
         residual = change.residual + self._system.K @ change.lift - sample[:n]
         gap = sample[n : n + self._k] + self._B @ change.lift
         derivative = gradient.displacement @ change.lift - self._w @ self._system.reduced(residual) - self._mu @ gap
@@ -109,13 +115,13 @@ class Adjoint:
     def _right_side(self) -> tuple[Array, Array]:
         """Return the derivatives of the quantity with respect to all unknowns (n,) and the multipliers (k,)."""
         gradient = self._gradient
-        displacement, multiplier = gradient.displacement.copy(), gradient.multiplier.copy()
+        right_side, multiplier = self._system.reduced(gradient.displacement), gradient.multiplier.copy()
         if gradient.sample is not None:
-            displacement += self._moving.T @ gradient.sample
+            right_side += self._moving.T @ gradient.sample
         if gradient.reaction is not None:
-            displacement += self._system.K @ gradient.reaction - self._force.T @ gradient.reaction
+            right_side += self._system.reduced(self._system.K @ gradient.reaction) - self._force.T @ gradient.reaction
             multiplier -= self._B @ gradient.reaction
-        return self._system.reduced(displacement), multiplier
+        return right_side, multiplier
 
     def _solve(self) -> tuple[Array, Array]:
         right_side, multiplier = self._right_side()
@@ -148,8 +154,7 @@ class Adjoint:
     def _transposed(self, w: Array, mu: Array) -> Array:
         """Return ``E.T y`` (n,)."""
         system, bodies = self._system, self._contact.problem.floating_bodies
-        displacement = w if system.T is None else system.T @ w
-        product = system.reduced(self._gap.T @ mu - self._force.T @ displacement)
+        product = self._gap.T @ mu - self._force.T @ (w if system.T is None else system.T @ w)
         if bodies is not None:
             product[bodies.dofs] -= bodies.stiffness * w[bodies.dofs]
         return product

@@ -9,12 +9,12 @@ Appl. 13, 1974).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_array, eye_array
+from scipy.sparse import csr_array, eye_array, hstack
 
 from fastcontact.analysis.contact_result import closed_node_pressures
 from fastcontact.analysis.inequalities import Iterate, pair_surfaces
@@ -29,6 +29,10 @@ from fastcontact.linear.sparse_rows import entry_rows
 from fastcontact.round_off import DIFFERENCES
 
 REMEDY = "Change the load slightly, or use one-sided finite differences between two solutions"
+OPPOSITE_NODES = (
+    f"{REMEDY}; or keep the pairing (Criteria(keep_pairing=True)), mesh both sides differently, or use the default "
+    "formulation (omit formulation and multipliers)"
+)
 # Increment of finite differences, relative to the admissible range of a constant or to the largest force. One-sided
 # differences of smooth functions have errors of this order, and central differences have errors of the order of its square.
 INCREMENT = 1e-3
@@ -109,7 +113,7 @@ class MovingContact:
         if len(constraints) != len(multiplier):
             raise ModelError(
                 f"contact has {len(multiplier)} constraints, but {len(constraints)} if nodes move: nodes of both sides "
-                f"coincide, and the one-sided derivatives differ there. {REMEDY}"
+                f"coincide, and the one-sided derivatives differ there. {OPPOSITE_NODES}"
             )
         gap = constraints.gap0 + constraints.B @ self.u
         if constraints.normal_compliance is not None:
@@ -145,23 +149,30 @@ class MovingContact:
         pairs = self.problem.pairs.values()
         return [side for pair in pairs for side in (pair.secondary, pair.primary) if isinstance(side, Surface)]
 
-    def derivatives(self) -> tuple[csr_array, csr_array]:
-        """Return forward and backward derivatives (n, n_dofs) of `Sample.all` with respect to the paired configuration.
+    def derivatives(self, lifts: Sequence[Array]) -> tuple[csr_array, csr_array]:
+        """Return forward and backward derivatives (n, n_dofs + q) of `Sample.all` with respect to the paired configuration.
 
-        Their mean is the derivative. Where they differ by more than the truncation error, a point projects onto the
+        The first columns belong to the unknowns of the system. The others belong to the q `lifts` (n_dofs,), divided by their
+        largest component. Points are only moved as the supports allow: if both sides end in a plane of symmetry, a point that
+        left the plane would face no facet.
+
+        The mean of both is the derivative. Where they differ by more than the truncation error, a point projects onto the
         edge between two facets.
         """
-        n = len(self.u)
-        size = n + len(self.active) + (len(self.problem.pairs[self.pair].secondary.points) if self.pair else 0)
-        fixed = self.problem.criteria.keep_pairing or not len(self.active)
-        dofs = np.empty(0, np.intp) if fixed else self._moving_dofs()
-        if not len(dofs):
-            return csr_array((size, n)), csr_array((size, n))
-        dependence = self._dependence()
+        if self.problem.criteria.keep_pairing or not len(self.active):
+            nodes = len(self.problem.pairs[self.pair].secondary.points) if self.pair else 0
+            shape = len(self.u) + len(self.active) + nodes, len(self.u) + len(lifts)
+            return csr_array(shape), csr_array(shape)
+        dofs, dependence = self._moving_dofs(), self._dependence()
         derivatives = self._differences(_independent_groups(dofs, dependence, self.problem.model.mesh.dim), dependence)
-        if self._is_consistent(0.5 * (derivatives[0] + derivatives[1]), dofs):
-            return derivatives
-        return self._differences([np.array([dof]) for dof in dofs], dependence)
+        if not self._is_consistent(0.5 * (derivatives[0] + derivatives[1]), dofs):
+            derivatives = self._differences([np.array([dof]) for dof in dofs], dependence)
+        along_lifts = [self._one_sided(lift / (largest(lift) or 1.0)) for lift in lifts]
+        forward, backward = (
+            csr_array(hstack([of_unknowns, *(csr_array(columns[side][:, None]) for columns in along_lifts)]))
+            for side, of_unknowns in enumerate(derivatives)
+        )
+        return forward, backward
 
     def kinks(self, forward: csr_array, backward: csr_array) -> csr_array:
         """Return half the difference of the two `derivatives` where points project onto an edge between two facets."""
@@ -176,12 +187,13 @@ class MovingContact:
         return jump
 
     def _moving_dofs(self) -> Indices:
-        """Return the displacement components that active constraints may depend on."""
+        """Return the unknowns that active constraints may depend on."""
         dim, contact_dofs = self.problem.model.mesh.dim, self.problem.contact_dofs
         points = np.unique(self._dependence().nonzero()[1])
         obstacle_dofs = contact_dofs[contact_dofs >= self.problem.model.n_dofs]
         dofs = (points[:, None] * dim + np.arange(dim)).ravel()
-        return np.concatenate([dofs, obstacle_dofs]).astype(np.intp)
+        dofs = np.concatenate([dofs, obstacle_dofs]).astype(np.intp)
+        return dofs[self.problem.system.free[dofs]]
 
     @cached_property
     def _involved(self) -> csr_array:
@@ -192,7 +204,7 @@ class MovingContact:
         return _with_unit_entries(csr_array((np.ones(keep.sum()), entries), shape=(len(self.active), n_points)))
 
     def _dependence(self) -> csr_array:
-        """Return the incidence matrix (k, n_points) of active constraints and the points on which they may depend."""
+        """Return the incidence (k, n_points) of active constraints and the points on whose unknowns they may depend."""
         n = self.problem.model.mesh.n_points
         neighbours = eye_array(n, format="csr")
         for side in self._surfaces():
@@ -203,21 +215,41 @@ class MovingContact:
         for name, pair in self.problem.pairs.items():
             if pair.options.tied:  # paired once, before any load
                 moving[self.constraints.rows[name]] = 0.0
-        return _with_unit_entries(csr_array((self._involved * moving[self.active, None]) @ neighbours))
+        dependence = csr_array((self._involved * moving[self.active, None]) @ neighbours)
+        if (T := self.problem.system.T) is not None:
+            dim = self.problem.model.mesh.dim
+            entries = T[: n * dim, : n * dim].tocoo()
+            points = entries.row // dim, entries.col // dim
+            dependence = csr_array(dependence @ _with_unit_entries(csr_array((np.ones(entries.nnz), points), (n, n))))
+        return _with_unit_entries(dependence)
 
     def _differences(self, groups: list[Indices], dependence: csr_array) -> tuple[csr_array, csr_array]:
-        base, n = self.at(self.u).all, len(self.u)
-        columns: list[list[csr_array]] = [[], []]
+        n, size = len(self.u), len(self._base)
+        sums = [csr_array((size, n)), csr_array((size, n))]
         for dofs in groups:
-            shift = np.zeros(n)
-            shift[dofs] = self.step
-            for side, sign in enumerate((1.0, -1.0)):
-                difference = sign * (self.at(self.u + sign * shift).all - base) / self.step
-                rows = np.flatnonzero(difference)
+            unknowns = np.zeros(n)
+            unknowns[dofs] = 1.0
+            for side, changed in enumerate(self._one_sided(self.problem.system.displacement(unknowns, np.zeros(n)))):
+                rows = np.flatnonzero(changed)
                 column = self._sources(rows, dofs, dependence) if len(dofs) > 1 else np.full(len(rows), dofs[0])
-                columns[side].append(csr_array((difference[rows], (rows, column)), shape=(len(base), n)))
-        forward, backward = (csr_array(sum(of_side[1:], of_side[0])) for of_side in columns)
-        return forward, backward
+                sums[side] = csr_array(sums[side] + csr_array((changed[rows], (rows, column)), shape=(size, n)))
+        return sums[0], sums[1]
+
+    @cached_property
+    def _base(self) -> Array:
+        return self.at(self.u).all
+
+    def _one_sided(self, motion: Array) -> tuple[Array, Array]:
+        """Return the forward and the backward derivative of `Sample.all` along a motion (n_dofs,) of the points."""
+        increment = self.step / (largest(motion) or 1.0)
+
+        def at(distance: float) -> Array:
+            shift = distance * motion
+            # Displacements of force-driven obstacles that are prescribed are taken from the load.
+            load = replace(self.load, lift=self.load.lift + np.where(self.problem.system.fixed, shift, 0.0))
+            return replace(self, load=load).at(self.u + shift).all
+
+        return (at(increment) - self._base) / increment, (self._base - at(-increment)) / increment
 
     def _sources(self, rows: Indices, dofs: Indices, dependence: csr_array) -> Indices:
         """Return, for each value in `rows`, the one of the simultaneously moved components `dofs` that changes it."""
@@ -239,8 +271,8 @@ class MovingContact:
         """Return whether the derivative agrees with that along a direction in which all points move."""
         shift = np.zeros(len(self.u))
         shift[dofs] = np.random.default_rng(0).uniform(-1.0, 1.0, len(dofs))
-        step = self.step * shift
-        difference = (self.at(self.u + step).all - self.at(self.u - step).all) / (2 * self.step)
+        forward, backward = self._one_sided(self.problem.system.displacement(shift, np.zeros(len(shift))))
+        difference = 0.5 * (forward + backward)
         n, k = len(self.u), len(self.active)
         error = np.abs(difference - derivative @ shift)
         blocks = (slice(0, n), slice(n, n + k), slice(n + k, None))
@@ -261,8 +293,8 @@ def _independent_groups(dofs: Indices, dependence: csr_array, dim: int) -> list[
     groups: list[Indices] = []
     for c in range(max(colour.values(), default=-1) + 1):
         group = np.array([p for p, colour_of_p in colour.items() if colour_of_p == c], np.intp)
-        groups += [group * dim + axis for axis in range(dim)]
-    return groups + [np.array([dof]) for dof in dofs[dofs >= n_points * dim]]
+        groups += [np.intersect1d(group * dim + axis, dofs) for axis in range(dim)]
+    return [group for group in groups if len(group)] + [np.array([dof]) for dof in dofs[dofs >= n_points * dim]]
 
 
 def _with_unit_entries(pattern: csr_array) -> csr_array:

@@ -20,6 +20,9 @@ from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
+# Reference coordinate up to which a facet is cut where the primary side ends. Points beyond it face the side within the
+# smallest tolerance of projections.
+INSIDE = 1.0 - 2.0 * SINGLE_PRECISION
 NO_BORDERS = np.empty(0, np.intp), np.empty(0)
 
 
@@ -105,7 +108,7 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     xi_0 = opposite.xi[:, 0]
     has_two_facets = primary.inner_ends.ravel()[first]
     smooth = has_two_facets & ~_corners(primary, deformed, normals)[ends]
-    in_facet = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(xi_0) < 1.0 - LENGTH_ROUND_OFF) & ~smooth)
+    in_facet = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(xi_0) < INSIDE) & ~smooth)
     rows = np.flatnonzero(has_two_facets)
     facets = np.column_stack([opposite.facet[rows], line_neighbours(block.local)[opposite.facet[rows]]])
     distance = _signed_distances(deformed[block.facets[facets]], foot[rows][:, None], normal[rows][:, None])
@@ -148,13 +151,14 @@ def _opposite_ends(
             facets.append(facet % len(block.facets))
             coordinates.append(xi)
         offset += len(primary_block.facets)
-    return np.concatenate(facets), np.concatenate(coordinates)
+    facet, xi = np.concatenate(facets), np.concatenate(coordinates)
+    inside = np.abs(xi) < INSIDE
+    return facet[inside], xi[inside]
 
 
 def facets_at_ends(block: FacetBlock, primary: Surface, deformed: Array, tolerance: float) -> Indices:
-    """Return the facets of a block inside which the primary side, or its part on one of several bodies, ends."""
-    facet, xi = _opposite_ends(block, primary, deformed, nodal_normals(primary, deformed), tolerance)
-    return facet[np.abs(xi) < 1.0 - SINGLE_PRECISION]
+    """Return the facets of a block inside which the primary side, or the side of one of several bodies, ends."""
+    return _opposite_ends(block, primary, deformed, nodal_normals(primary, deformed), tolerance)[0]
 
 
 def _zeros(values: Array) -> tuple[Indices, Array]:

@@ -176,6 +176,7 @@ def test_pairing_that_is_kept_takes_one_solution():
     assert abs(found.derivatives[by] / moving.derivatives[by] - 1.0) > 1e-3  # what the moving geometry makes
 
 
+@pytest.mark.filterwarnings("ignore:contact 'ball'. facets of 'TOP' and of the other side deviate")
 @pytest.mark.each_value
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
 @pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric", "3d"])
@@ -188,7 +189,8 @@ def test_rigid_obstacles_that_are_moved_and_pushed(kinematics, formulation):
     def make(pushed=False, E=1000.0, nu=0.3, motion=1.0, force=1.0):
         model = elastic_model(mesh, kinematics, E=E, nu=nu)
         model.fix(bottom, "xyz"[:dim])
-        driving = {"force": {up: -60.0 * force}} if pushed else {"motion": {up: -0.3 * motion}}
+        across = {} if kinematics == "axisymmetric" else {"motion": {"x": 0.1 * motion}}
+        driving = {"force": {up: -60.0 * force}, **across} if pushed else {"motion": {up: -0.3 * motion}}
         ball = fc.obstacles.Sphere(centre=centre, R=8.0)
         model.add_obstacle("ball", secondary=top, obstacle=ball, formulation=formulation, **driving)
         return model
@@ -199,8 +201,38 @@ def test_rigid_obstacles_that_are_moved_and_pushed(kinematics, formulation):
     def pushed(**changes):
         return make(True, **changes)
 
-    changes = {"E": (("E", 0), 1000.0, 10.0), "force": (("load", "ball"), 1.0, 1e-5)}
+    changes = {"E": (("E", 0), 1000.0, 1.0), "force": (("load", "ball"), 1.0, 1e-5)}
+    if kinematics != "axisymmetric":
+        changes["motion"] = ("motion", "ball"), 1.0, 2e-3 if dim == 3 else 1e-4
     compare(pushed, [("pressure_max", "ball")], changes, within=2e-6)
+
+
+@pytest.mark.each_value
+@pytest.mark.parametrize("secondary", ["INNER", "OUTER"])
+@pytest.mark.parametrize("multipliers", ["dual", "standard"])
+@pytest.mark.parametrize("angle", [0.0, 30.0])
+def test_sides_that_end_in_planes_of_symmetry(angle, multipliers, secondary):
+    rings = fc.generate.rings("quad8", divisions_inner=(3, 8), divisions_outer=(4, 11))
+    mesh, other = fc.generate.transformed(rings, rotate=angle), {"INNER": "OUTER", "OUTER": "INNER"}[secondary]
+
+    def make(E=210e3, load=1.0, clearance=-0.02):
+        model = fc.Model(mesh, kinematics="plane_strain")
+        model.add_material(fc.LinearElastic(E=E, nu=0.3), "INNER")
+        model.add_material(fc.LinearElastic(E=70e3, nu=0.33), "OUTER")
+        for plane, axis in (("SYMMETRY_X", "x"), ("SYMMETRY_Y", "y")):
+            model.prescribe(plane, **{"normal" if angle else axis: 0.0})
+        model.add_pressure("BORE", 20.0 * load)
+        sides = {"secondary": f"CONT_{secondary}", "primary": f"CONT_{other}"}
+        options = {"clearance": clearance, "formulation": "mortar", "multipliers": multipliers}
+        model.add_contact("c", **sides, **options)
+        return model
+
+    changes = {
+        "E": (("E", "INNER"), 210e3, 210.0),
+        "load": (("load", "BORE"), 1.0, 1e-3),
+        "clearance": (("clearance", "c"), -0.02, 2e-5),
+    }
+    compare(make, [("pressure_max", "c")], changes)
 
 
 def test_heat_normals_and_loads_by_volume():
