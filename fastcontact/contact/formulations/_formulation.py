@@ -497,6 +497,20 @@ class Formulation(ABC):
             held[nodes] = spanned(P @ Q @ P, 0.5)
         return held
 
+    def held_across(self, at: Configuration) -> Mask:
+        """Return the nodes (n_nodes,) at which supports hold both sides along the normal.
+
+        The contact forces of such nodes act between supports. On non-matching meshes, their gaps may depend on displacements
+        of other primary nodes, but not on those of secondary nodes, and the constraints are nearly redundant. Facets of
+        which all nodes are held are ignored.
+        """
+        normal = nodal_normals(self.secondary, self.points + at.displacement)
+        held = self._both_held(at)
+        if held.any():
+            held = _without_whole_facets(held, self.secondary)
+        across = np.einsum("nd,nde,ne->n", normal, held, normal) > 0.5
+        return across & (not self.options.tied) & ~self.options.excluded_nodes(self.secondary)
+
     def undetermined(self, at: Configuration) -> Mask:
         """Return which nodes (n_nodes,) belong to facets whose traction is undetermined.
 

@@ -22,7 +22,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
@@ -59,12 +59,15 @@ class Coverage(NamedTuple):
         Whether a secondary node has a gap.
     functions : list of (ndarray (n_facets, k, k), ndarray (n_facets, k, k))
         For each block, the coefficients of psi in its shape functions [-], and the integrals of psi with these [area].
+    values : csr_array (m, m)
+        Map from independent to nodal values of the multiplier field [-].
     """
 
     overlap: Overlap
     weights: list[Array]
     kept: Mask
     functions: list[tuple[Array, Array]]
+    values: csr_array
 
 
 class Means(NamedTuple):
@@ -173,6 +176,10 @@ class WeightedMortar(Formulation):
         B = rows_of(mean, normal)
         gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(rows, across, weight)
         gap0 -= np.einsum("nd,nd->n", closer, normal)
+        dependent = coverage.values.diagonal() == 0.0
+        if dependent.any():  # Gaps that supports prescribe neither open nor close those of neighbouring nodes.
+            prescribed = np.where(dependent, self.nodal_gap(at)[0], 0.0)
+            gap0 -= csr_array(rows[:, self.secondary.points]) @ prescribed / weight
         if at.worn is not None:
             gap0 += rows @ at.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
@@ -182,7 +189,7 @@ class WeightedMortar(Formulation):
             self.points[points],
             areas=weight,
             nodes=nodes,
-            nodal=WeightedPressures(weight, *self._whole_side),
+            nodal=WeightedPressures(weight, coverage.values, *self._whole_side),
         )
         if not self.slides:
             return constraints, None
@@ -208,16 +215,18 @@ class WeightedMortar(Formulation):
         constraints = replace(constraints, tangents=slips, directions=directions, friction=friction, slip0=slip0)
         return constraints, (np.stack(rubbing), length)
 
-    def _means(self, deformed: Array, at: Configuration, kept: Mask | None = None) -> Means:
+    def _means(self, deformed: Array, at: Configuration, like: Coverage | None = None) -> Means:
         """Return the mean relative motions of nodes at the coordinates `deformed` (n_points, dim) [length].
 
-        `kept` (m,) are the nodes with gaps; by default, they result from the overlap.
+        Nodes with gaps are those of the coverage `like`; by default, they result from the overlap.
         """
         overlap = self._overlap(deformed, at.pose)
         weights = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
-        if kept is None:
+        if like is None:
             kept = self._nodes_with_gaps(weights, LEAST if at.rounded else COVERED)
-        coverage = self._coverage(overlap, weights, kept)
+            coverage = self._coverage(overlap, weights, kept, self._values(kept, self.held_across(at)))
+        else:
+            coverage = self._coverage(overlap, weights, like.kept, like.values)
         rows, across, closer = self._weighted(coverage)
         # Only the gap of an excluded node is omitted. The functions of its neighbours are not extended over its area.
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
@@ -234,12 +243,13 @@ class WeightedMortar(Formulation):
 
         `constraints` and `slipping` are the results of `_weighted_gaps` for the other arguments.
         """
-        kept = means.coverage.kept
         if isinstance(self.primary, Surface) and (self.points.shape[1] == 3 or self._ends_within(at, multiplier)):
 
             def moved(motion: Array) -> Constraints:
                 here = replace(at, displacement=at.displacement + motion)
-                return self._weighted_gaps(here, self._means(self.points + here.displacement, at, kept), held)[0]
+                return self._weighted_gaps(
+                    here, self._means(self.points + here.displacement, at, means.coverage), held
+                )[0]
 
             sides = np.concatenate([self.secondary.points, self.primary.points])
             motions = displacement, displacement - at.start, displacement - at.displacement
@@ -270,7 +280,8 @@ class WeightedMortar(Formulation):
         Segments are constant, because the variation of the cuts has no effect if the integrand is continuous across them, as
         it is except at ends of the primary side.
         """
-        deformed, is_loaded, overlap = self.points + at.displacement, multiplier != 0.0, means.coverage.overlap
+        deformed, overlap, values = self.points + at.displacement, means.coverage.overlap, means.coverage.values
+        is_loaded = values @ multiplier != 0.0
         functions, tests, first, first_facet = list[Blocks](), list[Blocks](), 0, 0
         nodes, shapes, facets = [], [], []
         of_blocks = zip(self.secondary.blocks, self._test, means.coverage.functions, overlap.points, strict=True)
@@ -291,7 +302,7 @@ class WeightedMortar(Formulation):
         along = "facet" if self.normals == "secondary" else self.normals
         rise = self.rise(candidates, pairing, rows, deformed)
         points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, True, rise)
-        weighted = scaled(csr_array(assembled(functions, size)[:, rows]), 1.0 / means.weight)
+        weighted = scaled(csr_array(values.T @ assembled(functions, size)[:, rows]), 1.0 / means.weight)
         mean = csr_array(assembled(tests, size)[:, rows])
         separate_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
@@ -312,7 +323,7 @@ class WeightedMortar(Formulation):
             element = elements.get(block.element)
             if element.order == 2:
                 quadratic.append((element.n_corners, T, block.local))
-        if self.held is not None:
+        if self.held is not None and isinstance(self.primary, RigidSide):
             projectors = self.held.at(self.secondary.points)
             held = np.trace(projectors, axis1=1, axis2=2) > self.points.shape[1] - 0.5
         return tested, full_area, quadratic, held
@@ -348,7 +359,7 @@ class WeightedMortar(Formulation):
         for along, nodes in without_slip:
             if not (nodes & coverage.kept).any():
                 continue
-            replaced, across, _ = self._weighted(self._coverage(*coverage[:2], coverage.kept & ~nodes))
+            replaced, across, _ = self._weighted(self._coverage(*coverage[:2], coverage.kept & ~nodes, coverage.values))
             difference = csr_array(scaled(csr_array(replaced - across), 1.0 / weight) - mean)
             difference.eliminate_zeros()
             for k, direction in enumerate(directions):
@@ -381,10 +392,13 @@ class WeightedMortar(Formulation):
             secondary_facet, primary_facet = coupling.pairs.T
             values = functions[coupling.secondary.element][secondary_facet] @ coupling.integrals
             across.append((coupling.secondary.local[secondary_facet], coupling.primary.facets[primary_facet], values))
-        return assembled(rows, size), assembled(across, size), closer
+        if (values := coverage.values).diagonal().all():
+            return assembled(rows, size), assembled(across, size), closer
+        on_independent = csr_array(values.T)
+        return on_independent @ assembled(rows, size), on_independent @ assembled(across, size), on_independent @ closer
 
-    def _coverage(self, overlap: Overlap, weights: list[Array], kept: Mask) -> Coverage:
-        """Return the coverage with the functions psi of the nodes `kept` (m,)."""
+    def _coverage(self, overlap: Overlap, weights: list[Array], kept: Mask, values: csr_array) -> Coverage:
+        """Return the coverage with the functions psi of the nodes `kept` (m,), and a multiplier field with `values`."""
         functions, of_blocks = [], zip(self._test, overlap.mass, weights, self._whole, strict=True)
         for block, (T, mass, covered, full) in zip(self.secondary.blocks, of_blocks, strict=True):
             of_facets = kept[block.local]
@@ -395,7 +409,21 @@ class WeightedMortar(Formulation):
                 fraction = np.divide(covered, full, out=np.zeros_like(covered), where=full > 0.0)
                 psi, D = dual_functions(T @ mass @ T.T, of_facets, fraction)
                 functions.append((psi @ T, D @ np.linalg.inv(T).T))
-        return Coverage(overlap, weights, kept, functions)
+        return Coverage(overlap, weights, kept, functions, values)
+
+    def _values(self, kept: Mask, held: Mask) -> csr_array:
+        """Return the map (m, m) from independent to nodal values of the multiplier field.
+
+        The value at a node in `held` (m,) is the mean over the other nodes in `kept` (m,) of its facets.
+        """
+        independent, tested = ~held, self._whole_side[0]
+        entries = []
+        for block, full in zip(self.secondary.blocks, self._whole, strict=True) if held.any() else ():
+            giver = (kept & independent)[block.local] & (full > 0.0)
+            portion = np.where(held[block.local], full, 0.0) / np.maximum(tested, TINY)[block.local]
+            means = giver / np.maximum(giver.sum(axis=1), 1)[:, None]
+            entries.append((block.local, block.local, np.asarray(portion[:, :, None] * means[:, None, :])))
+        return csr_array(diags_array(independent.astype(float)) + assembled(entries, (len(held), len(held))))
 
     def _nodes_with_gaps(self, covered: list[Array], least: float) -> Mask:
         """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions.
@@ -466,6 +494,8 @@ class WeightedPressures(NodalField):
     ----------
     weight : ndarray (m,)
         Area of each gap, infinite where there is no gap [area].
+    values : csr_array (m, m)
+        Map from independent to nodal values of the multiplier field [-].
     tested : ndarray (m,)
         Integrals of the positive functions over the whole secondary side [area].
     nodal_areas : ndarray (m,)
@@ -477,6 +507,7 @@ class WeightedPressures(NodalField):
     """
 
     weight: Array
+    values: csr_array
     tested: Array
     nodal_areas: Array
     quadratic: list[tuple[int, Array, NDArray[np.signedinteger]]]
@@ -490,8 +521,9 @@ class WeightedPressures(NodalField):
     def covered(self) -> Array:
         """Covered part of the nodal areas; at mid nodes without a gap, the mean of their corners."""
         usable = np.isfinite(self.weight)
-        faced = usable & (self.tested > 0.0)
-        fraction = np.divide(self.weight, self.tested, out=np.zeros_like(self.weight), where=faced)
+        tested = self.values.T @ self.tested
+        faced = usable & (tested > 0.0)
+        fraction = np.divide(self.weight, tested, out=np.zeros_like(self.weight), where=faced)
         return self._at_nodes(fraction, only_without_gap=True)
 
     def over_whole_side(self, force: Array) -> Array:
@@ -500,7 +532,8 @@ class WeightedPressures(NodalField):
         The part of the area of a node that faces the other side may be arbitrarily small, and the force vanishes with it. The
         ratio of both is sensitive to round-off, unlike the force divided by the complete area.
         """
-        return self._at_nodes(np.divide(force, self.tested, out=np.zeros_like(force), where=self.tested > 0.0))
+        tested = self.values.T @ self.tested
+        return self._at_nodes(np.divide(force, tested, out=np.zeros_like(force), where=tested > 0.0))
 
     def _at_nodes(self, coefficients: Array, only_without_gap: bool = False) -> Array:
         """Return the nodal values (m,) of a field with `coefficients` (m,) of the positive functions.
@@ -508,6 +541,7 @@ class WeightedPressures(NodalField):
         They are the coefficients themselves, except at mid nodes of quadratic facets, where the functions of the corners do
         not vanish.
         """
+        coefficients = self.values @ coefficients
         values = coefficients.copy()
         for corners, T, local in self.quadratic:
             with_gaps = T[corners:].any()
