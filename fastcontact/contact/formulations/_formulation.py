@@ -504,12 +504,13 @@ class Formulation(ABC):
         of other primary nodes, but not on those of secondary nodes, and the constraints are nearly redundant. Facets of
         which all nodes are held are ignored.
         """
+        if not len(self._held_nodes) or self.held is None or self.options.tied:
+            return np.zeros(len(self.secondary.points), bool)
         normal = nodal_normals(self.secondary, self.points + at.displacement)
-        held = self._both_held(at)
-        if held.any():
-            held = _without_whole_facets(held, self.secondary)
-        across = np.einsum("nd,nde,ne->n", normal, held, normal) > 0.5
-        return across & (not self.options.tied) & ~self.options.excluded_nodes(self.secondary)
+        across = _held_along(normal, self.held.at(self.secondary.points))
+        if across.any():
+            across = _held_along(normal, _without_whole_facets(self._both_held(at), self.secondary))
+        return across & ~self.options.excluded_nodes(self.secondary)
 
     def undetermined(self, at: Configuration) -> Mask:
         """Return which nodes (n_nodes,) belong to facets whose traction is undetermined.
@@ -671,6 +672,11 @@ class Formulation(ABC):
         along += slip0
         slip = np.einsum("kn,knd->nd", along, np.stack(directions))
         return np.where(pairing.paired[:, None], slip, 0.0)
+
+
+def _held_along(directions: Array, projectors: Array) -> Mask:
+    """Return where `projectors` (n, dim, dim) retain at least half of the squares of unit `directions` (n, dim)."""
+    return np.asarray(np.einsum("nd,nde,ne->n", directions, projectors, directions) > 0.5)
 
 
 def _without_whole_facets(held: Array, side: Surface) -> Array:
