@@ -498,18 +498,21 @@ class Formulation(ABC):
         return held
 
     def held_across(self, at: Configuration) -> Mask:
-        """Return the nodes (n_nodes,) at which supports hold both sides along the normal.
+        """Return the nodes (n_nodes,) at which supports and multi-point constraints prescribe the gap.
 
         The contact forces of such nodes act between supports. On non-matching meshes, their gaps may depend on displacements
-        of other primary nodes, but not on those of secondary nodes, and the constraints are nearly redundant. Facets of
-        which all nodes are held are ignored.
+        of other primary nodes, but not on those of secondary nodes, and the constraints are nearly redundant.
         """
-        if not len(self._held_nodes) or self.held is None or self.options.tied:
-            return np.zeros(len(self.secondary.points), bool)
-        normal = nodal_normals(self.secondary, self.points + at.displacement)
-        across = _held_along(normal, self.held.at(self.secondary.points))
-        if across.any():
-            across = _held_along(normal, _without_whole_facets(self._both_held(at), self.secondary))
+        across = np.zeros(len(self.secondary.points), bool)
+        if self.held is None or self.options.tied or not isinstance(self.primary, Surface):
+            return across
+        nodes = np.flatnonzero(np.isin(self.secondary.points, self.held.restrained))
+        if len(nodes):
+            candidates = Candidates(self.secondary.points[nodes][:, None], np.ones((len(nodes), 1)))
+            pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, BESIDE))
+            rows = rows_along(pairing.normal, candidates, pairing, self.primary, self.points.size)
+            size, remaining = ((matrix**2).sum(axis=1) for matrix in (rows, rows @ self.held.motion))
+            across[nodes] = pairing.paired & (remaining < 0.25 * size)
         return across & ~self.options.excluded_nodes(self.secondary)
 
     def undetermined(self, at: Configuration) -> Mask:
@@ -672,11 +675,6 @@ class Formulation(ABC):
         along += slip0
         slip = np.einsum("kn,knd->nd", along, np.stack(directions))
         return np.where(pairing.paired[:, None], slip, 0.0)
-
-
-def _held_along(directions: Array, projectors: Array) -> Mask:
-    """Return where `projectors` (n, dim, dim) retain at least half of the squares of unit `directions` (n, dim)."""
-    return np.asarray(np.einsum("nd,nde,ne->n", directions, projectors, directions) > 0.5)
 
 
 def _without_whole_facets(held: Array, side: Surface) -> Array:

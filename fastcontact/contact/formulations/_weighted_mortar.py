@@ -416,14 +416,15 @@ class WeightedMortar(Formulation):
 
         The value at a node in `held` (m,) is the mean over the other nodes in `kept` (m,) of its facets.
         """
-        independent, tested = ~held, self._whole_side[0]
-        entries = []
+        independent, entries = ~held, []
         for block, full in zip(self.secondary.blocks, self._whole, strict=True) if held.any() else ():
             giver = (kept & independent)[block.local] & (full > 0.0)
-            portion = np.where(held[block.local], full, 0.0) / np.maximum(tested, TINY)[block.local]
             means = giver / np.maximum(giver.sum(axis=1), 1)[:, None]
-            entries.append((block.local, block.local, np.asarray(portion[:, :, None] * means[:, None, :])))
-        return csr_array(diags_array(independent.astype(float)) + assembled(entries, (len(held), len(held))))
+            of_held = np.where(held[block.local], full, 0.0)
+            entries.append((block.local, block.local, of_held[:, :, None] * means[:, None, :]))
+        sums = assembled(entries, (len(held), len(held)))
+        total = np.asarray(sums.sum(axis=1)).ravel()
+        return csr_array(diags_array(independent.astype(float)) + scaled(sums, 1.0 / np.where(total > 0.0, total, 1.0)))
 
     def _nodes_with_gaps(self, covered: list[Array], least: float) -> Mask:
         """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions.

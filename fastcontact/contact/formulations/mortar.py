@@ -229,8 +229,7 @@ class SegmentMortar(PressureFieldFormulation):
         covering, (n, k) = np.where(kept, area, 0.0), self.secondary.facets.shape
         mass = np.zeros((n, k, k))
         np.add.at(mass, facet, covering[:, None, None] * shape[:, :, None] * shape[:, None, :])
-        dependent = self.options.excluded_nodes(self.secondary) | self.held_across(at)
-        values = determined(self.secondary, self._whole, [mass], dependent)
+        values = determined(self.secondary, self._whole, [mass], self.dependent_nodes(at))
         around = self.secondary.local[facet], shape
         field = PressureField.of_points(around, (covering, area), self._rho, self.repeated(values), renewed=True)
         return self.of_points(candidates, pairing, field, at)
