@@ -190,6 +190,11 @@ def test_bolted_flanges_held_at_the_same_edge_settle_and_mirror_each_other(frict
 CLAMPS = {
     "fix": lambda model, group: model.fix(group, "xyz"),
     "axes": lambda model, group: model.fix(group, "xyz", axes=[(0.6, 0.8, 0.0), (-0.48, 0.36, 0.8)]),
+    "coupling": lambda model, group: (
+        model.add_coupling("O", group),
+        model.fix("O", "xyz"),
+        model.fix("O rotation", "xyz"),
+    ),
     "pushed together": lambda model, group: model.prescribe(group, x=0.0, y=0.0, z=1e-6 if group[0] == "A" else -1e-6),
 }
 
@@ -201,6 +206,7 @@ CLAMPS = {
     [
         ("hex20", "default", "fix"),
         ("hex20", "default", "axes"),
+        ("hex20", "default", "coupling"),
         ("hex20", "default", "pushed together"),
         ("hex20", "standard", "pushed together"),
         ("hex20", "continuous", "fix"),
@@ -211,6 +217,8 @@ CLAMPS = {
 def test_plates_clamped_at_the_same_edge_carry_their_load_on_every_mesh(element, method, clamp, friction):
     """Forces between nodes that supports hold do no work: they follow those of the neighbouring nodes."""
     mesh = fc.generate.union(flange("A", 0.0, element, (4, 6, 1)), flange("B", 8.0, element, (4, 4, 1)))
+    if clamp == "coupling":
+        mesh = fc.generate.with_reference_points(mesh, {"O": (0.0, 0.0, 8.0)})
     model = elastic_model(mesh, "3d", E=210e3)
     for name, outside in (("A", "ZMIN"), ("B", "ZMAX")):
         CLAMPS[clamp](model, f"{name}_XMIN")

@@ -414,17 +414,19 @@ class WeightedMortar(Formulation):
     def _values(self, kept: Mask, held: Mask) -> csr_array:
         """Return the map (m, m) from independent to nodal values of the multiplier field.
 
-        The value at a node in `held` (m,) is the mean over the other nodes in `kept` (m,) of its facets.
+        The value at a node in `held` (m,) is the mean over those nodes in `kept` (m,) of its facets that are not held. If
+        there are none, it is independent.
         """
-        independent, entries = ~held, []
+        entries = []
         for block, full in zip(self.secondary.blocks, self._whole, strict=True) if held.any() else ():
-            giver = (kept & independent)[block.local] & (full > 0.0)
+            giver = (kept & ~held)[block.local] & (full > 0.0)
             means = giver / np.maximum(giver.sum(axis=1), 1)[:, None]
             of_held = np.where(held[block.local], full, 0.0)
             entries.append((block.local, block.local, of_held[:, :, None] * means[:, None, :]))
         sums = assembled(entries, (len(held), len(held)))
         total = np.asarray(sums.sum(axis=1)).ravel()
-        return csr_array(diags_array(independent.astype(float)) + scaled(sums, 1.0 / np.where(total > 0.0, total, 1.0)))
+        sums = scaled(sums, 1.0 / np.where(total > 0.0, total, 1.0))
+        return csr_array(diags_array(np.where(total > 0.0, 0.0, 1.0)) + sums)
 
     def _nodes_with_gaps(self, covered: list[Array], least: float) -> Mask:
         """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions.
