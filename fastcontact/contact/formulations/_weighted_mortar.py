@@ -183,13 +183,14 @@ class WeightedMortar(Formulation):
         if at.worn is not None:
             gap0 += rows @ at.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
+        of_side = self._whole_side
         constraints = Constraints(
             B,
             gap0,
             self.points[points],
             areas=weight,
             nodes=nodes,
-            nodal=WeightedPressures(weight, coverage.values, *self._whole_side),
+            nodal=WeightedPressures(weight, coverage.values, coverage.values.T @ of_side[0], *of_side[1:]),
         )
         if not self.slides:
             return constraints, None
@@ -500,7 +501,7 @@ class WeightedPressures(NodalField):
     values : csr_array (m, m)
         Map from independent to nodal values of the multiplier field [-].
     tested : ndarray (m,)
-        Integrals of the positive functions over the whole secondary side [area].
+        Integrals of the functions of the independent values over the whole secondary side [area].
     nodal_areas : ndarray (m,)
         Integrals of the shape functions over the whole secondary side [area].
     quadratic : list of (int, ndarray (n_nodes, n_nodes), ndarray of int (n_facets, n_nodes))
@@ -524,9 +525,8 @@ class WeightedPressures(NodalField):
     def covered(self) -> Array:
         """Covered part of the nodal areas; at mid nodes without a gap, the mean of their corners."""
         usable = np.isfinite(self.weight)
-        tested = self.values.T @ self.tested
-        faced = usable & (tested > 0.0)
-        fraction = np.divide(self.weight, tested, out=np.zeros_like(self.weight), where=faced)
+        faced = usable & (self.tested > 0.0)
+        fraction = np.divide(self.weight, self.tested, out=np.zeros_like(self.weight), where=faced)
         return self._at_nodes(fraction, only_without_gap=True)
 
     def over_whole_side(self, force: Array) -> Array:
@@ -535,8 +535,7 @@ class WeightedPressures(NodalField):
         The part of the area of a node that faces the other side may be arbitrarily small, and the force vanishes with it. The
         ratio of both is sensitive to round-off, unlike the force divided by the complete area.
         """
-        tested = self.values.T @ self.tested
-        return self._at_nodes(np.divide(force, tested, out=np.zeros_like(force), where=tested > 0.0))
+        return self._at_nodes(np.divide(force, self.tested, out=np.zeros_like(force), where=self.tested > 0.0))
 
     def _at_nodes(self, coefficients: Array, only_without_gap: bool = False) -> Array:
         """Return the nodal values (m,) of a field with `coefficients` (m,) of the positive functions.
