@@ -7,14 +7,16 @@ u of the node is prescribed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.projection import CORNER
+from fastcontact.elasticity.multipoint_constraints import eliminate
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION, TINY
 
 # Cosine of the largest angle between directions at two adjacent nodes that belong to the same field, as along a curved rim.
@@ -33,11 +35,29 @@ class HeldMotions:
         Orthogonal projectors onto the prescribed directions of each node [-].
     driven : ndarray of bool (n_points, dim)
         Components with a prescribed displacement other than zero.
+    supported : ndarray of bool (n_points, dim)
+        Components that supports hold.
+    mpc_rows : csr_array (m, n_dofs)
+        Rows of multi-point constraints.
     """
 
     nodes: Indices
     projectors: Array
     driven: Mask
+    supported: Mask
+    mpc_rows: csr_array
+
+    @cached_property
+    def restrained(self) -> Indices:
+        """Nodes with supports or multi-point constraints, in ascending order."""
+        return np.union1d(self.nodes, self.mpc_rows.indices // self.supported.shape[1])
+
+    @cached_property
+    def motion(self) -> csr_array:
+        """Map (n_dofs, n_dofs) from the unknowns that supports and multi-point constraints leave to all displacements."""
+        elimination, free = eliminate(self.mpc_rows, self.supported.ravel()), ~self.supported.ravel()
+        free[elimination.pivots] = False
+        return csr_array(elimination.T @ diags_array(free.astype(float)))
 
     @classmethod
     def of(cls, supported: Mask, mpc_rows: csr_array, driven: Mask | None = None) -> HeldMotions:
@@ -48,7 +68,7 @@ class HeldMotions:
         supported : ndarray of bool (n_points, dim)
             Components that supports hold.
         mpc_rows : csr_array (m, n_dofs)
-            Rows of multi-point constraints; only those that involve a single node are used.
+            Rows of multi-point constraints; only those that involve a single node are used for `projectors`.
         driven : ndarray of bool (n_points, dim), optional
             Components with a prescribed displacement other than zero; by default none.
         """
@@ -62,7 +82,8 @@ class HeldMotions:
             np.add.at(projectors, index, np.einsum("md,me->mde", normals, normals))
             constrained = np.unique(index)
             projectors[constrained] = eigenspaces(projectors[constrained], SINGLE_PRECISION)
-        return cls(nodes, projectors, np.zeros_like(supported) if driven is None else driven)
+        driven = np.zeros_like(supported) if driven is None else driven
+        return cls(nodes, projectors, driven, supported, mpc_rows)
 
     def at(self, nodes: NDArray[np.integer]) -> Array:
         """Return the projectors (..., dim, dim) of `nodes` (...); zero for nodes that are free."""

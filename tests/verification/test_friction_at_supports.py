@@ -154,9 +154,9 @@ def test_a_stack_that_slides_in_its_weaker_joint_is_told_as_such(along):
         fc.solve(model, 1)
 
 
-def flange(name, bottom):
+def flange(name, bottom, element="hex8", divisions=(4, 12, 2)):
     """A quarter of a plate with a hole in the midst."""
-    mesh = fc.generate.box((1.0, 1.0, 8.0), (4, 12, 2), "hex8", (0.0, 0.0, bottom), name=name)
+    mesh = fc.generate.box((1.0, 1.0, 8.0), divisions, element, (0.0, 0.0, bottom), name=name)
     radius, angle = 20.0 + 40.0 * mesh.points[:, 0], np.pi / 2.0 * mesh.points[:, 1]
     mesh = mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle), mesh.points[:, 2]]))
     return prefixed(mesh, name)
@@ -185,6 +185,69 @@ def test_bolted_flanges_held_at_the_same_edge_settle_and_mirror_each_other(frict
     contact = step.contact["joint"]
     assert abs(step.reaction[a, 2].sum() + step.reaction[b, 2].sum()) < 1e-6 * contact.force[2]
     assert np.allclose(contact.coordinates[contact.pressure > 0.0, 2], 8.0, atol=1e-3)
+
+
+CLAMPS = {
+    "fix": lambda model, group: model.fix(group, "xyz"),
+    "axes": lambda model, group: model.fix(group, "xyz", axes=[(0.6, 0.8, 0.0), (-0.48, 0.36, 0.8)]),
+    "coupling": lambda model, group: (
+        model.add_coupling("O", group),
+        model.fix("O", "xyz"),
+        model.fix("O rotation", "xyz"),
+    ),
+    "pushed together": lambda model, group: model.prescribe(group, x=0.0, y=0.0, z=1e-6 if group[0] == "A" else -1e-6),
+}
+
+
+@pytest.mark.filterwarnings("ignore:supports push")
+@pytest.mark.parametrize("friction", [None, 0.3])
+@pytest.mark.parametrize(
+    ("element", "method", "clamp"),
+    [
+        ("hex20", "default", "fix"),
+        ("hex20", "default", "axes"),
+        ("hex20", "default", "coupling"),
+        ("hex20", "default", "pushed together"),
+        ("hex20", "standard", "pushed together"),
+        ("hex20", "continuous", "fix"),
+        ("hex27", "default", "fix"),
+        ("tet10", "default", "fix"),
+    ],
+)
+def test_plates_clamped_at_the_same_edge_carry_their_load_on_every_mesh(element, method, clamp, friction):
+    """Forces between nodes that supports hold do no work: they follow those of the neighbouring nodes."""
+    mesh = fc.generate.union(flange("A", 0.0, element, (4, 6, 1)), flange("B", 8.0, element, (4, 4, 1)))
+    if clamp == "coupling":
+        mesh = fc.generate.with_reference_points(mesh, {"O": (0.0, 0.0, 8.0)})
+    model = elastic_model(mesh, "3d", E=210e3)
+    for name, outside in (("A", "ZMIN"), ("B", "ZMAX")):
+        CLAMPS[clamp](model, f"{name}_XMIN")
+        model.add_pressure(f"{name}_{outside}", 1.0)
+    model.add_contact("joint", secondary="B_ZMIN", primary="A_ZMAX", friction=friction, **FORMULATIONS[method])
+    (step,) = fc.solve(model, 1)
+    contact, load = step.contact["joint"], 0.25 * np.pi * (60.0**2 - 20.0**2)
+    assert contact.force[2] == pytest.approx(0.958 * load, rel=0.025)  # the limit of fine meshes, clamps carry the rest
+    assert contact.force[2] + step.reaction[mesh.points_of("B"), 2].sum() == pytest.approx(load, rel=1e-3)
+    assert contact.pressure == pytest.approx(1.0, abs=0.25 if method == "default" else 0.4)
+
+
+@pytest.mark.parametrize("element", ["quad4", "quad8", "tri6"])
+@pytest.mark.parametrize("method", ["default", "standard", "continuous"])
+def test_the_force_between_clamped_plates_is_accurate_on_coarse_meshes(element, method):
+    forces = []
+    coarse = [(element, upper, lower, 1) for upper, lower in ((4, 4), (4, 6), (6, 4))]
+    for kind, upper, lower, height in [("quad4", 120, 120, 12), *coarse]:
+        parts = [
+            prefixed(fc.generate.block((60.0, 6.0), (n, height), kind, (40.0, y), name=name), name)
+            for name, n, y in (("A", lower, -6.0), ("B", upper, 0.0))
+        ]
+        model = elastic_model(fc.generate.union(*parts), "axisymmetric", E=210e3)
+        for name, outside in (("A", "BOTTOM"), ("B", "TOP")):
+            model.fix(f"{name}_LEFT", "xy")
+            model.add_pressure(f"{name}_{outside}", 1.0)
+        model.add_contact("joint", secondary="B_BOTTOM", primary="A_TOP", **FORMULATIONS[method])
+        forces.append(fc.solve(model, 1)[-1].contact["joint"].force[1])
+    assert np.array(forces) == pytest.approx(forces[0], rel=0.02)
 
 
 class Turned:

@@ -501,6 +501,24 @@ class Formulation(ABC):
             held[nodes] = eigenspaces(P @ Q @ P, 0.5)
         return held
 
+    def held_across(self, config: Configuration) -> Mask:
+        """Return the nodes (n_nodes,) at which supports and multi-point constraints prescribe the gap.
+
+        The contact forces of such nodes act between supports. On non-matching meshes, their gaps may depend on displacements
+        of other primary nodes, but not on those of secondary nodes, and the constraints are nearly redundant.
+        """
+        across = np.zeros(len(self.secondary.points), bool)
+        if self.held is None or self.options.tied or not isinstance(self.primary, Surface):
+            return across
+        nodes = np.flatnonzero(np.isin(self.secondary.points, self.held.restrained))
+        if len(nodes):
+            candidates = Candidates(self.secondary.points[nodes][:, None], np.ones((len(nodes), 1)))
+            pairing = self.facing(candidates, config, max(self.projection_tolerance or 0.0, BESIDE))
+            rows = rows_along(pairing.normal, candidates, pairing, self.primary, self.points.size)
+            size, remaining = ((matrix**2).sum(axis=1) for matrix in (rows, rows @ self.held.motion))
+            across[nodes] = pairing.paired & (remaining < 0.25 * size)
+        return across & ~self.options.excluded_nodes(self.secondary)
+
     def undetermined(self, config: Configuration) -> Mask:
         """Return which nodes (n_nodes,) belong to facets whose traction is undetermined.
 

@@ -22,7 +22,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
@@ -60,12 +60,15 @@ class Coverage(NamedTuple):
     functions : list of (ndarray (n_facets, k, k), ndarray (n_facets, k, k))
         For each block, the coefficients of the functions psi in terms of the shape functions [-], and the integrals of
         products of both [area].
+    values : csr_array (m, m)
+        Map from independent to nodal values of the multiplier field [-].
     """
 
     overlap: Overlap
     weights: list[Array]
     with_gap: Mask
     functions: list[tuple[Array, Array]]
+    values: csr_array
 
 
 class Means(NamedTuple):
@@ -175,10 +178,15 @@ class WeightedMortar(Formulation):
         B = rows_of(mean, normal)
         gap0 = B @ self.points.ravel() + config.clearance_factor * self._clearance(rows, across, weight)
         gap0 -= np.einsum("nd,nd->n", closer, normal)
+        dependent = coverage.values.diagonal() == 0.0
+        if dependent.any():  # Gaps that supports prescribe neither open nor close those of neighbouring nodes.
+            prescribed = np.where(dependent, self.nodal_gap(config)[0], 0.0)
+            gap0 -= csr_array(rows[:, self.secondary.points]) @ prescribed / weight
         if config.worn is not None:
             gap0 += rows @ config.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
-        pressures = WeightedPressures(weight, *self._whole_side)
+        side = self._whole_side
+        pressures = WeightedPressures(weight, coverage.values, coverage.values.T @ side[0], *side[1:])
         constraints = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=pressures)
         if not self.has_tangents:
             return constraints, None
@@ -204,16 +212,18 @@ class WeightedMortar(Formulation):
         constraints = replace(constraints, tangents=slips, directions=directions, friction=mu, slip0=slip0)
         return constraints, (np.stack(slip_axes), length)
 
-    def _means(self, deformed: Array, config: Configuration, with_gap: Mask | None = None) -> Means:
+    def _means(self, deformed: Array, config: Configuration, like: Coverage | None = None) -> Means:
         """Return the mean relative motions of nodes at the coordinates `deformed` (n_points, dim) [length].
 
-        `with_gap` (m,) are the nodes with gaps; by default, they result from the overlap.
+        Nodes with gaps are those of the coverage `like`; by default, they result from the overlap.
         """
         overlap = self._overlap(deformed, config.pose)
         weights = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
-        if with_gap is None:
+        if like is None:
             with_gap = self._nodes_with_gaps(weights, LEAST if config.rounded else COVERED)
-        coverage = self._coverage(overlap, weights, with_gap)
+            coverage = self._coverage(overlap, weights, with_gap, self._values(with_gap, self.held_across(config)))
+        else:
+            coverage = self._coverage(overlap, weights, like.with_gap, like.values)
         rows, across, closer = self._weighted_integrals(coverage)
         # The gap of an excluded node is omitted, but the functions of its neighbours are not extended over its area.
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
@@ -230,12 +240,12 @@ class WeightedMortar(Formulation):
 
         `constraints` and `slip_data` are the results of `_weighted_gaps` for the other arguments.
         """
-        nodes = means.coverage.with_gap
         if isinstance(self.primary, Surface) and (self.points.shape[1] == 3 or self._ends_within(config, multiplier)):
 
             def constraints_after(motion: Array) -> Constraints:
                 moved = replace(config, displacement=config.displacement + motion)
-                return self._weighted_gaps(moved, self._means(self.points + moved.displacement, config, nodes), held)[0]
+                after = self._means(self.points + moved.displacement, config, means.coverage)
+                return self._weighted_gaps(moved, after, held)[0]
 
             sides = np.concatenate([self.secondary.points, self.primary.points])
             motions = displacement, displacement - config.start, displacement - config.displacement
@@ -266,7 +276,8 @@ class WeightedMortar(Formulation):
         The segments are kept constant. The variation of a cut has no effect if the integrand is continuous across it, which
         is the case except at ends of the primary side.
         """
-        deformed, is_loaded, overlap = self.points + config.displacement, multiplier != 0.0, means.coverage.overlap
+        deformed, overlap, values = self.points + config.displacement, means.coverage.overlap, means.coverage.values
+        is_loaded = values @ multiplier != 0.0
         functions, tests, n_points, facet_offset = list[Blocks](), list[Blocks](), 0, 0
         nodes, shapes, facets = [], [], []
         of_blocks = zip(self.secondary.blocks, self._test, means.coverage.functions, overlap.points, strict=True)
@@ -287,7 +298,7 @@ class WeightedMortar(Formulation):
         normals = "facet" if self.normals == "secondary" else self.normals
         rise = self.smoothing_slope(candidates, pairing, rows, deformed)
         points = faced(candidates, pairing, rows, self.primary, deformed, normals, config.pose, True, rise)
-        weighted = scaled(csr_array(assembled(functions, size)[:, rows]), 1.0 / means.weight)
+        weighted = scaled(csr_array(values.T @ assembled(functions, size)[:, rows]), 1.0 / means.weight)
         mean = csr_array(assembled(tests, size)[:, rows])
         separate_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
@@ -308,7 +319,7 @@ class WeightedMortar(Formulation):
             element = elements.get(block.element)
             if element.order == 2:
                 quadratic.append((element.n_corners, T, block.local))
-        if self.held is not None:
+        if self.held is not None and isinstance(self.primary, RigidSide):
             projectors = self.held.at(self.secondary.points)
             held = np.trace(projectors, axis1=1, axis2=2) > self.points.shape[1] - 0.5
         return full_areas, full_area, quadratic, held
@@ -344,7 +355,8 @@ class WeightedMortar(Formulation):
         for axis, nodes in without_slip:
             if not (nodes & coverage.with_gap).any():
                 continue
-            substitute, across, _ = self._weighted_integrals(self._coverage(*coverage[:2], coverage.with_gap & ~nodes))
+            cover = self._coverage(*coverage[:2], coverage.with_gap & ~nodes, coverage.values)
+            substitute, across, _ = self._weighted_integrals(cover)
             difference = csr_array(scaled(csr_array(substitute - across), 1.0 / weight) - mean)
             difference.eliminate_zeros()
             for k, direction in enumerate(directions):
@@ -377,10 +389,13 @@ class WeightedMortar(Formulation):
             secondary_facet, primary_facet = coupling.pairs.T
             values = functions[coupling.secondary.element][secondary_facet] @ coupling.integrals
             across.append((coupling.secondary.local[secondary_facet], coupling.primary.facets[primary_facet], values))
-        return assembled(rows, size), assembled(across, size), closer
+        if (values := coverage.values).diagonal().all():
+            return assembled(rows, size), assembled(across, size), closer
+        on_independent = csr_array(values.T)
+        return on_independent @ assembled(rows, size), on_independent @ assembled(across, size), on_independent @ closer
 
-    def _coverage(self, overlap: Overlap, weights: list[Array], with_gap: Mask) -> Coverage:
-        """Return the coverage with the functions psi of the nodes `with_gap` (m,)."""
+    def _coverage(self, overlap: Overlap, weights: list[Array], with_gap: Mask, values: csr_array) -> Coverage:
+        """Return the coverage with the functions psi of the nodes `with_gap` (m,), and a multiplier field with `values`."""
         functions, of_blocks = [], zip(self._test, overlap.mass, weights, self._whole, strict=True)
         for block, (T, mass, covered, full) in zip(self.secondary.blocks, of_blocks, strict=True):
             with_psi = with_gap[block.local]
@@ -391,7 +406,24 @@ class WeightedMortar(Formulation):
                 fraction = np.divide(covered, full, out=np.zeros_like(covered), where=full > 0.0)
                 psi, D = dual_functions(T @ mass @ T.T, with_psi, fraction)
                 functions.append((psi @ T, D @ np.linalg.inv(T).T))
-        return Coverage(overlap, weights, with_gap, functions)
+        return Coverage(overlap, weights, with_gap, functions, values)
+
+    def _values(self, with_gap: Mask, held: Mask) -> csr_array:
+        """Return the map (m, m) from independent to nodal values of the multiplier field.
+
+        The value at a node in `held` (m,) is the mean over those nodes in `with_gap` (m,) of its facets that are not held.
+        If there are none, it is independent.
+        """
+        entries = []
+        for block, full in zip(self.secondary.blocks, self._whole, strict=True) if held.any() else ():
+            independent = (with_gap & ~held)[block.local] & (full > 0.0)
+            means = independent / np.maximum(independent.sum(axis=1), 1)[:, None]
+            held_areas = np.where(held[block.local], full, 0.0)
+            entries.append((block.local, block.local, held_areas[:, :, None] * means[:, None, :]))
+        sums = assembled(entries, (len(held), len(held)))
+        total = np.asarray(sums.sum(axis=1)).ravel()
+        sums = scaled(sums, 1.0 / np.where(total > 0.0, total, 1.0))
+        return csr_array(diags_array(np.where(total > 0.0, 0.0, 1.0)) + sums)
 
     def _nodes_with_gaps(self, covered: list[Array], least: float) -> Mask:
         """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions over the overlap.
@@ -462,8 +494,10 @@ class WeightedPressures(NodalField):
     ----------
     weight : ndarray (m,)
         Area of each gap, infinite where there is no gap [area].
+    values : csr_array (m, m)
+        Map from independent to nodal values of the multiplier field [-].
     full_areas : ndarray (m,)
-        Integrals of the positive functions over the complete secondary side [area].
+        Integrals of the functions of the independent values over the complete secondary side [area].
     nodal_areas : ndarray (m,)
         Integrals of the shape functions over the complete secondary side [area].
     quadratic : list of (int, ndarray (n_nodes, n_nodes), ndarray of int (n_facets, n_nodes))
@@ -474,6 +508,7 @@ class WeightedPressures(NodalField):
     """
 
     weight: Array
+    values: csr_array
     full_areas: Array
     nodal_areas: Array
     quadratic: list[tuple[int, Array, NDArray[np.signedinteger]]]
@@ -505,6 +540,7 @@ class WeightedPressures(NodalField):
         They are the coefficients themselves, except at mid-side nodes of quadratic facets, where the functions of the corners
         do not vanish.
         """
+        coefficients = self.values @ coefficients
         values = coefficients.copy()
         for corners, T, local in self.quadratic:
             with_gaps = T[corners:].any()

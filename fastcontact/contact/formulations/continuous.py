@@ -135,7 +135,7 @@ class Continuous(PressureFieldFormulation):
         """
         size = P.shape[1]
         weight = np.asarray((P.T @ diags_array(areas) @ P).diagonal())
-        excluded = self.options.excluded_nodes(self.secondary)
+        excluded = self.dependent_nodes(Configuration.undeformed(self.points))
         even = even_at_axis(self.secondary, self.points) if self.axisymmetric else csr_array(eye_array(size))
         if not self.friction:
             has_weight = (weight != 0.0).astype(float)

@@ -230,7 +230,7 @@ class SegmentMortar(PressureFieldFormulation):
         usable_area, (n, k) = np.where(usable, area, 0.0), self.secondary.facets.shape
         mass = np.zeros((n, k, k))
         np.add.at(mass, facet, usable_area[:, None, None] * shape[:, :, None] * shape[:, None, :])
-        values = independent_values(self.secondary, self._whole, [mass], self.options.excluded_nodes(self.secondary))
+        values = independent_values(self.secondary, self._whole, [mass], self.dependent_nodes(config))
         samples = self.secondary.local[facet], shape
         field = PressureField.of_points(samples, (usable_area, area), self._rho, self.repeated(values), renewed=True)
         return self.of_points(candidates, pairing, field, config)
