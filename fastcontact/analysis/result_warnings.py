@@ -77,9 +77,9 @@ def result_warnings(
     if problem.model.strain == "small":
         warnings += [*_large_strain(problem, last), *_large_rotation(problem, state, last)]
     if problem.bodies is None:
-        warnings += locking_warning(problem, state.u) or scatter_warnings(problem, last)
+        warnings += locking_warning(problem, state.u) or scatter_warnings(problem, state, last)
     else:
-        warnings += nonlinear_scatter_warnings(problem, state, last)
+        warnings += nonlinear_scatter_warnings(problem, state, last) or scatter_warnings(problem, state, last)
     if problem.solver.gave_up:
         warnings.append(f'{problem.solver.gave_up}. linear_solver="direct" factorises the matrix from the start')
     load = problem.load_at(last.load_factor)

@@ -14,10 +14,9 @@ import math
 
 import numpy as np
 
-from fastcontact.arrays import Array
-from fastcontact.elasticity import recovery
-from fastcontact.elasticity.initial_states import StressOffset
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.material_field import MaterialField
+from fastcontact.elasticity.recovery import CellStress, NodalAverage, interpolation
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
@@ -26,9 +25,28 @@ from fastcontact.mesh.mesh import Mesh
 SIMPLEX_FRACTION = {3: 0.5, 4: 1.0 / math.sqrt(5.0)}
 
 
-def smoothed_stress(
-    mesh: Mesh, kinematics: str, field: MaterialField, displacement: Array, offset: StressOffset | None = None
-) -> dict[str, Array]:
+class PointStress:
+    """Stresses in the cells of a mesh, interpolated from given ones at the quadrature points.
+
+    Parameters
+    ----------
+    stress : dict of str to ndarray (n_cells, n_q, n_components)
+        Stress by solid element type [pressure].
+    """
+
+    def __init__(self, stress: dict[str, Array]) -> None:
+        self._stress = stress
+
+    def at(self, name: str, xi: Array, _cells: Numbers, _material: Numbers, rows: Indices) -> Array:
+        """Return the stresses (n_cells, n, n_components) [pressure] at points `xi` (n, dim) [-], as `CellStress.at` does.
+
+        The integer array `rows` (n_cells,) contains the numbers of the cells. Their nodes `_cells` (n_cells, n_nodes) and
+        materials `_material` (n_cells,) are not needed.
+        """
+        return np.asarray(interpolation(name, xi) @ self._stress[name][rows])
+
+
+def smoothed_stress(mesh: Mesh, field: MaterialField, stress: CellStress | PointStress) -> dict[str, Array]:
     """Return the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each solid cell, by element type.
 
     All cells of one material at a node have the same stress there.
@@ -36,20 +54,16 @@ def smoothed_stress(
     Parameters
     ----------
     mesh : Mesh
-    kinematics : str
     field : MaterialField
         Materials of all cells.
-    displacement : ndarray (n_points, dim)
-        Displacements of all points [length].
-    offset : StressOffset, optional
-        Contribution of temperatures and initial states to the stress.
+    stress : CellStress or PointStress
+        Stresses in the cells.
     """
     components = field.moduli.shape[1]
-    stress = recovery.CellStress(mesh, kinematics, field.moduli, displacement, field.treatment, offset)
     at_nodes = {name: np.empty((*block.shape, components)) for name, block in mesh.solids.items()}
     material = field.distinct
     for number in np.unique(np.concatenate([*material.values()])):
-        average = recovery.NodalAverage(mesh.n_points, components)
+        average = NodalAverage(mesh.n_points, components)
         rows_of_material = {name: np.flatnonzero(material[name] == number) for name in at_nodes}
         rows_of_material = {name: rows for name, rows in rows_of_material.items() if len(rows)}
         for name, rows in rows_of_material.items():

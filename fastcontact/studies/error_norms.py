@@ -291,7 +291,9 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     model.refuse_nonlinear("error estimates are")
     heat, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
     offset = model.stress_offset(heat, initial, temperature=step.temperature)
-    smooth = smoothed_stress(model.mesh, model.kinematics, model.material_field(), step.displacement, offset)
+    field = model.material_field()
+    in_cells = CellStress(model.mesh, model.kinematics, field.moduli, step.displacement, field.treatment, offset)
+    smooth = smoothed_stress(model.mesh, field, in_cells)
     squares, energy = [], 0.0
     for name in model.mesh.solids:
         order, u = elements.get(name).order, step.displacement

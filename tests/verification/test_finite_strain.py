@@ -479,3 +479,4 @@ def test_multigrid_with_forcing_terms_unloads_a_body_to_rest():
         np.testing.assert_allclose(step.displacement, exact.displacement, rtol=0, atol=1e-10)
         assert len(step.iterations["history"]) <= len(exact.iterations["history"]) + 1
     assert all(np.abs(found["amg"][number].displacement).max() < 1e-12 for number in (1, 3))
+    assert not found["amg"][3].warnings + found["direct"][3].warnings

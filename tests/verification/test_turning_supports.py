@@ -46,6 +46,7 @@ def test_a_turned_end_takes_the_body_along_without_stress(kinematics, element, a
     last = fc.solve(model, steps)[-1]
     assert last.displacement == pytest.approx(turned(model.mesh.points, angle) - model.mesh.points, abs=1e-10)
     assert np.abs(last.stress).max() <= 1e-10
+    assert not last.warnings
 
 
 def test_the_axis_may_move_and_the_angle_have_a_history_of_its_own() -> None:
