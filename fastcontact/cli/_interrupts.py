@@ -21,7 +21,7 @@ from types import FrameType
 from typing import Any
 
 DELAY = 0.05  # time after which a signal is sent again [s]
-# Time in which another signal is ignored as a repetition of the last one [s].
+# Time during which another signal is ignored as a repetition of the last one [s].
 REPETITION = 0.5
 HANDLERS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 if hasattr(signal, "SIGHUP"):
@@ -33,14 +33,14 @@ COMMAND_LINE = "fastcontact.cli._main"
 
 
 @contextlib.contextmanager
-def interruptible(raised: list[int] | None = None) -> Iterator[None]:
+def interruptible(received: list[int] | None = None) -> Iterator[None]:
     """Let Ctrl-C, SIGTERM and SIGHUP interrupt a ``with`` block by KeyboardInterrupt, raised again if Python discards it.
 
-    The numbers of the signals received are appended to the list `raised`. Signals with a handler other than the default one
+    The numbers of the signals received are appended to the list `received`. Signals with a handler other than the default one
     keep it.
     """
     times: list[float] = []  # of signals whose exception was not discarded [s]
-    raised = [] if raised is None else raised
+    received = [] if received is None else received
     in_main_thread = threading.current_thread() is threading.main_thread()
     numbers = [number for number, default in HANDLERS.items() if in_main_thread and signal.getsignal(number) == default]
 
@@ -50,12 +50,12 @@ def interruptible(raised: list[int] | None = None) -> Iterator[None]:
         if _is_importing(frame):
             _send_later(number)
         else:
-            raised.append(number)
+            received.append(number)
             times.append(time.monotonic())
             raise KeyboardInterrupt
 
     try:
-        with _discarded_interrupts_repeated(raised, times), restoring_interrupt(raised):
+        with _repeating_discarded_interrupts(received, times), restoring_interrupt(received):
             for number in numbers:
                 signal.signal(number, interrupt)
             yield
@@ -65,32 +65,32 @@ def interruptible(raised: list[int] | None = None) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def restoring_interrupt(raised: list[int]) -> Iterator[None]:
+def restoring_interrupt(received: list[int]) -> Iterator[None]:
     """Raise KeyboardInterrupt if a C function has replaced the KeyboardInterrupt of a signal by another error.
 
-    `raised` contains the signals received. An error that is raised while KeyboardInterrupt is handled is genuine.
+    `received` contains the signals received. An error that is raised while KeyboardInterrupt is handled is genuine.
     """
     try:
         yield
     except Exception as error:
-        if raised and not isinstance(error.__context__, KeyboardInterrupt):
+        if received and not isinstance(error.__context__, KeyboardInterrupt):
             raise KeyboardInterrupt from error
         raise
 
 
 @contextlib.contextmanager
-def _discarded_interrupts_repeated(raised: list[int], times: list[float]) -> Iterator[None]:
+def _repeating_discarded_interrupts(received: list[int], times: list[float]) -> Iterator[None]:
     """Send a signal again if Python discards its KeyboardInterrupt; hide errors in finalisers after a signal.
 
-    `raised` contains the signals received, and `times` the times of those whose exception was not discarded.
+    `received` contains the signals received, and `times` the times of those whose exception was not discarded.
     """
     original = sys.unraisablehook
 
     def handle(unraisable: sys.UnraisableHookArgs) -> None:
         if issubclass(unraisable.exc_type, KeyboardInterrupt):
             times.clear()
-            _send_later(raised[-1] if raised else signal.SIGINT)
-        elif not raised:
+            _send_later(received[-1] if received else signal.SIGINT)
+        elif not received:
             original(unraisable)
 
     sys.unraisablehook = handle
@@ -100,7 +100,7 @@ def _discarded_interrupts_repeated(raised: list[int], times: list[float]) -> Ite
         sys.unraisablehook = original
 
 
-def forget(error: BaseException | None) -> None:
+def release_frames(error: BaseException | None) -> None:
     """Release the objects that an interrupted command was creating, and hide the messages of failing finalisers."""
     original, sys.unraisablehook = sys.unraisablehook, lambda ignored: None
     try:
@@ -111,7 +111,7 @@ def forget(error: BaseException | None) -> None:
         sys.unraisablehook = original
 
 
-def to_main_thread(number: int) -> None:
+def send_to_main_thread(number: int) -> None:
     """Send a signal to the main thread, which interrupts it even while it waits for a lock."""
     main = threading.main_thread().ident
     if hasattr(signal, "pthread_kill") and main is not None:
@@ -122,7 +122,7 @@ def to_main_thread(number: int) -> None:
 
 def _send_later(number: int) -> None:
     """Send a signal to the main thread after a delay."""
-    timer = threading.Timer(DELAY, to_main_thread, (number,))
+    timer = threading.Timer(DELAY, send_to_main_thread, (number,))
     timer.daemon = True
     timer.start()
 

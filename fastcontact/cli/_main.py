@@ -23,7 +23,7 @@ from typing import Any
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
 from fastcontact.cli._arguments import add_verbosity, declare
-from fastcontact.cli._interrupts import EXIT_CODES, forget, interruptible, restoring_interrupt
+from fastcontact.cli._interrupts import EXIT_CODES, interruptible, release_frames, restoring_interrupt
 from fastcontact.cli._terminal import encodable, say, stderr_is_terminal, warnings_shown
 from fastcontact.errors import ConvergenceError, FastcontactError, printable, unknown
 
@@ -144,29 +144,29 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
-    raised: list[int] = []
-    with interruptible(raised):  # error messages are printed within the block as well
-        return _run_with_exit_code(sys.argv[1:] if argv is None else list(argv), raised)
+    received: list[int] = []
+    with interruptible(received):  # error messages are printed within the block as well
+        return _run_with_exit_code(sys.argv[1:] if argv is None else list(argv), received)
 
 
-def _run_with_exit_code(words: list[str], raised: list[int]) -> int:
-    """Run a command, print its error and return the exit code; `raised` contains the signals received."""
+def _run_with_exit_code(words: list[str], received: list[int]) -> int:
+    """Run a command, print its error and return the exit code; `received` contains the signals received."""
     try:
-        with restoring_interrupt(raised):
+        with restoring_interrupt(received):
             return _run(words)
     except ConvergenceError as error:
         say("\n".join([f"no convergence: {error}", *history_lines(error.history), *_notes(error)]), error=True)
         return 2
     except FastcontactError as error:
         say(f"error: {error}", error=True)
-        forget(error)  # an interrupted study raises this error
-        return EXIT_CODES[raised[0]] if raised and raised[0] != signal.SIGINT else 1
+        release_frames(error)  # an interrupted study raises this error
+        return EXIT_CODES[received[0]] if received and received[0] != signal.SIGINT else 1
     except BrokenPipeError:
         return 1
     except KeyboardInterrupt as error:
-        number = raised[0] if raised else signal.SIGINT
+        number = received[0] if received else signal.SIGINT
         say("\n".join(["interrupted" if number == signal.SIGINT else "terminated", *_notes(error)]), error=True)
-        forget(error)
+        release_frames(error)
         return EXIT_CODES[number]
 
 

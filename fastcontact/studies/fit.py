@@ -6,11 +6,11 @@ The model of the values on meshes of size :math:`h_i` is
 
 with the limit L, the order p, a constant C and independent standard normal variables :math:`e_i`, so that s is the relative
 scatter of the mesh error. For each order p the parameters L, C and s are integrated out (Bayesian linear regression with
-weights :math:`h^{-2p}`; Zellner 1971, chapter 3), and the results are averaged with the evidence of the orders. The prior of
-p is log-normal. The prior of s^2 has the weight of one and a half meshes, so that a chance agreement of few meshes does not
-make the error bar too small. The first k meshes may be too coarse for a single power of h; each further mesh has the prior
-probability 1/2, as long as three meshes remain. The error bar is the distance from the median of L to the farther end of its
-95 % interval. The reasons for these choices are given in docs/theory/convergence.md.
+weights :math:`h^{-2p}`; Zellner 1971, chapter 3), and the results are averaged over the orders, weighted by their evidence.
+The prior of p is log-normal. The prior of s^2 has the weight of one and a half meshes, so that a chance agreement of a few
+meshes does not make the error bar too small. The first k meshes may be too coarse for a single power of h; the prior
+probability of each further coarse mesh is 1/2, as long as three meshes remain. The error bar is the distance from the median
+of L to the farther end of its 95 % interval. The reasons for these choices are given in docs/theory/convergence.md.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
     x = size / np.exp(np.log(size).mean())
     floor = (ROUND_OFF * np.abs(value).max() / scale) ** 2
     centre, width, evidence = np.concatenate(
-        [_regressions(x, (value - value[-1]) / scale, floor, coarse) for coarse in range(len(value) - 2)], axis=1
+        [_regressions(x, (value - value[-1]) / scale, floor, n_coarse) for n_coarse in range(len(value) - 2)], axis=1
     )
     weight = np.exp(evidence - evidence.max())
     weight /= weight.sum()
@@ -134,16 +134,16 @@ def _checked(h: ArrayLike, values: ArrayLike) -> tuple[Array, Array]:
     return size, value
 
 
-def _regressions(x: Array, y: Array, floor: float, coarse: int) -> Array:
+def _regressions(x: Array, y: Array, floor: float, n_coarse: int) -> Array:
     """Return location and scale of the Student distribution of the limit, and the logarithm of the evidence (3, n_orders).
 
     `x` (n,) and `y` (n,) are normalised mesh sizes and values [-], and `floor` is added to the sum of squares. The first
-    `coarse` meshes are assumed to be too coarse for a single power of the mesh size.
+    `n_coarse` meshes are assumed to be too coarse for a single power of the mesh size.
     """
     result = np.empty((3, len(ORDERS)))
     dof = len(x) - 2 + PRIOR_WEIGHT
-    noise = np.where(np.arange(len(x)) < coarse, COARSE_NOISE, 1.0)
-    prior = coarse * np.log(COARSE_PROBABILITY / COARSE_NOISE)
+    noise = np.where(np.arange(len(x)) < n_coarse, COARSE_NOISE, 1.0)
+    prior = n_coarse * np.log(COARSE_PROBABILITY / COARSE_NOISE)
     for i, p in enumerate(ORDERS):
         spread = noise * x**p
         A = np.column_stack([1.0 / spread, 1.0 / noise])
