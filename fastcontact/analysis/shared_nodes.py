@@ -1,8 +1,8 @@
-"""Nodes shared by several contact pairs, or by both ends of a period or sector: one constraint with distributed force.
+"""Merging of the constraints at nodes of several contact pairs, or at both ends of a periodic part or sector.
 
 A node of several pairs behaves like a node of one pair over all their facets. Its constraints are linearly dependent. They
-determine only the sum of their forces and cannot all be eliminated, so that their mean replaces them. This constraint has
-the sum of their areas, so that penalties add up, and their mean coefficient of friction. Each pair carries a fraction of the
+determine only the sum of their forces and cannot all be eliminated. They are therefore replaced by their mean, which has the
+sum of their areas, so that penalties add up, and their mean coefficient of friction. Each pair carries a fraction of the
 force that is proportional to its area, so that the pressures are equal. Of several clearances at one node, only the smallest
 can close. Constraints with a coupled normal compliance or with different clearances are not merged.
 
@@ -40,7 +40,7 @@ class SharedNodes:
     normal_fraction, tangential_fraction : ndarray (m,)
         Fraction of each constraint in the normal and in the tangential force of its representative [-].
     frame : ndarray (m, k, dim)
-        Tangents of the constraints, at second ends of periods rotated to the first one [-].
+        Tangents of the constraints [-]; those at the second end of a periodic part are rotated to the first end.
     """
 
     representative: Indices
@@ -51,7 +51,7 @@ class SharedNodes:
 
     @classmethod
     def of(cls, constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface] = ()) -> SharedNodes | None:
-        """Return the shared nodes of all pairs; None if no node is in several pairs, or at both ends of a period."""
+        """Return the shared nodes of all pairs; None if there are no such nodes."""
         first, second, behind = _dependent(constraints)
         ends = _at_periodic_interfaces(constraints, interfaces, behind)
         if not len(second) + len(behind) + ends.shape[1]:
@@ -106,10 +106,13 @@ class SharedNodes:
         """Return the rows (m, n_dofs) of the mean slip of each representative along its own tangents."""
         products = np.einsum("mjd,mkd->jkm", self.frame, self.frame[self.representative])
         sums = [[self._summation(self.tangential_fraction * factor) for factor in factors] for factors in products]
-        return tuple(csr_array(sum(M @ T for M, T in zip(of_axis, constraints.tangents))) for of_axis in zip(*sums))
+        return tuple(csr_array(sum(M @ T for M, T in zip(matrices, constraints.tangents))) for matrices in zip(*sums))
 
     def _mean(self, components: Array, weight: Array) -> Array:
-        """Return the weighted means, along the representatives' tangents, of components along the tangents (m, k)."""
+        """Return the weighted means (m, k) of vectors over the constraints of each representative.
+
+        Vectors are given by their `components` (m, k) along the tangents of their constraints, and means likewise.
+        """
         vectors = np.einsum("mk,mkd->md", weight[:, None] * components, self.frame)
         return np.einsum("md,mkd->mk", self.summed(vectors), self.frame)
 
@@ -159,7 +162,7 @@ class SharedNodes:
 
 
 def _frame(constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface]) -> Array:
-    """Return the tangents (m, k, dim) of constraints, at second ends of periods rotated back to the first one [-]."""
+    """Return the tangents (m, k, dim) [-] of constraints, rotated to the first end at the second end of a periodic part."""
     m, dim = constraints.positions.shape
     frame = np.stack(constraints.directions, axis=1) if constraints.directions else np.zeros((m, 0, dim))
     for interface in interfaces:
@@ -209,8 +212,8 @@ def _stiffness(softness: Array) -> Array:
 def _fractions(constraints: StackedConstraints, representative: Indices) -> tuple[Array, Array]:
     """Return the fractions (m,) of normal and tangential forces that constraints carry [-].
 
-    Normal forces are distributed by stiffness if all constraints of a node are compliant, otherwise by area among the exact
-    ones. Tangential forces are distributed by friction limit, so that a sliding node slides in each pair.
+    Normal forces are distributed by stiffness if all constraints of a node are compliant, otherwise by area among those
+    without compliance. Tangential forces are distributed by friction limit, so that a sliding node slides in each pair.
     """
     m = len(representative)
     is_shared = np.bincount(representative, minlength=m)[representative] > 1  # others may lack an area

@@ -10,7 +10,7 @@ from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from fastcontact.cli._interrupts import to_main_thread
+from fastcontact.cli._interrupts import send_to_main_thread
 from fastcontact.cli._outputs import check_outputs, save, write_json, write_text
 from fastcontact.cli._terminal import say, stderr_is_terminal
 from fastcontact.errors import CaseError, FastcontactError
@@ -80,7 +80,7 @@ def _failing_threads_interrupt() -> Iterator[list[BaseException]]:
     def record_failure(arguments: threading.ExceptHookArgs) -> None:
         if arguments.exc_value is not None:
             failures.append(arguments.exc_value)
-        to_main_thread(signal.SIGINT)
+        send_to_main_thread(signal.SIGINT)
 
     threading.excepthook = record_failure
     try:

@@ -13,7 +13,7 @@ from fastcontact.arrays import AnyArray, Array, Mask, Numbers
 from fastcontact.elasticity.incompatible_modes import MODES
 from fastcontact.elasticity.initial_states import InitialState, StressOffset
 from fastcontact.elasticity.materials import MODULI, Material
-from fastcontact.elasticity.varying_constants import centre, positions
+from fastcontact.elasticity.varying_constants import centre_weights, positions
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
@@ -202,7 +202,7 @@ def material_field(
     for index, material, name, block, cells in of_materials:
         if material.varies:
             centres = mesh.points[block[cells]].mean(axis=1)
-            rows[name][cells] = add(index, centres, material.constants_at(name, cells, centre(name)))
+            rows[name][cells] = add(index, centres, material.constants_at(name, cells, centre_weights(name)))
     for index, material, name, block, cells in of_materials:
         if material.varies_inside:
             N = elements.get(name).tables[0]

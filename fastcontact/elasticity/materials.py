@@ -110,7 +110,7 @@ class Material:
         Cells with a mean dilatation use the constants at their centres instead.
         """
         varying_constants = [v for name in (*MODULI, "expansion") for v in varying(getattr(self, name, None))]
-        return (callable(self.axes) or any(v.inside for v in varying_constants)) and not self.averaged
+        return (callable(self.axes) or any(v.varies_within_cells for v in varying_constants)) and not self.averaged
 
     def check_thermal_and_density(self, most: int) -> None:
         """Raise ModelError if the density is negative or a thermal constant is inadmissible.

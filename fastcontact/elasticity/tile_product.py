@@ -14,35 +14,37 @@ from fastcontact._jit.decorators import compiled
 
 
 def tile_plain(
-    left: Any, first: int, b: int, right: Any, second: int, a: int, n: int, out: Any, row: int, fresh: bool
-) -> None:
-    """Add a tile of ``left.T @ right`` to the tile of `out` that begins at (row, a), or replace this if `fresh` is true.
+    left: Any, left_row: int, left_column: int, right: Any, right_row: int, column: int, n: int, out: Any, row: int,
+    overwrite: bool,
+) -> None:  # fmt: skip
+    """Add a 4 x 4 tile of ``left.T @ right`` to the tile of `out` that begins at (row, column), or overwrite the latter.
 
     Parameters
     ----------
     left, right, out : ndarray (n_rows, n_columns)
         In C order. Indices are not checked.
-    first, second : int
+    left_row, right_row : int
         First rows of the factors in `left` and in `right`.
-    b, a : int
+    left_column, column : int
         First columns of the factors in `left` and in `right`.
     n : int
         Number of rows of both factors.
     row : int
-        First row of the tile in `out`; its first column is `a`.
-    fresh : bool
-        Whether the tile is replaced.
+        First row of the tile in `out`; its first column is `column`.
+    overwrite : bool
+        Whether the tile is overwritten.
     """
-    product = left[first : first + n, b : b + 4].T @ right[second : second + n, a : a + 4]
-    target = out[row : row + 4, a : a + 4]
-    target[:] = product if fresh else target + product
+    factor = left[left_row : left_row + n, left_column : left_column + 4]
+    product = factor.T @ right[right_row : right_row + n, column : column + 4]
+    target = out[row : row + 4, column : column + 4]
+    target[:] = product if overwrite else target + product
 
 
 def tile_in_vectors(
-    _context: Any, left: Any, first: Any, b: Any, right: Any, second: Any, a: Any, n: Any, out: Any, row: Any,
-    fresh: Any,
+    _context: Any, left: Any, left_row: Any, left_column: Any, right: Any, right_row: Any, column: Any, n: Any, out: Any,
+    row: Any, overwrite: Any,
 ) -> Any:  # fmt: skip
-    """Return the signature and the code generator of `tile_plain`, as an intrinsic of Numba."""
+    """Return the signature and the code generator of `tile_plain` for `numba.extending.intrinsic`."""
     from llvmlite import ir
     from numba.core import cgutils, types
 
@@ -55,7 +57,7 @@ def tile_in_vectors(
             start = builder.gep(array.data, [builder.add(builder.mul(row, width), column)])
             return builder.bitcast(start, vector.as_pointer())
 
-        first, all_lanes = ir.Constant(ir.IntType(32), 0), ir.Constant(ir.VectorType(ir.IntType(32), 4), [0] * 4)
+        lane_zero, all_lanes = ir.Constant(ir.IntType(32), 0), ir.Constant(ir.VectorType(ir.IntType(32), 4), [0] * 4)
         row_of_left, row_of_right, sums = args[1], args[4], []
         for k in range(4):
             pointer = address(7, builder.add(args[8], args[8].type(k)), args[5])
@@ -67,7 +69,7 @@ def tile_in_vectors(
             x = builder.load(address(3, builder.add(row_of_right, loop.index), args[5]), align=8)
             for k, (_, total) in enumerate(sums):
                 number = builder.load(builder.gep(y, [ir.Constant(ir.IntType(64), k)]), align=8)
-                lane = builder.insert_element(ir.Constant(vector, ir.Undefined), number, first)
+                lane = builder.insert_element(ir.Constant(vector, ir.Undefined), number, lane_zero)
                 factor = builder.shuffle_vector(lane, ir.Constant(vector, ir.Undefined), all_lanes)
                 builder.store(builder.fadd(builder.load(total), builder.fmul(factor, x)), total)
         for pointer, total in sums:

@@ -24,7 +24,7 @@ AXES = ("x", "y", "z", "radius")
 @typed(ModelError)
 @dataclass(frozen=True)
 class Tabulated:
-    """A tabulated function of one coordinate, which is piecewise linear and constant beyond both ends of the table.
+    """A piecewise linear function of one coordinate, given by a table and constant beyond both ends of the table.
 
     It can be used for material constants, temperatures, pressures and all other quantities that may be functions of position.
 
@@ -38,7 +38,7 @@ class Tabulated:
     Raises
     ------
     ModelError
-        If a number is not finite, or the coordinates do not ascend.
+        If a number is not finite, or the coordinates are not in ascending order.
 
     Examples
     --------
@@ -98,13 +98,13 @@ class Cells:
 
         The points are first the centres of the cells, then their quadrature points.
         """
-        for shapes in (centre, lambda name: elements.get(name).tables[0]):
+        for shapes in (centre_weights, lambda name: elements.get(name).tables[0]):
             for name, rows in self.rows.items():
                 yield name, rows, shapes(name)
 
 
-def centre(name: str) -> Array:
-    """Return the weights (1, n_nodes) [-] of the nodes of a cell in its centre, which is the mean of the nodes."""
+def centre_weights(name: str) -> Array:
+    """Return the weights (1, n_nodes) [-] of the nodes of a cell at its centre, which is the mean of their positions."""
     n = elements.get(name).n_nodes
     return np.full((1, n), 1.0 / n)
 
@@ -174,7 +174,7 @@ class Varying:
             self._by_cell = _by_cell(values, cells)
 
     @property
-    def inside(self) -> bool:
+    def varies_within_cells(self) -> bool:
         """Whether the constant varies within cells."""
         return self._by_cell is None
 
@@ -225,7 +225,7 @@ class CellAxes(Varying):
 
 
 def _by_cell(values: Array, cells: Cells) -> dict[str, Array]:
-    """Return values given for `cells` or for all solid cells as arrays by element type, with NaN for other cells."""
+    """Return arrays by element type of values that are given for `cells` or for all solid cells, with NaN for other cells."""
     blocks, first = {}, 0
     for name, block in cells.mesh.solids.items():
         blocks[name] = np.full((len(block), *values.shape[1:]), np.nan)
@@ -246,8 +246,8 @@ def positions(mesh: Mesh, nodes: Numbers, N: Array) -> Array:
 def wrapped(value: Any, vector: bool = False) -> Any:
     """Return functions and arrays as `Varying`, and numbers and None unchanged.
 
-    If `vector` is true, a sequence of constants is converted item by item. ModelError if an array does not contain real
-    numbers.
+    If `vector` is true, a sequence of constants is converted item by item. Raises ModelError if an array does not contain
+    real numbers.
     """
     if vector and isinstance(value, Sequence) and not isinstance(value, str):
         return tuple(wrapped(v) for v in value)
@@ -268,10 +268,10 @@ def wrapped(value: Any, vector: bool = False) -> Any:
 
 
 def mapped(value: Any, function: Callable[[Any], Any]) -> Any:
-    """Return `function` of a constant, or the tuple of its results for a tuple of constants."""
+    """Apply `function` to a constant, or to each item of a tuple of constants."""
     return tuple(function(v) for v in value) if isinstance(value, tuple) else function(value)
 
 
 def varying(value: Any) -> list[Varying]:
-    """Return the constants that vary among one constant or a tuple of constants."""
+    """Return those of one constant, or of a tuple of constants, that vary with position."""
     return [v for v in (value if isinstance(value, tuple) else (value,)) if isinstance(v, Varying)]

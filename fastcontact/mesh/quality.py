@@ -131,9 +131,9 @@ def poorest_cell(mesh: Mesh) -> str:
     such effect; Babuska and Aziz, 1976), or if it is nearly flat in 3D.
     """
     for name in mesh.solids:
-        measure, low, high, longest = _extremes(mesh, name)
+        measure, min_det, max_det, longest = _extremes(mesh, name)
         # For each criterion: the excess over its limit, the value, and the text of the message.
-        ratio, volume = low / high, measure / longest**3
+        ratio, volume = min_det / max_det, measure / longest**3
         text = "its smallest Jacobian is {:.2g} of its largest; move its nodes or remesh"
         criteria = [(LEAST_JACOBIAN_RATIO - ratio, ratio, text)]
         if mesh.dim == 2:
@@ -207,17 +207,17 @@ def corner_angles(corners: Array) -> Array:
 
 def _bad_cells(mesh: Mesh, name: str) -> tuple[Array, Mask, Mask]:
     """Return the area or volume (n_cells,) of the cells of one type, and the masks of degenerate and of inverted cells."""
-    measure, low, high, longest = _extremes(mesh, name)
+    measure, min_det, max_det, longest = _extremes(mesh, name)
     tolerance = _ROUND_OFF * longest**mesh.dim
-    degenerate = np.maximum(np.abs(low), np.abs(high)) <= tolerance
-    return measure, degenerate, (low <= tolerance) & ~degenerate
+    degenerate = np.maximum(np.abs(min_det), np.abs(max_det)) <= tolerance
+    return measure, degenerate, (min_det <= tolerance) & ~degenerate
 
 
 def _extremes(mesh: Mesh, name: str) -> tuple[Array, Array, Array, Array]:
     """Return the area or volume, the smallest and the largest Jacobian, and the longest edge of each cell (n_cells,)."""
     element = elements.get(name)
-    _, gradients, weights = element.tables
-    low, high, measure, longest = np.empty((4, len(mesh.cells[name])))
+    _, dN, weights = element.tables
+    min_det, max_det, measure, longest = np.empty((4, len(mesh.cells[name])))
     edges = np.array(element.edges, np.intp)
-    quality_kernels.extremes(mesh.points, mesh.cells[name], gradients, weights, edges, low, high, measure, longest)
-    return measure, low, high, longest
+    quality_kernels.extremes(mesh.points, mesh.cells[name], dN, weights, edges, min_det, max_det, measure, longest)
+    return measure, min_det, max_det, longest

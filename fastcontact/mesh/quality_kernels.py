@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Jacobian determinants at the quadrature points of solid cells, and the longest edges, for the detection of poor cells."""
+"""Jacobian determinants at the quadrature points of solid cells, and the longest edges, to detect poorly shaped cells."""
 
 import numpy as np
 
@@ -28,7 +28,7 @@ def _determinant_3d(x, slopes, q):
 
 
 @interpretable_kernel
-def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
+def extremes(points, cells, dN, weights, edges, min_det, max_det, measure, longest):
     """Fill the smallest and largest det J, the area or volume, and the longest edge of each cell, all (n_cells,).
 
     Parameters
@@ -43,7 +43,7 @@ def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
         Weights of the quadrature points.
     edges : (n_edges, 2)
         Local end nodes of the edges, which are treated as straight.
-    low, high, measure, longest : (n_cells,)
+    min_det, max_det, measure, longest : (n_cells,)
         Smallest and largest det J, area or volume, and longest edge.
     """
     n_q, n_nodes, dim = dN.shape
@@ -57,7 +57,7 @@ def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
             det = _determinant_2d(x, slopes, q) if dim == 2 else _determinant_3d(x, slopes, q)
             smallest, largest = min(smallest, det), max(largest, det)
             total += weights[q] * det
-        low[c], high[c], measure[c] = smallest, largest, total
+        min_det[c], max_det[c], measure[c] = smallest, largest, total
         largest_square = 0.0
         for e in range(edges.shape[0]):
             length_squared = 0.0

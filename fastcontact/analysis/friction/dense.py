@@ -1,7 +1,8 @@
-"""Contact with Coulomb friction on a dense Delassus operator.
+"""Solution of contact problems with Coulomb friction by means of a dense Delassus operator.
 
-The gaps g and the slips s depend on the normal forces n and the tangential forces t as ``(g, s) = free + F (n, t)``. Three
-methods are combined, see `_Problem.starts`:
+The gaps g and the slips s depend on the normal forces n and the tangential forces t as ``(g, s) = free + F (n, t)``,
+where F is the Delassus operator, and ``free`` are the gaps and slips without contact forces. Three methods are combined, see
+`_Problem.starts`:
 
 1. Newton's method with and without a line search, see `cone_newton`. In 2D it is an active set method, in which the state
    of a constraint is open, stick, or slip in one of two directions.
@@ -29,10 +30,11 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION,
 # Numbers of edges of the polyhedral cones that are tried in 3D, and largest size of a linear complementarity problem.
 EDGES, LARGEST = (8, 32), 2500
 # If slips are linearly dependent, tangential forces are not unique. Examples are nodes that belong to several surfaces, and
-# nodes that supports hold on one side of the contact. F counts as singular if a squared pivot of its scaled Cholesky factor
-# is below LENGTH_ROUND_OFF. A compliance, relative to that of the gaps, is then added to slips and equations: the first value
-# of REGULARISATION and, if it does not suffice, the second. If the elastic slip due to this compliance exceeds
-# SINGLE_PRECISION, relative to the gaps and slips without forces, the forces are not in equilibrium: the bodies jam.
+# nodes that are supported on one side of the contact. F counts as singular if a squared pivot of its scaled Cholesky factor
+# is below LENGTH_ROUND_OFF. A compliance, relative to that of the gaps, is then added to the diagonal entries of slips and
+# equations: the first value of REGULARISATION and, if it does not suffice, the second. If the elastic slip due to this
+# compliance exceeds SINGLE_PRECISION, relative to the gaps and slips without forces, the forces are not in equilibrium: the
+# bodies jam.
 REGULARISATION = ROUND_OFF, LENGTH_ROUND_OFF
 
 
@@ -154,7 +156,7 @@ class _Problem:
         """Return forces (1 + k, m) near a solution, from `y` with a compliance that decreases to round-off.
 
         Where constraints are nearly dependent, such as those of two pairs on one facet, Newton's method may alternate between
-        contact states, which a compliance prevents. Relative to that of the gaps, the compliance begins with NOTABLE. It is
+        contact states, which a compliance prevents. The compliance, relative to that of the gaps, starts at NOTABLE. It is
         reduced by the factor NOTABLE after each solution, or by less if the method then fails.
         """
         compliance, last, halvings = NOTABLE, 1.0, 0
@@ -225,10 +227,10 @@ def _dense_solution(A: Array, right: Array) -> Array:
 
 
 def _polyhedral_forces(problem: _Problem, edges: int) -> Array | None:
-    """Return the forces (1 + k, m) for a friction cone of `edges` edges; None if it is too large or Lemke's method fails.
+    """Return the forces (1 + k, m) for a friction cone of `edges` edges; None if Lemke's method fails or is too expensive.
 
     The unknowns of the linear complementarity problem are the normal forces, the tangential forces along each edge, the
-    tensile forces of equations, and the largest slip along an edge (Stewart and Trinkle, 1996).
+    tensile forces of equality constraints, and the largest slip along an edge (Stewart and Trinkle, 1996).
     """
     k, m = len(problem.free) - 1, problem.free.shape[1]
     equations = np.flatnonzero(problem.law.equality)

@@ -84,14 +84,14 @@ class MeshedSurface:
             )
 
     def distance(self, points: Array) -> tuple[Array, Array]:
-        """See `Obstacle.distance`; infinite beyond the border of an open surface."""
+        """See `Obstacle.distance`. The distance is infinite beyond the border of an open surface."""
         dim = self.mesh.dim
         if points.shape[1] != dim:
             raise ContactError(
                 f"the rigid surface '{self.group}' has {dim} dimensions, but the model {points.shape[1]}"
             )
         closest = closest_of_kinds(points, [block.corners for block in self._facets.blocks])
-        pseudonormal, smooth, on_edge, on_border = self._frames(closest)
+        pseudonormal, smooth, on_edge, on_border = self._closest_normals(closest)
         offset = points - closest.position
         extents = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._facets.blocks]
         size = np.concatenate(extents)[closest.facet]
@@ -101,23 +101,24 @@ class MeshedSurface:
         distance = np.where(outside, closest.distance, -closest.distance)
         normal = smooth if self.crease else np.where(on_edge[:, None], smooth, closest.normal)
         pseudonormal /= np.linalg.norm(pseudonormal, axis=1, keepdims=True)
-        # Next to a sharp edge the normal lies between the point and its closest point, not along the normal of either facet.
+        # Next to a sharp edge the normal has the direction from the closest point to the point, not that of a facet normal.
         sharp = np.einsum("nd,nd->n", pseudonormal, smooth) < np.cos(np.radians(0.5 * self.crease)) - LENGTH_ROUND_OFF
         is_corrected = on_edge & sharp & ~is_touching
         normal[is_corrected] = offset[is_corrected] / distance[is_corrected, None]
         height = np.abs(np.einsum("nd,nd->n", offset, pseudonormal))
         overhang = np.sqrt(np.maximum(closest.distance**2 - height**2, 0.0))
-        # At a plane of symmetry, facets of a smooth surface are inclined by up to half the crease angle, and points slightly
-        # beyond their borders remain in contact.
+        # At a plane of symmetry, the last facet may be inclined to the smooth surface of the full model by up to half the
+        # crease angle. Points slightly beyond its border must therefore remain in contact.
         slope = np.tan(np.radians(0.5 * MeshedSurface.crease))
         beyond_border = on_border & (overhang > BESIDE * size) & (overhang > slope * height)
         return np.where(beyond_border, np.inf, distance), normal
 
-    def _frames(self, closest: Closest) -> tuple[Array, Array, Mask, Mask]:
+    def _closest_normals(self, closest: Closest) -> tuple[Array, Array, Mask, Mask]:
         """Return pseudonormals (n, dim), smooth normals (n, dim), and which projections lie on edges and on the border.
 
-        The pseudonormal always gives the correct sign of the distance. It is the normal inside a facet, the mean of the
-        adjacent facets on an edge, and the angle-weighted mean of all facets at a corner (Baerentzen and Aanaes, 2005).
+        The pseudonormal always gives the correct sign of the distance. It is the facet normal inside a facet, the mean normal
+        of the adjacent facets on an edge, and the angle-weighted mean normal of all facets at a corner (Baerentzen and
+        Aanaes, 2005).
         """
         pseudonormal, smooth = closest.normal.copy(), np.empty_like(closest.normal)
         on_edge, on_border = np.zeros(len(pseudonormal), bool), np.zeros(len(pseudonormal), bool)
@@ -128,17 +129,18 @@ class MeshedSurface:
             mean = np.einsum("nk,nkd->nd", block.element.shape(xi), normals[rows])
             smooth[in_block] = mean / np.linalg.norm(mean, axis=1, keepdims=True)
             corner, edge = _corners_and_edges(block, xi)
-            on = np.flatnonzero(corner >= 0)
-            node = block.nodes[rows[on], corner[on]]
-            pseudonormal[in_block[on]], on_border[in_block[on]] = facets.at_points[node], facets.on_border[node]
-            on = np.flatnonzero(edge >= 0)
-            beyond = facets.beyond[closest.facet[in_block[on]], edge[on]]
-            pseudonormal[in_block[on]] += self._beyond_edges(block, rows[on], edge[on], beyond, xi[on])
-            on_border[in_block[on]] = beyond < 0
+            at_corner, at_edge = np.flatnonzero(corner >= 0), np.flatnonzero(edge >= 0)
+            node = block.nodes[rows[at_corner], corner[at_corner]]
+            pseudonormal[in_block[at_corner]] = facets.at_points[node]
+            on_border[in_block[at_corner]] = facets.on_border[node]
+            projections, edges = in_block[at_edge], edge[at_edge]
+            beyond = facets.beyond[closest.facet[projections], edges]
+            pseudonormal[projections] += self._normals_beyond_edges(block, rows[at_edge], edges, beyond, xi[at_edge])
+            on_border[projections] = beyond < 0
             on_edge[in_block] = (corner >= 0) | (edge >= 0)
         return pseudonormal, smooth, on_edge, on_border
 
-    def _beyond_edges(self, block: Block, rows: Indices, edge: Indices, beyond: Indices, xi: Array) -> Array:
+    def _normals_beyond_edges(self, block: Block, rows: Indices, edge: Indices, beyond: Indices, xi: Array) -> Array:
         """Return the normals (n, 3) of the facets `beyond` edges, at the same points; zero where there is none."""
         ends = np.array(block.element.edges)[edge]
         a, b = block.element.nodes[ends[:, 0]], block.element.nodes[ends[:, 1]]
@@ -154,7 +156,7 @@ class MeshedSurface:
 
 
 def _corners_and_edges(block: Block, xi: Array) -> tuple[Indices, Indices]:
-    """Return the corners (n,) and edges (n,) of facets on which reference coordinates lie, -1 for none."""
+    """Return the corners (n,) and edges (n,) of facets on which points with reference coordinates `xi` lie, -1 for none."""
     element = block.element
     none = np.full(len(xi), -1, np.intp)
     if element.dim == 1:

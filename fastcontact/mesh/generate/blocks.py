@@ -22,7 +22,7 @@ from fastcontact.mesh.generate._spacing import (
 )
 from fastcontact.mesh.generate._triangulate import filled
 from fastcontact.mesh.generate.half_spheres import quarter_disc
-from fastcontact.mesh.generate.quadratic import in_element
+from fastcontact.mesh.generate.quadratic import converted_to
 from fastcontact.mesh.generate.transform import renamed, union, with_points_at
 from fastcontact.mesh.mesh import Mesh
 
@@ -81,7 +81,7 @@ def block(
 def _block_mesh(grid: Array, element: str, name: str) -> Mesh:
     """Return the mesh of a grid with cells of type `element` and with groups for its sides and corners."""
     sides = {side: side for side in ("BOTTOM", "RIGHT", "TOP", "LEFT")}
-    mesh = in_element(structured(grid, name, sides, triangles=element in TRIANGLES), element)
+    mesh = converted_to(structured(grid, name, sides, triangles=element in TRIANGLES), element)
     corners = {"BOTTOM_LEFT": grid[0, 0], "BOTTOM_RIGHT": grid[-1, 0]}
     return with_points_at(mesh, {**corners, "TOP_RIGHT": grid[-1, -1], "TOP_LEFT": grid[0, -1]})
 
@@ -237,5 +237,5 @@ def _free_block(element: str, width: float, height: float, spacing: Spacing) -> 
         (name, divided(partial(straight, start, end), math.dist(start, end), spacing))
         for name, start, end in zip(names, corners, corners[1:] + corners[:1], strict=True)
     ]
-    mesh = in_element(filled("BLOCK", sides, spacing), element)
+    mesh = converted_to(filled("BLOCK", sides, spacing), element)
     return renamed(with_points_at(mesh, {"TOP_LEFT": (0.0, 0.0)}), _BLOCK_NAMES.get)

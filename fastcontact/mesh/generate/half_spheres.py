@@ -13,7 +13,7 @@ from fastcontact.errors import MeshError
 from fastcontact.mesh.generate._check import FACES, TRIANGLES, affordable, count, each, one_of, positive, unused, within
 from fastcontact.mesh.generate._spacing import Spacing, arc, divided, geometric, straight, structured, transfinite
 from fastcontact.mesh.generate._triangulate import filled
-from fastcontact.mesh.generate.quadratic import Circle, in_element
+from fastcontact.mesh.generate.quadratic import Circle, converted_to
 from fastcontact.mesh.generate.transform import merge_points, mirrored, union, with_points_at
 from fastcontact.mesh.mesh import Mesh
 
@@ -140,7 +140,7 @@ def quarter_disc(
         sizes = {"size": size, "contact_size": contact_size, "contact_radius": contact_radius}
         unused(element, "arc_sizes", "radial_sizes", "segments", **sizes)
         linear = _quadrangle_mesh(R, arc_sizes, segments, radial_sizes)
-    disc = in_element(linear, element, [Circle((0.0, -R), R, group) for group in ("CONT1", "D1B1")])
+    disc = converted_to(linear, element, [Circle((0.0, -R), R, group) for group in ("CONT1", "D1B1")])
     return disc if body == "lower" else mirrored(disc, "y", rename=_UPPER)
 
 
@@ -277,4 +277,4 @@ def _ring(element: str, radii: tuple[float, float], divisions: list[int], name: 
     groups = {"LEFT": sides[0], "RIGHT": sides[1], "BOTTOM": "SYMMETRY_Y", "TOP": "SYMMETRY_X"}
     mesh = structured(grid, name, groups, triangles=element in TRIANGLES)
     circles = [Circle((0.0, 0.0), radius, group) for radius, group in zip(radii, sides, strict=True)]
-    return in_element(mesh, element, circles)
+    return converted_to(mesh, element, circles)

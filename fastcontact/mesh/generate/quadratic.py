@@ -78,7 +78,7 @@ class Circle:
 
 @typed(MeshError)
 def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool = False) -> Mesh:
-    """Return the quadratic mesh, with a mid-side node on every edge, of a linear mesh.
+    """Convert a linear mesh to a quadratic mesh with a mid-side node on every edge.
 
     For example tri3 cells become tri6, quad4 quad8 or quad9, and hex8 hex20 cells. A mid-side node lies half-way between the
     ends of its edge. If the edge belongs to a facet in the group of a curve and both ends lie on the curve, the mid-side
@@ -133,8 +133,8 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
     return result
 
 
-def in_element(mesh: Mesh, element: str, curves: Iterable[Curve] = ()) -> Mesh:
-    """Return a linear mesh after a check of its cells, converted by `to_quadratic` if `element` is quadratic."""
+def converted_to(mesh: Mesh, element: str, curves: Iterable[Curve] = ()) -> Mesh:
+    """Check the cells of a linear mesh and return it, converted by `to_quadratic` if `element` is quadratic."""
     if elements.get(element).order == 1:
         check_cells(mesh)
         return mesh
@@ -144,7 +144,7 @@ def in_element(mesh: Mesh, element: str, curves: Iterable[Curve] = ()) -> Mesh:
 def _quadratic_names(mesh: Mesh, centre_nodes: bool) -> dict[str, str]:
     """Return the quadratic element type for each element type of the mesh."""
     if centre_nodes and mesh.dim != 2:
-        raise MeshError("centre_nodes is for 2D meshes: leave it out, and cells get mid nodes on their edges only")
+        raise MeshError("centre_nodes is for 2D meshes: leave it out, and cells get mid-side nodes only")
     names = {}
     for name in mesh.cells:
         element = elements.get(name)

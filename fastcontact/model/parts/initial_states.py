@@ -39,7 +39,7 @@ class ModelInitialStates(ModelLoads):
         times: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Prescribe the temperature of groups of solid cells, whose materials need a coefficient of thermal `expansion`.
+        """Prescribe the temperature of groups of solid cells, whose materials need a coefficient of thermal expansion.
 
         Temperatures are nodal: a cell adjacent to a group has a temperature gradient where it shares nodes with the group.
         If several temperatures act on a node, their rises above the reference temperatures are added.
@@ -261,7 +261,7 @@ class ModelInitialStates(ModelLoads):
         self, temperature_factors: Sequence[float] = (), initial_factors: Sequence[float] = (),
         field: MaterialField | None = None, temperature: Array | None = None,
     ) -> StressOffset | None:  # fmt: skip
-        """Return the stresses of thermal strains and initial states, which add to the stresses of the displacements.
+        """Return the stresses due to thermal strains and initial states, which are added to those due to displacements.
 
         Return None if there are no such stresses. `temperature_factors` and `initial_factors` are the multipliers of the
         temperatures and of the initial states, which `StepResult.iterations` contains under these names. With heat
@@ -276,7 +276,7 @@ class ModelInitialStates(ModelLoads):
         return (field or self.material_field()).offset(rise, states, self.mesh.n_points)
 
     def thermal_forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return the nodal forces (n_points, dim) [force] of thermal strains at multiplier 1, by history.
+        """Return the nodal forces (n_points, dim) [force] due to thermal strains at multiplier 1, by ramp.
 
         Raises ModelError if a cell with a temperature rise has a material without a coefficient of thermal expansion.
         """
@@ -304,7 +304,7 @@ class ModelInitialStates(ModelLoads):
         return self._forces_of(field, field.offset(rise))
 
     def initial_forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return the nodal forces (n_points, dim) [force] of initial stresses and strains at multiplier 1, by history."""
+        """Return the nodal forces (n_points, dim) [force] due to initial stresses and strains at multiplier 1, by ramp."""
         by_ramp: dict[Table | None, Array] = {}
         if not self.initial_states:
             return by_ramp

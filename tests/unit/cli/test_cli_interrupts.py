@@ -162,11 +162,11 @@ def test_a_signal_that_follows_at_once_changes_nothing(second, monkeypatch, caps
 
 @pytest.mark.parametrize("where", [in_an_import, in_a_finaliser])
 def test_a_sigterm_that_would_be_lost_comes_later(where, capsys):
-    raised = []
-    with interruptible(raised):
+    received = []
+    with interruptible(received):
         where(lambda: signal.raise_signal(signal.SIGTERM))
         interrupted_within(60)
-    assert signal.SIGTERM in raised
+    assert signal.SIGTERM in received
     assert capsys.readouterr().err == ""
 
 

@@ -327,13 +327,13 @@ def test_as_many_cells_as_points_is_no_array():
     for n in (2, 8, 9):
         model = fc.Model(wheel, "plane_strain")
         model.add_material(fc.LinearElastic(np.ones(n), 0.3), "A")
-        assert model.materials[0][0].E.inside == (n == 9)
+        assert model.materials[0][0].E.varies_within_cells == (n == 9)
     lone = fc.Mesh([*ring, [0, 0], [5.0, 0.0]], {"tri3": [*cells, [0, 9, 1], [0, 7, 9]]})
     model = fc.Model(lone, "plane_strain")
     with pytest.raises(fc.ModelError, match="10 numbers, but there are as many cells as points: give numbers of cells"):
         model.add_material(fc.LinearElastic(np.ones(10), 0.3))
     model.add_material(fc.LinearElastic(np.ones((10, 1)), 0.3))
-    assert not model.materials[0][0].E.inside
+    assert not model.materials[0][0].E.varies_within_cells
 
 
 def test_a_model_in_words_tells_the_range():
