@@ -111,7 +111,7 @@ def release_objects(error: BaseException | None) -> None:
         sys.unraisablehook = original
 
 
-def to_main_thread(number: int) -> None:
+def send_to_main_thread(number: int) -> None:
     """Send a signal to the main thread, which interrupts it even while it waits for a lock."""
     main = threading.main_thread().ident
     if hasattr(signal, "pthread_kill") and main is not None:
@@ -122,7 +122,7 @@ def to_main_thread(number: int) -> None:
 
 def _send_later(number: int) -> None:
     """Send a signal to the main thread after a delay."""
-    timer = threading.Timer(DELAY, to_main_thread, (number,))
+    timer = threading.Timer(DELAY, send_to_main_thread, (number,))
     timer.daemon = True
     timer.start()
 
