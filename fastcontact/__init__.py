@@ -73,9 +73,9 @@ def __getattr__(name: str) -> Any:
     elif name in _MODULES:
         value = importlib.import_module(f"{__name__}.{_MODULES[name]}")
     else:
-        from fastcontact.errors import names_of
+        from fastcontact.errors import module_access
 
-        return names_of(__name__, __all__)[0](name)
+        return module_access(__name__, __all__)[0](name)
     globals()[name] = value
     return value
 

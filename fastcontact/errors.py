@@ -14,7 +14,7 @@ LONGEST = 1500  # largest number of characters of a message
 
 
 def printable(text: str) -> str:
-    """Return a string in which escapes replace control and format characters, except line ends and tabs."""
+    """Return a string in which escapes replace control and format characters, except newlines and tabs."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text)
@@ -24,7 +24,7 @@ class FastcontactError(Exception):
     """Base class of the errors that fastcontact raises, whose messages consist of one line."""
 
     def __str__(self) -> str:
-        # Names and values from files may contain line ends, control characters and thousands of characters.
+        # Names and values from files may contain newlines, control characters and thousands of characters.
         text = printable(" ".join(super().__str__().splitlines()))
         return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 3 :]}"
 
@@ -102,7 +102,7 @@ LONGEST_NAME = 120  # largest number of characters of an unknown name in a messa
 SHOWN = 20  # largest number of known names in the message about an unknown one
 # Smallest similarity ratio (difflib) of a name that is suggested; that of "loads" and "nodes" is 0.6.
 SIMILAR = 0.65
-# Names in fastcontact, separated by blanks, by the names that other programs or other parts of fastcontact use.
+# For each name that other programs or other parts of fastcontact use, the names to suggest, separated by blanks.
 OTHER_WORDS = {
     "slave": "secondary", "master": "primary", "mu": "friction", "interference": "clearance", "gap": "clearance",
     "h": "coefficient", "k": "coefficient", "plane": "half_space", "circle": "sphere", "ball": "sphere",
@@ -148,7 +148,7 @@ def nearest(name: str, known: Collection[str]) -> list[str]:
 
 
 def no_attribute(owner: str, name: str, known: Collection[str]) -> AttributeError:
-    """Return the AttributeError for a name that an `owner`, such as "module 'x'", lacks, with similar known names."""
+    """Return the AttributeError for the attribute `name` that `owner`, e.g. "module 'x'", lacks; suggest known names."""
     text = f"{owner} has no attribute '{name}'"
     public = {"fastcontact": "fastcontact", "fastcontact.mesh.generate": "fastcontact.generate"}
     owners = [public[module] for module in public if name in getattr(sys.modules.get(module), "__all__", ())]
@@ -165,14 +165,14 @@ class Suggesting:
     if not TYPE_CHECKING:  # hidden from type checkers, which report unknown names themselves
 
         def __getattr__(self, name: str) -> object:
-            # Tools such as IPython look up private names, and a name of the class is missing only if its property fails.
+            # Tools such as IPython look up private names. A name of the class gets here only if its property failed.
             if name.startswith("_") or hasattr(type(self), name):
                 return object.__getattribute__(self, name)
             public = [attribute for attribute in dir(self) if not attribute.startswith("_")]
             raise no_attribute(f"'{type(self).__name__}' object", name, public)
 
 
-def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
+def module_access(module: str, known: list[str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
     """Return ``__getattr__`` and ``__dir__`` for the module called `module` with the public names `known`."""
 
     def missing(name: str) -> object:
@@ -182,11 +182,11 @@ def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Ca
 
 
 def check_known(
-    kind: str, name: object, known: Collection[str], error: type[FastcontactError], about: str = ""
+    kind: str, name: object, known: Collection[str], error: type[FastcontactError], prefix: str = ""
 ) -> None:
-    """Raise `error`, with similar known names, unless `name` is in `known`; `about` precedes the message."""
+    """Raise `error`, with similar known names, unless `name` is in `known`; `prefix` precedes the message."""
     if not isinstance(name, str) or name not in known:
-        raise error(about + unknown(kind, str(name), known))
+        raise error(prefix + unknown(kind, str(name), known))
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:

@@ -175,7 +175,7 @@ class Help:
         with self._changed:
             in_progress = [(helper, kernel) for helper, kernel in self._current.items() if _file_name(kernel) == name]
         for helper, kernel in in_progress:
-            compiling.tell()
+            compiling.announce()
             while self._current.get(helper) == kernel and self._compile_next():
                 pass
             with self._changed:

@@ -1,4 +1,4 @@
-"""Notification that kernels are being compiled, which may take a minute, and requests for helpers."""
+"""Notification that kernels are being compiled, which may take a minute, and requests to start helper processes."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _reported = False
 
 
 def notify() -> None:
-    """Notify that a kernel is being compiled, and request helpers."""
-    tell()
-    replace()
+    """Announce that a kernel is being compiled, count it, and request helpers."""
+    announce()
+    count_missing()
 
 
-def tell() -> None:
+def announce() -> None:
     """Notify all listeners that kernels are being compiled, and log this once per process at level INFO."""
     global _reported
     if not _reported:
@@ -28,7 +28,7 @@ def tell() -> None:
         listener()
 
 
-def replace() -> None:
+def count_missing() -> None:
     """Count a kernel that has no compiled version, and request helpers."""
     global count
     count += 1
@@ -37,13 +37,13 @@ def replace() -> None:
 
 
 def wait(name: str) -> bool:
-    """Wait for helpers that compile a kernel of this name; return whether there was one, so that its file may now exist."""
+    """Wait for helpers that compile a kernel of this name; if True, there was one, and the kernel's file may now exist."""
     return any(waiter(name) for waiter in waiters)
 
 
-def tell_who_waits() -> None:
+def print_once() -> None:
     """Print the notification once to a terminal or a notebook, unless the log or another listener shows it."""
-    listeners.remove(tell_who_waits)
+    listeners.remove(print_once)
     visible = sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
     if not listeners and not log.isEnabledFor(logging.INFO) and visible and not in_worker():
         print(f"fastcontact: {TEXT}", file=sys.stderr, flush=True)
@@ -56,7 +56,8 @@ def in_worker() -> bool:
 
 
 # Functions that are called when a kernel is compiled or waited for, but not when it is read from the disk cache.
-listeners: list[Callable[[], None]] = [tell_who_waits]
-# Functions of `ahead` that are called when a kernel has no compiled version, and to wait for a helper that compiles a kernel.
+listeners: list[Callable[[], None]] = [print_once]
+# Functions of `ahead` that start helpers, and are called when a kernel has no compiled version.
 helpers: list[Callable[[], None]] = []
+# Functions of `ahead` that wait for a helper that compiles a kernel.
 waiters: list[Callable[[str], bool]] = []

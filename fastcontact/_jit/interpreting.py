@@ -63,7 +63,7 @@ class Interpretable:
             self._call = self.compiled
             return self.compiled(*arguments)
         if self._spent == 0.0:
-            compiling.replace()
+            compiling.count_missing()
             _interpreted.append(self)
         result = interpret(self, arguments)
         self._spent += time.thread_time() - began

@@ -220,7 +220,7 @@ def accumulate_results(
     `start`, `load`, `settled` and `end` are those of `save_contact_history`; `results` are the contact results of each
     pair, and `energy` the elastic strain energy and the plastic work [energy].
     """
-    displacement, results_so_far, works = problem.displacement(end.u), dict(results), np.zeros(3)
+    displacement, results_so_far, increments = problem.displacement(end.u), dict(results), np.zeros(3)
     worn, slipped, forces = dict(start.worn), dict(start.slipped), dict(start.forces)
     for name, rows in settled.constraints.rows.items():
         pair, contact, constraints = problem.pairs[name], results[name], settled.constraints.parts[name]
@@ -238,21 +238,23 @@ def accumulate_results(
             results_so_far[name] = replace(results_so_far[name], damage=end.bonds[name].at(contact.coordinates)[1])
         elif not (pair.options.tied or pair.options.gap_only):
             arguments = constraints, settled.solution, rows, configuration, contact, start.forces.get(name)
-            forces[name], work_of_pair, over_slip = contact_work(pair, *arguments)
+            forces[name], increments_of_pair, over_slip = contact_work(pair, *arguments)
             load_of_pair = None
             if pair.friction:
                 closed_before = start.forces[name].pressing > 0.0 if name in start.forces else False
                 closed = contact.active | closed_before
                 load_of_pair = sliding_load(constraints, settled.solution, rows, over_slip, closed, pair.secondary)
-            results_so_far[name] = replace(results_so_far[name], dissipation=work_of_pair[0], sliding_load=load_of_pair)
-            works += work_of_pair
+            results_so_far[name] = replace(
+                results_so_far[name], dissipation=increments_of_pair[0], sliding_load=load_of_pair
+            )
+            increments += increments_of_pair
         if pair.options.wear is not None:
             before = start.worn.get(name, Worn.nothing(len(contact.points)))
             worn[name] = before.after(pair, configuration, results_so_far[name], pair.options.wear)
             results_so_far[name] = replace(results_so_far[name], wear=worn[name].depth)
     stored = sum(entry.stored for entry in forces.values()) + sum(entry.stored for entry in end.bonds.values())
     released = sum(entry.released for entry in end.bonds.values())
-    work = None if start.work is None else start.work.after(energy, stored, works.tolist(), released)
+    work = None if start.work is None else start.work.after(energy, stored, increments.tolist(), released)
     touched = start.touched.union(name for name, contact in results.items() if contact.active.any())
     first = {name: positions for name, positions in end.first_contact.items() if name in touched}
     end = replace(end, worn=worn, slipped=slipped, forces=forces, work=work, touched=touched, first_contact=first)

@@ -51,7 +51,7 @@ from fastcontact.analytic._receding import RecedingLayer, receding_layer
 from fastcontact.analytic.hertz_elliptical import HertzElliptical, hertz_elliptical
 from fastcontact.analytic.hertz_line import HertzLine, hertz_line
 from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
-from fastcontact.errors import names_of
+from fastcontact.errors import module_access
 
 THEORIES: dict[str, Callable[..., Any]] = {
     factory.__name__: factory
@@ -74,4 +74,4 @@ __all__ = [
 
 
 if not TYPE_CHECKING:  # type checkers see the imports above
-    __getattr__, __dir__ = names_of("fastcontact.analytic", __all__)
+    __getattr__, __dir__ = module_access("fastcontact.analytic", __all__)

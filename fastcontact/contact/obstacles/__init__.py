@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Protocol
 from fastcontact.arrays import Array
 from fastcontact.contact.obstacles.meshed import MeshedSurface
 from fastcontact.contact.obstacles.shapes import Cylinder, FlatPunch, HalfSpace, Height, Sphere, cone, paraboloid
-from fastcontact.errors import names_of
+from fastcontact.errors import module_access
 
 
 class Obstacle(Protocol):
@@ -54,4 +54,4 @@ __all__ = [
 
 
 if not TYPE_CHECKING:  # not for type checkers, which report unknown names themselves
-    __getattr__, __dir__ = names_of("fastcontact.obstacles", __all__)
+    __getattr__, __dir__ = module_access("fastcontact.obstacles", __all__)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from fastcontact.errors import names_of
+from fastcontact.errors import module_access
 from fastcontact.mesh.generate._refine import circles, linearised, refined
 from fastcontact.mesh.generate._sphere import sphere_octant, sphere_on_block
 from fastcontact.mesh.generate.blocks import block, block_on_block, cylinder_on_block
@@ -44,4 +44,4 @@ __all__ = [
 
 
 if not TYPE_CHECKING:  # not for type checkers, which report unknown names themselves
-    __getattr__, __dir__ = names_of("fastcontact.generate", __all__)
+    __getattr__, __dir__ = module_access("fastcontact.generate", __all__)

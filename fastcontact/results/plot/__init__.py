@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fastcontact.errors import names_of
+from fastcontact.errors import module_access
 from fastcontact.results.plot._axes import UNITS
 from fastcontact.results.plot._shape import animate, deformed_shape, section, view
 from fastcontact.results.plot.contact_map import contact_map
@@ -21,4 +21,4 @@ __all__ = [
 
 
 if not TYPE_CHECKING:  # not for type checkers, which report unknown names themselves
-    __getattr__, __dir__ = names_of("fastcontact.plot", __all__)
+    __getattr__, __dir__ = module_access("fastcontact.plot", __all__)

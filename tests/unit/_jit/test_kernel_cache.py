@@ -214,7 +214,7 @@ class Terminal(io.StringIO):
 def told(monkeypatch):
     """What a process that has compiled nothing yet says when two kernels are compiled, given its error output."""
     monkeypatch.setattr(compiling, "_reported", False)
-    monkeypatch.setattr(compiling, "listeners", [compiling.tell_who_waits])
+    monkeypatch.setattr(compiling, "listeners", [compiling.print_once])
     monkeypatch.setattr(compiling.log, "handlers", [])  # those of other tests may be closed
     monkeypatch.setattr(compiling.log, "propagate", False)
     level = compiling.log.level
@@ -247,7 +247,7 @@ def test_nothing_where_nobody_waits(told, monkeypatch):
 def test_nothing_without_error_output(told, monkeypatch):
     told(io.StringIO())
     monkeypatch.setattr(sys, "stderr", None)
-    monkeypatch.setattr(compiling, "listeners", [compiling.tell_who_waits])
+    monkeypatch.setattr(compiling, "listeners", [compiling.print_once])
     compiling.notify()
     assert compiling.listeners == []
 
