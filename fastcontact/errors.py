@@ -28,7 +28,7 @@ class FastcontactError(Exception):
     """Base class of the errors that fastcontact raises, whose messages consist of one line."""
 
     def __str__(self) -> str:
-        # Names and values from files may contain line ends, control characters and thousands of characters.
+        # Names and values from files may contain newlines, control characters and thousands of characters.
         text = printable(" ".join(super().__str__().splitlines()))
         return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 3 :]}"
 
@@ -188,11 +188,11 @@ def getattr_and_dir(module: str, known: list[str]) -> tuple[Callable[[str], obje
 
 
 def check_known(
-    kind: str, name: object, known: Collection[str], error: type[FastcontactError], about: str = ""
+    kind: str, name: object, known: Collection[str], error: type[FastcontactError], prefix: str = ""
 ) -> None:
-    """Raise `error`, with similar known names, unless `name` is in `known`; `about` precedes the message."""
+    """Raise `error`, with similar known names, unless `name` is in `known`; `prefix` precedes the message."""
     if not isinstance(name, str) or name not in known:
-        raise error(about + unknown(kind, str(name), known))
+        raise error(prefix + unknown(kind, str(name), known))
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:

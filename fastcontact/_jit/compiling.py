@@ -59,4 +59,5 @@ def in_worker() -> bool:
 listeners: list[Callable[[], None]] = [print_announcement]
 # Functions of `ahead` that are called when a kernel has no compiled version, and to wait for a helper that compiles a kernel.
 helpers: list[Callable[[], None]] = []
+# Functions of `ahead` that wait for a helper that compiles a kernel.
 waiters: list[Callable[[str], bool]] = []

@@ -49,8 +49,8 @@ def modes(
     """Return the lowest natural frequencies and mode shapes about the equilibrium of a load step, or at rest.
 
     Closed nodes remain closed, sticking nodes do not slip, sliding nodes are free along the surface, and open nodes
-    are free. Supports, multi-point constraints, couplings and springs act with their prescribed values, and pretension
-    sections keep their length. The stresses of the step stiffen or soften the bodies; in finite strain the modes are
+    are free. Supports, multi-point constraints, couplings and springs act as in the step, and pretension sections keep
+    their length. The stresses of the step stiffen or soften the bodies; in finite strain the modes are
     those of the deformed bodies under follower pressures. Force-driven obstacles have no mass.
 
     Parameters
@@ -109,7 +109,7 @@ def modes(
     vibration = _Vibration.of(model, sectors, step if stress_stiffening else None, step, hold_sliding)
     if sectors is None or diameters is None:
         values, vectors = vibration.lowest(n, linear_solver, None if sectors is None else Wave(sectors, 0))
-        vibration.warn_of_slides(values, vectors)
+        vibration.warn_of_sliding_modes(values, vectors)
         return _modes(vibration, values, vectors)
     waves = [Wave(sectors, d) for d in diameters]
     return _ring_modes(
@@ -120,7 +120,7 @@ def modes(
 def _diameters(
     model: Model, sectors: Sectors | None, nodal_diameters: int | str | Sequence[int] | None
 ) -> list[int] | None:
-    """Return the requested nodal diameters; None if none are requested. ModelError for a model that has none."""
+    """Return the requested nodal diameters; None by default. ModelError if the model is not a sector of a ring."""
     if nodal_diameters is None:
         if sectors is not None:
             warn(
@@ -155,7 +155,7 @@ class _Vibration:
     def of(
         cls, model: Model, sectors: Sectors | None, stressed: StepResult | None, step: StepResult | None, hold_sliding: bool
     ) -> _Vibration:  # fmt: skip
-        """Return the vibration about a step, without the ends of sectors; the stresses of `stressed` add stiffness."""
+        """Return the vibration about a step, open at the ends of sectors; the stresses of `stressed` add stiffness."""
         density = Densities([material for material, _ in model.materials], model.material_of_cells())
         field = model.material_field()
         K = _stiffness(model, stressed, field)
@@ -165,12 +165,14 @@ class _Vibration:
         held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
         contact = held_contact(model, step, held, hold_sliding)
         slides = step is not None and any((pair.active & ~pair.sticking).any() for pair in step.contact.values())
-        sliding = held_contact(model, step, held, True) if slides and not hold_sliding else []
-        # The shift regularises free bodies, and loaded ones that turn freely, whose eigenvalues may be a little negative. Its
-        # frequency is the part NOTABLE of that of a uniform deformation: below the frequencies of all but thin bodies.
-        return cls(model, field, K, M, contact, supported, NOTABLE**2 * _uniform_quotient(model, K, M), sliding)
+        with_sliding = held_contact(model, step, held, True) if slides and not hold_sliding else []
+        # The shift regularises the stiffness of free bodies. It also makes slightly negative eigenvalues positive, which
+        # occur in loaded bodies that rotate freely. The corresponding frequency is NOTABLE times that of a uniform
+        # deformation, which is below the frequencies of all but thin bodies.
+        shift = NOTABLE**2 * _uniform_quotient(model, K, M)
+        return cls(model, field, K, M, contact, supported, shift, with_sliding)
 
-    def warn_of_slides(self, values: Array, vectors: Array) -> None:
+    def warn_of_sliding_modes(self, values: Array, vectors: Array) -> None:
         """Warn of eigenvalues (n,) close to zero whose shapes (n_dofs, n) slide where friction holds small motions."""
         nearly_rigid = vectors[:, np.abs(values) < self.shift]
         sliding = [
@@ -197,16 +199,17 @@ class _Vibration:
             driven.stiffness(self.M),
             driven.near_nullspace(near_nullspace(model)),
         )
-        supported, massless = driven.supported(self.supported).ravel(), driven.without_stiffness
+        supported, without_stiffness = driven.supported(self.supported).ravel(), driven.without_stiffness
         if wave is not None:
             K, M, relations = wave.real_blocks(K), wave.real_blocks(M), wave.relations(model, relations)
-            supported, massless = wave.repeated(supported), wave.repeated(massless)
+            supported, without_stiffness = wave.repeated(supported), wave.repeated(without_stiffness)
             nullspace = nullspace if wave.single else np.asarray(np.kron(np.eye(2), nullspace), float)
         relations = driven.relations(relations)
         contact = joined(self.contact, K.shape[0]) if wave is None else joined(self.contact, K.shape[0], wave.on_ring)
         K = contact.stiffened(K)
         in_conditions = np.isin(np.arange(K.shape[0]), contact.rows.indices)
-        reduced = Reduced(System(K, supported, relations, massless & in_conditions), M, contact.rows, contact.nodes)
+        system = System(K, supported, relations, without_stiffness & in_conditions)
+        reduced = Reduced(system, M, contact.rows, contact.nodes)
         if n >= int(reduced.free.sum()):
             raise ModelError(f"n = {n} modes of {int(reduced.free.sum())} free displacements: request fewer")
         solver = choice.make(linear_solver, dim=model.mesh.dim, n_dofs=K.shape[0], columns=True)
@@ -277,15 +280,15 @@ def _ring_modes(vibration: _Vibration, sectors: Sectors, waves: list[tuple[Wave,
     for wave, eigenvalues, vectors in waves:
         vectors = (_with_positive_peak(vectors) if wave.single else np.sqrt(2.0) * vectors) / np.sqrt(number)
         phases = np.exp(1j * wave.angle * np.arange(number))
-        ring = np.einsum("nd,k,ked->ne", vectors.T @ momentum, phases, rotations)
-        for value, vector, ring_participation in zip(eigenvalues.tolist(), vectors.T, ring, strict=True):
+        ring_momentum = np.einsum("nd,k,ked->ne", vectors.T @ momentum, phases, rotations)
+        for value, vector, momentum_of_mode in zip(eigenvalues.tolist(), vectors.T, ring_momentum, strict=True):
             first = len(values)
             twins += [first] if wave.single else [first + 1, first]
             for component in (np.real,) if wave.single else (np.real, np.imag):
                 values.append(value)
                 diameters.append(wave.diameters)
                 shapes.append(component(vector).reshape(-1, momentum.shape[1]))
-                participation.append(component(ring_participation))
+                participation.append(component(momentum_of_mode))
     mass = number * np.einsum("nii->i", momentum.reshape(-1, momentum.shape[1], momentum.shape[1]))
     eigenvalues = np.array(values)
     return Modes(

@@ -119,7 +119,7 @@ class Problem:
         For each ramp, the prescribed displacements [length] and the nodal forces [force] at multiplier 1.
     solver_at_rest : dict
         Snapshot of the solver before the first step.
-    doubtful : tuple of str
+    warnings : tuple of str
         Warnings about the stiffness of springs.
     bodies : NonlinearBodies, optional
         The solid cells, if they are nonlinear. `system` and `solver` then hold the tangent at zero displacements, or at
@@ -147,7 +147,7 @@ class Problem:
     prescribed: ByRamp
     forces: ByRamp
     solver_at_rest: Mapping[str, Any]
-    doubtful: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     bodies: NonlinearBodies | None = None
     following: Sequence[tuple[FollowingPressure, Table | None]] = ()
     heat: Heat | None = None
@@ -310,7 +310,7 @@ def prepare(
     solver.contrast = field.contrast
     sides = material_sides(mesh, field.distinct)
     K = stiffness(mesh, model.kinematics, field.moduli, field.loops, None, field.treatment)
-    doubtful = too_stiff(K, model.springs)
+    warnings = too_stiff(K, model.springs)
     K = stiffened(K, model.springs)
     system = System(
         driven.stiffness(K),
@@ -327,7 +327,7 @@ def prepare(
     dofs = _prepared_dofs(model, solver, system, bodies, contact_dofs)
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies, dofs, contact_dofs, driven,
-        driven.prescribed(prescribed), driven.forces(_forces(model)), solver.snapshot(), tuple(doubtful),
+        driven.prescribed(prescribed), driven.forces(_forces(model)), solver.snapshot(), tuple(warnings),
         model.nonlinear_bodies(field), model.following_pressures(),
         prepared_heat(model, ramp, criteria, linear_solver, solver.tolerance),
     )  # fmt: skip

@@ -45,7 +45,8 @@ def solve(
     model : Model
     ramp : Ramp, int or array, optional
         One of: the number of equal load steps (20 by default); the load factors (n,) at the ends of the steps [-]; or
-        points (instant, multiplier) (n, 2) of the load function [-], where each point but the first is the end of a step.
+        the points (n, 2) of the load function, each of them an instant and a multiplier [-]. Every point but the first
+        is the end of a step.
     linear_solver : str
         ``"direct"``, ``"cholmod"``, ``"amg"``, ``"pyamg"`` or ``"auto"``; see `linear.choice.make`.
     linear_tolerance : float
@@ -78,8 +79,8 @@ def solve(
     Warns
     -----
     FastcontactWarning
-        Before the first step if the model is doubtful, and after the last step if the result is. Each warning states a
-        number and is stored in `StepResult.warnings`.
+        Before the first step about the model, and after the last step about the result. Each warning states a number
+        and is stored in `StepResult.warnings`.
 
     Examples
     --------
@@ -191,18 +192,19 @@ def _solved_steps(
     model: Model, ramp: Ramp, prepare_model: Callable[[Model], Problem], instants: list[float], case: dict[str, Any],
     last: StepResult | None, earlier: tuple[frozenset[str], dict[str, Peak]],
 ) -> Iterator[StepResult]:  # fmt: skip
-    """Yield the steps at `instants`, which follow the step `last`; `earlier` are `_touched_pairs` and `_peaks` before."""
-    doubtful = model_warnings(model, ramp)
-    for text in doubtful if last is None else ():
+    """Yield the steps at `instants`, after the step `last`; `earlier` holds the `_touched_pairs` and `_peaks` until then."""
+    model_texts = model_warnings(model, ramp)
+    for text in model_texts if last is None else ():
         warn(text)
     problem = prepare_model(stage_of(model, last, ramp.table[0][0]))
-    for text in problem.doubtful if last is None else ():  # before the first step: the warning may explain its failure
+    for text in problem.warnings if last is None else ():  # before the first step: the warning may explain its failure
         warn(text)
-    doubtful += problem.doubtful
+    model_texts += problem.warnings
     touched, peaks = earlier
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
     begin, last_index = problem.ramp.table[0][0], 0
-    undetermined: tuple[int, dict[str, list[str]]] | None = None  # first step in which nothing determines positions
+    # The first step in which the positions of bodies are undetermined, and their names.
+    undetermined: tuple[int, dict[str, list[str]]] | None = None
     if last is not None:
         begin, last_index, last = last.load_factor, last.index, None  # to free the memory of the step
     for index, instant in enumerate(instants, start=last_index + 1):
@@ -214,7 +216,7 @@ def _solved_steps(
         warnings = result_warnings(problem, state, step, undetermined, peaks) if instant == instants[-1] else []
         for text in warnings:
             warn(text)
-        warned = (*doubtful * (index == 1), *warnings)
+        warned = (*model_texts * (index == 1), *warnings)
         yield replace(step, warnings=warned, restart=restart.restart_data(problem, state, case))
         del step  # to free its memory before the next step is computed
         begin = instant

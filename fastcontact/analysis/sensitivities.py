@@ -105,15 +105,15 @@ def sensitivities(
         groups or its number in the model; for an `Orthotropic` with the numbers of the axes, such as ``("E", material,
         "1")``, ``("nu", material, "12")`` and ``("G", material, "12")`` [pressure]; ``("expansion", material)``, or
         ``("expansion", material, "1")`` along one axis [1 / temperature]; ``("load", group)``, the factor of all loads
-        on a group, or of the force on a rigid obstacle by its name [-]; ``("speed", group)``, the angular speed of
-        centrifugal forces [radian / time]; ``("temperature", group)``, the factor of the temperature rise [-]; "load",
-        "speed" and "temperature" also with ``"all solid cells"`` instead of a group, for loads without one;
-        ``("pretension", name)``, the factor of the force or the shortening of a section [-]; ``("prescribed", group)``,
-        the factor of the displacements prescribed on a group, or ``("prescribed", group, "y")`` of one component [-];
-        ``("motion", obstacle)``, the factor of its motion [-]; ``("clearance", pair)``, a length added to the gap
-        [length]. All factors have the value 1.
+        on a group [-]; ``("load", obstacle)``, the factor of the force on a rigid obstacle [-]; ``("speed", group)``, the
+        angular speed of centrifugal forces [radian / time]; ``("temperature", group)``, the factor of the temperature
+        rise [-]; ``("pretension", name)``, the factor of the force or the shortening of a section [-]; ``("prescribed",
+        group)``, the factor of the displacements prescribed on a group, or ``("prescribed", group, "y")`` of one
+        component [-]; ``("motion", obstacle)``, the factor of its motion [-]; ``("clearance", pair)``, a length added
+        to the gap [length]. All factors have the value 1. For loads, speeds and temperatures that are defined without a
+        group, the group is ``"all solid cells"``.
     ramp, criteria, linear_solver
-        Described for `solve`.
+        As for `solve`.
     margin : float
         Smallest admissible `Sensitivities.margin` [-].
 
@@ -124,7 +124,7 @@ def sensitivities(
     Raises
     ------
     ModelError
-        If there is no such quantity or parameter; with nonlinear bodies or conduction of heat; with friction, wear, or
+        If there is no such quantity or parameter; with nonlinear bodies or heat conduction; with friction, wear, or
         locked pretension sections, since results then depend on earlier steps; if an active constraint is about to open
         or an open one to close; if a node projects onto the edge between two facets, and the one-sided derivatives
         differ there.
@@ -147,19 +147,19 @@ def sensitivities(
     """
     tuples = [tuple(parameter) for parameter in parameters]
     check_labels(model, quantity, parameters)
-    problem, contact = settled_step(model, step, ramp_of(ramp), criteria or Criteria(), linear_solver)
-    nearest = checked_margin(contact, margin) if problem.pairs else 1.0
+    problem, contact = recomputed_step(model, step, ramp_of(ramp), criteria or Criteria(), linear_solver)
+    distance = checked_margin(contact, margin) if problem.pairs else 1.0
     contact, gradient = with_gradient(contact, step, tuple(quantity))
     changes = [KINDS[str(parameter[0])][2](contact, parameter) for parameter in tuples]
     values, solutions = _derivatives(contact, gradient, changes)
-    return Sensitivities(gradient.value, dict(zip(tuples, values.tolist(), strict=True)), nearest, solutions)
+    return Sensitivities(gradient.value, dict(zip(tuples, values.tolist(), strict=True)), distance, solutions)
 
 
 def check_labels(model: Model, quantity: Sequence[str | int], parameters: Sequence[Sequence[str | int]]) -> None:
     """Raise ModelError or MeshError if a model has no such quantity or parameter, see `sensitivities`."""
     model.refuse_nonlinear("sensitivities are")
     if model.conducts:
-        raise ModelError("sensitivities are not available with conduction of heat, which depends on the contact")
+        raise ModelError("sensitivities are not available with heat conduction, which depends on the contact")
     check_quantity(model, tuple(quantity))
     for parameter in parameters:
         check_parameter(model, tuple(parameter))
@@ -192,7 +192,7 @@ def _kink_message(contact: MovingContact, kinks: csr_array, jump: float) -> str:
     )
 
 
-def settled_step(
+def recomputed_step(
     model: Model, step: StepResult, ramp: Ramp, criteria: Criteria, linear_solver: str
 ) -> tuple[Problem, MovingContact]:
     """Return the problem of a step, and the contact at its end with fixed multipliers.
@@ -202,7 +202,7 @@ def settled_step(
     ModelError
         If the step belongs to another case, or depends on earlier ones.
     """
-    _check_path(model, step, criteria)
+    _check_independent_of_path(model, step, criteria)
     case = restart.identity(model, ramp, criteria)
     restart.check(step, case, model)
     model.check(ramp)
@@ -217,7 +217,7 @@ def settled_step(
     return problem, MovingContact(problem, state, load, step.load_factor, u, solution)
 
 
-def _check_path(model: Model, step: StepResult, criteria: Criteria) -> None:
+def _check_independent_of_path(model: Model, step: StepResult, criteria: Criteria) -> None:
     meanings = {"friction": "friction", "wear": "wear", "cohesion": "a cohesive layer", "adhesion": "adhesion"}
     for pair in model.contact:
         for option, meaning in meanings.items():
@@ -254,7 +254,7 @@ def checked_margin(contact: MovingContact, least: float) -> float:
         If it is less than `least`.
     """
     constraints, solution = contact.constraints, contact.solution
-    size = float(np.abs(contact.u).max(initial=0.0))
+    largest_displacement = float(np.abs(contact.u).max(initial=0.0))
     gap = constraints.gap0 + constraints.B @ contact.u
     distance = np.full(len(constraints), np.inf)
     for name, rows in constraints.rows.items():
@@ -262,8 +262,10 @@ def checked_margin(contact: MovingContact, least: float) -> float:
         # Forces are divided by areas, since the force of a constraint with a small area is small.
         areas = constraints.parts[name].areas
         force = solution.multiplier[rows] / (1.0 if areas is None else areas)
-        largest = float(np.abs(force).max(initial=0.0)) or 1.0
-        distance[rows] = np.where(active, force / largest, np.where(usable, gap[rows] / size, np.inf))
+        largest_force = float(np.abs(force).max(initial=0.0)) or 1.0
+        distance[rows] = np.where(
+            active, force / largest_force, np.where(usable, gap[rows] / largest_displacement, np.inf)
+        )
     distance[constraints.equality] = np.inf
     critical = np.flatnonzero(~(distance >= least))
     if len(critical):

@@ -42,7 +42,7 @@ def check_quantity(model: Model, quantity: Label) -> None:
 
 
 def with_gradient(contact: MovingContact, step: StepResult, quantity: Label) -> tuple[MovingContact, Gradient]:
-    """Return the contact, whose samples include the quantity, and the gradient of the quantity.
+    """Return the contact, whose `Sample` includes the pressures of a pair if the quantity is one, and its gradient.
 
     `check_quantity` must have accepted the quantity. Raises ModelError if it has no sensitivities in this state.
     """
@@ -67,7 +67,7 @@ def _axis(model: Model, quantity: Label) -> int:
 
 
 def _point(model: Model, point: str | int) -> int:
-    """Return a point, given by its number or the name of a group of one point."""
+    """Return the number of a point, which is given by this number or by the name of a group of one point."""
     if isinstance(point, str):
         return int(model.mesh.point(point))
     if not 0 <= point < model.mesh.n_points:
@@ -123,14 +123,14 @@ def _pressure(
     if contact.problem.model.periodic_interfaces:
         raise ModelError("pressures of periodic and cyclic models have no sensitivities: use forces or displacements")
     contact = replace(contact, pair=name, closed=result.active)
-    multiplier, by_multiplier = contact.solution.multiplier, zero.multiplier
+    multiplier, multiplier_gradient = contact.solution.multiplier, zero.multiplier
     rows_of_pair, rows = contact.constraints.rows[name], contact.active
     change = INCREMENT * (float(np.abs(multiplier[rows_of_pair]).max(initial=0.0)) or 1.0)
     base = contact.pressure(multiplier)[row]
     for k in np.flatnonzero((rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)):
         increased = multiplier.copy()
         increased[rows[k]] += change
-        by_multiplier[k] = (contact.pressure(increased)[row] - base) / change
+        multiplier_gradient[k] = (contact.pressure(increased)[row] - base) / change
     sample = np.zeros(len(contact.u) + len(rows) + len(result.points))
     sample[len(contact.u) + len(rows) + row] = 1.0
     return contact, replace(zero, value=float(base), sample=sample)

@@ -1,8 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Closest points of facets with straight sides: flat triangles in closed form, bilinear quadrangles by a few Newton steps.
+"""Closest points on facets with straight sides: flat triangles in closed form, bilinear quadrangles by a few Newton steps.
 
-Vectors are tuples of three numbers: Numba would count references to arrays in every call. A point nearer to a side of the
-domain than ROUND_OFF, in reference coordinates, lies on it.
+Vectors are tuples of three numbers: Numba would count references to arrays in every call. A point whose reference
+coordinates are within ROUND_OFF of a side is taken to lie on this side.
 """
 
 import numpy as np
@@ -90,7 +90,7 @@ def on_flat(r, a, b):
 
 @kernel
 def _on_longest_side(r, a, b):
-    """Return (s, t) of the closest point of a triangle degenerate to its longest side."""
+    """Return (s, t) of the closest point of a triangle that degenerates to its longest side."""
     c = minus(b, a)
     aa, bb, cc = dot(a, a), dot(b, b), dot(c, c)
     if aa >= bb and aa >= cc:
@@ -121,7 +121,7 @@ def on_bilinear(r, a, b, c, reach):
         beyond = max((abs(s) - 1.0) * np.sqrt(determinant / bb), (abs(t) - 1.0) * np.sqrt(determinant / aa))
         if beyond > reach + np.sqrt(cc):
             return s, t, np.inf
-    # The second start is inside, for minima in the facet that the first one misses by leaving it.
+    # If the first search leaves the facet, a second one starts inside it, since there may still be a minimum inside.
     for _ in range(2):
         s, t, stationary = _stationary(aa, ab, bb, ac, bc, cc, ar, br, cr, s, t)
         if stationary:

@@ -64,11 +64,11 @@ class Iteration:
         """Restart from `x` and its residual `r`, both set by the caller."""
         self.norm, self._last_step = float(np.sqrt(self.dot(self.r, self.r))), None
 
-    def change(self, n: int) -> float:
+    def change_rate(self, n: int) -> float:
         """Return the largest change of the first n unknowns in the last step, divided by the decrease of the residual norm.
 
-        If the rate of convergence persists, its product with the norm of the residual is the remaining error. It is zero
-        before the first step.
+        If the rate of convergence persists, the remaining error is this ratio times the norm of the residual. The ratio
+        is zero before the first step.
         """
         if self._last_step is None:
             return 0.0
@@ -81,7 +81,7 @@ class Iteration:
         self.norm = float(np.sqrt(self._stepped(alpha, p, q, self.x, self.r)))
 
     def _stepped(self, alpha: float, p: Array, q: Array, x: Array, r: Array) -> float:
-        """Make the step ``x += alpha p``, ``r -= alpha q`` of any vectors; return the square of the norm of r."""
+        """Make the step ``x += alpha p``, ``r -= alpha q`` for arbitrary vectors; return the square of the norm of r."""
         parallel_for(krylov_kernels.advance, len(self._sums), WORK_OF_NUMBER * CHUNK, alpha, p, q, x, r, self._sums)
         return float(krylov_kernels.total(self._sums))
 
@@ -153,7 +153,7 @@ class ConjugateResiduals(Iteration):
         self._failed = False
 
     def step(self, multiply: Multiply, precondition: Precondition) -> bool:
-        """Make one iteration; return False if the new search direction depends on the stored ones up to round-off.
+        """Make one iteration; return False if the new image depends linearly on the stored ones, up to round-off.
 
         After a failed step, the preconditioner is applied to the last image instead of the residual.
         """

@@ -382,7 +382,7 @@ class Multigrid:
         if iteration.norm > tolerance * scale:
             return False
         n = self.K.shape[0]
-        self._change_rate = iteration.change(n) or self._change_rate
+        self._change_rate = iteration.change_rate(n) or self._change_rate
         if tolerance > self.tolerance or not iteration.norm:
             return True
         return self._change_rate * iteration.norm <= DISPLACEMENT_ERROR * self.tolerance * largest(iteration.x[:n])
