@@ -220,7 +220,7 @@ def accumulate_results(
     `start`, `load`, `settled` and `end` are those of `save_contact_history`; `results` are the contact results of each
     pair, and `energy` the elastic strain energy and the plastic work [energy].
     """
-    displacement, results_so_far, increments = problem.displacement(end.u), dict(results), np.zeros(3)
+    displacement, results_so_far, works = problem.displacement(end.u), dict(results), np.zeros(3)
     worn, slipped, forces = dict(start.worn), dict(start.slipped), dict(start.forces)
     for name, rows in settled.constraints.rows.items():
         pair, contact, constraints = problem.pairs[name], results[name], settled.constraints.parts[name]
@@ -252,7 +252,7 @@ def accumulate_results(
             results_so_far[name] = replace(results_so_far[name], wear=worn[name].depth)
     stored = sum(entry.stored for entry in forces.values()) + sum(entry.stored for entry in end.bonds.values())
     released = sum(entry.released for entry in end.bonds.values())
-    work = None if start.work is None else start.work.after(energy, stored, increments.tolist(), released)
+    work = None if start.work is None else start.work.after(energy, stored, works.tolist(), released)
     touched = start.touched.union(name for name, contact in results.items() if contact.active.any())
     first = {name: positions for name, positions in end.first_contact.items() if name in touched}
     end = replace(end, worn=worn, slipped=slipped, forces=forces, work=work, touched=touched, first_contact=first)

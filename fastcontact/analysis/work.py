@@ -87,7 +87,7 @@ class ContactForces:
 
 @dataclass(frozen=True)
 class Work:
-    """Energies at the end of a load step, and the work of all steps so far [energy].
+    """Energies at the end of a load step, and works of all steps so far [energy].
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Work:
     released : float
         Energy dissipated by the damage of cohesive layers.
     largest : float
-        The largest of these values in all steps so far.
+        The largest of these energies and works in all steps so far.
     plastic : float
         Plastic work.
     """
@@ -123,9 +123,7 @@ class Work:
         """External work, done by loads, supports and obstacles [energy]."""
         return self.strain_energy + self.plastic + self.friction + self.imbalance + self.stored + self.released
 
-    def after(
-        self, energy: tuple[float, float], stored: float, increments: Sequence[float], released: float = 0.0
-    ) -> Work:
+    def after(self, energy: tuple[float, float], stored: float, works: Sequence[float], released: float = 0.0) -> Work:
         """Return the work after another load step.
 
         Parameters
@@ -134,19 +132,19 @@ class Work:
             Strain energy and plastic work at the end of the step [energy].
         stored : float
             Energy of penalties, cohesive layers and adhesion at the end of the step [energy].
-        increments : sequence of three float
-            Sums of the increments of `contact_work` over all pairs [energy].
+        works : sequence of three float
+            Sums of the works of `contact_work` over all pairs [energy].
         released : float
             Energy dissipated by cohesive layers so far [energy].
         """
-        friction, touching, imbalance = increments
+        friction, touching, imbalance = works
         sums = self.friction + friction, self.touching + touching, self.imbalance + imbalance
         work = Work(energy[0], *sums, stored, plastic=energy[1], released=released)
         terms = (self.largest, *energy, work.friction, abs(work.external))
         return replace(work, largest=max(terms))
 
     def as_dict(self) -> dict[str, float]:
-        """Return energies and work under the names of `StepResult.work` [energy]."""
+        """Return the energies and works under the names of `StepResult.work` [energy]."""
         return {
             "strain_energy": self.strain_energy, "plastic_work": self.plastic,
             "external_work": self.external, "friction_work": self.friction,
@@ -159,7 +157,7 @@ def contact_work(
     pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, configuration: Configuration,
     contact: ContactResult, before: ContactForces | None,
 ) -> tuple[ContactForces, tuple[float, float, float], Array]:  # fmt: skip
-    """Return the contact forces of a pair at the end of a load step, and the increments of work in this step.
+    """Return the contact forces of a pair at the end of a load step, and the works of contact in this step.
 
     Parameters
     ----------
@@ -180,23 +178,23 @@ def contact_work(
     Returns
     -------
     forces : ContactForces
-    increments : (float, float, float)
+    works : (float, float, float)
         Increments of `Work.friction`, `Work.touching` and `Work.imbalance` [energy].
     slip_integrals : ndarray (m,)
         Integrals of the normal forces over the slips in the step [energy].
     """
     normal, k = constraints.contact_forces(solution.multiplier[rows]), len(constraints.tangents)
-    tangential, slip = solution.tangential[rows, :k], solution.slip[rows, :k]
+    tangents, slip = solution.tangential[rows, :k], solution.slip[rows, :k]
     no_tangents = np.zeros((len(constraints), 0, contact.coordinates.shape[1]))
     directions = np.stack(constraints.directions, axis=1) if k else no_tangents
-    force, slips = (np.einsum("mk,mkd->md", values, directions) for values in (tangential, slip))
-    after = _forces(pair, constraints, normal, tangential, force, contact, _added_gaps(pair, configuration, contact))
+    force, slips = (np.einsum("mk,mkd->md", values, directions) for values in (tangents, slip))
+    after = _forces(pair, constraints, normal, tangents, force, contact, _added_gaps(pair, configuration, contact))
     before = before or _no_forces(after)
     areas = constraints.finite_areas
     pressure, traction = before.at(constraints.positions)
     ratio = np.divide(pressure * areas, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
-    work_at_end, work_at_start = (-0.5 * np.einsum("md,md->m", f, slips) for f in (force, areas[:, None] * traction))
-    work = np.where(normal != 0.0, (1.0 + ratio) * work_at_end, np.maximum(work_at_start, 0.0))
+    work_at_end, work_at_begin = (-0.5 * np.einsum("md,md->m", f, slips) for f in (force, areas[:, None] * traction))
+    work = np.where(normal != 0.0, (1.0 + ratio) * work_at_end, np.maximum(work_at_begin, 0.0))
     closing = pressure == 0.0
     if solution.work is not None:  # the work of all increments, in which constraints carry no force before they close
         work, closing = solution.work[rows], np.zeros_like(closing)
@@ -219,7 +217,7 @@ def contact_work(
     (work_after, energy_after), (work_before, energy_before) = (
         forces.normal_work(other, displacement) for forces, other in ((after, before), (before, after))
     )
-    total_work = work_after + work_before + energy_after - energy_before
+    gained = work_after + work_before + energy_after - energy_before
     added_gap = np.where((after.pressing != 0.0) & (before.pressing != 0.0), after.added - before.added, 0.0)
     gained -= 0.5 * float((after.pressing + before.pressing) @ added_gap)
     gained -= 0.5 * float(((after.tangential + before.tangential) * displacement).sum())
@@ -227,7 +225,7 @@ def contact_work(
 
 
 def _forces(
-    pair: Formulation, constraints: Constraints, normal: Array, tangential: Array, force: Array, contact: ContactResult,
+    pair: Formulation, constraints: Constraints, normal: Array, tangents: Array, force: Array, contact: ContactResult,
     added: Array,
 ) -> ContactForces:  # fmt: skip
     """Return the contact forces of a pair at the end of a step.
@@ -238,7 +236,7 @@ def _forces(
     constraints : Constraints
     normal : ndarray (m,)
         Normal forces [force].
-    tangential : ndarray (m, k)
+    tangents : ndarray (m, k)
         Tangential forces along each tangent [force].
     force : ndarray (m, dim)
         Tangential forces as vectors [force].
@@ -250,7 +248,7 @@ def _forces(
     rows = csr_array(diags_array(normal) @ constraints.B)[:, :size]
     rows.eliminate_zeros()
     nodal_forces = np.zeros(size)
-    for tangent, components in zip(constraints.tangents, tangential.T, strict=False):
+    for tangent, components in zip(constraints.tangents, tangents.T, strict=False):
         nodal_forces += (tangent.T @ components)[:size]
     force_vectors = rows.sum(axis=0).reshape(-1, dim)[pair.secondary.points]
     normals = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
@@ -260,8 +258,8 @@ def _forces(
     if constraints.law is not None:  # The energy of the law is not that of a linear spring.
         energy = 2.0 * constraints.finite_areas * constraints.law.energy(normal * inverse_area)
         penetration = np.divide(energy, normal, out=np.zeros_like(normal), where=normal != 0.0)
-    stored = float(normal @ penetration) + float(constraints.tangential_softness @ (tangential**2).sum(axis=1))
-    all_forces = np.column_stack([normal, tangential]).T
+    stored = float(normal @ penetration) + float(constraints.tangential_softness @ (tangents**2).sum(axis=1))
+    all_forces = np.column_stack([normal, tangents]).T
     amplitudes = np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)])
     return ContactForces(
         constraints.positions, normal * inverse_area, force * inverse_area[:, None], penetration * normal,

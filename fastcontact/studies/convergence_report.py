@@ -35,7 +35,7 @@ def sentences(series: Series) -> list[str]:
 
 
 def _without_limits(series: Series) -> str:
-    return f"{len(series.levels)} levels were solved, but an extrapolated limit needs three"
+    return f"{len(series.levels)} levels were solved, and an extrapolated limit needs three"
 
 
 def _quantity_sentences(series: Series, quantity: str) -> list[str]:
@@ -76,7 +76,7 @@ def _not_to_theory(series: Series, quantity: str, start: str, split: Split) -> s
     """Return the sentence for a formulation that does not converge to a theory that is exact for the model."""
     limit = series.limits[quantity]
     return (
-        f"{start} tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)} whereas the theory gives "
+        f"{start} tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)} where the theory has "
         f"{number(split.theory, 6)}. That theory is exact for the bodies of the model, "
         f"so this is not a model error: {series.combination} does not converge to it on these meshes. Compare formulations "
         "(--formulations all), or let the meshes of the two sides match."
@@ -92,8 +92,7 @@ def _cancellation_sentences(series: Series, quantity: str, split: Split) -> list
         return []
     return [
         f"Level {level.number} ({level.n_dofs} degrees of freedom) lies only {percent(difference)} from theory because its "
-        f"mesh error of {percent(difference - split.model)} cancels most of the model error; this "
-        "agreement does not prove that the mesh is fine enough."
+        f"mesh error of {percent(difference - split.model)} cancels model error: the agreement does not prove a good mesh."
     ]
 
 
@@ -249,7 +248,7 @@ MOST_CURVES_WITH_BARS = 3
 
 
 def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Mapping[str, str]) -> None:
-    """Draw the mesh error of a quantity against h with logarithmic axes, error bars, fits and slope triangles."""
+    """Draw the mesh error of a quantity over h with logarithmic axes, error bars, fits and slope triangles."""
     fitted = [(k, series) for k, series in enumerate(all_series) if quantity in series.limits]
     if not fitted:
         return message(ax, f"no limit of the {title(quantity)}:\nit needs three levels")
@@ -302,7 +301,7 @@ def _slope_triangles(ax: Any, quantity: str, all_series: Sequence[Series]) -> No
 
 
 def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]) -> None:
-    """Draw the contact pressure of all levels and of the theory against the distance from the middle of the contact."""
+    """Draw the contact pressure of all levels and of the theory over the distance from the middle of the contact."""
     if not series.finest.profile:
         return message(ax, "this case has no contact pair,\nso there is no contact pressure")
     from matplotlib import colormaps
@@ -340,7 +339,7 @@ def _draw_theory(ax: Any, theory: Any, series: Series, x: Array) -> None:
 
 
 def draw_differences(ax: Any, all_series: Sequence[Series], best: Series, units: Mapping[str, str]) -> None:
-    """Draw the difference of the largest pressure from theory against h, which tends to the model error."""
+    """Draw the difference of the largest pressure from theory over h, which tends to the model error."""
     quantity = "pressure_max"
     compared = [(k, series) for k, series in enumerate(all_series) if series.split(quantity)]
     if not compared:
@@ -382,17 +381,15 @@ class Study(Report):
     """
 
     kind = "Mesh convergence"
-    picture = "mesh errors against the mesh size, pressures of all levels and of the theory, differences from theory"
+    picture = "mesh errors over the mesh size, the pressure of all levels over theory, the difference from theory"
     explanations = (
         "The limit is the value to which the results tend with mesh refinement, from a fit of value = limit + C h^order. It "
         f"lies within the error bar with a probability of {CONFIDENCE:.0%}. Orders between two levels are erratic, because "
-        "the edge of the contact lies at a different position within a facet on each mesh; the fitted order is more "
-        "reliable.",
+        "the edge of the contact lies at another position within a facet on each mesh; the fitted order is more reliable.",
         "The mesh error is the difference between the finest mesh and the limit and decreases with mesh refinement. The "
         "model error is the difference between the limit and the theory; it does not depend on the mesh, because theory and "
         "model describe different bodies. Both are relative to the theory, and their sum is the difference from theory.",
-        "At equal approach, the bodies of theory and model approach by the same distance; at equal force, they are pressed "
-        "together by the same force.",
+        "A comparison at equal approach has the same displacement, and one at equal force the same contact force.",
     )
 
     series: list[Series]
@@ -457,9 +454,9 @@ class Study(Report):
         names = COMPARED if of_case else self.best.shown(COMPARED) or self.best.quantities[:2]
         options: dict[str, Any] = {"all_series": self.series, "units": self.units}
         plots: list[Callable[[Any], None]] = [partial(draw_errors, quantity=name, **options) for name in names]
-        if is_case_study or self.best.finest.profile:
+        if of_case or self.best.finest.profile:
             plots.append(partial(draw_pressure, series=self.best, theory=self.theory, units=self.units))
-        if is_case_study:
+        if of_case:
             plots.append(partial(draw_differences, best=self.best, **options))
         rows, columns = (len(plots) + 1) // 2, min(2, len(plots))
         axes = panels((rows, columns), (6.0 * columns, 4.6 * rows), self.title)
