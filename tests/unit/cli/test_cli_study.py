@@ -200,7 +200,7 @@ def is_running(process):
 class Solved(Run):
     """A run that is already solved."""
 
-    def measured(self):
+    def evaluate(self):
         return {"values": {}, "seconds": 1.0}
 
 
