@@ -1,4 +1,4 @@
-"""Warnings about bodies that interpenetrate at the end of an analysis, without a contact pair or beside its facets."""
+"""Warnings about bodies that interpenetrate, without a contact pair or beside its facets."""
 
 from __future__ import annotations
 

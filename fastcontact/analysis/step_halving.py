@@ -38,7 +38,7 @@ def advance(problem: Problem, state: State, index: int, begin: float, end: float
     numbers of iterations, the slip and the dissipation of all substeps. If there are several, ``iterations["substeps"]``
     lists the instants of their ends.
 
-    With friction, loads that act at the beginning of the first step already are applied before it, in a substep of no
+    With friction, loads that already act at the beginning of the first step are applied before it, in a substep of no
     duration, unless there is no equilibrium under them.
 
     Raises

@@ -229,16 +229,16 @@ class PressureFieldFormulation(Formulation):
         if not self.augmentation > 0:
             raise ContactError(f"augmentation = {self.augmentation} must be positive; 1 suits most problems")
 
-    def dependent_nodes(self, at: Configuration) -> Mask:
+    def dependent_nodes(self, config: Configuration) -> Mask:
         """Return the nodes (n_nodes,) whose values follow from those of their neighbours.
 
         They are excluded or `held_across`. Values on facets of which all nodes are held remain independent.
         """
-        held, dependent = self.held_across(at), self.options.excluded_nodes(self.secondary)
-        alone = np.zeros_like(held)
+        held, dependent = self.held_across(config), self.options.excluded_nodes(self.secondary)
+        on_held_facets = np.zeros_like(held)
         for block in self.secondary.blocks:
-            alone[block.local[held[block.local].all(axis=1)]] = True
-        return dependent | (held & ~alone)
+            on_held_facets[block.local[held[block.local].all(axis=1)]] = True
+        return dependent | (held & ~on_held_facets)
 
     def repeated(self, field: tuple[csr_array, Indices]) -> tuple[csr_array, Indices]:
         """Return a pressure field in which coincident nodes have a common value.
