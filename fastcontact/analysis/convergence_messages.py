@@ -89,12 +89,11 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
 def friction_exceeded(factor: float, bodies: list[str], coefficients: Array) -> str:
     """Return the message for loads that move `bodies`, which `factor` times the friction `coefficients` would hold."""
     distinct = np.unique(coefficients[coefficients > 0.0])
-    values = factor * distinct[0], distinct[0]
-    digits = next((n for n in range(3, 12) if f"{values[0]:.{n}g}" != f"{values[1]:.{n}g}"), 12)
+    digits = next((n for n in range(3, 12) if f"{factor:.{n}g}" != "1"), 12)
     needed = (
-        f"a coefficient of about {values[0]:.{digits}g} where the largest is {values[1]:.{digits}g}"
+        f"a coefficient of about {factor * distinct[0]:.{digits}g} where the largest is {distinct[0]:.{digits}g}"
         if np.isclose(distinct[0], distinct[-1])
-        else f"about {factor:.3g} times the coefficients given, which are from {distinct[0]:.3g} to {distinct[-1]:.3g}"
+        else f"about {factor:.{digits}g} times the coefficients given, which are from {distinct[0]:.3g} to {distinct[-1]:.3g}"
     )
     return (
         f"friction cannot hold {', '.join(bodies)} against the loads: this would require {needed}. Lower "

@@ -148,9 +148,10 @@ def _through_obstacles(problem: Problem, displacement: Array, contact: Contacts)
         motion = contact[name].obstacle_displacement
         assert motion is not None
         pose = Pose(motion, contact[name].obstacle_angle or 0.0)
-        gap = pair.primary.facing(mesh.points[points] + u[points], pose)[0]
-        contact_gap = contact[name].gap
-        contact_depth = -float(np.min(contact_gap, initial=0.0, where=np.isfinite(contact_gap)))
+        # Depths are those of the geometry, of which a clearance is not part.
+        gap, contact_gap = (pair.primary.facing(mesh.points[at] + u[at], pose)[0] for at in (points, nodes))
+        facing = np.isfinite(contact[name].gap)
+        contact_depth = -float(np.min(contact_gap, initial=0.0, where=facing))
         limit = max(NOTABLE * float(np.ptp(u, axis=0).max()), DEPTH_RATIO * contact_depth)
         row = int(np.argmin(np.where(at_rest >= 0.0, gap, np.inf)))
         if at_rest[row] >= 0.0 and -gap[row] > limit:

@@ -109,7 +109,9 @@ def _load(load: Any) -> str:
 
 
 def _value(value: Any) -> str:
-    """Return a number, or a note that the value is a function of position."""
+    """Return a number, or a note that the value is a function of position or given at several load factors."""
+    if isinstance(value, tuple):
+        return "; ".join(f"{_value(entry)} at the load factor {instant:g}" for instant, entry in value)
     return "a function of position" if callable(value) else f"{value:g}"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any
@@ -76,6 +76,16 @@ def table_of(ramp: History, caption: str) -> Table | None:
     if ramp is None:
         return None
     return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, caption)
+
+
+def interpolation_tables(instants: Sequence[float], caption: str) -> list[Table]:
+    """Return the tables of piecewise linear functions that are 1 at one of `instants` and 0 at the others.
+
+    All functions are zero at the load factor 0, unless the first instant is 0. Raises the errors of `checked_table`.
+    """
+    times = instants if 0.0 in instants[:1] else [0.0, *instants]
+    checked_table([(time, 0.0) for time in times], caption)
+    return [tuple((time, float(time == instant)) for time in times) for instant in instants]
 
 
 def table_value(table: Table, instant: float) -> float:

@@ -476,3 +476,32 @@ def test_units_do_not_matter_for_floating_bodies(length, pressure, request):
     one, other = results
     assert np.abs(one.stress - other.stress / pressure).max() < 1e-9 * np.abs(one.stress).max()
     assert one.iterations["active_set_iterations"] == other.iterations["active_set_iterations"]
+
+
+def test_a_sub_model_follows_the_stages_of_the_global_model():
+    """A block is pressed onto a rigid plane with friction and then sheared; its lower half is solved again on its own."""
+
+    def model(height, divisions):
+        model = fc.Model(fc.generate.block((1.0, height), (4, divisions), "quad8"), "plane_strain")
+        model.add_material(fc.LinearElastic(E=100.0, nu=0.3))
+        plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+        model.add_obstacle("plane", secondary="BOTTOM", obstacle=plane, friction=0.3)
+        return model
+
+    block, half = model(1.0, 4), model(0.5, 2)
+    block.prescribe("TOP", x=[(0.5, 0.0), (1.0, lambda x: 0.004 - 0.001 * x[:, 0])], y=[(0.5, -0.01), (1.0, -0.008)])
+    steps = fc.solve(block, 4)
+    cut, top = np.flatnonzero(block.mesh.points[:, 1] == 0.5), half.mesh.points_of("TOP")
+    order = np.argsort(block.mesh.points[cut, 0])
+
+    def displacement(step, axis):
+        return lambda x: np.interp(x[:, 0], block.mesh.points[cut[order], 0], step.displacement[cut[order], axis])
+
+    for axis, name in enumerate("xy"):
+        half.prescribe("TOP", **{name: [(step.load_factor, displacement(step, axis)) for step in steps]})
+    for step, lower in zip(steps, fc.solve(half, 4), strict=True):
+        contact, expected = lower.contact["plane"], step.contact["plane"]
+        assert lower.displacement[top, 0] == pytest.approx(displacement(step, 0)(half.mesh.points[top]), abs=1e-12)
+        assert contact.force == pytest.approx(expected.force, rel=1e-9)
+        assert contact.dissipation == pytest.approx(expected.dissipation, rel=1e-6, abs=1e-12)
+    assert expected.dissipation > 0.0

@@ -1,5 +1,7 @@
 """Automatic contact pairs: the right facets of the right bodies, and results equal to those of named groups."""
 
+import copy
+
 import numpy as np
 import pytest
 from models import elastic_model
@@ -168,6 +170,40 @@ def test_softer_bodies_are_secondary_and_pairs_by_name_stay():
     assert [(pair.bodies, pair.reason) for pair in found] == [(("C", "B"), "softer")]
     assert [pair.name for pair in model.contact] == ["named", "C on B"]
     assert repr(found).splitlines()[1].split()[:4] == ["C", "on", "B", "C"]
+
+
+@pytest.mark.parametrize("element", ["quad4", "quad8"])
+def test_softer_bodies_are_secondary_even_with_coarser_meshes(element):
+    parts = [("STRIP", (20.0, 2.0), (24, 2), 0.0), ("BASE", (20.0, 8.0), (16, 5), -8.0)]
+    strip, base = (
+        fc.generate.renamed(
+            block(size, n, element, (0.0, y), name=name), lambda g, name=name: g if g == name else f"{name} {g}"
+        )
+        for name, size, n, y in parts
+    )
+    model = fc.Model(union(strip, base), "plane_strain")
+    model.add_material(fc.LinearElastic(E=200e3, nu=0.3), "STRIP")
+    model.add_material(fc.LinearElastic(E=500.0, nu=0.3), "BASE")
+    for body in ("STRIP", "BASE"):
+        model.fix(f"{body} LEFT", "x")
+        model.fix(f"{body} RIGHT", "x")
+    model.fix("BASE BOTTOM", "y")
+    model.add_pressure("STRIP TOP", lambda x: 10.0 * np.exp(-((x[:, 0] / 4.0) ** 2)))
+    exchanged = copy.copy(model)
+    exchanged.contact = []
+    exchanged.add_contact("pair", secondary="STRIP BOTTOM", primary="BASE TOP")
+    (found,) = model.add_contacts()
+    assert (found.bodies, found.reason) == (("BASE", "STRIP"), "softer")
+    pressures, warnings = [], []
+    for each in (model, exchanged):
+        step = fc.solve(each, 1)[-1]
+        (contact,) = step.contact.values()
+        pressures.append(contact.pressure[np.argsort(contact.coordinates[:, 0])])
+        warnings.append([text for text in step.warnings if "oscillate" in text])
+    assert (np.diff(pressures[0]) < 0.0).all()
+    assert (np.diff(pressures[1]) > 0.0).sum() >= 5
+    assert not warnings[0]
+    assert "or exchange the sides, since the body of 'BASE TOP' is softer" in warnings[1][0]
 
 
 @pytest.mark.parametrize("element", ["quad8", "hex8"])

@@ -106,7 +106,7 @@ def test_thin_triangles_are_told_and_means_of_neighbours_are_right():
     pressure = contact.pressure[np.argsort(np.arctan2(*contact.coordinates.T))]
     assert np.abs(pressure / LAME - 1).max() > 0.15
     (text,) = told
-    assert "'fit': nodal pressures oscillate from node to node, by" in text
+    assert "'fit': nodal pressures oscillate from node to node, typically by 29%" in text
     smooth = 0.25 * (pressure[:-2] + 2 * pressure[1:-1] + pressure[2:])
     assert np.abs(smooth / LAME - 1).max() < 0.55 * np.abs(pressure / LAME - 1).max()
 

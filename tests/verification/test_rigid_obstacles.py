@@ -83,6 +83,18 @@ def test_a_flat_punch_leaves_the_surface_beside_it_free():
     assert half_space < abs(contact.force[1]) < 1.4 * half_space  # a finite block is stiffer, the mesh too
 
 
+def test_a_clearance_is_not_a_penetration_beside_the_facets():
+    model = elastic_model(
+        fc.generate.block((50.0, 2.0), (50, 2), "quad8"), "plane_strain", E=200e3, LEFT="x", RIGHT="xy"
+    )
+    model.add_pressure("TOP", 5.0)
+    floor = obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, clearance=0.5)
+    step = fc.solve(model, 1)[-1]
+    assert step.contact["floor"].normal_force > 100.0
+    assert not step.warnings
+
+
 def test_a_plane_drawn_along_drags_by_friction():
     mesh = fc.generate.block((1.0, 1.0), (4, 4), "quad4")
     model = elastic_model(mesh, "plane_strain", nu=0.0, TOP="xy")

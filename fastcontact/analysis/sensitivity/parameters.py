@@ -16,7 +16,7 @@ from fastcontact.analysis.wear import Worn
 from fastcontact.arrays import Array
 from fastcontact.elasticity.anisotropic_materials import NAMES, Anisotropic, Orthotropic
 from fastcontact.elasticity.inertia_loads import Centrifugal
-from fastcontact.elasticity.loads import Load, evaluated
+from fastcontact.elasticity.loads import Load
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.elasticity.varying_constants import varying
@@ -280,8 +280,10 @@ def _prescribed_derivatives(contact: MovingContact, parameter: Label) -> Change:
     values = np.zeros(problem.shape)
     for support in supports:
         nodes = model.mesh.points_of(support.group)
-        displacements = evaluated(support.value, model.mesh.points[nodes], support.name)
-        values[nodes, support.component] = displacements * multiplier(support.ramp, problem.ramp, instant)
+        values[nodes, support.component] = sum(
+            displacements * multiplier(history, problem.ramp, instant)
+            for history, displacements in support.by_history(model.mesh.points[nodes]).items()
+        )
     if model.kinematics == "axisymmetric":
         values[model.axis_nodes, 0] = 0.0
     return _prescribed_value_derivatives(contact, values, relation_numbers)

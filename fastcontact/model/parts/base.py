@@ -33,7 +33,7 @@ from fastcontact.mesh.quality import check_cells
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.model.pretension import Pretension
-from fastcontact.model.ramp import Harmonic, PartHistory, Table
+from fastcontact.model.ramp import Harmonic, PartHistory, Table, interpolation_tables
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
@@ -55,8 +55,9 @@ class Support:
         Name of the group.
     component : int
         Number of the component, from 0.
-    value : float or callable
-        Displacement at multiplier 1 [length], a number or a function of position.
+    value : float, callable or tuple of (float, float or callable)
+        Displacement at multiplier 1 [length], a number or a function of position; or load factors and the displacements at
+        them, which are interpolated linearly.
     ramp : Table, optional
         History of `value`; None means the history of the analysis.
     rotation : Rotation, optional
@@ -67,7 +68,7 @@ class Support:
 
     group: str
     component: int
-    value: Value
+    value: Value | tuple[tuple[float, Value], ...]
     ramp: Table | None = None
     rotation: Rotation | None = None
     rotation_ramp: Table | None = None
@@ -79,6 +80,10 @@ class Support:
 
     def by_history(self, points: Array) -> dict[PartHistory, Array]:
         """Return the displacements (n,) [length] of the positions `points` (n, dim) at multiplier 1, by history."""
+        if isinstance(self.value, tuple):
+            instants, displacements = zip(*self.value, strict=True)
+            tables = interpolation_tables(instants, self.name)
+            return {t: evaluated(u, points, self.name) for t, u in zip(tables, displacements, strict=True)}
         values: dict[PartHistory, Array] = {self.ramp: evaluated(self.value, points, self.name)}
         if self.rotation is not None:
             arms, angle = points - np.array(self.rotation.centre), self.rotation.angle

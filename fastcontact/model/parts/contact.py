@@ -156,8 +156,8 @@ class ModelContact(ModelConnections):
         """Find the surfaces of different bodies that face each other, and add a contact pair for each two such surfaces.
 
         Groups with the facets of these surfaces are added to the mesh of the model. Surfaces of existing pairs and of
-        pretension sections are skipped. Between two equally fine surfaces the one of the softer material becomes the
-        secondary side, if materials have been assigned.
+        pretension sections are skipped. If materials have been assigned, the choice of the secondary side takes their
+        moduli into account.
 
         Parameters
         ----------

@@ -22,7 +22,7 @@ from fastcontact.errors import ModelError
 from fastcontact.model.contact_pair import rotation_of
 from fastcontact.model.parts.base import Support, displacement_name
 from fastcontact.model.parts.contact import ModelContact
-from fastcontact.model.ramp import History, PartHistory, Table, table_of
+from fastcontact.model.ramp import History, PartHistory, Table, interpolation_tables, table_of
 from fastcontact.model.relation_rows import NORMAL, along, normals_of
 from fastcontact.round_off import SINGLE_PRECISION
 
@@ -76,7 +76,7 @@ class ModelSupports(ModelContact):
         axes: SupportAxes = None,
         rotation: Mapping[str, Any] | None = None,
         ramp: History = None,
-        **components: Value,
+        **components: Value | Sequence[tuple[float, Value]],
     ) -> None:
         """Prescribe displacement components of all nodes of a group.
 
@@ -96,9 +96,11 @@ class ModelSupports(ModelContact):
             Axisymmetric models do not support rotation.
         ramp : Ramp or iterable of (float, float), optional
             History of the displacement.
-        **components : float or callable
+        **components : float, callable or sequence of (float, float or callable)
             Displacements ``x``, ``y`` and ``z`` at multiplier 1: numbers, or functions from reference positions (n, dim)
-            [length] to displacements (n,) [length].
+            [length] to displacements (n,) [length]. Fields that are not proportional to one history are given as pairs
+            (load factor, displacement): displacements are interpolated linearly between these load factors, beginning with
+            zero at the load factor 0.
 
         Raises
         ------
@@ -111,6 +113,12 @@ class ModelSupports(ModelContact):
         >>> model = fc.Model(fc.generate.rings(), kinematics="plane_strain")
         >>> model.prescribe("RIM", normal=-0.1)  # shrinks the rim
         >>> model.prescribe("BORE", x=lambda points: 0.01 * points[:, 1], y=0.0)
+
+        Displacements that a global model has at the load factors 0.5 and 1, as functions of position:
+
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> pressed, sheared = (lambda points: 0.0 * points[:, 1]), (lambda points: 0.01 * points[:, 1])
+        >>> model.prescribe("LEFT", x=[(0.5, pressed), (1.0, sheared)])
 
         A group that turns by a quarter of a circle while the load factor goes from 0 to 1:
 
@@ -139,7 +147,7 @@ class ModelSupports(ModelContact):
         if components or normal is None:
             self._add_support(group, components, ramp)
 
-    def _add_along_axes(self, group: str, components: Mapping[str, Value], axes: SupportAxes, ramp: History) -> None:
+    def _add_along_axes(self, group: str, components: Mapping[str, Any], axes: SupportAxes, ramp: History) -> None:
         """Prescribe displacements along the given axes by multi-point constraints."""
         dim, name = self.mesh.dim, f"the support of '{group}'"
         check_points(self.mesh, group, "no displacement can be prescribed on it")
@@ -166,16 +174,22 @@ class ModelSupports(ModelContact):
         self.related_supports.append((group, relation))
 
     def _add_support(
-        self, group: str, components: Mapping[str, Value], ramp: History, rotation: Rotation | None = None,
+        self, group: str, components: Mapping[str, Any], ramp: History, rotation: Rotation | None = None,
         rotation_ramp: Table | None = None,
     ) -> None:  # fmt: skip
         """Add a support for each component of the displacement, after checking it."""
         check_points(self.mesh, group, "no displacement can be prescribed on it")
         for axis, value in axes_of(f"the support of '{group}'", components, self.mesh.dim).items():
+            name = displacement_name("xyz"[axis], group)
             table = table_of(ramp, f"the ramp of the displacement prescribed on '{group}'")
-            support = Support(group, axis, value, table, rotation, rotation_ramp)
-            check_value(support.name, value)
-            self.supports.append(support)
+            if isinstance(value, Sequence):
+                if table is not None or rotation is not None:
+                    raise ModelError(f"{name} is given at several load factors: leave out ramp and rotation")
+                value = tuple((float(instant), displacement) for instant, displacement in value)
+                table = interpolation_tables([instant for instant, _ in value], name)[-1]
+            for _, displacement in value if isinstance(value, tuple) else [(1.0, value)]:
+                check_value(name, displacement)
+            self.supports.append(Support(group, axis, value, table, rotation, rotation_ramp))
 
     def prescribed(self) -> tuple[Mask, Array]:
         """Return the mask of the prescribed components and their displacements at multiplier 1 [length].

@@ -102,7 +102,7 @@ def spheres(mesh, E=20_000.0, nu=0.3, moved=1.0, **options):
     model = fc.Model(mesh, kinematics="axisymmetric")
     model.add_material(fc.LinearElastic(E=E, nu=nu), "SPHHAU")
     model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
-    supported(model, A1A2="x", A2B2={"y": -moved}, A1B1={"y": 1.0})
+    supported(model, A1A2="x", A2B2={"y": [(0.5, -0.7 * moved), (1.0, -moved)]}, A1B1={"y": 1.0})
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
     return model
 
