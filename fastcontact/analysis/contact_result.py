@@ -38,7 +38,7 @@ def contact_results(
     load : StepLoad
     settled : SettledContact
     end : State
-        State at the end of the step, of which displacements and points of first contact are used.
+        State at the end of the step; its displacements and its points of first contact are used.
     """
     displacement = problem.displacement(end.u)
     paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
@@ -140,9 +140,10 @@ def contact_result(
 def _contact_radius(
     pair: Formulation, middle: ContactMiddle, distances: tuple[Array, Array], active: Mask, closed: Mask
 ) -> tuple[float, float]:
-    """Return the bounds `ContactResult.radius`, given two `distances` of each constraint from the middle.
+    """Return the bounds `ContactResult.radius`.
 
-    In 3D the radius may depend on the direction, and facets of closed nodes (n_nodes,) may be only partly in contact.
+    `distances` are the places of the constraints relative to the middle, and their coordinates along the tangent there. In 3D
+    the radius may depend on the direction, and facets of closed nodes (n_nodes,) may be only partly in contact.
     """
     low, high = half_width(distances[0], active, distances[1])
     side = pair.secondary
@@ -205,8 +206,9 @@ def _closed_nodes(
     multiplier : ndarray (n_nodes,)
         The pressure field over the whole side [pressure].
     scale : ndarray (n_nodes,)
-        Ratio of reported to raw pressures at closed nodes, by which tractions are scaled as well; zero at open nodes. If raw
-        pressures are negative anywhere, the ratio is at most 1, since the raw pressure of a node may then nearly vanish [-].
+        Ratio of the reported pressures to the pressures of the formulation at closed nodes, by which tractions are scaled as
+        well; zero at open nodes. If the formulation has negative pressures anywhere, the ratio is at most 1, since its
+        pressure at a node may then nearly vanish [-].
     """
     field, excluded = constraints.nodal, pair.options.excluded_nodes(pair.secondary)
     assert field is not None
@@ -229,7 +231,7 @@ def _closed_nodes(
 
 
 def closed_node_pressures(constraints: Constraints, forces: Array, closed: Mask, side: Surface) -> tuple[Mask, Array]:
-    r"""Return the closed nodes (n,) without tension, and pressures (n,) at these nodes that carry the contact force.
+    r"""Return the closed nodes (n,) without tension, and pressures (n,) at them whose resultant is the contact force.
 
     A pressure field :math:`p_h` with the nodal values :math:`p_j`, which is obtained by projection, is not zero beyond the
     edge of the contact. Its values at open nodes also contribute to the contact force :math:`\int p_h\,dA = \sum_j A_j p_j`,
@@ -275,7 +277,8 @@ def closed_node_pressures(constraints: Constraints, forces: Array, closed: Mask,
 def _received_pressures(receivers: Mask, excess: Array, areas: Array, side: Surface) -> Array:
     """Return the changes (n,) of pressures at the `receivers` (n,) due to the shares `excess` (n,) of other nodes [pressure].
 
-    Shares move from ring to ring of neighbours towards the receiving nodes, beginning with the ring that is farthest away.
+    The other nodes form rings of neighbours around the receivers. Shares move inward from ring to ring, beginning with the
+    outermost ring.
     """
     rings, visited = [receivers], receivers.copy()
     while (excess[~visited] != 0.0).any():
@@ -416,7 +419,7 @@ def _with_periodic_nodes(problem: Problem, results: dict[str, ContactResult]) ->
 
 
 def _common_rows(problem: Problem, contact: ContactResult, interface: PeriodicInterface) -> tuple[Indices, Indices]:
-    """Return the rows, in a contact result, of the node pairs of a periodic interface that both belong to the contact."""
+    """Return the rows, in a contact result, of the node pairs of a periodic interface with both nodes in the contact."""
     row_of_node = np.full(problem.model.mesh.n_points, -1, np.intp)
     row_of_node[contact.points] = np.arange(len(contact.points))
     on_side = (row_of_node[interface.first] >= 0) & (row_of_node[interface.second] >= 0)

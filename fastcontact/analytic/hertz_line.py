@@ -84,7 +84,7 @@ class HertzLine:
         """Return the displacements (..., 2) [length] of body 1 or 2 at points `x` (...) [length], `y` (...) [length].
 
         Displacements are relative to that of the point (0, 0), because the displacement of a half-plane is unbounded at
-        infinity. They follow by integration from the stresses of McEwen (1949). Raises ModelError for a rigid body.
+        infinity. They are obtained by integrating the stresses of McEwen (1949). Raises ModelError for a rigid body.
         """
         E, nu = self.bodies.constants(body)
         return _half_plane.displacement(x, y, self.radius, self.pressure_max, E, nu, self.kinematics)
@@ -147,8 +147,8 @@ def hertz_line(
     E1, nu1, R1, E2, nu2, R2 : float
         See `hertz_point`.
     force, radius, pressure_max : float
-        Normal force per unit length [force/length], half-width of the contact [length] or largest pressure [pressure]; give
-        exactly one of them.
+        Normal force per unit length [force/length], half-width of the contact [length] or largest pressure [pressure].
+        Exactly one of them must be given.
     kinematics : {"plane_strain", "plane_stress"}
         Plane strain is for long cylinders, plane stress for thin discs.
 

@@ -13,7 +13,7 @@ from fastcontact.cli._outputs import check_outputs, draw_profile, say_written
 from fastcontact.cli._results import load_multiplier, pressure_curves
 from fastcontact.cli._terminal import say
 
-HELP = "pressure along the contact line against theory: CSV, XMGRACE .agr, PNG"
+HELP = "pressure along the contact line compared with theory: CSV, XMGRACE .agr, PNG"
 ARGUMENTS = {
     **_results.ARGUMENTS,
     "--csv FILE": "write the table",
@@ -23,7 +23,7 @@ ARGUMENTS = {
 
 
 def run(options: Namespace) -> int:
-    """Write the files of the options, or print the table if none is requested."""
+    """Write the files that the options request, or print the table if there are none."""
     from fastcontact.results.reader import open_results
     from fastcontact.results.tables import contact_table, with_column, write_csv
 
@@ -63,7 +63,7 @@ def _print(table: Any) -> None:
 
 
 def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, PressureCurve]) -> None:
-    """Write an XMGRACE project with the computed pressure and that of theories by label."""
+    """Write an XMGRACE project with the computed pressure and the theoretical pressures, given by label."""
     from fastcontact.results.units import axis_label
     from fastcontact.results.xmgrace import Curve, write_agr
 

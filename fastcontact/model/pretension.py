@@ -24,14 +24,14 @@ ALONG = 0.7
 
 @dataclass(frozen=True, eq=False)
 class Pretension:
-    """A pretension section, whose sides move relative to each other only along its normal, equally at all nodes.
+    """A pretension section, whose sides move relative to each other only along its normal, by the same amount at all nodes.
 
     Attributes
     ----------
     label : str
         Name in results.
     nodes, opposite : ndarray of int (m,)
-        Coincident points of both sides.
+        Coincident points of the two sides.
     normal : ndarray (dim,)
         Unit vector from the first side to the opposite one, along the bolt [-].
     force : float
@@ -39,7 +39,7 @@ class Pretension:
     shortening : float or None
         Relative approach of the sides, at multiplier 1 [length]; None if the force is given.
     locked_from : float or None
-        Instant from which the shortening is kept.
+        Load factor from which the shortening is locked [-].
     ramp : tuple, optional
         Ramp of the force or shortening.
     """
@@ -64,7 +64,7 @@ class Pretension:
         return f"the shortening of {self.name}"
 
     def row(self, n_dofs: int) -> csr_array:
-        """Return the row (1, n_dofs) whose product with displacements is the shortening [-]."""
+        """Return the row (1, n_dofs) that multiplies the displacements to give the shortening [-]."""
         m = len(self.nodes)
         return csr_array(csr_array(np.full((1, m), 1.0 / m)) @ self._approach(self.normal, n_dofs))
 
@@ -76,7 +76,7 @@ class Pretension:
     def relations(self, n_dofs: int) -> list[MultiPointConstraint]:
         """Return the permanent constraints.
 
-        The sides have no relative shear, and the shortening is equal at all nodes and, if given, prescribed.
+        The sides do not slide relative to each other, and the shortening is equal at all nodes and, if given, prescribed.
         """
         rows = [self._approach(direction, n_dofs) for direction in _tangents(self.normal)]
         approach = self._approach(self.normal, n_dofs)
@@ -147,7 +147,7 @@ def pretension(
     label, section, opposite, normal
         See `Model.add_pretension`.
     amounts : (float or None, float or None, float or None)
-        Force [force], shortening [length], and instant from which the shortening is locked.
+        Force [force], shortening [length], and load factor from which the shortening is locked [-].
     ramp : tuple, optional
 
     Raises
@@ -175,13 +175,13 @@ def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[I
     nodes = mesh.points_of(section).astype(np.intp)
     if opposite is None and other not in mesh.group_names:
         raise ModelError(
-            f"{name}: the mesh is not cut along '{section}', there is no group '{other}': build the model on "
+            f"{name}: the mesh is not cut along '{section}', since there is no group '{other}': build the model on "
             f"fc.generate.cut(mesh, '{section}'), or name the opposite side"
         )
     opposite_nodes = mesh.points_of(other).astype(np.intp)
     shared = np.intersect1d(nodes, opposite_nodes)
     if len(shared):
-        raise ModelError(f"{name}: '{section}' and '{other}' share point {shared[0]}: both sides need separate nodes")
+        raise ModelError(f"{name}: '{section}' and '{other}' share point {shared[0]}: the sides need separate nodes")
     match = matched(mesh, (section, nodes), (other, opposite_nodes), [0.0] * mesh.dim)
     return nodes, opposite_nodes[match]
 
@@ -213,7 +213,8 @@ def _outward(mesh: Mesh, name: str, section: str, direction: Array) -> Array:
     if abs(cosine) < ALONG:
         angle = np.degrees(np.arccos(min(abs(cosine), 1.0)))
         raise ModelError(
-            f"the normal of {name} deviates by {angle:.0f} degrees from that of '{section}': omit it, or cut the bolt across"
+            f"the normal of {name} deviates by {angle:.0f} degrees from that of '{section}': omit it, or cut the bolt "
+            "perpendicular to its axis"
         )
     return direction if cosine > 0.0 else -direction
 
@@ -229,7 +230,7 @@ def _tangents(normal: Array) -> Array:
 def locked_lengths(
     sections: Sequence[Pretension], begin: float, displacement: Array, stored: Mapping[str, Any]
 ) -> dict[str, float]:
-    """Return by name the shortenings of the sections that are locked in the load step from the instant `begin` [length].
+    """Return by label the shortenings [length] of the sections that are locked in a load step that begins at `begin`.
 
     The shortening of a section that is locked in this step is computed from displacements (n_points, dim) [length]. Later
     steps use the `stored` value, because their displacements reproduce it only up to round-off.
@@ -239,7 +240,7 @@ def locked_lengths(
 
 
 def loose_bolts(sections: Sequence[Pretension], modes: Array, force: Array) -> str:
-    """Return a remark about sections without a force whose shortening is free in rigid-body motions, to append to a message.
+    """Return a remark, to be appended to a message, about unloaded sections whose sides rigid-body motions move apart.
 
     `modes` (n_dofs, k) are the displacements in these motions, and `force` (n_points, dim) are the loads [force].
     """
@@ -247,7 +248,7 @@ def loose_bolts(sections: Sequence[Pretension], modes: Array, force: Array) -> s
     loose = " and ".join(bolt.name for bolt in free if not force[bolt.nodes].any())
     if not loose:
         return ""
-    return f". The force of {loose} is 0: give a loose bolt a small force from the beginning, 0.001 of the full one"
+    return f". The force of {loose} is 0: give a loose bolt a small force from the beginning, such as 0.001 of the full force"
 
 
 def check_locks(sections: Sequence[Pretension], instants: Sequence[float]) -> None:
@@ -258,12 +259,12 @@ def check_locks(sections: Sequence[Pretension], instants: Sequence[float]) -> No
             continue
         if locked_from <= 0.0:
             raise ModelError(
-                f"{bolt.name} is locked from {locked_from:g}, and its force never acts: lock it at the end of a load step"
+                f"{bolt.name} is locked from {locked_from:g}, so that its force never acts: lock it at the end of a load step"
             )
         if instants[0] < locked_from < instants[-1] and locked_from not in instants:
             nearest = min(instants, key=lambda instant: abs(instant - locked_from))
             raise ModelError(
-                f"{bolt.name} is locked from {locked_from:g}, but no load step ends there: give the ramp that instant, or "
+                f"{bolt.name} is locked from {locked_from:g}, but no load step ends there: add this instant to the ramp, or "
                 f"lock it at the end of a step, such as {nearest:g}"
             )
 
@@ -271,7 +272,7 @@ def check_locks(sections: Sequence[Pretension], instants: Sequence[float]) -> No
 def section_results(
     sections: Sequence[Pretension], displacement: Array, reaction: Array, factors: Sequence[float]
 ) -> dict[str, dict[str, float]]:
-    """Return by name the ``force`` in each section, positive in tension [force], and its ``shortening`` [length].
+    """Return, by label, the ``force`` in each section, positive in tension [force], and its ``shortening`` [length].
 
     Parameters
     ----------

@@ -95,8 +95,8 @@ def run_all(
 ) -> list[Result]:
     """Run jobs in parallel and return their results in the order of the jobs; for options see `convergence_study`.
 
-    Raises CaseError if the number of workers is invalid or if the function of a quantity fails before any run succeeds, and
-    FastcontactError if no worker process can start.
+    Raises CaseError if the number of workers is invalid or if the function that computes a quantity fails before any run has
+    succeeded, and FastcontactError if no worker process can start.
     """
     storage = None if store is None else Store(store)
     results = {i: stored for i, job in enumerate(jobs) if storage and (stored := storage.get(job)) is not None}
@@ -143,9 +143,9 @@ def run_study(
 
 
 class Store:
-    """A folder with a JSON file for each finished run, named by the key of its job.
+    """A folder with a JSON file for each finished run, named after the key of the run.
 
-    The folder is created if it does not exist; FileError if this fails.
+    The folder is created if it does not exist. FileError is raised if this fails.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -153,7 +153,9 @@ class Store:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise FileError(f"the folder '{folder}' cannot be created: {error.strerror}; name another store") from error
+            raise FileError(
+                f"the folder '{folder}' cannot be created: {error.strerror}; choose another folder"
+            ) from error
 
     def path(self, job: Run) -> Path:
         """Return the path of the file for the result of a run."""
@@ -180,7 +182,7 @@ def _run_jobs(
 ) -> Iterator[tuple[int, Result]]:
     """Run the jobs with the given `indices`. Yields the index and the result of each job when it ends."""
     if workers is not None and workers < 1:
-        raise CaseError(f"workers = {workers} must be at least 1, the number of processes")
+        raise CaseError(f"workers = {workers} is not allowed: the number of processes must be at least 1")
     count = min(workers or _processors(), len(indices))
     if executor is not None:
         yield from run_on_executor(executor, jobs, indices)
@@ -282,7 +284,7 @@ def _run_alone(job: Run) -> Result:
         with process_pool(1) as pool:
             return pool.submit(run, job, 1).result()
     except BrokenProcessPool:
-        text = "its worker process was killed, probably because the memory was full: use coarser meshes"
+        text = "its worker process was killed, probably because it ran out of memory: use coarser meshes"
         return {"error": text, "kind": "BrokenProcessPool"}
 
 

@@ -121,7 +121,7 @@ CASES = [
      '[contact.hertz]\nsecondary = "CONT1"\nprimary = "CONT2"\nformulation = "node_to_segment"', "",
      r"case\.toml: 'theory': unknown contact pair 'hertz': none is defined"),
     ("two materials for one body", "[ramp]", '[[material]]\ngroups = ["SPHBAS"]\nE = 1000.0\nnu = 0.3\n[ramp]',
-     r"1584 cells of 'SPHBAS' have two materials, E = 20000, nu = 0\.3 and E = 1000, nu = 0\.3: assign one to each group; a material of all other cells must come first, without groups"),
+     r"1584 cells of 'SPHBAS' have two materials, E = 20000, nu = 0\.3 and E = 1000, nu = 0\.3: assign one to each group; the material of all other cells must be assigned first, without groups"),
     ("no body with sufficient supports", '[[support]]\ngroup = "A2B2"\ny = -2.0\n\n[[support]]\ngroup = "A1B1"\ny = 2.0', "",
      r"1 rigid-body motion is not supported: body '\w+': translation along y \(the axis\); body '\w+': translation along y \(the axis\)\. Fix or prescribe a displacement component that stops each, or let a load press the body against a contact"),
     ("contact pair defined twice in a case", "[ramp]", '[contact.again]\nsecondary = "CONT2"\nprimary = "CONT1"\n[ramp]',

@@ -248,7 +248,7 @@ MATERIALS = [
             r"18 solid cells in 'UPPER' have no material: assign one to their groups by add_material or \[\[material\]\]"),
     Mistake("two materials for one group",
             lambda: solved(with_materials((1000.0, 0.3, ["LOWER", "UPPER"]), (2000.0, 0.3, "UPPER"))), fc.ModelError,
-            r"18 cells of 'UPPER' have two materials, E = 1000, nu = 0\.3 and E = 2000, nu = 0\.3: assign one to each group; a material of all other cells must come first, without groups"),
+            r"18 cells of 'UPPER' have two materials, E = 1000, nu = 0\.3 and E = 2000, nu = 0\.3: assign one to each group; the material of all other cells must be assigned first, without groups"),
     Mistake("a material for all cells, and another for a group",
             lambda: solved(with_materials((2000.0, 0.3, "UPPER"), (1000.0, 0.3, None))), fc.ModelError,
             r"18 cells of the mesh have two materials"),

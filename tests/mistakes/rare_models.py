@@ -150,6 +150,6 @@ MISTAKES = [
     Mistake("stresses on the axis of a solid in space", solid_stress_on_axis, fc.errors.FastcontactError,
             r"stresses along the axis need a two-dimensional mesh: in three dimensions draw a section"),
     Mistake("a spring without second node", lambda: with_load("add_spring", group="UPPER_TOP_LEFT", axial=1.0), fc.ModelError,
-            r"the spring on 'UPPER_TOP_LEFT' has an axial or transverse stiffness but no second node: name it by `to`, give a"),
+            r"the spring on 'UPPER_TOP_LEFT' has an axial or transverse stiffness but no second node: specify it by `to`, give a"),
 ]
 # fmt: on

@@ -46,7 +46,7 @@ COMMANDS = [
     ("nothing to export", ["export", "run.vtkhdf"], r"nothing to export: give --med FILE or --xdmf FILE"),
     ("two elements for adaptive meshes", ["converge", "case.toml", "--adaptive", "--elements", "tri3,quad4"], r"adaptive refinement takes one element, not 2: tri3,quad4"),
     ("unknown place to run", ["converge", "case.toml", "--executor", "grid"], r"--executor 'grid' must be processes, mpi, or the address of a Dask scheduler"),
-    ("no worker", ["converge", "case.toml", "--levels", "1", "--workers", "0"], r"workers = 0 must be at least 1, the number of processes"),
+    ("no worker", ["converge", "case.toml", "--levels", "1", "--workers", "0"], r"workers = 0 is not allowed: the number of processes must be at least 1"),
 ]  # fmt: skip
 
 
@@ -144,7 +144,7 @@ CALLS = [
     ("mpi4py is not installed", lambda patch: without(patch, "mpi4py", "futures", "mpi"), fc.errors.CaseError, r"--executor mpi needs mpi4py .*: pip install mpi4py"),
     ("no worker starts", no_worker_starts, fc.errors.FastcontactError, r"no worker process could start: in a script, put the call of the study under if __name__ == '__main__':"),
     ("a text on a read-only disk", protected_text, fc.errors.FileError, r"'a\.json' cannot be written \(Read-only file system\)"),
-    ("a file where the store should be", file_for_a_store, fc.errors.FileError, r"the folder 'runs' cannot be created: File exists; name another store"),
+    ("a file where the store should be", file_for_a_store, fc.errors.FileError, r"the folder 'runs' cannot be created: File exists; choose another folder"),
     ("refining solids in space", lambda: refined(box()), fc.MeshError, r"cells of hex8 cannot be refined: only lines, triangles and quadrangles are divided here"),
     ("a curve elsewhere", lambda: refined(block((1.0, 1.0), (2, 2)), curves=[Circle((50.0, 50.0), 1.0)]), fc.MeshError, r"no outer facet has all its nodes on .*: check its centre and radius"),
     ("a negative tolerance of merging", lambda: merge_points(half_spheres(size=20.0), -1.0), fc.MeshError, r"tolerance = -1 is out of range: it must be at least 0"),

@@ -71,7 +71,7 @@ def _point(model: Model, point: str | int) -> int:
     if isinstance(point, str):
         return int(model.mesh.point(point))
     if not 0 <= point < model.mesh.n_points:
-        raise ModelError(f"point {point} is not in the mesh of {model.mesh.n_points} points (numbers from 0)")
+        raise ModelError(f"point {point} is not in the mesh of {model.mesh.n_points} points (numbered from 0)")
     return point
 
 

@@ -31,12 +31,12 @@ Component = tuple[int, int, bool]
 
 @dataclass(frozen=True, slots=True)
 class Period:
-    """Period of a support.
+    """Period in which a support acts.
 
     Attributes
     ----------
     location : Location or None
-        Line of a support that begins after the start of the first step; otherwise None.
+        Line of the deck that prescribes the support, if it acts only from a later step on; otherwise None.
     begins, ends : float
         Load factors [-] between which the support acts.
     keeps : bool
@@ -68,7 +68,7 @@ class Conditions:
         self.heat = HeatConditions(assembly, initial)
         self.locks = Locks(assembly)
         self.directions = local_directions(assembly)
-        if assembly.dim == 3:  # the rotations of a node have the axes of the node
+        if assembly.dim == 3:  # rotations refer to the local axes of their node
             rotations, rotated = assembly.rotations, self.directions
             self.directions = {rotations[p]: axes for p, axes in rotated.items() if p in rotations} | rotated
 
@@ -163,7 +163,7 @@ class Conditions:
                 for component in components:
                     self._support(condition, row, point, component, value)
         if driven:
-            self.assembly.content.note(block, "a displacement prescribed before all steps is reached in the first step")
+            self.assembly.content.note(block, "a displacement prescribed before the first step is applied in that step")
 
     def _support(self, condition: Condition, row: Row, point: int, component: int, value: float) -> None:
         """Record a support of a point. Raises CaseError if the component does not exist and the value is not zero."""
@@ -203,7 +203,7 @@ class Conditions:
         return (point, number, True), 1.0
 
     def _forces(self, block: Block) -> Iterator[tuple[Component, float, Location]]:
-        """Yield the component, the value [force] and the location of each force of a *CLOAD."""
+        """Yield the component, the value [force] and the location of each force in a *CLOAD block."""
         for row in block.each():
             component, value = row.whole(1), row.number(2)
             for point in self.assembly.nodes(row.text(0), row.location):

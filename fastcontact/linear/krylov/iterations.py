@@ -20,10 +20,10 @@ from fastcontact.linear.krylov.krylov_kernels import CHUNK, WORK_OF_NUMBER
 # with an approximation of ``A^-1 r``, given the 2-norm of r.
 Multiply = Callable[[Array, Array], None]
 Precondition = Callable[[Array, float, Array], None]
-# Number of earlier search directions of the conjugate residual method to which a new one is made orthogonal.
+# Number of search directions that the conjugate residual method stores; their images are orthogonal to that of a new one.
 STORED_DIRECTIONS = 20
-# A step of the conjugate residual method counts as failed if the norm of the residual stays above this fraction of the
-# previous norm.
+# A step of the conjugate residual method has failed (stagnation) if the norm of the residual stays above this fraction of
+# the previous norm.
 FAILED_REDUCTION = 0.98
 
 
@@ -76,12 +76,12 @@ class Iteration:
         return abs(alpha) * largest(p[:n]) / (before - self.norm) if self.norm < before else np.inf
 
     def _advance(self, alpha: float, p: Array, q: Array) -> None:
-        """Make the step ``x += alpha p``, ``r -= alpha q`` of the iterate and its residual."""
+        """Update the iterate and its residual, ``x += alpha p`` and ``r -= alpha q``."""
         self._last_step = alpha, p, self.norm
         self.norm = float(np.sqrt(self._stepped(alpha, p, q, self.x, self.r)))
 
     def _stepped(self, alpha: float, p: Array, q: Array, x: Array, r: Array) -> float:
-        """Make the step ``x += alpha p``, ``r -= alpha q`` for arbitrary vectors; return the square of the norm of r."""
+        """Update arbitrary vectors, ``x += alpha p`` and ``r -= alpha q``; return the square of the norm of r."""
         parallel_for(krylov_kernels.advance, len(self._sums), WORK_OF_NUMBER * CHUNK, alpha, p, q, x, r, self._sums)
         return float(krylov_kernels.total(self._sums))
 
@@ -89,8 +89,9 @@ class Iteration:
 class ConjugateGradients(Iteration):
     """Preconditioned conjugate gradients; see `Iteration`.
 
-    Because of round-off, a preconditioner in single precision is slightly variable. Search directions are therefore updated
-    by the Polak-Ribiere formula (flexible conjugate gradients; Notay, 2000), which takes one more dot product.
+    Because of round-off, a preconditioner in single precision varies slightly from one iteration to the next. Search
+    directions are therefore updated by the Polak-Ribiere formula (flexible conjugate gradients; Notay, 2000), which takes one
+    more dot product.
     """
 
     def __init__(self, n: int) -> None:
@@ -109,7 +110,7 @@ class ConjugateGradients(Iteration):
         self._rz = 0.0
 
     def step(self, multiply: Multiply, precondition: Precondition) -> bool:
-        """Make one iteration; return False, without changes, if the preconditioner or A is not positive definite."""
+        """Perform one iteration; return False, with x and r kept, if A or the preconditioner is not positive definite."""
         precondition(self.r, self.norm, self.z)
         rz = self.dot(self.r, self.z)
         beta = 0.0
@@ -135,7 +136,8 @@ class ConjugateResiduals(Iteration):
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
-        # Search directions p with images A p of unit norm, and -A p, so that `_stepped` makes vectors orthogonal to A p.
+        # Pairs of a search direction p and -A p, where A p has unit norm. With this sign, `_stepped` makes vectors orthogonal
+        # to A p.
         self._stored: deque[tuple[Array, Array]] = deque()
         self._unused: list[tuple[Array, Array]] = []  # memory for directions and images
         self._failed = False  # whether the last step failed, see FAILED_REDUCTION
@@ -153,7 +155,7 @@ class ConjugateResiduals(Iteration):
         self._failed = False
 
     def step(self, multiply: Multiply, precondition: Precondition) -> bool:
-        """Make one iteration; return False if the new image depends linearly on the stored ones, up to round-off.
+        """Perform one iteration; return False if the new image depends linearly on the stored ones, up to round-off.
 
         After a failed step, the preconditioner is applied to the last image instead of the residual.
         """

@@ -2,7 +2,7 @@
 
 Constraint equations ``B u = c`` are eliminated (`multigrid.solver`). Those with a diagonal compliance are eliminated or
 replaced by springs (`multigrid.loaded`). Equations with a full compliance matrix cannot be eliminated. They need columns of
-K^-1, each of which takes one linear solution; the columns are stored for the complete analysis.
+K^-1, each of which requires the solution of one linear system; they are stored for the complete analysis.
 
 A factorisation replaces multigrid for the rest of the analysis if too many columns are needed, if the iteration stalls on
 thin or nearly incompressible parts, or if a load step has taken more work than a factorisation. Very large matrices are not
@@ -34,10 +34,9 @@ from fastcontact.linear.springs import Springs
 from fastcontact.round_off import ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# Number of iterations in one load step above which a factorisation is cheaper, for each unknown, in addition to the largest
-# number in one solution. It depends on the number of components per node. In 3D, a factorisation and a load step with it cost
-# as much as 300 iterations plus 0.04 per unknown for two bodies in contact, and three times as much in stacks with friction
-# (measured, see bench/README.md).
+# By the number of components per node: a factorisation is cheaper if one load step takes more iterations than MAX_ITERATIONS
+# plus this number for each unknown. In 3D, a factorisation and a load step with it cost as much as 300 iterations plus 0.04
+# per unknown for two bodies in contact, and three times as much in stacks with friction (measured, see bench/README.md).
 COST_OF_UNKNOWN = {1: 0.0, 2: 0.0, 3: 0.08}
 
 
@@ -88,7 +87,7 @@ class Amg(Multigrid, LinearSolver):
 
     @property
     def affordable(self) -> int:
-        """Number of iterations that cost more than a factorisation and a load step with it."""
+        """Number of iterations in one load step above which a factorisation is cheaper."""
         n, size = self.K.shape[0], self.K.blocksize[0]
         return MAX_ITERATIONS + int(COST_OF_UNKNOWN[size] * n)
 
@@ -105,9 +104,9 @@ class Amg(Multigrid, LinearSolver):
         return tighten(self, excess)
 
     def snapshot(self) -> dict[str, Any]:
-        """Return equations, springs and bounds of the hierarchy, and requested columns of K^-1; see `LinearSolver.snapshot`.
+        """Return the equations, springs and eigenvalue bounds of the hierarchy, and the requested columns of K^-1.
 
-        The keys are names in result files and must not be changed.
+        See `LinearSolver.snapshot`. The keys are names in result files and must not be changed.
         """
         instead = None if self.instead is None else {"why": self.gave_up, **self.instead.snapshot()}
         return {
@@ -170,7 +169,7 @@ class Amg(Multigrid, LinearSolver):
         return bool(self.K.shape[0] <= AFFORDABLE[self.K.blocksize[0]])
 
     def _factorise(self, why: str) -> Direct:
-        """Replace multigrid by a factorisation with the reason `why`, and return the direct solver."""
+        """Replace multigrid by a factorisation for the reason `why`, and return the direct solver."""
         if self._factor_solver is None:
             log.warning("%s", why)
             self._factor_solver = Direct()
@@ -232,7 +231,7 @@ class _Loaded(LoadedMultigrid):
         friction: FrictionTerms | None = None, C: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         if self._solver.instead is not None:
-            raise ConvergenceError("with a factorisation, friction is solved on the Delassus operator")
+            raise ConvergenceError("with a factorisation, the friction problem is solved with the Delassus operator")
         try:
             return super().solve_nonsymmetric(B, c, nodes, guess, tolerance, friction, C)
         except StallError as stalled:

@@ -1,8 +1,8 @@
 """Reference solver: conjugate gradients of SciPy, preconditioned by the smoothed aggregation of pyamg.
 
-This solver is simple and slow. Except for the choice of pivots, it only consists of calls of pyamg and SciPy, so that the
-solver "amg" can be verified against it. Equations are eliminated, ``u = T v + t``, and each set of
-equations requires a new hierarchy for the matrix ``T.T K T``.
+This solver is simple and slow. Except for the choice of pivots, it consists only of calls to pyamg and SciPy, so that the
+solver "amg" can be verified against it. Equations are eliminated, ``u = T v + t``, and each set of equations requires a new
+hierarchy for the matrix ``T.T K T``.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from fastcontact.linear.elimination.loaded import LoadedIteration, put_back_tole
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS
 from fastcontact.linear.protocol import TOLERANCE, Counters, LinearSolver, Monitor
 
-# All connections are strong, as in "amg", candidates are not improved because rigid-body modes need no improvement, and the
-# smoother with the shortest solution time is used.
+# As in "amg", all connections are treated as strong. The near-nullspace candidates are not improved, because rigid-body modes
+# need no improvement. Of the smoothers, the one with the shortest solution time is used.
 SMOOTHER = ("chebyshev", {"degree": 2, "iterations": 1})
 OPTIONS: dict[str, Any] = {
     "strength": ("symmetric", {"theta": 0.0}), "max_coarse": 200, "improve_candidates": None,
@@ -87,7 +87,7 @@ class Pyamg(LinearSolver):
         self, f: Array, elimination: Elimination | None, guess: Array | None, monitor: Monitor | None = None,
         tolerance: float | None = None,
     ) -> Array:  # fmt: skip
-        """Solve ``K u = f`` under the equations of `elimination` to the solver's tolerance, or a larger one.
+        """Solve ``K u = f`` under the equations of `elimination` to the solver's tolerance, or `tolerance` if larger.
 
         Raises
         ------

@@ -56,8 +56,8 @@ class Support:
     component : int
         Number of the component, from 0.
     value : float, callable or tuple of (float, float or callable)
-        Displacement at multiplier 1 [length], a number or a function of position; or load factors and the displacements at
-        them, which are interpolated linearly.
+        Displacement at multiplier 1 [length], a number or a function of position; or pairs of a load factor and the
+        displacement at it, between which displacements are interpolated linearly.
     ramp : Table, optional
         History of `value`; None means the history of the analysis.
     rotation : Rotation, optional
@@ -147,7 +147,7 @@ class ModelBase(Suggesting):
         self.related_supports: list[tuple[str, MultiPointConstraint]] = []  # supports by group, as constraints
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
-        self.interpolated: dict[str, Indices] = {}  # nodes of cyclic symmetries without a counterpart, tied to facets
+        self.interpolated: dict[str, Indices] = {}  # nodes of cyclic interfaces without a counterpart, tied to facets
         self.periodic_interfaces: list[PeriodicInterface] = []  # coincident nodes of periodic parts
         self.contact: list[ContactPair] = []
 
@@ -166,7 +166,7 @@ class ModelBase(Suggesting):
         return names
 
     def _cells_of(self, groups: Sequence[str] | None) -> Cells:
-        """Return the solid cells of `groups`, or all solid cells for None."""
+        """Return the solid cells of `groups`, or all solid cells if it is None."""
         return Cells(self.mesh, solid_rows(self.mesh, groups))
 
     def _nodes(self, point: str | int) -> AnyArray:
@@ -174,7 +174,7 @@ class ModelBase(Suggesting):
         if isinstance(point, str):
             return self.mesh.points_of(point)
         if point != int(point) or not 0 <= point < self.mesh.n_points:
-            raise ModelError(f"point {point} is not in the mesh of {self.mesh.n_points} points (numbers from 0)")
+            raise ModelError(f"point {point} is not in the mesh of {self.mesh.n_points} points (numbered from 0)")
         return np.array([point])
 
     def _direction(
@@ -188,8 +188,8 @@ class ModelBase(Suggesting):
         if direction is None:
             if stiffness and not between:
                 raise ModelError(
-                    f"{name} has an axial or transverse stiffness but no second node: name it by `to`, give a direction, "
-                    "or x, y or z"
+                    f"{name} has an axial or transverse stiffness but no second node: specify it by `to`, give a "
+                    "direction, or give stiffnesses along x, y or z instead"
                 )
             return None
         if not stiffness:
@@ -298,7 +298,7 @@ class ModelBase(Suggesting):
                 raise ModelError(
                     f"{int((numbers == number).sum())} cells of {'the mesh' if group is None else repr(group)} have two "
                     f"materials, {old.described} and {new.described}: assign one to each group; "
-                    "a material of all other cells must come first, without groups"
+                    "the material of all other cells must be assigned first, without groups"
                 )
 
     def _check_all_have_material(self, numbers: dict[str, Numbers]) -> None:
@@ -330,7 +330,7 @@ class ModelBase(Suggesting):
         Raises
         ------
         ModelError
-            If the displacement has a wrong shape, or forces do not depend on the displacement alone.
+            If the displacement has the wrong shape, or forces do not depend on the displacement alone.
 
         Examples
         --------
@@ -347,7 +347,7 @@ class ModelBase(Suggesting):
         """
         field, shape = self.material_field(), self.mesh.points.shape
         if np.size(displacement) != self.n_dofs:
-            raise ModelError(f"the displacement has shape {np.shape(displacement)}, but the mesh {shape}")
+            raise ModelError(f"the displacement has shape {np.shape(displacement)}, but the mesh requires {shape}")
         bodies = self.nonlinear_bodies(field)
         if bodies is not None:
             if self.strain == "small":

@@ -136,7 +136,7 @@ def test_nothing_is_eliminated_once_factors_have_taken_over():
     n = analysis.model.n_dofs
     analysis.solver.give_up(solver.StallError("stalled"))
     none = csr_array((0, n))
-    with pytest.raises(ConvergenceError, match="friction is solved on the Delassus operator"):
+    with pytest.raises(ConvergenceError, match="the friction problem is solved with the Delassus operator"):
         analysis.solver.load(np.zeros(n)).solve_nonsymmetric(
             none, np.empty(0), np.empty(0, np.int64), np.zeros(n), 1e-10
         )

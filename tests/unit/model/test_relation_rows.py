@@ -255,7 +255,7 @@ def bar(cut=True):
         ({"force": 1.0, "shortening": 1.0}, "needs either a force or a shortening"),
         ({"shortening": 1.0, "locked_from": 1.0}, "locked_from applies to a force only"),
         ({"force": np.inf}, "the force of pretension 'bolt' is inf"),
-        ({"force": 1.0, "opposite": "CUT"}, "share point 2: both sides need separate nodes"),
+        ({"force": 1.0, "opposite": "CUT"}, "share point 2: the sides need separate nodes"),
         ({"force": 1.0, "opposite": "TOP"}, "lies .* from the nearest node of 'TOP'"),
         ({"force": 1.0, "normal": (0.0, 0.0)}, "the normal .* must be 2 numbers, not all zero"),
     ],

@@ -339,7 +339,7 @@ def test_a_displacement_before_the_first_step_is_reached_in_it(tmp_path, in_step
     deck = deck_of(tmp_path, text)
     force = 200.0 if in_step else 100.0
     assert deck.solve()[0].contact["ss/sm"].force[2] == pytest.approx(force)
-    assert "a displacement prescribed before all steps is reached in the first step" in notes_of(deck)
+    assert "a displacement prescribed before the first step is applied in that step" in notes_of(deck)
 
 
 def test_adjust_closes_gaps_that_vary(tmp_path):
