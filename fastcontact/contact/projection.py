@@ -361,23 +361,22 @@ def along_line_normals(
     points: Array, side: Surface, coordinates: Array, normals: Array, start: Closest
 ) -> tuple[Indices, Array, Array, Array]:
     """Project points (n, 2) onto a line along its interpolated normals; for the other parameters see `along_normals`."""
-    n_facets = len(normals)
-    corners, at_nodes = np.zeros((n_facets, 3, 2)), np.zeros((n_facets, 3, 2))
-    at_nodes[:, : normals.shape[1]] = normals
-    counts, ends = np.empty(n_facets, np.intp), np.empty((n_facets, 2), np.intp)
-    first = 0
-    for block in side.blocks:
-        rows, k = slice(first, first + len(block.facets)), block.facets.shape[1]
-        corners[rows, :k], counts[rows], ends[rows] = coordinates[block.facets], k, block.local[:, :2]
-        first = rows.stop
+    corners = side.corners(coordinates)
+    at_nodes = [n[:, : x.shape[1]] for n, x in zip(np.split(normals, np.cumsum(side.sizes)[:-1]), corners, strict=True)]
+    ends = np.concatenate([block.local[:, :2] for block in side.blocks])
     facet, xi, overhang = start.facet.astype(np.intp), start.xi[:, 0].copy(), start.overhang.copy()
-    work = np.empty(3), np.empty(3)
     neighbour = np.where(smooth_ends(side, normals), line_neighbours(ends), -1)
     search_2d_kernels.along_normals(
-        np.ascontiguousarray(points), corners, at_nodes, counts, neighbour, facet, xi, overhang, *work
+        np.ascontiguousarray(points), _with_middles(corners), _with_middles(at_nodes), neighbour, facet, xi, overhang
     )
     xi = xi[:, None]
     return facet, xi, overhang, interpolate(normals[facet], places(side, facet, xi))
+
+
+def _with_middles(lines: Sequence[Array]) -> Array:
+    """Return vectors (n, 3, 2) at three nodes of lines: in the middle of a straight line they are the mean of both ends."""
+    three_nodes = [np.concatenate([x, x[:, :2].mean(axis=1, keepdims=True)], axis=1)[:, :3] for x in lines]
+    return np.concatenate(three_nodes)
 
 
 def smooth_ends(side: Surface, normals: Array) -> Mask:
