@@ -131,11 +131,12 @@ def _nodal_means(side: Surface, node: Indices, normal: Array, angle: Array) -> A
     return np.divide(total, length, out=np.zeros_like(total), where=length != 0.0)
 
 
-def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
+def smooth_normals(side: Surface, coordinates: Array, corner: float = CORNER) -> list[Array]:
     """Return averaged unit normals at the nodes of the facets, separately on both sides of corners.
 
     Except at corners, they are those of `nodal_normals`. At a corner, the mean for a facet includes only those facets that
-    continue it smoothly, so that a punch is flat up to its corner although its flanks belong to the surface.
+    continue it smoothly, so that a punch is flat up to its corner although its flanks belong to the surface. Two facets form
+    a corner if their normals enclose a larger angle than `corner` [degrees].
 
     Returns
     -------
@@ -144,12 +145,12 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
     """
     node, normal, angle = _at_nodes(side, coordinates)
     smooth = _nodal_means(side, node, normal, angle)[node]
-    # A node is a corner if the normal of one of its facets deviates from the mean by more than half of CORNER.
-    corners = np.unique(node[np.einsum("pd,pd->p", normal, smooth) < np.cos(np.radians(0.5 * CORNER))])
+    # A node is a corner if the normal of one of its facets deviates from the mean by more than half of the angle.
+    corners = np.unique(node[np.einsum("pd,pd->p", normal, smooth) < np.cos(np.radians(0.5 * corner))])
     by_node, start = np.argsort(node, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(node))])
-    for corner in corners:
-        entries = by_node[start[corner] : start[corner + 1]]
-        similar = normal[entries] @ normal[entries].T > np.cos(np.radians(CORNER))
+    for node_at_corner in corners:
+        entries = by_node[start[node_at_corner] : start[node_at_corner + 1]]
+        similar = normal[entries] @ normal[entries].T >= np.cos(np.radians(corner)) - LENGTH_ROUND_OFF
         total = (similar * angle[entries]) @ normal[entries]
         smooth[entries] = total / np.linalg.norm(total, axis=1, keepdims=True)
     of_blocks = np.split(smooth, np.cumsum([block.local.size for block in side.blocks])[:-1])
@@ -197,6 +198,12 @@ def interpolate(normals: Array, points: Places) -> Array:
     """Return unit normals (n, dim) at points, interpolated between the normals (n, k, dim) at the nodes of their facets."""
     normal = np.einsum("nk,nkd->nd", points.shape, normals)
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+
+def distance_from_edges(side: Surface, facet: Indices, xi: Array) -> Array:
+    """Return the distances (n,) of points from the edges of their facets, as fractions of the size of the facet [-]."""
+    on_triangle = np.column_stack([xi, 1.0 - xi.sum(axis=1)]).min(axis=1)
+    return np.where(side.triangular[facet], on_triangle, 0.5 * (1.0 - np.abs(xi).max(axis=1)))
 
 
 class Closest(NamedTuple):
