@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.projection import at_nodes_of_facets, facet_angles, facet_normals, smooth_normals
+from fastcontact.contact.projection import at_nodes_of_facets, facet_normals, nodal_normals, smooth_normals
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
@@ -32,7 +32,7 @@ class SurfaceFacets(NamedTuple):
     side: Surface
     normals: Array  # (n_facets, k, dim): unit normals at the nodes [-]
     smooth: Array  # (n_facets, k, dim): the same, of the smooth surface [-]
-    angles: Array  # (n_facets, k): angles of the facets at their corners, and 1 at other nodes [radian]
+    at_nodes: Array  # (m, dim): normals of the nodes of the side, the means over all facets [-]
     on_border: Mask  # (m,): whether the surface ends at the node
 
 
@@ -44,10 +44,9 @@ def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> Surface
     """
     side, numbers = _oriented(mesh, group, flip)
     normals = [facet_normals(block, mesh.points) for block in side.blocks]
-    angles = [facet_angles(elements.get(block.element), mesh.points[block.facets]) for block in side.blocks]
-    smooth = smooth_normals(side, mesh.points, crease)
-    at_nodes = [at_nodes_of_facets(values) for values in (normals, smooth, angles)]
-    return SurfaceFacets(side, at_nodes[0], at_nodes[1], at_nodes[2], _border(mesh, side, numbers))
+    smooth, border = smooth_normals(side, mesh.points, crease), _border(mesh, side, numbers)
+    at_nodes = nodal_normals(side, mesh.points)
+    return SurfaceFacets(side, at_nodes_of_facets(normals), at_nodes_of_facets(smooth), at_nodes, border)
 
 
 def _oriented(mesh: Mesh, group: str, flip: bool) -> tuple[Surface, Indices]:
@@ -93,12 +92,12 @@ def _description(mesh: Mesh, number: int) -> str:
 
 
 def _border(mesh: Mesh, side: Surface, numbers: Indices) -> Mask:
-    """Return the nodes (m,) at the ends of ridges that belong to one facet only; `numbers` are the cell numbers of facets.
+    """Return the nodes (m,) of ridges that belong to one facet only; `numbers` are the cell numbers of facets.
 
     Raises ContactError, which names a facet, if the surface branches or neighbours have opposite orientations.
     """
-    facet, ends, sign = _ridges(side)
-    nodes, ridge, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    facet, nodes, sign = _ridges(side)
+    _, ridge, count = np.unique(nodes[:, :2], axis=0, return_inverse=True, return_counts=True)
     ridge = ridge.ravel()
     branches = np.flatnonzero(count[ridge] > 2)
     if len(branches):
@@ -110,22 +109,27 @@ def _border(mesh: Mesh, side: Surface, numbers: Indices) -> Mask:
     first, second = shared[count[ridge[shared]] == 2].reshape(-1, 2).T
     _check_orientation(mesh, side, numbers, facet[first], facet[second], sign[first] != sign[second])
     on_border = np.zeros(len(side.points), bool)
-    on_border[nodes[count == 1]] = True
+    on_border[nodes[count[ridge] == 1]] = True
     return on_border
 
 
 def _ridges(side: Surface) -> tuple[Indices, Indices, Indices]:
-    """Return the facet (n,), the nodes (n, 2) and the orientation (n,) of all ridges; in 2D both nodes are the same."""
-    facets, ends, signs, start = [], [], [], 0
+    """Return the facet (n,), the nodes (n, 3) and the orientation (n,) of all ridges.
+
+    The nodes are both ends and the middle. Without a node in the middle, an end occurs twice; in 2D all are the same.
+    """
+    facets, nodes, signs, start = [], [], [], 0
     for block in side.blocks:
         element = elements.get(block.element)
         ridges = block.local[:, np.array([(0, 0), (1, 1)] if element.dim == 1 else element.edges)]
         sign = np.sign(ridges[..., 1] - ridges[..., 0])
         signs.append((np.broadcast_to([1, -1], sign.shape) if element.dim == 1 else sign).ravel())
         facets.append(np.repeat(start + np.arange(len(ridges)), ridges.shape[1]))
-        ends.append(np.sort(ridges, axis=2).reshape(-1, 2))
+        first, middles = ridges[..., 0], slice(element.n_corners, element.n_corners + len(element.edges))
+        middle = block.local[:, middles] if element.dim == 2 and element.order == 2 else first
+        nodes.append(np.stack([*np.sort(ridges, axis=2).transpose(2, 0, 1), middle], axis=2).reshape(-1, 3))
         start += len(ridges)
-    return np.concatenate(facets), np.concatenate(ends), np.concatenate(signs)
+    return np.concatenate(facets), np.concatenate(nodes), np.concatenate(signs)
 
 
 def _check_orientation(

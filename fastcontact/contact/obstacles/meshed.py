@@ -127,16 +127,16 @@ class MeshedSurface:
         of the adjacent facets on an edge, and the angle-weighted mean normal of all facets at a corner (Baerentzen and
         Aanaes, 2005).
         """
-        (side, normals, smooth, angles, border), (facet, xi) = self._facets, closest[:2]
-        pseudonormal, on_border = closest.normal.copy(), np.zeros(len(facet), bool)
+        (side, normals, smooth, at_nodes, border), (facet, xi) = self._facets, closest[:2]
         at, on_edge = places(side, facet, xi), distance_from_edges(side, facet, xi) <= ROUND_OFF
-        rows = np.flatnonzero(on_edge)
-        node, at_node = at.local[rows, at.shape[rows].argmax(axis=1)], at.shape[rows].max(axis=1) >= 1.0 - ROUND_OFF
-        point, common, xi_there = at_common_edges(side, facet[rows], xi[rows])
-        there, own = places(side, common, xi_there), common == facet[rows][point]
-        normal = np.where(own[:, None], closest.normal[rows][point], interpolate(normals[common], there))
-        angle = angles[common, (there.local == node[point, None]).argmax(axis=1)]
-        pseudonormal[rows] = 0.0
-        np.add.at(pseudonormal, rows[point], np.where(at_node[point], angle, 1.0)[:, None] * normal)
-        on_border[rows] = (np.bincount(point) == 1) | (at_node & border[node])
+        node = at.local[np.arange(len(facet)), at.shape.argmax(axis=1)]
+        at_node = on_edge & (at.shape.max(axis=1) >= 1.0 - ROUND_OFF)
+        pseudonormal, on_border = np.where(at_node[:, None], at_nodes[node], closest.normal), at_node & border[node]
+        rows = np.flatnonzero(on_edge & ~at_node)
+        if len(rows):
+            point, common, xi_there = at_common_edges(side, facet[rows], xi[rows])
+            others = common != facet[rows][point]
+            beyond = interpolate(normals[common[others]], places(side, common[others], xi_there[others]))
+            np.add.at(pseudonormal, rows[point[others]], beyond)
+            on_border[rows] = np.bincount(point) == 1
         return pseudonormal, interpolate(smooth[facet], at), on_edge, on_border
