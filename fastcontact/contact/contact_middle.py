@@ -96,7 +96,7 @@ def _loop(surface: Surface) -> list[int] | None:
     chains = [
         chain for block in surface.blocks for chain in np.delete(block.local, 1, axis=1).tolist()
     ]  # without the end
-    following = line_neighbours(np.concatenate([block.local[:, :2] for block in surface.blocks]))[:, 1].tolist()
+    following = line_neighbours(surface.ends)[:, 1].tolist()
     order = [0]
     while (facet := following[order[-1]]) > 0 and len(order) < len(chains):
         order.append(facet)

@@ -116,10 +116,9 @@ def nodal_normals(side: Surface, coordinates: Array) -> Array:
 
 def _at_nodes(side: Surface, coordinates: Array) -> tuple[Indices, Array, Array]:
     """Return the node (p,), the unit normal (p, dim) and the angle (p,) [radian] of each facet at each of its nodes."""
-    node = np.concatenate([block.local.ravel() for block in side.blocks])
     normals = [facet_normals(block, coordinates).reshape(-1, coordinates.shape[1]) for block in side.blocks]
     angles = [facet_angles(elements.get(block.element), coordinates[block.facets]).ravel() for block in side.blocks]
-    return node, np.concatenate(normals), np.concatenate(angles)
+    return side.nodes_of_facets, np.concatenate(normals), np.concatenate(angles)
 
 
 def _nodal_means(side: Surface, node: Indices, normal: Array, angle: Array) -> Array:
@@ -370,9 +369,8 @@ def along_line_normals(
     """Project points (n, 2) onto a line along its interpolated normals; for the other parameters see `along_normals`."""
     corners = side.corners(coordinates)
     at_nodes = [n[:, : x.shape[1]] for n, x in zip(np.split(normals, np.cumsum(side.sizes)[:-1]), corners, strict=True)]
-    ends = np.concatenate([block.local[:, :2] for block in side.blocks])
     facet, xi, overhang = start.facet.astype(np.intp), start.xi[:, 0].copy(), start.overhang.copy()
-    neighbour = np.where(smooth_ends(side, normals), line_neighbours(ends), -1)
+    neighbour = np.where(smooth_ends(side, normals), line_neighbours(side.ends), -1)
     search_2d_kernels.along_normals(
         np.ascontiguousarray(points), _with_middles(corners), _with_middles(at_nodes), neighbour, facet, xi, overhang
     )
@@ -392,7 +390,6 @@ def smooth_ends(side: Surface, normals: Array) -> Mask:
     `normals` (n_facets, k, 2) are the normals at the nodes of the facets, see `smooth_normals`. At such an end they are
     equal for both facets.
     """
-    ends = np.concatenate([block.local[:, :2] for block in side.blocks])
     total = np.zeros((len(side.points), 2))
-    np.add.at(total, ends, normals[:, :2])
-    return np.asarray(side.inner_ends & (np.linalg.norm(total, axis=1)[ends] > 2.0 - 1e-6))
+    np.add.at(total, side.ends, normals[:, :2])
+    return np.asarray(side.inner_ends & (np.linalg.norm(total, axis=1)[side.ends] > 2.0 - 1e-6))
