@@ -372,16 +372,17 @@ def along_line_normals(
     facet, xi, overhang = start.facet.astype(np.intp), start.xi[:, 0].copy(), start.overhang.copy()
     neighbour = np.where(smooth_ends(side, normals), line_neighbours(side.ends), -1)
     search_2d_kernels.along_normals(
-        np.ascontiguousarray(points), _with_middles(corners), _with_middles(at_nodes), neighbour, facet, xi, overhang
+        np.ascontiguousarray(points), _of_one_width(corners), _of_one_width(at_nodes), neighbour, facet, xi, overhang
     )
     xi = xi[:, None]
     return facet, xi, overhang, interpolate(normals[facet], places(side, facet, xi))
 
 
-def _with_middles(lines: Sequence[Array]) -> Array:
-    """Return vectors (n, 3, 2) at three nodes of lines: in the middle of a straight line they are the mean of both ends."""
-    three_nodes = [np.concatenate([x, x[:, :2].mean(axis=1, keepdims=True)], axis=1)[:, :3] for x in lines]
-    return np.concatenate(three_nodes)
+def _of_one_width(lines: Sequence[Array]) -> Array:
+    """Return vectors (n, k, 2) at the nodes of lines; beside curved lines, straight ones get a third node in the middle."""
+    if len(lines) == 1:
+        return lines[0]
+    return np.concatenate([np.concatenate([x, x[:, :2].mean(axis=1, keepdims=True)], axis=1)[:, :3] for x in lines])
 
 
 def smooth_ends(side: Surface, normals: Array) -> Mask:

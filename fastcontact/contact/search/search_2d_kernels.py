@@ -162,8 +162,9 @@ def along_normals(points, corners, normals, neighbour, facet, xi, overhang):
     ----------
     points : ndarray (n, 2)
         [length].
-    corners, normals : ndarray (n_facets, 3, 2)
-        Nodes of the facets and unit normals there, ends first. A straight facet has its middle as the third node.
+    corners, normals : ndarray (n_facets, k, 2)
+        Nodes of the facets and unit normals there, ends first; k is 2 or 3. With three nodes, a straight facet has its middle
+        as the third one.
     neighbour : ndarray of int (n_facets, 2)
         The facet beyond each end, or -1. Its end 1 is shared beyond end 0, and its end 0 beyond end 1.
     facet, xi, overhang : ndarray (n,)
