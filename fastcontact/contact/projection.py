@@ -381,7 +381,7 @@ def along_line_normals(
 def _of_one_width(lines: Sequence[Array]) -> Array:
     """Return vectors (n, k, 2) at the nodes of lines; beside curved lines, straight ones get a third node in the middle."""
     if len(lines) == 1:
-        return lines[0]
+        return np.ascontiguousarray(lines[0])
     return np.concatenate([np.concatenate([x, x[:, :2].mean(axis=1, keepdims=True)], axis=1)[:, :3] for x in lines])
 
 
