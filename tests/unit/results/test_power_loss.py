@@ -80,10 +80,6 @@ def recorded(largest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> t
             events.append(("size", size))
             super()._set_size(size)
 
-    def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
-        events.append(("size", max(os.fstat(descriptor).st_size, start + size)))
-        os.truncate(descriptor, max(os.fstat(descriptor).st_size, start + size))
-
     fsync = os.fsync
 
     def synchronise(descriptor: int) -> None:
@@ -94,7 +90,6 @@ def recorded(largest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> t
         patch.setattr(writer, "CommittedFile", Watched)
         with ResultWriter(path, MESH, synchronise=True) as out:
             shutil.copy(path, begun)
-            patch.setattr(writer, "reserve", reserve)
             patch.setattr(os, "fsync", synchronise)
             events.clear()
             for number in range(6):
