@@ -176,21 +176,15 @@ class OpenObjects(dict[str, Any]):
         return opened
 
 
-def append_fields(file: OpenObjects, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> int:
-    """Write the point and cell fields of step `number`, and return their size [bytes].
-
-    They replace the fields of a step that was not completed.
-    """
+def append_fields(file: OpenObjects, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
+    """Write the point and cell fields of step `number`, which replace those of a step that was not completed."""
     by_cell = {name: step.cell_fields[name] for name in cell_fields}
     by_cell |= layout.material_fields(mesh, step) if _has_material_stress(file) else {}
-    size = 0
     for group, fields in (("PointData", layout.point_fields(mesh, step)), ("CellData", by_cell)):
         for name, values in fields.items():
             table = file[f"VTKHDF/{group}/{name}"]
             if table is not None:
                 _extend(table, values, number * len(values))
-                size += values.nbytes
-    return size
 
 
 def _has_material_stress(file: OpenObjects) -> bool:

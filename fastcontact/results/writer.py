@@ -28,7 +28,7 @@ from fastcontact._tools.paths import PathLike, checked_target, replacing
 from fastcontact.elasticity.material_sides import material_sides
 from fastcontact.errors import ConvergenceError, FastcontactError, FileError, ModelError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results import journal, layout, write_arrays
+from fastcontact.results import layout, write_arrays
 from fastcontact.results.committed_file import CommittedFile, uninterrupted
 from fastcontact.results.file_lock import PathLock, file_state
 from fastcontact.results.reader import Results, StoredSteps, read_text
@@ -231,10 +231,9 @@ class ResultWriter:
             by_default = time.monotonic() - self._started > SYNCHRONISED_FROM
             self._committed.synchronised = by_default if self._synchronise is None else self._synchronise
             restart = pack({"step": self.n_steps, "restart": step.restart})
-            size = write_arrays.append_fields(self._objects, self._mesh, self.n_steps, step, self._cell_fields)
-            # Fields, rows and the number of steps are flushed one after the other, unless a single journal contains all of
-            # them.
-            in_parts = not self._committed.synchronised or size + restart.nbytes > journal.LARGEST
+            # Fields, rows and the number of steps are flushed one after the other, unless a journal contains all of them.
+            in_parts = not self._committed.synchronised
+            write_arrays.append_fields(self._objects, self._mesh, self.n_steps, step, self._cell_fields)
             write_arrays.append_tables(self._objects, self._mesh, self.n_steps, step, self._pairs, self._notes)
             write_arrays.set_restart(self._objects, self.n_steps, restart)
             if in_parts:
