@@ -1,9 +1,8 @@
 """Writing of result files, in which a crash does not damage completed steps.
 
-The fields and tables of a step are written first, then the rows with the positions of its fields, and finally the number of
-steps, with a flush after each of the three. Data of completed steps are never moved: uncompressed tables and small fields
-grow in place, and larger fields have a separate chunk for each step. On a full disk, the new blocks cannot be written, to
-which nothing refers yet, and the file remains as it was.
+The fields and tables of a step are written and flushed before the number of steps, beyond which nothing is read. Data of
+completed steps are never moved: uncompressed tables and small fields grow in place, and larger fields have a separate chunk
+for each step. On a full disk, the new blocks cannot be written, to which nothing refers yet, and the file remains as it was.
 """
 
 from __future__ import annotations
@@ -231,15 +230,11 @@ class ResultWriter:
             by_default = time.monotonic() - self._started > SYNCHRONISED_FROM
             self._committed.synchronised = by_default if self._synchronise is None else self._synchronise
             restart = pack({"step": self.n_steps, "restart": step.restart})
-            # Fields, rows and the number of steps are flushed one after the other, unless a journal contains all of them.
-            in_parts = not self._committed.synchronised
             write_arrays.append_fields(self._objects, self._mesh, self.n_steps, step, self._cell_fields)
             write_arrays.append_tables(self._objects, self._mesh, self.n_steps, step, self._pairs, self._notes)
             write_arrays.set_restart(self._objects, self.n_steps, restart)
-            if in_parts:
-                self._flush()
             write_arrays.append_offsets(self._objects, self._mesh, self.n_steps, step, self._cell_fields)
-            if in_parts:
+            if not self._committed.synchronised:  # otherwise a journal contains the step and the number of steps
                 self._flush()
             self._objects["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))
             self._flush()
