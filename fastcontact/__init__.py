@@ -8,6 +8,8 @@ from __future__ import annotations
 import importlib
 import logging
 import os
+import re
+from pathlib import Path
 from typing import Any
 
 from fastcontact._version import __version__ as __version__
@@ -18,64 +20,20 @@ os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
 
 logging.getLogger(__name__).addHandler(logging.NullHandler())  # no output unless the user configures logging
 
-# Modules by their public names, and public names by the module that defines them. Type checkers read `__init__.pyi`.
-_MODULES = {
-    "analytic": "analytic",
-    "generate": "mesh.generate",
-    "obstacles": "contact.obstacles",
-    "plot": "results.plot",
-    "recovery": "elasticity.recovery",
-    "topology": "mesh.topology",
-}
-_NAMES = {
-    "analysis.criteria": ("Criteria",),
-    "analysis.modal.shapes": ("Modes", "RingModes"),
-    "analysis.modes": ("modes",),
-    "analysis.resultants": ("ContactAnswers", "ContactResultants", "contact_answers", "contact_history",
-        "contact_moment", "contact_resultants", "pretension_history", "spring_forces", "support_forces", "wear"),
-    "analysis.run": ("solve", "solve_steps"),
-    "analysis.sensitivities": ("Sensitivities", "sensitivities"),
-    "cases.decks.deck": ("Deck", "read_deck"),
-    "contact.found_contacts": ("FoundContacts", "find_contacts"),
-    "elasticity.anisotropic_materials": ("Anisotropic", "Orthotropic"),
-    "elasticity.material_axes": ("CylindricalAxes",),
-    "elasticity.materials": ("LinearElastic",),
-    "elasticity.nonlinear_materials": ("ElasticPlastic", "MooneyRivlin", "NeoHookean", "Ogden", "Yeoh"),
-    "elasticity.varying_constants": ("Tabulated",),
-    "errors": ("CaseError", "ContactError", "ConvergenceError", "FastcontactError", "FastcontactWarning",
-        "FileError", "MeshError", "ModelError"),
-    "mesh.files.med": ("read_med_field",),
-    "mesh.files.mesh_fields": ("read_field",),
-    "mesh.files.mesh_files": ("read_mesh", "write_mesh"),
-    "mesh.from_libraries": ("from_gmsh", "from_meshio", "from_pyvista"),
-    "mesh.mesh": ("Mesh",),
-    "mesh.quality": ("quality",),
-    "mesh.topology": ("ordered_line",),
-    "model.model": ("Model",),
-    "model.ramp": ("Ramp", "linear_ramp"),
-    "results.med": ("write_med_results",),
-    "results.reader": ("open_results",),
-    "results.step": ("ContactResult", "StepResult"),
-    "results.tables": ("contact_table", "line_table", "normal_stress", "write_csv"),
-    "results.writer": ("ResultWriter",),
-    "results.xmgrace": ("write_agr",),
-    "studies.adaptive": ("adaptive_study",),
-    "studies.error_norms": ("ErrorEstimate", "ErrorNorms", "error_against", "estimate_error"),
-    "studies.runs": ("convergence_study", "parameter_sweep"),
-}  # fmt: skip
-_MODULE_OF = {name: module for module, names in _NAMES.items() for name in names}
-__all__ = sorted([*_MODULE_OF, *_MODULES])
+# Modules of the public names. The stub lists them for type checkers, and here they are imported on first use.
+_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+_MODULE_OF = {name: module for module, name in re.findall(r"^from ([\w.]+) import \(?\s*(\w+) as", _STUB, re.MULTILINE)}
+__all__ = sorted(_MODULE_OF.keys() - {"__version__"})
 
 
 def __getattr__(name: str) -> Any:
-    if name in _MODULE_OF:
-        value = getattr(importlib.import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
-    elif name in _MODULES:
-        value = importlib.import_module(f"{__name__}.{_MODULES[name]}")
-    else:
+    if name not in _MODULE_OF:
         from fastcontact.errors import getattr_and_dir
 
         return getattr_and_dir(__name__, __all__)[0](name)
+    owner = importlib.import_module(_MODULE_OF[name])
+    is_module = hasattr(owner, "__path__")  # the public names of packages are modules
+    value = importlib.import_module(f"{owner.__name__}.{name}") if is_module else getattr(owner, name)
     globals()[name] = value
     return value
 

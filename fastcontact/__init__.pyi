@@ -1,4 +1,4 @@
-# The public names for type checkers. `__init__.py` loads the same names from the same modules when they are first used.
+# The public names for type checkers. `__init__.py` reads them from this file, and imports their modules on first use.
 
 from fastcontact import analytic as analytic
 from fastcontact._version import __version__ as __version__

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact._jit import compiling
-from fastcontact._jit.cache import KernelFiles
+from fastcontact._jit.cache import KernelFiles, cache_folder
 
 # Limits for running a kernel in Python: number of entries of all arguments of a call, time [s] of all its calls in one run,
 # and time [s] of all its calls in all runs. Python takes 1 to 8 microseconds per entry. The compilation of a kernel takes 0.2
@@ -50,7 +50,7 @@ class Interpretable:
     def __init__(self, compiled: Any, files: KernelFiles | None) -> None:
         functools.update_wrapper(self, compiled.py_func)
         self.compiled, self.py_func, self.compile = compiled, compiled.py_func, compiled.compile
-        self._files, self._spent = files, 0.0
+        self.files, self.spent = files, 0.0
         self._call: Callable[..., Any] = self._choose
 
     def __call__(self, *arguments: Any) -> Any:
@@ -60,31 +60,26 @@ class Interpretable:
     def _choose(self, *arguments: Any) -> Any:
         """Return the result of a call in Python, or compile the kernel for this call and all later ones."""
         began = time.thread_time()
-        is_compiled = self.compiled.signatures or (self._files is not None and self._files.exist())
+        is_compiled = self.compiled.signatures or (self.files is not None and self.files.exist())
         if is_compiled or not self._is_small(arguments):
             self._call = self.compiled
             return self.compiled(*arguments)
-        if self._spent == 0.0:
+        if self.spent == 0.0:
             compiling.count_uncompiled()
             _interpreted.append(self)
         result = interpret(self, arguments)
-        self._spent += time.thread_time() - began
+        self.spent += time.thread_time() - began
         return result
 
     def _is_small(self, arguments: tuple[Any, ...]) -> bool:
         """Return whether a call may run in Python: it is small, and the time so far is less than that of a compilation."""
-        if self._spent > SECONDS or entries(arguments) > ENTRIES:
+        if self.spent > SECONDS or entries(arguments) > ENTRIES:
             return False
-        if _overdue or self._files is None:
+        if _overdue or self.files is None:
             return True
-        earlier = _earlier_times(self._files.folder).get(self._files.version, 0.0)
-        _overdue.extend([self] if earlier + self._spent > SECONDS_OF_RUNS else [])
+        earlier = _earlier_times(self.files.folder).get(self.files.version, 0.0)
+        _overdue.extend([self] if earlier + self.spent > SECONDS_OF_RUNS else [])
         return not _overdue
-
-    @property
-    def spent(self) -> tuple[Path, str, float] | None:
-        """Cache folder, version, and time in Python in this process [s]; None for a kernel that is not cached."""
-        return None if self._files is None else (self._files.folder, self._files.version, self._spent)
 
 
 # Kernels that this process has run in Python, and the kernel that it compiles because of its time in earlier runs. In each
@@ -104,12 +99,11 @@ def _earlier_times(folder: Path) -> dict[str, float]:
 
 def save_times() -> None:
     """Add the times of this process to those of earlier runs. Of runs that end simultaneously, only one is counted."""
-    spent = [kernel.spent for kernel in _interpreted if kernel.spent is not None]
-    for folder in {folder for folder, _, _ in spent}:
+    spent = {kernel.files.version: kernel.spent for kernel in _interpreted if kernel.files is not None}
+    if spent and (folder := cache_folder()) is not None:
         _earlier_times.cache_clear()
-        sums = dict(_earlier_times(folder))
-        for _, version, seconds in (entry for entry in spent if entry[0] == folder):
-            sums[version] = round(sums.get(version, 0.0) + seconds, 4)
+        sums = _earlier_times(folder)
+        sums |= {version: round(sums.get(version, 0.0) + seconds, 4) for version, seconds in spent.items()}
         temporary = folder / f"{TIMES_FILE}.{os.getpid()}"
         with contextlib.suppress(OSError):
             temporary.write_text(json.dumps(sums), encoding="utf-8")

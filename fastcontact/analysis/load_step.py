@@ -34,9 +34,9 @@ from fastcontact.analysis.work import contact_work
 from fastcontact.arrays import Array, largest
 from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.elasticity import recovery
+from fastcontact.elasticity.loads import Pressure
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.model.pretension import section_results
-from fastcontact.model.ramp import multiplier
 from fastcontact.model.rigid_motions import generalised
 from fastcontact.results.step import ContactResult, StepResult, by_largest_von_mises
 from fastcontact.results.units import units_of_results
@@ -285,7 +285,7 @@ def recover(
     sections, reaction = problem.model.pretensions, reaction.reshape(-1, mesh.dim)
     histories = problem.model.temperatures, problem.model.initial_states, sections
     temperature, initial, pretension = (problem.factors(parts, instant[1]) for parts in histories)
-    pressures = [multiplier(table, problem.ramp, instant[1]) for _, table in problem.following]
+    pressures = problem.factors([load for load in problem.model.loads if isinstance(load, Pressure)], instant[1])
     factors = {"temperature_factors": temperature, "initial_factors": initial, "pressure_factors": pressures}
     iterations = {**iterations, **{key: multipliers for key, multipliers in factors.items() if multipliers}}
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise

@@ -231,21 +231,24 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> b
     """Return the stiffness (n_dofs, n_dofs) of cells and springs, with that of the stresses of a step [force / length]."""
     mesh, kinematics = model.mesh, model.kinematics
     bodies = model.nonlinear_bodies(field)
-    if bodies is not None and step is not None:
-        if model.strain == "small":
-            model.refuse_nonlinear("modes about a step are")
-        rise = model.expanding_rise(step.iterations.get("temperature_factors", ()), step.temperature)
-        K = stiffened(bodies.at(step.displacement, bodies.beginning, rise=rise).K, model.springs)
-        for factor, (pressure, _) in zip(step.iterations.get("pressure_factors", ()), model.following_pressures()):
-            K = sum_of_blocks(K, factor * pressure.at(step.displacement)[1])
-        return K
-    K = stiffened(stiffness(mesh, kinematics, field.moduli, field.loops, None, field.treatment), model.springs)
+    if step is None or bodies is None:
+        K = stiffened(stiffness(mesh, kinematics, field.moduli, field.loops, None, field.treatment), model.springs)
     if step is None:
         return K
     temperature, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
-    offset = model.stress_offset(temperature, initial, field, step.temperature)
-    stresses = CellStress(mesh, kinematics, field.moduli, step.displacement, field.treatment, offset)
-    return bsr_array(K + stress_stiffness(mesh, stresses, field.loops, kinematics == "axisymmetric"))
+    deformation = np.zeros_like(step.displacement)
+    if bodies is not None:
+        if model.strain == "small":
+            model.refuse_nonlinear("modes about a step are")
+        deformation, rise = step.displacement, model.expanding_rise(temperature, step.temperature)
+        K = stiffened(bodies.at(deformation, bodies.beginning, rise=rise).K, model.springs)
+    else:
+        offset = model.stress_offset(temperature, initial, field, step.temperature)
+        stresses = CellStress(mesh, kinematics, field.moduli, step.displacement, field.treatment, offset)
+        K = sum_of_blocks(K, stress_stiffness(mesh, stresses, field.loops, kinematics == "axisymmetric"))
+    for factor, (pressure, _) in zip(step.iterations.get("pressure_factors", ()), model.following_pressures()):
+        K = sum_of_blocks(K, factor * pressure.at(deformation)[1])
+    return K
 
 
 def _uniform_quotient(model: Model, K: bsr_array, M: bsr_array) -> float:

@@ -26,6 +26,7 @@ from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.following_pressure import FollowingPressure
 from fastcontact.elasticity.initial_states import InitialState
+from fastcontact.elasticity.loads import Load
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
 from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies, NonlinearBodies
@@ -193,8 +194,10 @@ class Problem:
         rise = None if self.bodies is None else self.model.temperature_rise(temperatures)
         return StepLoad(lift, force, obstacles, clearances, angles, following, frictions, fluids, rise)
 
-    def factors(self, histories: Iterable[Temperature | InitialState | Pretension], instant: float) -> list[float]:
-        """Return the load factors of temperatures, initial states or pretension sections at an instant of the ramp [-]."""
+    def factors(
+        self, histories: Iterable[Temperature | InitialState | Pretension | Load], instant: float
+    ) -> list[float]:
+        """Return the load factors of temperatures, initial states, pretension sections or loads at an instant [-]."""
         return [multiplier(history.ramp, self.ramp, instant) for history in histories]
 
     def displacement(self, u: Array) -> Array:
@@ -328,7 +331,7 @@ def prepare(
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies, dofs, contact_dofs, driven,
         driven.prescribed(prescribed), driven.forces(_forces(model)), solver.snapshot(), tuple(warnings),
-        model.nonlinear_bodies(field), model.following_pressures(),
+        model.nonlinear_bodies(field), model.following_pressures() if model.strain == "finite" else [],
         prepared_heat(model, ramp, criteria, linear_solver, solver.tolerance),
     )  # fmt: skip
 

@@ -13,7 +13,6 @@ import numpy as np
 from fastcontact.arrays import Array, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
-from fastcontact.mesh import elements
 from fastcontact.results.step import ContactResult
 
 
@@ -92,8 +91,4 @@ def stability_ratio(pair: Formulation, worn: Worn) -> float:
     decays if the product of `Worn.largest_rate` and this stiffness is less than two. For pressures at integration points the
     stiffness is up to twice as large, so that the limit used here is one.
     """
-    edge = np.inf
-    for block in pair.secondary.blocks:
-        lengths = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
-        edge = min(edge, float(lengths.min()) / elements.get(block.element).order)
-    return worn.largest_rate * np.pi * pair.modulus / (2.0 * edge)
+    return worn.largest_rate * np.pi * pair.modulus / (2.0 * pair.shortest_edge)

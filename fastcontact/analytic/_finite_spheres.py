@@ -142,9 +142,5 @@ def finite_half_spheres(approach: float, *, R: float = 50.0, E: float = 20_000.0
         raise ModelError(
             f"approach is {x:g} R: the table of finite half spheres runs from {low:g} to {high:g}; {remedy}"
         )
-    row = table[np.argmin(np.abs(table[:, 0] - x))]
-    if abs(row[0] - x) <= 1e-12 * x and np.isfinite(row).all():
-        force, pressure, radius = row[1:].tolist()
-    else:
-        force, pressure, radius = _interpolated(table, x)
+    force, pressure, radius = _interpolated(table, x)
     return FiniteHalfSpheres(E, R, delta, force * E * R**2, pressure * E, radius * R)

@@ -84,8 +84,6 @@ def _ratio_of_axes(ratio_of_radii: float) -> float:
     """Return the ratio b/a <= 1 of the semi-axes of the contact ellipse for a ratio R'/R'' >= 1 of the relative radii."""
     from scipy.optimize import brentq
 
-    if ratio_of_radii == 1.0:
-        return 1.0
     if ratio_of_radii > _ratio_of_radii(_FLATTEST):
         raise ModelError(
             f"the relative radii differ by a factor of {ratio_of_radii:g}: use hertz_line for line contact"

@@ -20,6 +20,9 @@ from fastcontact.contact.constraints import Constraints
 # Stiffness of the linearised layer where it softens, relative to that of the intact layer. It is the magnitude of the ratio
 # of the two slopes of the default law. With a smaller ratio, the iteration for a beam glued at its nodes does not converge.
 SOFTENING_SLOPE = ELASTIC
+# Stiffness per area of adhering sides that are pressed together, relative to the modulus of the bodies over the length of
+# the shortest facet. The penetration is then about a hundredth of the elastic deformation of a facet.
+COMPRESSION = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +42,8 @@ class Layer:
         Damage at which the law is linearised [-].
     separation, rest : ndarray (1 + k, m)
         Opening and sliding at which the law is linearised, and those at which the linearised traction vanishes [length].
+    compression : float
+        Stiffness in compression, relative to that of the intact layer [-].
     """
 
     law: CohesiveLaw
@@ -48,6 +53,7 @@ class Layer:
     damage: Array
     separation: Array
     rest: Array
+    compression: float
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
         """Return normal (m,) and tangential (m, k) forces [force]."""
@@ -63,18 +69,21 @@ class Layer:
         slip, law = np.linalg.norm(sliding, axis=1), self.law
         areas = np.where(np.isfinite(self.areas), self.areas, 0.0)
         integrity = np.where(self.damage < 1.0, 1.0 - self.damage, 0.0)
-        squares = np.where(opening < 0.0, 1.0, integrity) * opening**2 + integrity * slip**2
+        squares = np.where(opening < 0.0, self.compression, integrity) * opening**2 + integrity * slip**2
         dissipated = law.released(opening, slip, self.damage) - law.released(opening, slip, self.before.damage)
         released = self.before.released + float(areas @ dissipated)
         return Bond(self.before.positions, sliding, self.damage, released, 0.5 * law.stiffness * float(areas @ squares))
 
 
-def cohesive_rows(law: CohesiveLaw, constraints: Constraints, config: Configuration, initial_gap: Array) -> Constraints:
+def cohesive_rows(
+    law: CohesiveLaw, constraints: Constraints, config: Configuration, initial_gap: Array, bodies: float
+) -> Constraints:
     """Return equations of a cohesive layer at the points of `constraints`, which must have tangents.
 
     The compliance of the equations follows the traction law. A cohesive layer is free of stress at the initial gaps
     `initial_gap` (m,) [length], whereas adhesion acts across them. Broken constraints may close again, with the stiffness of
-    the intact layer.
+    the intact layer. Adhering sides are stiffer in compression, where their stiffness depends on that of the `bodies`, the
+    modulus over the length of the shortest facet [pressure / length].
     """
     assert constraints.areas is not None
     m, u, start = len(constraints), config.displacement.ravel(), config.start.ravel()
@@ -96,11 +105,14 @@ def cohesive_rows(law: CohesiveLaw, constraints: Constraints, config: Configurat
         damage = np.minimum(damage, before.damage)
     intact, jump = damage < 1.0, np.stack([opening, *slips])
     secant = np.tile(np.where(intact, 1.0 - damage, 1.0), (len(jump), 1))
-    secant[0, opening < 0.0] = 1.0
+    compression = max(1.0, COMPRESSION * bodies / law.stiffness) if law.reversible else 1.0
+    secant[0, opening < 0.0] = compression
     softening = intact & (damage > (0.0 if law.reversible else before.damage)) & (secant > SOFTENING_SLOPE)
     slope = np.where(softening, SOFTENING_SLOPE, secant)
     default = np.empty(0)
-    layer = Layer(law, constraints.directions, constraints.areas, before, damage, jump, jump * (1.0 - secant / slope))
+    layer = Layer(
+        law, constraints.directions, constraints.areas, before, damage, jump, jump * (1.0 - secant / slope), compression
+    )
     return replace(
         constraints,
         B=csr_array(vstack([constraints.B, *constraints.tangents], format="csr")),

@@ -17,18 +17,16 @@ half the chord, not half the arc.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.formulations._formulation import LEANING
 from fastcontact.contact.held_motions import SAME_DIRECTION
 from fastcontact.contact.pairing import FACING
-from fastcontact.contact.projection import nodal_normals
-from fastcontact.contact.surface import Surface
+from fastcontact.contact.projection import closest, nodal_normals
+from fastcontact.contact.surface import Surface, line_neighbours
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Largest distance of nodes from a plane of symmetry, relative to the size of the surface, and smallest cosine of the angle
@@ -69,18 +67,10 @@ class UnrolledLine:
 
     def lengths(self, positions: Array) -> Array:
         """Return the arc length (n,) of the point of the line nearest to each of `positions` (n, 2) [length]."""
-        n_segments = len(self.nodes) - 1
-        nearest_node = nearest(self.nodes, positions)[1]
-        best, arc_length = np.full(len(positions), np.inf), np.zeros(len(positions))
-        for segment in (np.clip(nearest_node - 1, 0, n_segments - 1), np.clip(nearest_node, 0, n_segments - 1)):
-            begin, tangent = self.nodes[segment], self.nodes[segment + 1] - self.nodes[segment]
-            squared_length = np.einsum("nd,nd->n", tangent, tangent)
-            fraction = np.clip(np.einsum("nd,nd->n", positions - begin, tangent) / squared_length, 0.0, 1.0)
-            distance = np.linalg.norm(begin + fraction[:, None] * tangent - positions, axis=1)
-            nearer = distance < best
-            best[nearer] = distance[nearer]
-            arc_length[nearer] = (self.abscissa[segment] + fraction * np.sqrt(squared_length))[nearer]
-        return arc_length
+        segments = np.stack([self.nodes[:-1], self.nodes[1:]], axis=1)
+        segment, xi = closest(positions, segments)[:2]
+        sizes = np.linalg.norm(np.diff(self.nodes, axis=0), axis=1)
+        return np.asarray(self.abscissa[segment] + 0.5 * (1.0 + xi[:, 0]) * sizes[segment])
 
 
 def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> UnrolledLine | None:
@@ -103,21 +93,14 @@ def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> Unro
 
 def _loop(surface: Surface) -> list[int] | None:
     """Return the nodes, as rows of the points of a surface, in order along its closed line; None if there is no such line."""
-    next_node: dict[int, int] = {}
-    for block in surface.blocks:
-        middles = block.local[:, 2:]
-        chains = np.concatenate([block.local[:, :1], middles, block.local[:, 1:2]], axis=1).tolist()
-        for chain in chains:
-            for begin, end in pairwise(chain):
-                if begin in next_node:
-                    return None
-                next_node[begin] = end
-    first = next(iter(next_node))
-    order, node = [first], next_node.get(first)
-    while node is not None and node != first and len(order) <= len(next_node):
-        order.append(node)
-        node = next_node.get(node)
-    return order if node == first and len(order) == len(surface.points) else None
+    chains = [
+        chain for block in surface.blocks for chain in np.delete(block.local, 1, axis=1).tolist()
+    ]  # without the end
+    following = line_neighbours(surface.ends)[:, 1].tolist()
+    order = [0]
+    while (facet := following[order[-1]]) > 0 and len(order) < len(chains):
+        order.append(facet)
+    return [node for facet in order for node in chains[facet]] if facet == 0 and len(order) == len(chains) else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -95,18 +95,13 @@ class HeldMotions:
 
 def _rows_of_single_nodes(mpc_rows: csr_array, dim: int) -> tuple[Indices, Array]:
     """Return the nodes (k,) of the rows that involve only one node, and the unit vectors (k, dim) of these rows."""
-    counts = np.diff(mpc_rows.indptr)
-    rows = np.flatnonzero(counts > 0)
-    if not len(rows):
-        return np.empty(0, np.intp), np.empty((0, dim))
-    node = (mpc_rows.indices // dim).astype(np.intp)
-    first = mpc_rows.indptr[rows]
-    single_node = np.minimum.reduceat(node, first) == np.maximum.reduceat(node, first)
-    normals = np.zeros((mpc_rows.shape[0], dim))
-    np.add.at(normals, (np.repeat(np.arange(len(counts)), counts), mpc_rows.indices % dim), mpc_rows.data)
-    length = np.linalg.norm(normals[rows], axis=1)
-    single_node &= length > 0.0
-    return node[first[single_node]], normals[rows[single_node]] / length[single_node, None]
+    entries, normals = mpc_rows.tocoo(), np.zeros((mpc_rows.shape[0], dim))
+    row, column = entries.coords
+    np.add.at(normals, (row, column % dim), entries.data)
+    nodes = csr_array((np.ones(len(row)), (row, column // dim)), shape=mpc_rows.shape)
+    single = (np.diff(nodes.indptr) == 1) & normals.any(axis=1)
+    unit = normals[single] / np.linalg.norm(normals[single], axis=1, keepdims=True)
+    return nodes.indices[nodes.indptr[:-1][single]].astype(np.intp), unit
 
 
 def eigenspaces(tensors: Array, threshold: float) -> Array:

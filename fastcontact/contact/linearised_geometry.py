@@ -33,14 +33,12 @@ from fastcontact.contact.pairing import Candidates, Pairing, normals, tangents
 from fastcontact.contact.projection import (
     Places,
     at_nodes_of_facets,
-    facet_angles,
-    facet_normals,
+    nodal_normals,
     places,
     smooth_normals,
 )
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import shapes_at
-from fastcontact.mesh import elements
 from fastcontact.round_off import DIFFERENCES, TINY
 
 
@@ -60,56 +58,14 @@ class NodalNormals:
     """
 
     def __init__(self, side: Surface, coordinates: Array) -> None:
-        self._side, self._blocks = side, []
-        total = np.zeros((len(side.points), coordinates.shape[1]))
-        for block in side.blocks:
-            element, corners = elements.get(block.element), coordinates[block.facets]
-            slope = element.gradient(element.nodes)
-            axes = np.einsum("qka,fkd->fqad", slope, corners)
-            normal, angle = facet_normals(block, coordinates), facet_angles(element, corners)
-            dual_axes = np.linalg.solve(np.einsum("fqad,fqbd->fqab", axes, axes), axes)
-            np.add.at(total, block.local, angle[:, :, None] * normal)
-            dual_axes *= angle[:, :, None, None]
-            self._blocks.append((block, slope, normal, dual_axes, _angle_gradient(element, corners)))
-        side.add_across_ends(total)
-        self._length = np.linalg.norm(total, axis=1, keepdims=True)
-        self.normal = total / self._length
+        self._side, self._coordinates, self.normal = side, coordinates, nodal_normals(side, coordinates)
+        self._step = DIFFERENCES * float(np.ptp(coordinates[side.points], axis=0).max()) / np.sqrt(side.n_facets)
 
     def along(self, du: Array) -> Array:
         """Return the variation (m, dim) [-] of the normals for a variation `du` (n_points, dim) of displacements [length]."""
-        total = np.zeros_like(self.normal)
-        for block, slope, normal, dual_axes, angle_gradient in self._blocks:
-            du_nodes = du[block.facets]
-            tilt = np.einsum("fqk,qka->fqa", normal @ np.swapaxes(du_nodes, 1, 2), slope)
-            np.add.at(total, block.local, -np.einsum("fqad,fqa->fqd", dual_axes, tilt))
-            if angle_gradient is not None:
-                np.add.at(total, block.local, np.einsum("fqkd,fkd->fq", angle_gradient, du_nodes)[:, :, None] * normal)
-        self._side.add_across_ends(total)
-        return transverse(self.normal, total) / self._length
-
-
-def _angle_gradient(element: elements.Element, nodes: Array) -> Array | None:
-    """Return the derivatives (n, q, k, dim) [1 / length] of the angles at the nodes q of facets; None on lines.
-
-    `nodes` (n, k, dim) contains the coordinates of the nodes of the facets [length]. The derivative of the angle between
-    two edges with unit vectors a and b, with respect to the end of the first edge, is ``-(b - (a . b) a)``, normalised and
-    divided by the length of this edge.
-    """
-    if element.dim == 1:
-        return None
-    gradient = np.zeros((len(nodes), nodes.shape[1], *nodes.shape[1:]))
-    n = element.n_corners
-    for corner in range(n):
-        ends = (corner + 1) % n, (corner - 1) % n
-        edges = [nodes[:, end] - nodes[:, corner] for end in ends]
-        length = [np.linalg.norm(edge, axis=1, keepdims=True) for edge in edges]
-        unit = [edge / size for edge, size in zip(edges, length, strict=True)]
-        for end, a, b, size in zip(ends, unit, unit[::-1], length, strict=True):
-            direction = transverse(a, b)
-            slope = -direction / (size * np.linalg.norm(direction, axis=1, keepdims=True))
-            gradient[:, corner, end] += slope
-            gradient[:, corner, corner] -= slope
-    return gradient
+        rate = (largest(du[self._side.points]) or 1.0) / self._step
+        ahead, behind = (nodal_normals(self._side, self._coordinates + sign / rate * du) for sign in (0.5, -0.5))
+        return np.asarray(rate * (ahead - behind))
 
 
 class InterpolatedNormals:

@@ -21,6 +21,7 @@ from fastcontact.contact.projection import (
     along_normals,
     at_nodes_of_facets,
     closest_of_kinds,
+    distance_from_edges,
     facet_normals,
     interpolate,
     nodal_normals,
@@ -218,9 +219,7 @@ def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array
     """
     normals = at_nodes_of_facets([facet_normals(block, coordinates) for block in primary.blocks])[facet]
     normals = interpolate(normals, places(primary, facet, xi))
-    on_triangle = np.column_stack([xi, 1.0 - xi.sum(axis=1)]).min(axis=1)
-    distance = np.where(primary.triangular[facet], on_triangle, 0.5 * (1.0 - np.abs(xi).max(axis=1)))
-    weight = np.clip(1.0 - distance / ROUNDED, 0.0, 1.0)[:, None]
+    weight = np.clip(1.0 - distance_from_edges(primary, facet, xi) / ROUNDED, 0.0, 1.0)[:, None]
     normal = weight * mean + (1.0 - weight) * normals
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 

@@ -116,10 +116,9 @@ def nodal_normals(side: Surface, coordinates: Array) -> Array:
 
 def _at_nodes(side: Surface, coordinates: Array) -> tuple[Indices, Array, Array]:
     """Return the node (p,), the unit normal (p, dim) and the angle (p,) [radian] of each facet at each of its nodes."""
-    node = np.concatenate([block.local.ravel() for block in side.blocks])
     normals = [facet_normals(block, coordinates).reshape(-1, coordinates.shape[1]) for block in side.blocks]
     angles = [facet_angles(elements.get(block.element), coordinates[block.facets]).ravel() for block in side.blocks]
-    return node, np.concatenate(normals), np.concatenate(angles)
+    return side.nodes_of_facets, np.concatenate(normals), np.concatenate(angles)
 
 
 def _nodal_means(side: Surface, node: Indices, normal: Array, angle: Array) -> Array:
@@ -131,11 +130,12 @@ def _nodal_means(side: Surface, node: Indices, normal: Array, angle: Array) -> A
     return np.divide(total, length, out=np.zeros_like(total), where=length != 0.0)
 
 
-def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
+def smooth_normals(side: Surface, coordinates: Array, corner: float = CORNER) -> list[Array]:
     """Return averaged unit normals at the nodes of the facets, separately on both sides of corners.
 
     Except at corners, they are those of `nodal_normals`. At a corner, the mean for a facet includes only those facets that
-    continue it smoothly, so that a punch is flat up to its corner although its flanks belong to the surface.
+    continue it smoothly, so that a punch is flat up to its corner although its flanks belong to the surface. Two facets form
+    a corner if their normals enclose a larger angle than `corner` [degrees].
 
     Returns
     -------
@@ -144,12 +144,12 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
     """
     node, normal, angle = _at_nodes(side, coordinates)
     smooth = _nodal_means(side, node, normal, angle)[node]
-    # A node is a corner if the normal of one of its facets deviates from the mean by more than half of CORNER.
-    corners = np.unique(node[np.einsum("pd,pd->p", normal, smooth) < np.cos(np.radians(0.5 * CORNER))])
+    # A node is a corner if the normal of one of its facets deviates from the mean by more than half of the angle.
+    corners = np.unique(node[np.einsum("pd,pd->p", normal, smooth) < np.cos(np.radians(0.5 * corner))])
     by_node, start = np.argsort(node, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(node))])
-    for corner in corners:
-        entries = by_node[start[corner] : start[corner + 1]]
-        similar = normal[entries] @ normal[entries].T > np.cos(np.radians(CORNER))
+    for node_at_corner in corners:
+        entries = by_node[start[node_at_corner] : start[node_at_corner + 1]]
+        similar = normal[entries] @ normal[entries].T >= np.cos(np.radians(corner)) - LENGTH_ROUND_OFF
         total = (similar * angle[entries]) @ normal[entries]
         smooth[entries] = total / np.linalg.norm(total, axis=1, keepdims=True)
     of_blocks = np.split(smooth, np.cumsum([block.local.size for block in side.blocks])[:-1])
@@ -197,6 +197,12 @@ def interpolate(normals: Array, points: Places) -> Array:
     """Return unit normals (n, dim) at points, interpolated between the normals (n, k, dim) at the nodes of their facets."""
     normal = np.einsum("nk,nkd->nd", points.shape, normals)
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+
+def distance_from_edges(side: Surface, facet: Indices, xi: Array) -> Array:
+    """Return the distances (n,) of points from the edges of their facets, as fractions of the size of the facet [-]."""
+    on_triangle = np.column_stack([xi, 1.0 - xi.sum(axis=1)]).min(axis=1)
+    return np.where(side.triangular[facet], on_triangle, 0.5 * (1.0 - np.abs(xi).max(axis=1)))
 
 
 class Closest(NamedTuple):
@@ -361,23 +367,22 @@ def along_line_normals(
     points: Array, side: Surface, coordinates: Array, normals: Array, start: Closest
 ) -> tuple[Indices, Array, Array, Array]:
     """Project points (n, 2) onto a line along its interpolated normals; for the other parameters see `along_normals`."""
-    n_facets = len(normals)
-    corners, at_nodes = np.zeros((n_facets, 3, 2)), np.zeros((n_facets, 3, 2))
-    at_nodes[:, : normals.shape[1]] = normals
-    counts, ends = np.empty(n_facets, np.intp), np.empty((n_facets, 2), np.intp)
-    first = 0
-    for block in side.blocks:
-        rows, k = slice(first, first + len(block.facets)), block.facets.shape[1]
-        corners[rows, :k], counts[rows], ends[rows] = coordinates[block.facets], k, block.local[:, :2]
-        first = rows.stop
+    corners = side.corners(coordinates)
+    at_nodes = [n[:, : x.shape[1]] for n, x in zip(np.split(normals, np.cumsum(side.sizes)[:-1]), corners, strict=True)]
     facet, xi, overhang = start.facet.astype(np.intp), start.xi[:, 0].copy(), start.overhang.copy()
-    work = np.empty(3), np.empty(3)
-    neighbour = np.where(smooth_ends(side, normals), line_neighbours(ends), -1)
+    neighbour = np.where(smooth_ends(side, normals), line_neighbours(side.ends), -1)
     search_2d_kernels.along_normals(
-        np.ascontiguousarray(points), corners, at_nodes, counts, neighbour, facet, xi, overhang, *work
+        np.ascontiguousarray(points), _of_one_width(corners), _of_one_width(at_nodes), neighbour, facet, xi, overhang
     )
     xi = xi[:, None]
     return facet, xi, overhang, interpolate(normals[facet], places(side, facet, xi))
+
+
+def _of_one_width(lines: Sequence[Array]) -> Array:
+    """Return vectors (n, k, 2) at the nodes of lines; beside curved lines, straight ones get a third node in the middle."""
+    if len(lines) == 1:
+        return np.ascontiguousarray(lines[0])
+    return np.concatenate([np.concatenate([x, x[:, :2].mean(axis=1, keepdims=True)], axis=1)[:, :3] for x in lines])
 
 
 def smooth_ends(side: Surface, normals: Array) -> Mask:
@@ -386,7 +391,6 @@ def smooth_ends(side: Surface, normals: Array) -> Mask:
     `normals` (n_facets, k, 2) are the normals at the nodes of the facets, see `smooth_normals`. At such an end they are
     equal for both facets.
     """
-    ends = np.concatenate([block.local[:, :2] for block in side.blocks])
     total = np.zeros((len(side.points), 2))
-    np.add.at(total, ends, normals[:, :2])
-    return np.asarray(side.inner_ends & (np.linalg.norm(total, axis=1)[ends] > 2.0 - 1e-6))
+    np.add.at(total, side.ends, normals[:, :2])
+    return np.asarray(side.inner_ends & (np.linalg.norm(total, axis=1)[side.ends] > 2.0 - 1e-6))

@@ -79,32 +79,32 @@ class Surface:
             vectors[first] += (vectors[second][:, None] @ rotation)[:, 0]
             vectors[second] = (vectors[first][:, None] @ np.swapaxes(rotation, -1, -2))[:, 0]
 
-    @property
+    @cached_property
     def sizes(self) -> list[int]:
         """Number of facets of each block."""
         return [len(block.facets) for block in self.blocks]
 
-    @property
+    @cached_property
     def n_facets(self) -> int:
         """Number of facets of all blocks."""
         return sum(self.sizes)
 
-    @property
+    @cached_property
     def order(self) -> int:
         """Order of the facets: 1 if all facets are linear, otherwise 2."""
         return max(elements.get(block.element).order for block in self.blocks)
 
-    @property
+    @cached_property
     def element(self) -> str:
         """Name of the element type of the facets; ContactError if there are several types."""
         return self._only_block().element
 
-    @property
+    @cached_property
     def facets(self) -> Numbers:
         """`FacetBlock.facets` (n_facets, n_nodes) of the only block; ContactError if there are several."""
         return self._only_block().facets
 
-    @property
+    @cached_property
     def local(self) -> Indices:
         """`FacetBlock.local` (n_facets, n_nodes) of the only block; ContactError if there are several."""
         return self._only_block().local
@@ -118,15 +118,24 @@ class Surface:
         return self.blocks[0]
 
     @cached_property
+    def ends(self) -> Indices:
+        """Nodes (n_facets, 2) at both ends of line facets, numbered on the side."""
+        return np.concatenate([block.local[:, :2] for block in self.blocks])
+
+    @cached_property
     def inner_ends(self) -> Mask:
         """Ends (n_facets, 2) of line facets at which another line facet begins or ends."""
-        ends = np.concatenate([block.local[:, :2] for block in self.blocks])
-        return np.asarray(np.bincount(ends.ravel())[ends] > 1)
+        return np.asarray(np.bincount(self.ends.ravel())[self.ends] > 1)
+
+    @cached_property
+    def nodes_of_facets(self) -> Indices:
+        """Nodes (p,) of all facets one after the other, numbered on the side."""
+        return np.concatenate([block.local.ravel() for block in self.blocks])
 
     @cached_property
     def incidence(self) -> csr_array:
         """Incidence matrix (n_facets, m) of facets and nodes: one if a node belongs to a facet, otherwise zero."""
-        nodes = np.concatenate([block.local.ravel() for block in self.blocks])
+        nodes = self.nodes_of_facets
         sizes = np.concatenate([np.full(len(block.local), block.local.shape[1]) for block in self.blocks])
         start = np.concatenate([[0], np.cumsum(sizes)])
         return csr_array((np.ones(len(nodes)), nodes, start), shape=(self.n_facets, len(self.points)))

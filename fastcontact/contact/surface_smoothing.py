@@ -51,10 +51,6 @@ class SmoothSide:
     heights: Array
     curvature: Array
 
-    def of_facets(self, rows: slice) -> SmoothSide:
-        """Return the smooth surface above some of the facets."""
-        return SmoothSide(self.heights[rows], self.curvature[rows])
-
     def at(self, facet: Indices, xi: Array) -> Array:
         """Return the heights (n,) at the reference coordinates `xi` (n, dim - 1) of facets (n,) [length]."""
         k, m = self.heights.shape[1:]

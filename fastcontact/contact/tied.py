@@ -29,6 +29,7 @@ from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Pairing, normals
 from fastcontact.contact.projection import at_common_edges, places
 from fastcontact.contact.surface import Surface
+from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.linear.sparse_rows import nodal_rows
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, TINY
 
@@ -185,7 +186,7 @@ def with_rigid_arms(constraints: Constraints, pairing: Pairing, primary: Surface
     mean = csr_array((share[point], (point, np.arange(len(point)))))
     slopes = [np.einsum("pkd,pd->pk", gradient, direction[point]) for direction in constraints.directions]
     levers = [mean @ nodal_rows(feet.nodes, slope[:, :, None] * normal[:, None, :], points.size) for slope in slopes]
-    rotations, translations = _rotations(points), np.tile(np.eye(points.shape[1]), (len(points), 1))
+    translations, rotations = np.split(rigid_modes(points, "3d"), [points.shape[1]], axis=1)
     arms = np.stack([lever @ rotations for lever in levers], axis=1)
     spurious = np.stack([tangent @ rotations for tangent in constraints.tangents], axis=1)
     translates = np.stack([np.abs(tangent @ translations).max(axis=1) for tangent in constraints.tangents], axis=1)
@@ -197,11 +198,3 @@ def with_rigid_arms(constraints: Constraints, pairing: Pairing, primary: Surface
         for k, tangent in enumerate(constraints.tangents)
     ]
     return replace(constraints, tangents=tuple(tangents) if lengths.any() else constraints.tangents)
-
-
-def _rotations(points: Array) -> Array:
-    """Return the displacements (n_dofs, 1), in 3D (n_dofs, 3), of unit rotations about the mean point [length]."""
-    x = points - points.mean(axis=0)
-    if points.shape[1] == 2:
-        return np.column_stack([-x[:, 1], x[:, 0]]).reshape(-1, 1)
-    return np.stack([np.cross(axis, x).ravel() for axis in np.eye(3)], axis=1)

@@ -19,6 +19,7 @@ import numpy as np
 
 from fastcontact._tools.argument_types import values_at
 from fastcontact.arrays import Array, Indices, Numbers
+from fastcontact.elasticity.energy import cell_volumes
 from fastcontact.elasticity.symmetry_axis import axis_nodes
 from fastcontact.errors import ModelError, check_known
 from fastcontact.mesh import elements, quadrature
@@ -372,17 +373,6 @@ def _quadrature(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array,
     return np.einsum("qn,cnd->cqd", N, mesh.points[cells]), N, reference.gradient(xi), weights
 
 
-def cell_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
-    """Return positions (c, q, dim) [length], shape functions (q, n) [-] and volumes (c, q) [length^dim] in cells.
-
-    They are those of the quadrature points of `cells` (c, n) of int of an element. Volumes include the weight of a point and,
-    in axisymmetry, the circumference.
-    """
-    x, N, dN, weights = _quadrature(mesh, element, cells)
-    J = np.einsum("qnk,cnd->cqdk", dN, mesh.points[cells])
-    return x, N, _over_circle(np.linalg.det(J) * weights, x, kinematics)
-
-
 def facet_points(mesh: Mesh, element: str, facets: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
     """Return positions (f, q, dim) [length], shape functions (q, n) [-] and area vectors (f, q, dim) [length^2] of facets.
 
@@ -390,27 +380,21 @@ def facet_points(mesh: Mesh, element: str, facets: Numbers, kinematics: str) -> 
     point and, in axisymmetry, the circumference.
     """
     x, N, dN, weights = _quadrature(mesh, element, facets)
-    normal = area_vectors(mesh.points[facets], dN)
-    return x, N, _over_circle(normal * weights[:, None], x, kinematics)
-
-
-def _over_circle(measure: Array, x: Array, kinematics: str) -> Array:
-    """Return volumes (c, q) or area vectors (c, q, dim), in axisymmetry times the circumference at `x` (c, q, dim)."""
-    if kinematics != "axisymmetric":
-        return measure
-    circumference = 2.0 * np.pi * x[:, :, 0]
-    return measure * (circumference if measure.ndim == 2 else circumference[:, :, None])
+    normal = area_vectors(mesh.points[facets], dN) * weights[:, None]
+    return x, N, normal if kinematics != "axisymmetric" else normal * (2.0 * np.pi * x[:, :, :1])
 
 
 def measured_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
     """Return positions (c, q, dim) [length], shape functions (q, n) [-] and volumes or areas (c, q) [length^dim].
 
-    The results are those of `cell_points`, or those of `facet_points` with areas if `cells` (c, n) of int are facets.
+    They are those of the quadrature points of cells or facets, `cells` (c, n) of int. Volumes and areas include the weight of
+    a point and, in axisymmetry, the circumference.
     """
-    if elements.get(element).dim == mesh.dim:
-        return cell_points(mesh, element, cells, kinematics)
-    x, N, normal = facet_points(mesh, element, cells, kinematics)
-    return x, N, np.linalg.norm(normal, axis=2)
+    if elements.get(element).dim < mesh.dim:
+        x, N, normal = facet_points(mesh, element, cells, kinematics)
+        return x, N, np.linalg.norm(normal, axis=2)
+    x, N, dN, weights = _quadrature(mesh, element, cells)
+    return x, N, cell_volumes(mesh.points[cells], N, dN, kinematics == "axisymmetric") * weights
 
 
 def add_density(forces: Array, cells: Numbers, N: Array, density: Array) -> None:

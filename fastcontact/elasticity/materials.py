@@ -424,19 +424,6 @@ class LinearElastic(Material):
         return f"E = {self.E:g}, nu = {self.nu:g}"
 
     @property
-    def young(self) -> tuple[float, float]:
-        """Smallest and largest Young's modulus [pressure], which are equal unless E varies."""
-        return self.E.range if isinstance(self.E, Varying) else (self.E, self.E)
-
-    @property
-    def contact_modulus(self) -> float:
-        """Plane-strain modulus E / (1 - nu^2) [pressure], or its smallest value if E or nu varies."""
-        if not self.graded:
-            return self.E / (1 - self.nu**2)
-        samples = [self.constants_at(*sample) for sample in self._cells().samples()]
-        return float(min(np.min(c.E / (1 - c.nu**2)) for c in samples))
-
-    @property
     def largest_nu(self) -> float:
         """Largest Poisson's ratio [-]; zero if it varies and the material has not been assigned to cells."""
         if not isinstance(self.nu, Varying):

@@ -377,19 +377,17 @@ def _facets_with_nodes(mesh: Mesh, selected: Mask, between: bool, considered: Ma
     considered : ndarray of bool (n_cells,)
         Whether the facets of each cell are considered.
     """
-    candidates: dict[str, list[AnyArray]] = {}
-    flags: dict[str, list[Mask]] = {}
+    candidates: dict[str, list[tuple[AnyArray, Mask]]] = {}
     for kind, nodes, cells in facets_of_cells(mesh):
         rows = selected[nodes].all(axis=1)
-        candidates.setdefault(kind, []).append(nodes[rows])
-        flags.setdefault(kind, []).append(considered[cells[rows]])
+        candidates.setdefault(kind, []).append((nodes[rows], considered[cells[rows]]))
     facets_by_kind, n_cells = {}, 2 if between else 1
     for kind, blocks in candidates.items():
-        facets = np.concatenate(blocks)
+        facets, flags = map(np.concatenate, zip(*blocks, strict=True))
         _, first, group, count = np.unique(
             np.sort(facets, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
         )
-        count_considered = np.bincount(group.ravel(), np.concatenate(flags[kind]), len(count))
+        count_considered = np.bincount(group.ravel(), flags, len(count))
         rows = np.sort(first[(count == n_cells) & (count_considered == n_cells)])
         if len(rows):
             facets_by_kind[kind] = facets[rows]

@@ -154,14 +154,12 @@ def cells_of_outer_facets(mesh: Mesh) -> Mapping[str, Numbers]:
 @remembered
 def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Numbers]]:
     """Return `outer_facets`, `cells_joined_by_facets` and `cells_of_outer_facets`."""
-    facets_of_kind: dict[str, list[Numbers]] = {}
-    owners: dict[str, list[Numbers]] = {}
+    by_kind: dict[str, list[tuple[Numbers, Numbers]]] = {}
     for kind, nodes, numbers in facets_of_cells(mesh):
-        facets_of_kind.setdefault(kind, []).append(nodes)
-        owners.setdefault(kind, []).append(numbers)
+        by_kind.setdefault(kind, []).append((nodes, numbers))
     outer, behind, pairs = {}, {}, [np.empty((2, 0), np.int32)]
-    for name, blocks in facets_of_kind.items():
-        facets, owner = np.concatenate(blocks), np.concatenate(owners[name])
+    for name, blocks in by_kind.items():
+        facets, owner = map(np.concatenate, zip(*blocks, strict=True))
         equal = np.stack(equal_rows(np.sort(facets, axis=1)))
         single = np.ones(len(facets), bool)
         single[equal] = False

@@ -50,8 +50,7 @@ class CommittedFile(DriverFile):
     Attributes
     ----------
     synchronised : bool
-        Whether flushes are atomic on the disk. A flush with more than `journal.LARGEST` bytes of changes is divided into
-        several atomic parts.
+        Whether flushes are atomic on the disk.
     exclusive : bool
         False after another program has written to the file.
     end : int
@@ -138,13 +137,12 @@ class CommittedFile(DriverFile):
         changes = [change for write in pending[n_new:] if (change := self._changed_part(*write))[1]]
         for offset, data in new:
             self._put(offset, data)
-        for batch in journal.batches(changes) if self.synchronised else [changes]:
-            if self.synchronised:
-                self._synchronise(new, batch)
-            for offset, data in batch:
-                self._put(offset, data)
-            if self.synchronised:
-                os.fsync(self.fileno())
+        if self.synchronised:
+            self._synchronise(new, changes)
+        for offset, data in changes:
+            self._put(offset, data)
+        if self.synchronised:
+            os.fsync(self.fileno())
         self._head = self._read_head()
         for offset, data in pending:
             self._record(offset, offset + len(data))

@@ -1,11 +1,10 @@
-"""Reservation of disk space and exclusive write access for result files."""
+"""Exclusive write access for result files."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
 import os
-import shutil
 import stat
 import sys
 import weakref
@@ -14,19 +13,6 @@ from typing import IO, Any
 
 from fastcontact.errors import FileError
 from fastcontact.results.committed_file import uninterrupted
-
-
-def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
-    """Reserve `size` bytes of an open file from the offset `start`. Raises OSError if the disk has too little space."""
-    if hasattr(os, "posix_fallocate"):
-        try:
-            os.posix_fallocate(descriptor, start, size)
-            return
-        except OSError as error:
-            if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS):
-                raise
-    if shutil.disk_usage(folder).free < size:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def file_state(path: Path) -> tuple[int, ...] | None:

@@ -23,8 +23,6 @@ FOOTER = struct.Struct(f"<Q32s{len(MAGIC)}s")  # length and SHA-256 of the write
 # Offset and length of a write, and whether it is new data, of which only the checksum follows.
 HEADER = struct.Struct("<QQ?")
 DIGEST = hashlib.sha256().digest_size
-# Largest size of the changes in a journal [bytes]. Larger changes are divided, so that a journal fits in memory.
-LARGEST = 1 << 28
 # Size of the pieces in which data are read for a checksum [bytes].
 PIECE = 1 << 20
 
@@ -38,23 +36,6 @@ def pack(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
         ]
     )
     return body + FOOTER.pack(len(body), hashlib.sha256(body).digest(), MAGIC)
-
-
-def batches(changes: Iterable[Write]) -> Iterator[list[Write]]:
-    """Yield lists of at most LARGEST bytes of changes, in the order of the changes.
-
-    Changes longer than LARGEST are split. Without changes, a single empty list is yielded.
-    """
-    batch, size = [], 0  # type: tuple[list[Write], int]
-    for offset, data in changes:
-        for start in range(0, len(data), LARGEST):
-            piece = data[start : start + LARGEST]
-            if size + len(piece) > LARGEST:
-                yield batch
-                batch, size = [], 0
-            batch.append((offset + start, piece))
-            size += len(piece)
-    yield batch
 
 
 def pending(file: IO[bytes]) -> list[Write]:
@@ -71,7 +52,7 @@ def pending(file: IO[bytes]) -> list[Write]:
     if magic != MAGIC or length > size - FOOTER.size:
         return []
     end = size - FOOTER.size - length  # end of the contents before the journal
-    if length > 2 * LARGEST:  # upper bound of the size of the changes, their headers and the checksums
+    if length > PIECE + 2 * end:  # changes replace parts of the contents, and their headers and the checksums are short
         raise _damage_error(file, f"declares {length:.3g} bytes")
     file.seek(end)
     body = file.read(length)

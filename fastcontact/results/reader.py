@@ -415,8 +415,6 @@ class Results(StepSequence):
         return values
 
     def _contact(self, number: int, formulations: Mapping[str, str]) -> dict[str, ContactResult]:
-        if not formulations:
-            return {}
         pairs = {_read_json(pair["name"], self._raw): pair for pair in self._file["fastcontact/contact"].values()}
         contacts = {name: _read_contact(pairs[name], number, name, kind) for name, kind in formulations.items()}
         for name, contact in contacts.items():

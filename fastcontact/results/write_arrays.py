@@ -242,30 +242,6 @@ def set_restart(file: OpenObjects, number: int, state: NDArray[np.uint8]) -> Non
     _write(table, state, 0)
 
 
-def header_size(mesh: Mesh) -> int:
-    """Return an upper bound of the size of a file without steps [bytes]."""
-    n_groups = len(mesh.cell_groups) + len(mesh.point_groups)
-    arrays = [mesh.points, *mesh.cells.values(), *mesh.cell_groups.values(), *mesh.point_groups.values()]
-    return 6 * sum(array.nbytes for array in arrays) + n_groups * (mesh.n_cells + mesh.n_points + BYTES)
-
-
-def step_size(mesh: Mesh, step: StepResult) -> int:
-    """Return an upper bound of the size of a step in the file, without its restart data [bytes]."""
-    fields = 8 * (sum(layout.POINT_FIELDS.values()) * mesh.n_points + sum(map(np.size, step.cell_fields.values())))
-    primary_size = layout.primary_row(mesh.dim).itemsize
-    contact = sum(
-        (len(pair.points) + 2 * ROWS) * layout.contact_row(mesh.dim, layout.optional_columns(pair)).itemsize
-        + (len(pair.primary_points) + 2 * ROWS) * primary_size
-        + BYTES
-        for pair in step.contact.values()
-    )
-    if step.material_stress is not None:
-        cells = len(step.material_stress.cells)
-        fields += 8 * 7 * cells
-        contact += (len(step.material_stress.points) + 2 * ROWS) * layout.material_row(mesh.dim).itemsize + 4 * cells
-    return int(1.01 * fields) + contact + len(as_json([step.iterations, step.warnings]))
-
-
 def _new_pair(parent: Any, name: str, dim: int, optional: Iterable[str]) -> dict[str, Any]:
     pair = parent.create_group(None)  # the group gets a name when it is complete, so that interrupts do no harm
     pair["name"] = as_json(name)

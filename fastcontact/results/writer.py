@@ -1,9 +1,8 @@
 """Writing of result files, in which a crash does not damage completed steps.
 
-The fields and tables of a step are written first, then the rows with the positions of its fields, and finally the number of
-steps, with a flush after each of the three. Data of completed steps are never moved: uncompressed tables and small fields
-grow in place, and larger fields have a separate chunk for each step. Disk space is reserved beforehand, because a failed
-write of HDF5 may damage the entire file.
+The fields and tables of a step are written and flushed before the number of steps, beyond which nothing is read. Data of
+completed steps are never moved: uncompressed tables and small fields grow in place, and larger fields have a separate chunk
+for each step. On a full disk, the new blocks cannot be written, to which nothing refers yet, and the file remains as it was.
 """
 
 from __future__ import annotations
@@ -28,16 +27,14 @@ from fastcontact._tools.paths import PathLike, checked_target, replacing
 from fastcontact.elasticity.material_sides import material_sides
 from fastcontact.errors import ConvergenceError, FastcontactError, FileError, ModelError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results import journal, layout, write_arrays
+from fastcontact.results import layout, write_arrays
 from fastcontact.results.committed_file import CommittedFile, uninterrupted
-from fastcontact.results.file_lock import PathLock, file_state, reserve
+from fastcontact.results.file_lock import PathLock, file_state
 from fastcontact.results.reader import Results, StoredSteps, read_text
 from fastcontact.results.step import StepResult
 
 # Age of a file [s] from which each step is synchronised to the disk. A run that is lost before takes less time to repeat.
 SYNCHRONISED_FROM = 10.0
-# Disk space that is reserved for the metadata of HDF5 [bytes].
-MARGIN = 1 << 19
 # Size in the file of the indices that HDF5 caches in memory [bytes].
 CACHED_INDICES = 1 << 18
 # Suffixes of other formats, in which results cannot be written.
@@ -233,18 +230,11 @@ class ResultWriter:
             by_default = time.monotonic() - self._started > SYNCHRONISED_FROM
             self._committed.synchronised = by_default if self._synchronise is None else self._synchronise
             restart = pack({"step": self.n_steps, "restart": step.restart})
-            size = write_arrays.step_size(self._mesh, step) + restart.nbytes
-            self._reserve(2 * size if self._committed.synchronised else size)
-            # Fields, rows and the number of steps are flushed one after the other, unless a single journal contains all of
-            # them.
-            in_parts = not self._committed.synchronised or size > journal.LARGEST
             write_arrays.append_fields(self._objects, self._mesh, self.n_steps, step, self._cell_fields)
             write_arrays.append_tables(self._objects, self._mesh, self.n_steps, step, self._pairs, self._notes)
             write_arrays.set_restart(self._objects, self.n_steps, restart)
-            if in_parts:
-                self._flush()
             write_arrays.append_offsets(self._objects, self._mesh, self.n_steps, step, self._cell_fields)
-            if in_parts:
+            if not self._committed.synchronised:  # otherwise a journal contains the step and the number of steps
                 self._flush()
             self._objects["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))
             self._flush()
@@ -293,7 +283,6 @@ class ResultWriter:
             closing.callback(self._file.close)
             self._check_exclusive()
             if self._committed.writable:
-                self._reserve(len(write_arrays.as_json(run)))
                 write_arrays.append_run(self._objects, self.n_steps, run, self._flush)
 
     def _abandon(self) -> None:
@@ -357,9 +346,6 @@ class ResultWriter:
         self._file.flush()
         self._committed.check()
 
-    def _reserve(self, size: int) -> None:
-        reserve(self._committed.fileno(), self.path.parent, self._committed.end, size + MARGIN)
-
     @contextlib.contextmanager
     def _explained(self, action: str) -> Iterator[None]:
         """Convert errors of HDF5 and of the operating system to a FileError with a remedy, and defer signals."""
@@ -383,13 +369,9 @@ class ResultWriter:
 
     def _begin(self, kinematics: str, case_text: str) -> None:
         """Write all data except the steps to a temporary file, then replace the old file by it."""
-        with replacing(self.path) as temporary:
-            with open(temporary, "r+b") as probe:
-                size = write_arrays.header_size(self._mesh) + len(case_text) + MARGIN
-                reserve(probe.fileno(), temporary.parent, 0, size)
-            with new_hdf5(temporary) as file:
-                write_arrays.write_geometry(file, self._mesh, self._cell_fields, self._material, self._point_fields)
-                write_arrays.write_case(file, self._mesh, kinematics, case_text, self._units)
+        with replacing(self.path) as temporary, new_hdf5(temporary) as file:
+            write_arrays.write_geometry(file, self._mesh, self._cell_fields, self._material, self._point_fields)
+            write_arrays.write_case(file, self._mesh, kinematics, case_text, self._units)
         # The file was closed, because Windows does not rename open files. `_open` sets no lock, so that viewers can read it.
         self._open()
 

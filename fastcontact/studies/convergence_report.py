@@ -19,7 +19,6 @@ from fastcontact.studies.fit import CONFIDENCE, Limit
 from fastcontact.studies.quantities import column, title
 from fastcontact.studies.report import Report, Rows, frame, marker, message, number, panels, percent, rows_from_columns
 from fastcontact.studies.series import Series, Split
-from fastcontact.studies.settings import FunctionCombination
 
 # Quantities that the report discusses in sentences, in this order.
 MAIN = ("pressure_max", "force")
@@ -252,7 +251,6 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
     fitted = [(k, series) for k, series in enumerate(all_series) if quantity in series.limits]
     if not fitted:
         return message(ax, f"no limit of the {title(quantity)}:\nit needs three levels")
-    of_function = isinstance(all_series[0].combination, FunctionCombination)
     has_bars = len(fitted) <= MOST_CURVES_WITH_BARS
     for position, (k, series) in enumerate(fitted):
         limit, h = series.limits[quantity], np.array(series.h)
@@ -272,8 +270,8 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
     for style, text in entries.items():
         ax.plot([], [], style, color="0.4", lw=1.0, label=text)
     _slope_triangles(ax, quantity, [series for _, series in fitted])
-    x_label = axis_label("mesh size h" if of_function else "facet length at the contact h", units, "length")
-    labels, size = (x_label, "|value - limit| / limit"), 8 if has_bars else 6.5
+    mesh_size = "mesh size h" if all_series[0].combination.function else "facet length at the contact h"
+    labels, size = (axis_label(mesh_size, units, "length"), "|value - limit| / limit"), 8 if has_bars else 6.5
     frame(ax, f"Mesh error of the {title(quantity)}", labels, scales=("plain log", "log"), legend_size=size)
     ax.grid(which="minor", alpha=0.12)
     if has_bars:  # Matplotlib ignores error bars when it places the legend
@@ -450,7 +448,7 @@ class Study(Report):
 
     def figure(self) -> Any:
         """Return a Matplotlib figure with the mesh errors, the contact pressure, and the differences from theory."""
-        of_case = not isinstance(self.best.combination, FunctionCombination)
+        of_case = not self.best.combination.function
         names = COMPARED if of_case else self.best.shown(COMPARED) or self.best.quantities[:2]
         options: dict[str, Any] = {"all_series": self.series, "units": self.units}
         plots: list[Callable[[Any], None]] = [partial(draw_errors, quantity=name, **options) for name in names]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import multiprocessing
 import os
@@ -85,61 +86,44 @@ class Progress:
     stored: bool
 
 
-def run_all(
+def run_study(
     jobs: Sequence[Run],
+    name: str,
     *,
     executor: Executor | None = None,
     workers: int | None = None,
     store: str | Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
+    progress: bool = False,
 ) -> list[Result]:
     """Run jobs in parallel and return their results in the order of the jobs; for options see `convergence_study`.
 
     Raises CaseError if the number of workers is invalid or if the function that computes a quantity fails before any run has
-    succeeded, and FastcontactError if no worker process can start.
+    succeeded, and FastcontactError if no worker process can start. If all runs fail, the error of the first one is raised,
+    with `name` before its message.
     """
     storage = None if store is None else Store(store)
-    results = {i: stored for i, job in enumerate(jobs) if storage and (stored := storage.get(job)) is not None}
-    waiting = {index: job.label for index, job in enumerate(jobs)}
-
-    def report(index: int, stored: bool = False) -> None:
-        label, result = waiting.pop(index), results[index]
-        if on_progress is not None:
-            seconds = 0.0 if stored else float(result.get("seconds", 0.0))
-            error, left = str(result.get("error", "")), tuple(waiting.values())
-            on_progress(Progress(label, len(jobs) - len(left), len(jobs), left, seconds, error, stored))
-
-    for index in list(results):
-        report(index, stored=True)
-    for index, result in _run_jobs(jobs, list(waiting), executor, workers):
-        if storage is not None and "error" not in result:
-            storage.put(jobs[index], result)
-        if result.get("kind") == QuantityError.__name__ and all("error" in other for other in results.values()):
-            raise CaseError(f"{jobs[index].label}: {result['error']}")  # it would fail for the other runs as well
-        results[index] = result
-        report(index)
-    return [results[index] for index in range(len(jobs))]
-
-
-def run_study(
-    jobs: Sequence[Run], name: str, *, on_progress: Callable[[Progress], None] | None, progress: bool, **options: Any
-) -> list[Result]:
-    """Run jobs by `run_all` and return their results, with a status line if `progress` is true.
-
-    If all runs fail, the error of the first one is raised, with `name` before its message.
-    """
+    stored = {i: result for i, job in enumerate(jobs) if storage and (result := storage.get(job)) is not None}
+    waiting, results = {index: job.label for index, job in enumerate(jobs)}, dict[int, Result]()
+    to_run = [index for index in waiting if index not in stored]
     with StudyStatus(progress) as line:
-
-        def report(progress: Progress) -> None:
-            line(progress)
+        for index, result in itertools.chain(stored.items(), _run_jobs(jobs, to_run, executor, workers)):
+            if storage is not None and "error" not in result and index not in stored:
+                storage.put(jobs[index], result)
+            if result.get("kind") == QuantityError.__name__ and all("error" in other for other in results.values()):
+                raise CaseError(f"{jobs[index].label}: {result['error']}")  # it would fail for the other runs as well
+            results[index], label, left = result, waiting.pop(index), tuple(waiting.values())
+            seconds = 0.0 if index in stored else float(result.get("seconds", 0.0))
+            state = Progress(
+                label, len(results), len(jobs), left, seconds, str(result.get("error", "")), stored=index in stored
+            )
+            line(state)
             if on_progress is not None:
-                on_progress(progress)
-
-        results = run_all(jobs, on_progress=report, **options)
-    if all("error" in result for result in results):
+                on_progress(state)
+    if all("error" in result for result in results.values()):
         kind = getattr(errors, str(results[0].get("kind")), CaseError)
         raise kind(f"{name}; {jobs[0].label}: {results[0]['error']}")
-    return results
+    return [results[index] for index in range(len(jobs))]
 
 
 class Store:

@@ -14,7 +14,7 @@ import traceback
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -44,6 +44,12 @@ KEYS = {
 }
 # Version of the results in a store, incremented when the quantities or their form change.
 SCHEMA = 4
+# A function of the last step, or of the list of all steps if its argument has the name `STEPS_ARGUMENT`.
+Measure = Callable[..., float]
+# Names of quantities, or functions by the name of their quantity.
+Quantities = Sequence[str] | Mapping[str, Measure]
+STEPS_ARGUMENT = "steps"
+Function = Callable[..., Any]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -54,6 +60,8 @@ class Run:
     name: str  # name of the case or of the model function
     marks: dict[str, Any]  # values that distinguish the run from other runs of the study, for example the level
     size: float = 0.0  # measure of the work; larger runs start first
+    pair: str | None = None  # contact pair to evaluate; None for the first one
+    measures: Mapping[str, Measure] = field(default_factory=dict)  # functions of additional quantities, by name
 
     def solve_run(self) -> tuple[Case | None, Sequence[StepResult]]:
         """Solve the run. Returns its case, or None if it is unknown, and all steps of the solution or only the last one."""
@@ -65,9 +73,10 @@ class Run:
         with record_warnings() as texts:
             case, steps = self.solve_run()
         last = steps[-1]
-        pair = self.pair_of(last)
+        pair = self.pair or next(iter(last.contact), None)
         values = quantities.quantities_of_contacts(last) if case is None else quantities.measure(case, last, pair)
-        values = {name: value for name, value in values.items() if np.isfinite(value)} | self.extra_quantities(steps)
+        values = {name: value for name, value in values.items() if np.isfinite(value)}
+        values |= {name: _number(name, measure, steps) for name, measure in self.measures.items()}
         return {
             "h": math.nan if case is None else quantities.mesh_size(case, pair),
             "n_dofs": last.displacement.size,
@@ -80,14 +89,6 @@ class Run:
             "units": dict(last.units),
         }
 
-    def pair_of(self, last: StepResult) -> str | None:
-        """Return the name of the contact pair to evaluate, by default the first one; None if there is none."""
-        return next(iter(last.contact), None)
-
-    def extra_quantities(self, steps: Sequence[StepResult]) -> dict[str, float]:
-        """Return additional quantities of the steps."""
-        return {}
-
     @property
     def key(self) -> str:
         """Name of the run in a store, a hash of all its inputs. Raises CaseError if the inputs are unknown."""
@@ -99,7 +100,6 @@ class Job(Run):
     """A run of a case."""
 
     data: dict[str, Any]  # parsed case file with the values of this run
-    pair: str | None  # contact pair to evaluate
     recipe: Recipe  # recipe of the mesh
     base: Mesh | None  # mesh of the case, if it is read from a file
     folder: Path = Path()  # folder to which file names in the case are relative
@@ -118,18 +118,6 @@ class Job(Run):
         case = build_case(self.data, name=self.name, folder=self.folder, mesh=make_mesh(self.recipe, self.base))
         return case, [last_step(case)]
 
-    def pair_of(self, last: StepResult) -> str | None:
-        """See `Run`."""
-        return self.pair
-
-
-# A function of the last step, or of the list of all steps if its argument has the name `STEPS_ARGUMENT`.
-Measure = Callable[..., float]
-# Names of quantities, or functions by the name of their quantity.
-Quantities = Sequence[str] | Mapping[str, Measure]
-STEPS_ARGUMENT = "steps"
-Function = Callable[..., Any]
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FunctionRun(Run):
@@ -138,7 +126,6 @@ class FunctionRun(Run):
     function: Function
     positional: tuple[Any, ...]  # positional arguments
     named: Mapping[str, Any]  # keyword arguments
-    measures: Mapping[str, Measure]  # functions of additional quantities, by name
 
     def solve_run(self) -> tuple[Case | None, Sequence[StepResult]]:
         """See `Run`."""
@@ -154,10 +141,6 @@ class FunctionRun(Run):
             f"the function {self.name} must return a Model, or what fc.solve returns, not {type(result).__name__}: end it "
             "with 'return'"
         )
-
-    def extra_quantities(self, steps: Sequence[StepResult]) -> dict[str, float]:
-        """See `Run`."""
-        return {name: _number(name, measure, steps) for name, measure in self.measures.items()}
 
     def _call(self) -> Any:
         """Return the result of the function; CaseError, with the line of the error, if it fails."""

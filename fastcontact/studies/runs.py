@@ -30,7 +30,6 @@ from fastcontact.studies.report import report_fields
 from fastcontact.studies.series import Level, Point, Series, TheoryCurve, Value
 from fastcontact.studies.settings import (
     Combination,
-    FunctionCombination,
     Settings,
     combinations,
     data_of,
@@ -171,8 +170,7 @@ def _study_of_function(
     results = run_functions(runs, "no size could be solved", **options)
     solved = [(level, {**result, "h": descending[level], "theory": {**theory}}) for level, result in enumerate(results)]
     no_theory = None, 1.0, "under the given load"
-    member = FunctionCombination(None, None, name)
-    series = _series(member, solved, [*quantities], (), no_theory, asked=tuple(quantities))
+    series = _series(Combination(None, None, name), solved, [*quantities], (), no_theory, asked=tuple(quantities))
     for coarse, fine in pairwise(series.levels):
         if fine.n_dofs <= coarse.n_dofs:
             warn(

@@ -26,30 +26,24 @@ ALL_ELEMENTS = ("quad4", "quad8", "tri3", "tri6")
 class Combination:
     """An element and a contact formulation.
 
-    `element` is None for a mesh with several element types, and `formulation` is None without contact.
+    `element` is None for a mesh with several element types, and `formulation` is None without contact. In the study of a
+    function instead of a case both are None, and `function` is its name.
     """
 
     element: str | None
     formulation: str | None
+    function: str = ""
 
     def __str__(self) -> str:
-        return f"{self.element or 'mixed cells'} {(self.formulation or 'no contact').replace('_', '-')}"
+        return (
+            self.function or f"{self.element or 'mixed cells'} {(self.formulation or 'no contact').replace('_', '-')}"
+        )
 
     @property
     def rank(self) -> tuple[int, int, int]:
         """Sort key of the expected accuracy, by formulation (node-to-segment last), order and shape of the cells."""
         order = elements.get(self.element).order if self.element else 0
         return int(self.formulation != "node_to_segment"), order, int((self.element or "").startswith("quad"))
-
-
-@dataclass(frozen=True)
-class FunctionCombination(Combination):
-    """Combination in a study of a function instead of a case, with the name of the function."""
-
-    name: str
-
-    def __str__(self) -> str:
-        return self.name
 
 
 @dataclass(frozen=True)

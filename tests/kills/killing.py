@@ -24,8 +24,8 @@ from fastcontact.results.layout import OPTIONAL_COLUMNS
 # Largest relative difference of a step in a file of a killed run from that of the run that was let alone.
 OF_STEPS = 1e-12
 POLL = 2e-4  # s
-# The file is seen to change when room for a step is reserved, and again when it is written, within a millisecond or two. A
-# kill falls up to so long after a change, mostly soon [s].
+# The writes of a step follow each other within a millisecond or two. A kill falls up to so long after a change of the file,
+# mostly soon [s].
 WITHIN = 20e-3
 # Part of the kills that fall while steps are written; the others fall anywhere between start and end.
 WRITING = 0.6

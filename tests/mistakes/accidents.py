@@ -3,7 +3,7 @@
 import errno
 import os
 
-from fastcontact._tools import paths
+from fastcontact._tools import hdf5, paths
 from fastcontact.results import file_lock
 
 
@@ -11,7 +11,7 @@ def full_disk(patch, folder):
     def refuse(*_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    patch.setattr(os, "posix_fallocate", refuse, raising=False)
+    patch.setattr(hdf5.DriverFile, "_put", refuse)
 
 
 def protected_folder(patch, folder):

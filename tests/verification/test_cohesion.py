@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -139,6 +139,20 @@ def test_a_ball_is_pulled_off_with_the_force_of_johnson_kendall_and_roberts(form
     pulls = [step.contact["ball"].force[1] for step in steps]
     assert abs(max(pulls) / (1.5 * np.pi * w * R) - 1.0) < 0.03
     assert pulls[-1] == 0.0
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
+def test_adhering_blocks_are_as_stiff_in_compression_as_one(formulation):
+    lower, upper = (
+        fc.generate.block((1.0, 1.0), (2, 2), origin=(0.0, y), name=name) for name, y in (("A", 0.0), ("B", 1.0))
+    )
+    mesh = united(A=lower, B=upper)
+    model = elastic_model(mesh, "plane_stress", E=210e3, nu=0.0)
+    model.fix("ABOTTOM", "xy")
+    model.prescribe("BTOP", x=0.0, y=-1e-4)
+    law = {"work": 0.02, "strength": 1.0}
+    model.add_contact("pair", secondary="BBOTTOM", primary="ATOP", adhesion=law, formulation=formulation)
+    assert fc.solve(model, 1)[-1].contact["pair"].normal_force == pytest.approx(10.5, rel=0.01)
 
 
 def test_adhesion_on_facets_longer_than_its_reach_tells_it():

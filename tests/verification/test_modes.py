@@ -87,10 +87,28 @@ def test_a_clamped_disc_and_a_ring():
     ring = model_of(block((0.01, 0.01), (1, 1), "quad8", origin=(0.995, 0.0)), "axisymmetric", 0.3)
     ring.fix("BOTTOM", "y")
     assert fc.modes(ring, n=1).frequencies[0] == pytest.approx(1 / (2 * np.pi), rel=1e-4)
-    # Under pressure inside its hoop stress stiffens: E + stress in place of E.
-    ring.add_pressure("LEFT", 0.001 / 0.995)
+    # The hoop stress due to a traction of fixed direction and size stiffens the ring: E + stress in place of E.
+    ring.add_traction("LEFT", x=0.001 / 0.995)
     (step,) = fc.solve(ring, 1)
     assert fc.modes(ring, step, 1).frequencies[0] == pytest.approx(np.sqrt(1.1) / (2 * np.pi), rel=2e-3)
+
+
+def test_pressure_follows_the_vibrating_surface():
+    """Hydrostatic pressure does not change the frequencies of a cantilever (small and finite strain agree)."""
+    free, loaded = {}, {}
+    for strain in ("small", "finite"):
+        beam = fc.Model(block((100.0, 8.0), (20, 2), "quad8"), "plane_stress", strain=strain)
+        beam.add_material(fc.LinearElastic(E=210e3, nu=0.3, density=7.85e-9))
+        beam.fix("LEFT", "xy")
+        free[strain] = fc.modes(beam, n=1).frequencies[0]
+        for side in ("BOTTOM", "TOP"):
+            beam.add_pressure(side, 50.0)
+        axial = fc.modes(beam, fc.solve(beam, 1)[-1], 1).frequencies[0]
+        beam.add_pressure("RIGHT", 50.0)
+        loaded[strain] = axial, fc.modes(beam, fc.solve(beam, 1)[-1], 1).frequencies[0]
+    assert loaded["small"] == pytest.approx(loaded["finite"], rel=5e-4)
+    assert loaded["small"][1] == pytest.approx(free["small"], rel=5e-4)
+    assert loaded["small"][0] < 0.99 * free["small"]
 
 
 @pytest.mark.parametrize(
@@ -332,7 +350,7 @@ def pressed_column(divisions):
     """A column under more than Euler's load, and its step."""
     model = model_of(block((1.0, 0.1), divisions), "plane_stress")
     model.fix("LEFT", "xy")
-    model.add_pressure("RIGHT", 0.01)
+    model.add_traction("RIGHT", x=-0.01)
     return model, fc.solve(model, 1)[0]
 
 

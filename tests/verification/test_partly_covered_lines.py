@@ -61,7 +61,7 @@ def test_fields_are_as_rich_as_what_takes_part_determines(element, axisymmetric)
     model.add_material(fc.LinearElastic(1.0, 0.0))
     model.add_contact("pair", secondary="L_TOP", primary="U_BOTTOM", formulation="mortar")
     side = model.bind(model.contact[0]).secondary
-    whole = [WholeFacets.of(side.blocks[0], model.mesh.points, axisymmetric)]
+    whole = WholeFacets.of(side.blocks[0], model.mesh.points, axisymmetric)
     k, rng = side.local.shape[1], np.random.default_rng(3)
     for _ in range(50):
         s, w = np.polynomial.legendre.leggauss(6)
@@ -75,9 +75,9 @@ def test_fields_are_as_rich_as_what_takes_part_determines(element, axisymmetric)
             N = fc.mesh.elements.get(side.element).shape(xi[:, None])
             dA = 0.5 * (high - low) * w * (2.0 * np.pi * at if axisymmetric else 1.0)
             mass[f] = (dA[:, None, None] * N[:, :, None] * N[:, None, :]).sum(axis=0)
-        nodes, independent = independent_values(side, whole, [mass], np.zeros(len(side.points), bool))
+        nodes, independent = independent_values(side, whole, mass, np.zeros(len(side.points), bool))
         total, reference = np.zeros((2, len(side.points), len(side.points)))
-        for one, full, local in zip(mass, whole[0].mass, side.local, strict=True):
+        for one, full, local in zip(mass, whole.mass, side.local, strict=True):
             total[np.ix_(local, local)] += one
             reference[np.ix_(local, local)] += full if one.any() else 0.0
         Z = nodes.toarray()

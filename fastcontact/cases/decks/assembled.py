@@ -403,13 +403,14 @@ ON_SURFACES = {"DSLOAD": "P", "DSFLUX": "S", "SFILM": "F"}
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Keyword, kind and target of a distributed load, which is a face or some elements.
+    """Keyword, location, kind and target of a distributed load, which is a face or some elements.
 
     `numbers` contains the direction [-] of gravity, two vectors for the axis of rotation of centrifugal forces (origin
     [length] and direction [-]), or the film coefficient [power / (area temperature)].
     """
 
     keyword: str
+    location: Location = field(compare=False)
     kind: str
     face: Face | None = None
     elements: tuple[Element, ...] = ()
@@ -428,17 +429,17 @@ def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> li
         if label != letter:
             raise row.refuse(f"{load}{label[:40]} on a surface is not supported, only {letter}")
         faces = assembly.faces(row.text(0), row.location)
-        return [Target(keyword, letter, face, (), numbers) for face in faces]
+        return [Target(keyword, row.location, letter, face, (), numbers) for face in faces]
     letter, element_loads = ON_ELEMENTS[keyword]
     on_all_solids = keyword == "DLOAD" and not row.text(0)
     elements = assembly.solids if on_all_solids else assembly.elements_of(row.text(0), row.location)
     if label[:1] == letter and label[1:].isdigit():
         faces = [(element, assembly.facet(element, int(label[1:]), row.location)) for element in elements]
-        return [Target(keyword, letter, face, (), numbers) for face in faces]
+        return [Target(keyword, row.location, letter, face, (), numbers) for face in faces]
     if label not in element_loads:
         labels = ", ".join([f"{letter}1", f"{letter}2", "...", *element_loads])
         raise row.refuse(f"{load}{label[:40]} is not supported; expected one of {labels}")
     vector = tuple(row.number(3 + i, 0.0) for i in range(element_loads[label]))
     if vector and not any(vector[-3:]):
         raise row.refuse(f"the direction of {label} is missing")
-    return [Target(keyword, label, None, tuple(elements), vector)]
+    return [Target(keyword, row.location, label, None, tuple(elements), vector)]

@@ -285,7 +285,7 @@ class Building:
                 by_density: dict[tuple[str, float], list[int]] = {}
                 for element in name.elements:
                     if element.type is not None:
-                        cell, density = element.type.element, self._density(element, name, conditions)
+                        cell, density = element.type.element, self._density(element, name)
                         by_density.setdefault((cell, density), []).append(self.model.mesh.offsets[cell] + element.row)
                 for (cell, density), cells in by_density.items():
                     scaled = tuple((time, density * value) for time, value in table)
@@ -295,14 +295,13 @@ class Building:
         for group, (kind, vector, _), _, value, table in loads:
             self.model.add_body_force(group, ramp=table, **_body_force(kind, vector, value, self.assembly.dim))
 
-    def _density(self, element: Element, load: Target, conditions: Conditions) -> float:
+    def _density(self, element: Element, load: Target) -> float:
         """Return the factor of a body force at an element: the density of its material, or 1 for a force per volume."""
         if load.kind[0] == "B":
             return 1.0
         material = self._material(element.assigned_section)
         if material.density is None:
-            location = conditions.loads.tracks[load].location
-            raise location.refuse(f"material '{material.name}' has no *DENSITY, which {load.kind} requires")
+            raise load.location.refuse(f"material '{material.name}' has no *DENSITY, which {load.kind} requires")
         return material.density
 
     def _springs(self) -> None:

@@ -9,10 +9,10 @@ import numpy as np
 
 from fastcontact.cases.decks.assembled import Target, targets
 from fastcontact.cases.decks.axes import local_directions
-from fastcontact.cases.decks.blocks import Block, Location, Row
+from fastcontact.cases.decks.blocks import Block, Location
 from fastcontact.cases.decks.content import Condition
 from fastcontact.cases.decks.fields import OF_HEAT, HeatConditions, initial_temperatures, temperatures_of_block
-from fastcontact.cases.decks.histories import Histories
+from fastcontact.cases.decks.histories import Histories, Value
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.sections import Locks
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -100,7 +100,7 @@ class Conditions:
         elif keyword == "CLOAD":
             self.forces.record(condition, self._forces(block))
         else:
-            entries = ((t, row.number(2), row.location) for row in block.each() for t in targets(self.assembly, row))
+            entries = ((targets(self.assembly, row), row.number(2), row.location) for row in block.each())
             self.loads.record(condition, entries)
 
     def _update_periods(self, number: int) -> None:
@@ -114,7 +114,7 @@ class Conditions:
         new_periods: dict[tuple[Location | None, bool], Period] = {}
         for name in step_values:
             if name in released or not self._acts(name):
-                key = step_values.get(name)[2] if begin else None, name in self.fixed_in_step
+                key = step_values[name].location if begin else None, name in self.fixed_in_step
                 self.periods[name] = new_periods.setdefault(key, Period(key[0], begin, keeps=key[1]))
         self.fixed_in_step.clear()
 
@@ -159,30 +159,34 @@ class Conditions:
                     raise row.refuse(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
                 components = tuple(range(first, last + 1))
             driven = driven or bool(before and value)
+            prescribed = Value(value, condition.amplitude, row.location)
             for point in points:
                 for component in components:
-                    self._support(condition, row, point, component, value)
+                    self._support(point, component, prescribed, "FIXED" in block.parameters)
         if driven:
             self.assembly.content.note(block, "a displacement prescribed before the first step is applied in that step")
 
-    def _support(self, condition: Condition, row: Row, point: int, component: int, value: float) -> None:
-        """Record a support of a point. Raises CaseError if the component does not exist and the value is not zero."""
+    def _support(self, point: int, component: int, prescribed: Value, fixed: bool) -> None:
+        """Record a support of a point; `fixed` is true for FIXED.
+
+        Raises CaseError if the component does not exist and the prescribed value is not zero.
+        """
         name = self._component(point, component)
         if name is None:
-            if value:
-                raise row.refuse(f"component {component} does not exist at nodes of this model")
+            if prescribed.value:
+                raise prescribed.location.refuse(f"component {component} does not exist at nodes of this model")
             return
-        if self.locks.record(point, component, "FIXED" in condition.block.parameters):
+        if self.locks.record(point, component, fixed):
             return
-        sign = 1.0
         if name[0] in self.directions:
             name, sign = self._local_component(*name[:2])
-        if "FIXED" in condition.block.parameters:
+            prescribed = prescribed._replace(value=sign * prescribed.value)
+        if fixed:
             self.fixed_in_step.add(name)
             if self._acts(name):
-                self.supports.hold(name, row.location)
+                self.supports.hold(name, prescribed.location)
                 return
-        self.supports.set_value(name, sign * value, condition.amplitude, row.location)
+        self.supports.set_value(name, prescribed)
 
     def _component(self, point: int, component: int) -> Component | None:
         """Return a component of a point or, for rotations, of the point that represents them; None if it does not exist."""
@@ -202,12 +206,12 @@ class Conditions:
             return (point, axis, False), float(np.sign(direction[axis]))
         return (point, number, True), 1.0
 
-    def _forces(self, block: Block) -> Iterator[tuple[Component, float, Location]]:
-        """Yield the component, the value [force] and the location of each force in a *CLOAD block."""
+    def _forces(self, block: Block) -> Iterator[tuple[list[Component], float, Location]]:
+        """Yield the components, the value [force] and the location of each line of a *CLOAD block."""
         for row in block.each():
             component, value = row.whole(1), row.number(2)
-            for point in self.assembly.nodes(row.text(0), row.location):
-                name = self._component(point, component) if 1 <= component <= 6 else None
-                if name is None:
-                    raise row.refuse(f"a force cannot act on component {component} of this node")
-                yield (*name[:2], name[0] in self.directions), value, row.location
+            points = self.assembly.nodes(row.text(0), row.location)
+            names = [self._component(point, component) if 1 <= component <= 6 else None for point in points]
+            if None in names:
+                raise row.refuse(f"a force cannot act on component {component} of this node")
+            yield [(*name[:2], name[0] in self.directions) for name in names if name], value, row.location

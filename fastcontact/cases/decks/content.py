@@ -39,10 +39,9 @@ class Members(Item):
 
 
 @dataclass(frozen=True, slots=True)
-class SurfaceEntry:
+class SurfaceEntry(Item):
     """An entry of a surface: `of` is an element set or number, with the label of a face, or a node set or number."""
 
-    location: Location
     of: str
     label: str = ""
 
@@ -226,10 +225,9 @@ class Axes(Item):
 
 
 @dataclass(frozen=True)
-class Amplitude:
+class Amplitude(Item):
     """Times and values of an amplitude, in total time if `total` is true, otherwise in step time."""
 
-    location: Location
     name: str
     times: tuple[float, ...]
     values: tuple[float, ...]

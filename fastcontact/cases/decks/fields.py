@@ -12,7 +12,7 @@ from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembly, Face, Target, targets
 from fastcontact.cases.decks.blocks import Block, Location, Row
 from fastcontact.cases.decks.content import Condition, Content, Step
-from fastcontact.cases.decks.histories import ByShape, Histories, Name
+from fastcontact.cases.decks.histories import ByShape, Histories, Name, Value
 from fastcontact.cases.decks.meshing import DeckMesh, rows_by_type
 from fastcontact.mesh.mesh import starts_of
 from fastcontact.model.model import Model
@@ -29,16 +29,17 @@ def initial_conditions(content: Content, block: Block) -> None:
 
 def initial_temperatures(assembly: Assembly, blocks: Iterable[Block]) -> dict[int, float]:
     """Return the initial temperatures by point; the last of several values at a point applies."""
-    return {point: value for block in blocks for point, value, _ in temperatures_of_block(assembly, block)}
+    rows = (row for block in blocks for row in temperatures_of_block(assembly, block))
+    return {point: value for points, value, _ in rows for point in points}
 
 
-def temperatures_of_block(assembly: Assembly, block: Block) -> Iterator[tuple[int, float, Location]]:
+def temperatures_of_block(assembly: Assembly, block: Block) -> Iterator[tuple[list[int], float, Location]]:
     """Yield each point of a block with its temperature and the location of the data line."""
     for row in block.each():
         if any(row.entries[2:]):
             raise row.refuse("temperature gradients exist in beams and shells only: give a single temperature")
         value = row.number(1)
-        yield from ((point, value, row.location) for point in assembly.nodes(row.text(0), row.location))
+        yield assembly.nodes(row.text(0), row.location), value, row.location
 
 
 def add_temperatures(model: Model, histories: Histories[int]) -> None:
@@ -193,7 +194,7 @@ class HeatConditions:
         if "FIXED" in condition.block.parameters:
             raise row.refuse("FIXED is not supported for temperatures: give their values")
         for point in self._points_of_solids(row):
-            self.temperatures.set_value(point, row.number(3, 0.0), condition.amplitude, row.location)
+            self.temperatures.set_value(point, Value(row.number(3, 0.0), condition.amplitude, row.location))
 
     def _points_of_solids(self, row: Row) -> list[int]:
         """Return the points of the node set in a line. Raises CaseError if a point belongs to no solid."""
@@ -207,7 +208,7 @@ class HeatConditions:
         """Record a block of heat loads of the current step."""
         keyword = condition.block.keyword
         histories: dict[str, Histories[Any]] = {"CFLUX": self.powers, "FILM": self.films, "SFILM": self.films}
-        entries = ((name, row.number(2), row.location) for row in condition.block.each() for name in self._names(row))
+        entries = ((list(self._names(row)), row.number(2), row.location) for row in condition.block.each())
         histories.get(keyword, self.fluxes).record(condition, entries)
 
     def _names(self, row: Row) -> Iterator[int | Target]:

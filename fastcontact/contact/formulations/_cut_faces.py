@@ -102,10 +102,9 @@ def _heights(
     if smoothing is None or axes is None:
         no_heights = np.zeros((0, 0, 0))
         return no_heights, no_heights, np.zeros((len(pairs), 2))
-    secondary, primary = smoothing.secondary.of_facets(rows[0]), smoothing.primary.of_facets(rows[1])
-    axes_of_facets = axes[0][rows[0]], axes[1][rows[1]]
-    factors = Smoothing(secondary, primary).shared(pairs[:, 0], pairs[:, 1], axes_of_facets)
-    return secondary.heights, primary.heights, factors
+    secondary, primary = rows
+    factors = smoothing.shared(pairs[:, 0] + secondary.start, pairs[:, 1] + primary.start, axes)
+    return smoothing.secondary.heights[secondary], smoothing.primary.heights[primary], factors
 
 
 @dataclass(frozen=True, eq=False)

@@ -223,9 +223,6 @@ def line_overlap(
             rows = np.flatnonzero((area > 0) & (pairing.facet >= first[number]) & (pairing.facet < first[number + 1]))
             shape = elements.get(primary_block.element).shape(pairing.xi[rows])
             products = area[rows, None, None] * points.shape[rows, :, None] * shape[:, None, :]
-            facets_of_points = np.column_stack([points.facet[rows], pairing.facet[rows] - first[number]])
-            pairs, pair_of_point = np.unique(facets_of_points, axis=0, return_inverse=True)
-            integrals = np.zeros((len(pairs), *products.shape[1:]))
-            np.add.at(integrals, pair_of_point.ravel(), products)
-            couplings.append(Coupling(block, primary_block, pairs, integrals))
+            pairs = np.column_stack([points.facet[rows], pairing.facet[rows] - first[number]])
+            couplings.append(Coupling(block, primary_block, pairs, products))
     return Overlap(masses, couplings, gap_reductions, overlap_points)

@@ -53,6 +53,7 @@ from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.contact.tied import TiedPair, moments_of, reduction, tied_pair, with_rigid_arms
 from fastcontact.errors import ContactError, unknown
+from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 SLIPS = ("symmetric", "primary")
@@ -218,7 +219,9 @@ class Formulation(ABC):
             constraints = constraints.without(distance > self.options.search_distance)
         if self.options.cohesion is not None:
             initial_gap = _values_at(self._initial_gaps, constraints.positions)
-            return cohesive_rows(self.options.cohesion, constraints, config, initial_gap)
+            return cohesive_rows(
+                self.options.cohesion, constraints, config, initial_gap, self.modulus / self.shortest_edge
+            )
         equality = self.never_opening(constraints.positions, config)
         constraints = replace(constraints, equality=equality, friction=config.friction_factor * constraints.friction)
         if self.options.source is None:
@@ -249,6 +252,15 @@ class Formulation(ABC):
         """Positions (m, dim) and gaps (m,) of the constraints between the undeformed bodies [length]."""
         constraints = self.unilateral(Configuration.undeformed(self.points))
         return constraints.positions, constraints.gap0
+
+    @cached_property
+    def shortest_edge(self) -> float:
+        """Length of the shortest facet, over the order of its shape functions [length]."""
+        sizes = [
+            np.linalg.norm(np.ptp(self.points[block.facets], axis=1), axis=1) / elements.get(block.element).order
+            for block in self.secondary.blocks
+        ]
+        return float(np.concatenate(sizes).min())
 
     @cached_property
     def tied(self) -> TiedPair | None:

@@ -25,7 +25,7 @@ class Coupling:
     ----------
     secondary, primary : FacetBlock
     pairs : ndarray of int (n, 2)
-        Numbers of the secondary and the primary facet of each pair, each in its block.
+        Numbers of the secondary and the primary facet of each pair, each in its block. A pair may occur several times.
     integrals : ndarray (n, n_nodes, n_primary_nodes)
         Integrals of secondary times primary shape functions over the overlap [area].
     """

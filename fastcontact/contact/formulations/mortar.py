@@ -97,19 +97,17 @@ def _smallest_eigenvalues(full: Array, mass: Array) -> Array:
     return np.asarray(np.linalg.eigvalsh(inverse @ mass @ inverse.transpose(0, 2, 1))[:, 0])
 
 
-def independent_values(
-    side: Surface, fields: list[WholeFacets], masses: list[Array], excluded: Mask
-) -> tuple[csr_array, Indices]:
+def independent_values(side: Surface, field: WholeFacets, mass: Array, excluded: Mask) -> tuple[csr_array, Indices]:
     """Return the map from the independent values of the field to all nodal values, and the nodes of the independent values.
 
     Parameters
     ----------
     side : Surface
         The secondary side, with m nodes.
-    fields : list of WholeFacets
-        Mass matrices of the complete facets, for each block of the side.
-    masses : list of ndarray (n_facets, n_nodes, n_nodes)
-        Integrals of products of two shape functions over the covered part of each facet, for each block [area].
+    field : WholeFacets
+        Mass matrices of the complete facets.
+    mass : ndarray (n_facets, n_nodes, n_nodes)
+        Integrals of products of two shape functions over the covered part of each facet [area].
     excluded : ndarray of bool (m,)
         Nodes that have no independent value.
 
@@ -120,58 +118,43 @@ def independent_values(
     nodes : ndarray of int (k,)
         Node of each independent value.
     """
-    degrees = [field.degrees(mass) for field, mass in zip(fields, masses, strict=True)]
-    chosen = np.zeros(len(side.points), bool)
-    for field, degree in zip(fields, degrees, strict=True):
-        chosen[field.block.local[degree == 2]] = True
-        chosen[field.block.local[degree == 1][:, : len(field.to_corners)]] = True
+    degree, local, chosen = field.degrees(mass), field.block.local, np.zeros(len(side.points), bool)
+    chosen[local[degree == 2]] = True
+    chosen[local[degree == 1][:, : len(field.to_corners)]] = True
     chosen &= ~excluded
-    for field, degree, mass in zip(fields, degrees, masses, strict=True):
-        # In a facet without an independent node, the node with the largest covered area becomes independent.
-        for facet in np.flatnonzero((degree >= 0) & ~chosen[field.block.local].any(axis=1)):
-            nodes = field.block.local[facet]
-            if not (chosen[nodes].any() or excluded[nodes].all()):
-                chosen[nodes[np.argmax(np.where(excluded[nodes], -np.inf, mass[facet].sum(axis=1)))]] = True
+    # In a facet without an independent node, the node with the largest covered area becomes independent.
+    for facet in np.flatnonzero((degree >= 0) & ~chosen[local].any(axis=1)):
+        nodes = local[facet]
+        if not (chosen[nodes].any() or excluded[nodes].all()):
+            chosen[nodes[np.argmax(np.where(excluded[nodes], -np.inf, mass[facet].sum(axis=1)))]] = True
     independent = np.flatnonzero(chosen)
     values = nodal_map(side, excluded, independent) if excluded.any() else csr_array(diags_array(chosen.astype(float)))
-    if any((degree[degree >= 0] < 2).any() for degree in degrees):
-        values = _with_interpolated_rows(csr_array(values), fields, degrees, chosen, excluded)
+    if (degree[degree >= 0] < 2).any():
+        values = _with_interpolated_rows(csr_array(values), field, local[degree >= 0], chosen, excluded)
     return csr_array(csr_array(values)[:, independent]), independent
 
 
 def _with_interpolated_rows(
-    values: csr_array, fields: list[WholeFacets], degrees: list[Indices], with_value: Mask, excluded: Mask
+    values: csr_array, field: WholeFacets, local: Indices, with_value: Mask, excluded: Mask
 ) -> csr_array:
     """Return the map `values` (m, m) with rows added for nodes that are neither independent nor excluded.
 
     The value at a corner is the mean of those at the independent nodes of its facets. The values at other nodes are
-    interpolated linearly between the corners.
+    interpolated linearly between the corners. `local` (n, k) are the nodes of the facets that are at least partly covered.
     """
-    m = len(with_value)
-    pairs = []
-    for field, degree in zip(fields, degrees, strict=True):
-        local = field.block.local[degree >= 0]
-        corners = local[:, : len(field.to_corners)]
-        row, column = np.repeat(corners, local.shape[1], axis=1).ravel(), np.tile(local, corners.shape[1]).ravel()
-        selected = ~with_value[row] & ~excluded[row] & with_value[column]
-        pairs.append(np.column_stack([row[selected], column[selected]]))
-    row, column = np.unique(np.concatenate(pairs), axis=0).T
+    m, has_value = len(with_value), with_value | excluded
+    corners = local[:, : len(field.to_corners)]
+    row, column = np.repeat(corners, local.shape[1], axis=1).ravel(), np.tile(local, corners.shape[1]).ravel()
+    selected = ~has_value[row] & with_value[column]
+    row, column = np.unique(np.column_stack([row[selected], column[selected]]), axis=0).T
     count = np.bincount(row, minlength=m)
-    values = csr_array(diags_array((with_value | excluded).astype(float)) @ values)
+    values = csr_array(diags_array(has_value.astype(float)) @ values)
     values = csr_array(values + coo_array((1.0 / count[row], (row, column)), shape=(m, m)))
-    return csr_array(values + _between_corners(fields, degrees, with_value | excluded) @ values)
-
-
-def _between_corners(fields: list[WholeFacets], degrees: list[Indices], has_value: Mask) -> csr_array:
-    """Return rows (m, m) that interpolate linearly between corners, for mid-side nodes that do not yet have a value."""
-    between = lil_array((len(has_value), len(has_value)))
-    for field, degree in zip(fields, degrees, strict=True):
-        corners = len(field.to_corners)
-        facet, k = np.nonzero(~has_value[field.block.local[:, corners:]] & (degree >= 0)[:, None])
-        for nodes, node in zip(field.block.local[facet], k + corners, strict=True):
-            # The facets on both sides of an edge have the same row.
-            between[nodes[node], nodes[:corners]] = field.to_corners[:, node]
-    return csr_array(between)
+    between = lil_array((m, m))
+    for facet, k in zip(*np.nonzero(~has_value[local[:, corners.shape[1] :]]), strict=True):
+        # The facets on both sides of an edge have the same row.
+        between[local[facet, corners.shape[1] + k], corners[facet]] = field.to_corners[:, corners.shape[1] + k]
+    return csr_array(values + csr_array(between) @ values)
 
 
 @dataclass(eq=False)
@@ -202,7 +185,7 @@ class SegmentMortar(PressureFieldFormulation):
         facets, element = self.secondary.facets, self.secondary.element
         xi, weights = quadrature.gauss_line(3)
         lengths = facet_measure(facets, element, self.points, xi, False) @ weights
-        self._whole = [WholeFacets.of(self.secondary.blocks[0], self.points, self.axisymmetric)]
+        self._whole = WholeFacets.of(self.secondary.blocks[0], self.points, self.axisymmetric)
         self._rho = self.augmentation * self.modulus / float(lengths.min())
 
     @classmethod
@@ -230,7 +213,7 @@ class SegmentMortar(PressureFieldFormulation):
         usable_area, (n, k) = np.where(usable, area, 0.0), self.secondary.facets.shape
         mass = np.zeros((n, k, k))
         np.add.at(mass, facet, usable_area[:, None, None] * shape[:, :, None] * shape[:, None, :])
-        values = independent_values(self.secondary, self._whole, [mass], self.dependent_nodes(config))
+        values = independent_values(self.secondary, self._whole, mass, self.dependent_nodes(config))
         samples = self.secondary.local[facet], shape
         field = PressureField.of_points(samples, (usable_area, area), self._rho, self.repeated(values), renewed=True)
         return self.of_points(candidates, pairing, field, config)

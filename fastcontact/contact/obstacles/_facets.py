@@ -6,84 +6,51 @@ line in 2D, and the edge of a face in 3D.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.projection import facet_angles
+from fastcontact.contact.projection import at_nodes_of_facets, facet_normals, nodal_normals, smooth_normals
+from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
-from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets, same_facets
-from fastcontact.round_off import LENGTH_ROUND_OFF
-
-
-@dataclass(frozen=True, eq=False)
-class Block:
-    """Facets of one element type."""
-
-    element: elements.Element
-    numbers: Indices  # (n,): cell numbers in the mesh
-    nodes: Indices  # (n, k): connectivity, normals pointing out
-    corners: Array  # (n, k, dim): positions of the nodes [length]
-
-    def ridges(self) -> tuple[Indices, Indices]:
-        """Return the first and the last node (n, r) of each ridge, which are the same node in 2D."""
-        if self.element.dim == 1:
-            return self.nodes[:, :2], self.nodes[:, :2]
-        edges = np.array(self.element.edges)
-        return self.nodes[:, edges[:, 0]], self.nodes[:, edges[:, 1]]
-
-    def normals(self) -> tuple[Array, Array]:
-        """Return the unit normals (n, k, dim) at the nodes, and the angles (n, k) of `facet_angles` there."""
-        normal = area_vectors(self.corners, self.element.gradient(self.element.nodes))
-        length = np.linalg.norm(normal, axis=2, keepdims=True)
-        unit = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
-        return unit, facet_angles(self.element, self.corners)
 
 
 class SurfaceFacets(NamedTuple):
-    """The facets of a rigid surface, their neighbours and their normals.
+    """The facets of a rigid surface and their normals.
 
     The smooth normal of a facet at a node is the mean over the facets at this node whose angle to the facet is at most the
-    crease angle. The normal of a point is the mean over all facets at this point, not normalised. It determines on which side
-    of the surface positions near the point lie (Baerentzen and Aanaes, 2005). Both means are weighted by the angles of the
-    facets (Thuermer and Wuethrich, 1998).
+    crease angle, weighted by the angles of the facets (Thuermer and Wuethrich, 1998). k is the largest number of nodes of a
+    facet, see `at_nodes_of_facets`.
     """
 
-    blocks: list[Block]
-    beyond: Indices  # (n_facets, most ridges): the facet beyond each ridge, -1 where the surface ends
-    normals: list[Array]  # (n, k, dim) for each block: unit normals at the nodes [-]
-    smooth: list[Array]  # the same, of the smooth surface [-]
-    at_points: Array  # (n_points, dim): normals of points [-]
-    on_border: Mask  # (n_points,): whether the surface ends there
+    side: Surface
+    normals: Array  # (n_facets, k, dim): unit normals at the nodes [-]
+    smooth: Array  # (n_facets, k, dim): the same, of the smooth surface [-]
+    at_nodes: Array  # (m, dim): normals of the nodes of the side, the means over all facets [-]
+    on_border: Mask  # (m,): whether the surface ends at the node
 
 
 def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> SurfaceFacets:
-    """Return the facets of a group, their neighbours and their normals.
+    """Return the facets of a group, and their normals.
 
     Facets that meet at the angle `crease` [degrees] or less form a smooth surface. Raises ContactError if the facets do not
     form an orientable surface.
     """
-    blocks = _oriented_blocks(mesh, group, flip)
-    beyond = _neighbours(blocks, group)
-    facet_normals_of_blocks = [block.normals() for block in blocks]
-    smooth, at_points = _smooth_normals(blocks, facet_normals_of_blocks, crease)
-    on_border, last = np.zeros(len(at_points), bool), np.cumsum([len(block.nodes) for block in blocks])
-    for block, neighbours in zip(blocks, np.split(beyond, last[:-1]), strict=True):
-        ends = np.stack(block.ridges(), axis=2)
-        on_border[ends[neighbours[:, : ends.shape[1]] < 0]] = True
-    by_block = [normals for normals, _ in facet_normals_of_blocks]
-    return SurfaceFacets(blocks, beyond, by_block, smooth, at_points, on_border)
+    side, numbers = _oriented(mesh, group, flip)
+    normals = [facet_normals(block, mesh.points) for block in side.blocks]
+    smooth, border = smooth_normals(side, mesh.points, crease), _border(mesh, side, numbers)
+    at_nodes = nodal_normals(side, mesh.points)
+    return SurfaceFacets(side, at_nodes_of_facets(normals), at_nodes_of_facets(smooth), at_nodes, border)
 
 
-def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
-    """Return the facets of a group with the orientation of the mesh or, with `flip`, the opposite one.
+def _oriented(mesh: Mesh, group: str, flip: bool) -> tuple[Surface, Indices]:
+    """Return the facets of a group, as oriented in the mesh or, with `flip`, the opposite way, and their cell numbers.
 
     Facets on the outside of solid cells point out of these cells, independently of the order of their nodes in the group.
     """
@@ -95,111 +62,88 @@ def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
             "name a group of lines in 2D, of triangles or quadrangles in 3D"
         )
     outer = outer_facets(mesh) if mesh.solids else {}
+    points = np.unique(np.concatenate([mesh.cells[name][block].ravel() for name, block in rows.items()]))
     blocks = []
     for name, block in rows.items():
-        element = elements.get(name)
-        nodes = mesh.cells[name][block]
+        facets = mesh.cells[name][block]
         if name in outer:  # facets of solids are oriented outwards
-            outer_rows = same_facets(outer[name], nodes)
-            nodes = np.where((outer_rows >= 0)[:, None], outer[name][outer_rows], nodes)
+            outer_rows = same_facets(outer[name], facets)
+            facets = np.where((outer_rows >= 0)[:, None], outer[name][outer_rows], facets)
         if flip:
-            nodes = nodes[:, list(element.reversed)]
-        blocks.append(Block(element, block + mesh.offsets[name], nodes.astype(np.intp), mesh.points[nodes]))
-        lengths = np.linalg.norm(blocks[-1].normals()[0], axis=2)
-        degenerate = np.flatnonzero(lengths.min(axis=1) == 0.0)
+            facets = facets[:, list(elements.get(name).reversed)]
+        blocks.append(FacetBlock(name, np.ascontiguousarray(facets), np.searchsorted(points, facets)))
+        lengths = np.linalg.norm(facet_normals(blocks[-1], mesh.points), axis=2)
+        degenerate = np.flatnonzero(~(lengths.min(axis=1) > 0.0))
         if len(degenerate):
             raise ContactError(
-                f"{_description(blocks[-1:], int(degenerate[0]))} of the rigid surface '{group}' has no area, or none at "
-                "one of its nodes: remove it or repair the mesh there"
+                f"{_description(mesh, int(block[degenerate[0]]) + mesh.offsets[name])} of the rigid surface '{group}' has no "
+                "area, or none at one of its nodes: remove it or repair the mesh there"
             )
-    return blocks
+    numbers = np.concatenate([block + mesh.offsets[name] for name, block in rows.items()])
+    return Surface(group, tuple(blocks), points, np.zeros(len(points))), numbers
 
 
-def _description(blocks: list[Block], facet: int) -> str:
-    """Return a description of a facet with its number, element type and position."""
-    for block in blocks:
-        if facet < len(block.nodes):
-            break
-        facet -= len(block.nodes)
-    middle = block.corners[facet, : block.element.n_corners].mean(axis=0)
-    position = ", ".join(f"{x:.6g}" for x in middle)
-    return f"facet {block.numbers[facet]} ({block.element.name} near ({position}))"
+def _description(mesh: Mesh, number: int) -> str:
+    """Return a description of a cell with its number, element type and position."""
+    ((name, rows),) = mesh.split(np.array([number])).items()
+    corners = mesh.cells[name][rows, : elements.get(name).n_corners]
+    position = ", ".join(f"{x:.6g}" for x in mesh.points[corners[0]].mean(axis=0))
+    return f"facet {number} ({name} near ({position}))"
 
 
-def _neighbours(blocks: list[Block], group: str) -> Indices:
-    """Return the facet beyond each ridge (n_facets, most ridges), -1 where the surface ends.
+def _border(mesh: Mesh, side: Surface, numbers: Indices) -> Mask:
+    """Return the nodes (m,) of ridges that belong to one facet only; `numbers` are the cell numbers of facets.
 
     Raises ContactError, which names a facet, if the surface branches or neighbours have opposite orientations.
     """
-    facet, ridge, key, sign = _ridge_table(blocks)
-    order = np.argsort(key, kind="stable")
-    facet, ridge, key, sign = facet[order], ridge[order], key[order], sign[order]
-    first = np.flatnonzero(np.r_[True, key[1:] != key[:-1]])
-    count = np.diff(np.r_[first, len(key)])
-    if (count > 2).any():
-        branch = facet[first[np.argmax(count > 2)]]
+    facet, nodes, sign = _ridges(side)
+    _, ridge, count = np.unique(nodes[:, :2], axis=0, return_inverse=True, return_counts=True)
+    ridge = ridge.ravel()
+    branches = np.flatnonzero(count[ridge] > 2)
+    if len(branches):
         raise ContactError(
-            f"{_description(blocks, branch)} of the rigid surface '{group}' shares an edge with more than one other facet: a "
-            "surface must not branch, so split it into several groups"
+            f"{_description(mesh, int(numbers[facet[branches[0]]]))} of the rigid surface '{side.group}' shares an edge with "
+            "more than one other facet: a surface must not branch, so split it into several groups"
         )
-    shared = first[count == 2]
-    beyond = np.full((sum(len(block.nodes) for block in blocks), ridge.max() + 1), -1, np.intp)
-    beyond[facet[shared], ridge[shared]] = facet[shared + 1]
-    beyond[facet[shared + 1], ridge[shared + 1]] = facet[shared]
-    _check_orientation(blocks, group, facet[shared], facet[shared + 1], sign[shared] != sign[shared + 1])
-    return beyond
+    shared = np.argsort(ridge, kind="stable")
+    first, second = shared[count[ridge[shared]] == 2].reshape(-1, 2).T
+    _check_orientation(mesh, side, numbers, facet[first], facet[second], sign[first] != sign[second])
+    on_border = np.zeros(len(side.points), bool)
+    on_border[nodes[count[ridge] == 1]] = True
+    return on_border
 
 
-def _ridge_table(blocks: list[Block]) -> tuple[Indices, Indices, Indices, Indices]:
-    """Return, for all ridges, the facet, the number in the facet, a key of the nodes, and the orientation in the facet."""
-    facets, ridges, keys, signs, start = [], [], [], [], 0
-    size = 1 + max(int(block.nodes.max()) for block in blocks)
-    for block in blocks:
-        a, b = block.ridges()
-        facets.append(np.repeat(start + np.arange(len(a)), a.shape[1]))
-        ridges.append(np.tile(np.arange(a.shape[1]), len(a)))
-        keys.append((np.minimum(a, b) * size + np.maximum(a, b)).ravel())
-        signs.append((np.broadcast_to([1, -1], a.shape) if block.element.dim == 1 else np.sign(b - a)).ravel())
-        start += len(a)
-    return np.concatenate(facets), np.concatenate(ridges), np.concatenate(keys), np.concatenate(signs)
+def _ridges(side: Surface) -> tuple[Indices, Indices, Indices]:
+    """Return the facet (n,), the nodes (n, 3) and the orientation (n,) of all ridges.
+
+    The nodes are both ends and the middle. Without a node in the middle, an end occurs twice; in 2D all are the same.
+    """
+    facets, nodes, signs, start = [], [], [], 0
+    for block in side.blocks:
+        element = elements.get(block.element)
+        ridges = block.local[:, np.array([(0, 0), (1, 1)] if element.dim == 1 else element.edges)]
+        sign = np.sign(ridges[..., 1] - ridges[..., 0])
+        signs.append((np.broadcast_to([1, -1], sign.shape) if element.dim == 1 else sign).ravel())
+        facets.append(np.repeat(start + np.arange(len(ridges)), ridges.shape[1]))
+        first, middles = ridges[..., 0], slice(element.n_corners, element.n_corners + len(element.edges))
+        middle = block.local[:, middles] if element.dim == 2 and element.order == 2 else first
+        nodes.append(np.stack([*np.sort(ridges, axis=2).transpose(2, 0, 1), middle], axis=2).reshape(-1, 3))
+        start += len(ridges)
+    return np.concatenate(facets), np.concatenate(nodes), np.concatenate(signs)
 
 
-def _check_orientation(blocks: list[Block], group: str, first: Indices, second: Indices, consistent: Mask) -> None:
+def _check_orientation(
+    mesh: Mesh, side: Surface, numbers: Indices, first: Indices, second: Indices, consistent: Mask
+) -> None:
     """Raise ContactError if neighbours have opposite orientations; the message names a facet of the smaller part."""
     if consistent.all():
         return
-    n = sum(len(block.nodes) for block in blocks)
-    graph = coo_array((np.ones(consistent.sum()), (first[consistent], second[consistent])), shape=(n, n))
+    graph = coo_array((np.ones(consistent.sum()), (first[consistent], second[consistent])), shape=(side.n_facets,) * 2)
     _, component = connected_components(graph, directed=False)
     size = np.bincount(component)
     wrong = int(np.flatnonzero(~consistent)[0])
     pair = sorted((int(first[wrong]), int(second[wrong])), key=lambda facet: (size[component[facet]], facet))
-    numbers = np.concatenate([block.numbers for block in blocks])
     raise ContactError(
-        f"{_description(blocks, pair[0])} of the rigid surface '{group}' has the opposite orientation to its neighbour facet "
-        f"{numbers[pair[1]]}: reverse it, so that all normals point out of the obstacle"
+        f"{_description(mesh, int(numbers[pair[0]]))} of the rigid surface '{side.group}' has the opposite orientation to "
+        f"its neighbour facet {numbers[pair[1]]}: reverse it, so that all normals point out of the obstacle"
     )
-
-
-def _smooth_normals(
-    blocks: list[Block], by_block: list[tuple[Array, Array]], crease: float
-) -> tuple[list[Array], Array]:
-    """Return the smooth normals of facets and those of points, from the normals and angles of single facets."""
-    dim = by_block[0][0].shape[2]
-    node = np.concatenate([block.nodes.ravel() for block in blocks])
-    normal = np.concatenate([normals.reshape(-1, dim) for normals, _ in by_block])
-    weight = np.concatenate([angle.ravel() for _, angle in by_block])
-    at_points = np.zeros((node.max() + 1, dim))
-    np.add.at(at_points, node, weight[:, None] * normal)
-    incidence = csr_array((np.ones(len(node)), node, np.arange(len(node) + 1)))
-    pairs = incidence @ incidence.T  # pairs of facets at a common node
-    pairs.sort_indices()
-    i, j = pairs.nonzero()
-    is_smooth = np.einsum("nd,nd->n", normal[i], normal[j]) >= np.cos(np.radians(crease)) - LENGTH_ROUND_OFF
-    is_smooth |= i == j
-    mean = np.zeros_like(normal)
-    np.add.at(mean, i[is_smooth], weight[j[is_smooth], None] * normal[j[is_smooth]])
-    mean /= np.linalg.norm(mean, axis=1, keepdims=True)
-    ends = np.cumsum([block.nodes.size for block in blocks])[:-1]
-    means = np.split(mean, ends)
-    return [values.reshape(*block.nodes.shape, dim) for values, block in zip(means, blocks, strict=True)], at_points

@@ -7,10 +7,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.obstacles._facets import Block, SurfaceFacets, surface_facets
-from fastcontact.contact.projection import BESIDE, Closest, closest_of_kinds
-from fastcontact.contact.surface import by_block
+from fastcontact.arrays import Array, Mask
+from fastcontact.contact.obstacles._facets import SurfaceFacets, surface_facets
+from fastcontact.contact.projection import (
+    BESIDE,
+    Closest,
+    at_common_edges,
+    closest_of_kinds,
+    distance_from_edges,
+    interpolate,
+    places,
+)
 from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
@@ -66,7 +73,7 @@ class MeshedSurface:
         object.__setattr__(self, "_facets", surface_facets(self.mesh, self.group, self.flip, self.crease))
 
     def __repr__(self) -> str:
-        return f"MeshedSurface('{self.group}', {len(self._facets.beyond)} facets)"
+        return f"MeshedSurface('{self.group}', {self._facets.side.n_facets} facets)"
 
     def check_apart(self, mesh: Mesh) -> None:
         """Raise ContactError if the surface is part of `mesh` and belongs to solid cells there."""
@@ -90,11 +97,11 @@ class MeshedSurface:
             raise ContactError(
                 f"the rigid surface '{self.group}' has {dim} dimensions, but the model {points.shape[1]}"
             )
-        closest = closest_of_kinds(points, [block.corners for block in self._facets.blocks])
+        corners = self._facets.side.corners(self.mesh.points)
+        closest = closest_of_kinds(points, corners)
         pseudonormal, smooth, on_edge, on_border = self._closest_normals(closest)
         offset = points - closest.position
-        extents = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._facets.blocks]
-        size = np.concatenate(extents)[closest.facet]
+        size = np.concatenate([np.linalg.norm(np.ptp(x, axis=1), axis=1) for x in corners])[closest.facet]
         # At touching points, the direction from the closest point is dominated by round-off, and the facet normal is used.
         is_touching = closest.distance <= SINGLE_PRECISION * size
         outside = np.einsum("nd,nd->n", offset, pseudonormal) >= 0
@@ -120,54 +127,16 @@ class MeshedSurface:
         of the adjacent facets on an edge, and the angle-weighted mean normal of all facets at a corner (Baerentzen and
         Aanaes, 2005).
         """
-        pseudonormal, smooth = closest.normal.copy(), np.empty_like(closest.normal)
-        on_edge, on_border = np.zeros(len(pseudonormal), bool), np.zeros(len(pseudonormal), bool)
-        facets = self._facets
-        of_blocks = by_block(closest.facet, [len(block.nodes) for block in facets.blocks])
-        for block, normals, (in_block, rows) in zip(facets.blocks, facets.smooth, of_blocks, strict=True):
-            xi = closest.xi[in_block]
-            mean = np.einsum("nk,nkd->nd", block.element.shape(xi), normals[rows])
-            smooth[in_block] = mean / np.linalg.norm(mean, axis=1, keepdims=True)
-            corner, edge = _corners_and_edges(block, xi)
-            at_corner, at_edge = np.flatnonzero(corner >= 0), np.flatnonzero(edge >= 0)
-            node = block.nodes[rows[at_corner], corner[at_corner]]
-            pseudonormal[in_block[at_corner]] = facets.at_points[node]
-            on_border[in_block[at_corner]] = facets.on_border[node]
-            projections, edges = in_block[at_edge], edge[at_edge]
-            beyond = facets.beyond[closest.facet[projections], edges]
-            pseudonormal[projections] += self._normals_beyond_edges(block, rows[at_edge], edges, beyond, xi[at_edge])
-            on_border[projections] = beyond < 0
-            on_edge[in_block] = (corner >= 0) | (edge >= 0)
-        return pseudonormal, smooth, on_edge, on_border
-
-    def _normals_beyond_edges(self, block: Block, rows: Indices, edge: Indices, beyond: Indices, xi: Array) -> Array:
-        """Return the normals (n, 3) of the facets `beyond` edges, at the same points; zero where there is none."""
-        ends = np.array(block.element.edges)[edge]
-        a, b = block.element.nodes[ends[:, 0]], block.element.nodes[ends[:, 1]]
-        fraction = np.linalg.norm(xi - a, axis=1) / np.linalg.norm(b - a, axis=1)
-        directions = np.zeros((len(rows), self.mesh.dim))
-        facets, of_blocks = self._facets, by_block(beyond, [len(block.nodes) for block in self._facets.blocks])
-        for block_beyond, normals, (in_block, facet) in zip(facets.blocks, facets.normals, of_blocks, strict=True):
-            for weight, end in ((1.0 - fraction, ends[:, 0]), (fraction, ends[:, 1])):
-                node = block.nodes[rows[in_block], end[in_block]]
-                local = np.argmax(block_beyond.nodes[facet] == node[:, None], axis=1)
-                directions[in_block] += weight[in_block, None] * normals[facet, local]
-        return directions
-
-
-def _corners_and_edges(block: Block, xi: Array) -> tuple[Indices, Indices]:
-    """Return the corners (n,) and edges (n,) of facets on which points with reference coordinates `xi` lie, -1 for none."""
-    element = block.element
-    none = np.full(len(xi), -1, np.intp)
-    if element.dim == 1:
-        s = xi[:, 0]
-        return np.where(s <= -1.0 + ROUND_OFF, 0, np.where(s >= 1.0 - ROUND_OFF, 1, none)), none
-    edges = np.array(element.edges)
-    a, b = element.nodes[edges[:, 0]], element.nodes[edges[:, 1]]
-    across = np.column_stack([a[:, 1] - b[:, 1], b[:, 0] - a[:, 0]])
-    is_on = np.einsum("nej,ej->ne", xi[:, None] - a[None], across) <= ROUND_OFF * np.einsum("ej,ej->e", across, across)
-    corner = none.copy()
-    for k in range(element.n_corners):
-        edges_of_corner = np.flatnonzero((edges == k).any(axis=1))
-        corner[is_on[:, edges_of_corner].all(axis=1)] = k
-    return corner, np.where((corner < 0) & is_on.any(axis=1), np.argmax(is_on, axis=1), -1)
+        (side, normals, smooth, at_nodes, border), (facet, xi) = self._facets, closest[:2]
+        at, on_edge = places(side, facet, xi), distance_from_edges(side, facet, xi) <= ROUND_OFF
+        node = at.local[np.arange(len(facet)), at.shape.argmax(axis=1)]
+        at_node = on_edge & (at.shape.max(axis=1) >= 1.0 - ROUND_OFF)
+        pseudonormal, on_border = np.where(at_node[:, None], at_nodes[node], closest.normal), at_node & border[node]
+        rows = np.flatnonzero(on_edge & ~at_node)
+        if len(rows):
+            point, common, xi_there = at_common_edges(side, facet[rows], xi[rows])
+            others = common != facet[rows][point]
+            beyond = interpolate(normals[common[others]], places(side, common[others], xi_there[others]))
+            np.add.at(pseudonormal, rows[point[others]], beyond)
+            on_border[rows] = np.bincount(point) == 1
+        return pseudonormal, interpolate(smooth[facet], at), on_edge, on_border

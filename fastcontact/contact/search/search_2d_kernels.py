@@ -135,37 +135,17 @@ def _write(result, i, nodes, f, s, x, y):
 
 
 @kernel
-def _shape(count, s, values, slopes):
-    """Fill shape functions and their derivatives of a line of two or three nodes at s."""
-    if count == 2:
-        values[0], values[1], values[2] = 0.5 * (1.0 - s), 0.5 * (1.0 + s), 0.0
-        slopes[0], slopes[1], slopes[2] = -0.5, 0.5, 0.0
-    else:
-        values[0], values[1], values[2] = 0.5 * s * (s - 1.0), 0.5 * s * (s + 1.0), 1.0 - s * s
-        slopes[0], slopes[1], slopes[2] = s - 0.5, s + 0.5, -2.0 * s
-
-
-@kernel
-def _newton(x, y, corners, normals, f, count, s, values, slopes):
+def _newton(x, y, corners, normals, f, s):
     """Return s where (x, y) lies on the normal of facet f, extended beyond its ends, and whether the iteration converged."""
     for _ in range(MAX_ITERATIONS):
-        _shape(count, s, values, slopes)
-        px, py, tx, ty, nx, ny, mx, my = x, y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for k in range(count):
-            px -= values[k] * corners[f, k, 0]
-            py -= values[k] * corners[f, k, 1]
-            tx += slopes[k] * corners[f, k, 0]
-            ty += slopes[k] * corners[f, k, 1]
-            nx += values[k] * normals[f, k, 0]
-            ny += values[k] * normals[f, k, 1]
-            mx += slopes[k] * normals[f, k, 0]
-            my += slopes[k] * normals[f, k, 1]
-        slope = (px * my - py * mx) - (tx * ny - ty * nx)
+        px, py, tx, ty, _, _ = _curve(corners, f, s)
+        nx, ny, mx, my, _, _ = _curve(normals, f, s)
+        dx, dy, across = x - px, y - py, tx * ny - ty * nx
+        slope = (dx * my - dy * mx) - across
         # The slope vanishes at a centre of curvature, where the foot of the normal is not unique.
-        if not abs(slope) > LENGTH_ROUND_OFF * abs(tx * ny - ty * nx):
+        if not abs(slope) > LENGTH_ROUND_OFF * abs(across):
             return s, False
-        step = -(px * ny - py * nx) / slope
-        step = min(1.0, max(-1.0, step))
+        step = min(1.0, max(-1.0, -(dx * ny - dy * nx) / slope))
         s += step
         if 0.5 * (abs(s) - 1.0) > 2.0 * BEYOND:
             return s, False
@@ -175,28 +155,25 @@ def _newton(x, y, corners, normals, f, count, s, values, slopes):
 
 
 @interpretable_kernel
-def along_normals(points, corners, normals, counts, neighbour, facet, xi, overhang, values, slopes):
+def along_normals(points, corners, normals, neighbour, facet, xi, overhang):
     """Replace closest-point projections (facet, xi) by projections along the interpolated normals.
 
     Parameters
     ----------
     points : ndarray (n, 2)
         [length].
-    corners, normals : ndarray (n_facets, 3, 2)
-        Nodes of the facets and unit normals there, ends first.
-    counts : ndarray of int (n_facets,)
-        Nodes of each facet, 2 or 3.
+    corners, normals : ndarray (n_facets, k, 2)
+        Nodes of the facets and unit normals there, ends first; k is 2 or 3. With three nodes, a straight facet has its middle
+        as the third one.
     neighbour : ndarray of int (n_facets, 2)
         The facet beyond each end, or -1. Its end 1 is shared beyond end 0, and its end 0 beyond end 1.
     facet, xi, overhang : ndarray (n,)
         Closest points, changed in place where the projection succeeds.
-    values, slopes : ndarray (3,)
-        Working space.
     """
     for i in range(points.shape[0]):
         f, s, previous = facet[i], xi[i], -1
         for _ in range(MAX_ITERATIONS):
-            s, converged = _newton(points[i, 0], points[i, 1], corners, normals, f, counts[f], s, values, slopes)
+            s, converged = _newton(points[i, 0], points[i, 1], corners, normals, f, s)
             if not converged or 0.5 * (abs(s) - 1.0) > BEYOND:
                 break
             if abs(s) <= 1.0:

@@ -186,11 +186,9 @@ def without_duplicates(block: Block) -> Block:
 def _renumbered(blocks: list[Block]) -> Groups:
     """Return the members of all groups as numbers of cells in the sequence of the blocks."""
     groups: dict[str, list[Indices]] = {}
-    start = 0
-    for block in blocks:
+    for block, start in zip(blocks, np.cumsum([0, *(len(block.nodes) for block in blocks)]), strict=False):
         for name, rows in block.groups.items():
             groups.setdefault(name, []).append(np.asarray(rows, np.intp) + start)
-        start += len(block.nodes)
     return {name: np.concatenate(parts) for name, parts in groups.items()}
 
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.arrays import AnyArray, Array, Indices
+from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate.forest import RED
@@ -28,16 +27,18 @@ _TURN = np.pi / 5
 class _Pattern:
     """The division of a cell of one element type, described by the points of its children.
 
-    The first n_nodes points are the nodes of the parent. `shape` (m, n_nodes) [-] contains the shape functions of the
-    parent at the points, and `children` (n_children, n_nodes) the points of each child. `on_edge` (m,) is the number of the
-    edge of the parent on which a new point lies, -1 for other points, and `quarters` (m,) its distance from the start of this
-    edge in quarters of the length.
+    The first n_nodes points are the nodes of the parent, and m new points follow. `children` (n_children, n_nodes) are the
+    points of each child. `shape` (m, n_nodes) [-] contains the shape functions of the parent at the new points. `on_edge`
+    (m,) is the number of the edge of the parent on which a new point lies, -1 inside the parent, and `quarters` (m,) its
+    distance from the start of this edge in quarters of the length. `parents` (m, n_nodes) is true for the nodes of this edge,
+    and inside the parent for all nodes.
     """
 
-    shape: Array
     children: AnyArray
+    shape: Array
     on_edge: AnyArray
     quarters: AnyArray
+    parents: Mask
 
 
 @cache
@@ -57,15 +58,16 @@ def _pattern(name: str) -> _Pattern:
                 points.append(node)
             child.append(points.index(node))
         children.append(child)
-    lattice = np.array(points)
-    on_edge, quarters = np.full(len(points), -1), np.zeros(len(points), int)
+    new_points = np.array(points)[element.n_nodes :]
+    on_edge, quarters = np.full(len(new_points), -1), np.zeros(len(new_points), int)
+    parents = np.ones((len(new_points), element.n_nodes), bool)
     for number, (a, b) in enumerate(element.edges):
         start, edge = element.nodes[a], element.nodes[b] - element.nodes[a]
-        fraction = (lattice - start) @ edge / (edge @ edge)
-        new = np.abs(lattice - start - fraction[:, None] * edge).max(axis=1) < 1e-12
-        new[: element.n_nodes] = False
-        on_edge[new], quarters[new] = number, np.round(4 * fraction[new]).astype(int)
-    return _Pattern(element.shape(lattice), np.array(children), on_edge, quarters)
+        fraction = (new_points - start) @ edge / (edge @ edge)
+        on = np.abs(new_points - start - fraction[:, None] * edge).max(axis=1) < 1e-12
+        on_edge[on], quarters[on] = number, np.round(4 * fraction[on]).astype(int)
+        parents[on] = np.isin(np.arange(element.n_nodes), [a, b, element.n_corners + number])
+    return _Pattern(np.array(children), element.shape(new_points), on_edge, quarters, parents)
 
 
 @typed(MeshError)
@@ -101,79 +103,56 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
     >>> generate.refined(generate.block(divisions=(2, 2))).cells["quad4"].shape
     (16, 4)
     """
-    new = _new_points(mesh)
-    points = np.concatenate([mesh.points, np.empty((len(new.keys), mesh.dim))])
-    for name, point, parents, rows in new.sources:
-        points[rows] = np.einsum("n,cnd->cd", _pattern(name).shape[point], mesh.points[mesh.cells[name][parents]])
+    keys, lattices = _lattices(mesh)
+    points = np.concatenate([mesh.points, np.empty((len(keys), mesh.dim))])
+    for name, block in mesh.cells.items():
+        rows = lattices[name][:, block.shape[1] :]
+        points[rows] = np.einsum("pn,cnd->cpd", _pattern(name).shape, mesh.points[block])
     for curve in curves:
-        rows = _on_curve(mesh, curve, new.keys)
+        rows = _on_curve(mesh, curve, keys)
         points[rows] = curve.project(points[rows])
-    blocks = {name: lattice[:, _pattern(name).children] for name, lattice in new.lattices.items()}
+    blocks = {name: lattice[:, _pattern(name).children] for name, lattice in lattices.items()}
     cells = {name: block.reshape(-1, block.shape[2]) for name, block in blocks.items()}
-    result = Mesh(points, cells, _cell_groups(mesh), _point_groups(mesh, new))
+    result = Mesh(points, cells, _cell_groups(mesh), _point_groups(mesh, lattices))
     check_cells(result)
     return result
 
 
-class _NewPoints(NamedTuple):
-    """The new points of a refined mesh, in the order of their keys; points on edges precede points inside cells.
+def _lattices(mesh: Mesh) -> tuple[AnyArray, dict[str, AnyArray]]:
+    """Return the keys (n,) of the new points, and all points (n_cells, n_lattice) of the refined cells, by element type.
 
-    `keys` (n,) identifies the points: cells that share a point have the same key for it. Each item of `sources` consists of
-    an element type, the number of a point in its `_Pattern`, rows of cells, and the numbers of the new points in these
-    cells. `lattices` (n_cells, n_lattice) contains all points of every cell, by element type.
+    Cells that share a new point have the same key for it. The new points are in the order of their keys; those on edges
+    precede those inside cells.
     """
-
-    keys: AnyArray
-    sources: list[tuple[str, int, AnyArray, AnyArray]]
-    lattices: dict[str, AnyArray]
-
-
-def _new_points(mesh: Mesh) -> _NewPoints:
-    """Return the new points of a refined mesh."""
-    point_keys, origins, next_key = [np.empty(0, np.int64)], [], 4 * mesh.n_points**2  # keys of edges are smaller
-    lattices = {}
+    keys, next_key = [], 4 * mesh.n_points**2  # keys of edges are smaller
     for name, block in mesh.cells.items():
         pattern, ends = _pattern(name), block[:, elements.get(name).edges].astype(np.int64)
-        lattices[name] = np.empty((len(block), len(pattern.shape)), np.int64)
-        lattices[name][:, : block.shape[1]] = block
-        for point in range(block.shape[1], len(pattern.shape)):
-            edge = pattern.on_edge[point]
-            if edge >= 0:
-                start, end = ends[:, edge].T
-                point_keys.append(_keys(start, end, int(pattern.quarters[point]), mesh.n_points))
-            else:  # a separate point for each cell
-                point_keys.append(next_key + np.arange(len(block)))
-                next_key += len(block)
-            origins.append((name, point))
-    keys, first, rank = np.unique(np.concatenate(point_keys), return_index=True, return_inverse=True)
-    sources, start = [], 0
-    for name, point in origins:
-        numbers = mesh.n_points + rank[start : start + len(lattices[name])]
-        lattices[name][:, point] = numbers
-        cells = np.sort(first[(first >= start) & (first < start + len(numbers))]) - start
-        sources.append((name, point, cells, numbers[cells]))
-        start += len(numbers)
-    return _NewPoints(keys, sources, lattices)
+        start, end = np.moveaxis(ends[:, pattern.on_edge], 2, 0)
+        keys.append(_keys(start, end, pattern.quarters, mesh.n_points))
+        inside = np.flatnonzero(pattern.on_edge < 0)
+        separate = np.arange(len(inside) * len(block)).reshape(len(inside), len(block))
+        keys[-1][:, inside] = next_key + separate.T
+        next_key += separate.size
+    flat = [np.empty(0, np.int64), *(block.ravel() for block in keys)]
+    unique, rank = np.unique(np.concatenate(flat), return_inverse=True)
+    numbers = np.split(mesh.n_points + rank, np.cumsum([block.size for block in keys]))
+    blocks = zip(mesh.cells.items(), numbers, keys, strict=False)
+    return unique, {name: np.hstack([block, new.reshape(of_cells.shape)]) for (name, block), new, of_cells in blocks}
 
 
-def _keys(a: AnyArray, b: AnyArray, quarters: int, n_points: int) -> AnyArray:
+def _keys(a: AnyArray, b: AnyArray, quarters: AnyArray | int, n_points: int) -> AnyArray:
     """Return a key of the point at `quarters` of the edge from a to b, independent of the direction of the edge."""
     from_smaller = np.where(a < b, quarters, 4 - quarters)
     return (np.minimum(a, b) * n_points + np.maximum(a, b)) * 4 + from_smaller
 
 
-def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
-    """Return the facets in the group of a curve whose nodes all lie on the curve, as one array for each element type."""
+def _on_curve(mesh: Mesh, curve: Curve, keys: AnyArray) -> AnyArray:
+    """Return the numbers of the new points of the facets in the group of a curve whose nodes all lie on the curve."""
     facets = [block[all_on(mesh, curve, block)] for block in facets_of(mesh, curve).values()]
     if not sum(map(len, facets)):
         kind = "outer facet" if curve.group is None else f"facet of group '{curve.group}'"
         raise MeshError(f"no {kind} has all its nodes on {curve}: check its centre and radius")
-    return facets
-
-
-def _on_curve(mesh: Mesh, curve: Curve, keys: AnyArray) -> AnyArray:
-    """Return the numbers of the new points of the facets that lie on a curve."""
-    ends = np.concatenate([block[:, :2] for block in _facets_on(mesh, curve)]).astype(np.int64)
+    ends = np.concatenate([block[:, :2] for block in facets]).astype(np.int64)
     curve_keys = np.unique(np.concatenate([_keys(ends[:, 0], ends[:, 1], q, mesh.n_points) for q in (1, 2, 3)]))
     return mesh.n_points + np.flatnonzero(np.isin(keys, curve_keys))
 
@@ -185,19 +164,14 @@ def _cell_groups(mesh: Mesh) -> dict[str, AnyArray]:
     return {group: np.flatnonzero(np.isin(parent, members)) for group, members in mesh.cell_groups.items()}
 
 
-def _point_groups(mesh: Mesh, new: _NewPoints) -> dict[str, AnyArray]:
+def _point_groups(mesh: Mesh, lattices: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
     """Return the point groups of the refined mesh."""
     groups: dict[str, AnyArray] = {}
     for group, members in mesh.point_groups.items():
-        in_group = np.zeros(mesh.n_points, bool)
-        in_group[members] = True
-        parts = [members]
-        for name, point, cells, rows in new.sources if len(members) > 1 else ():
-            edge, nodes, element = _pattern(name).on_edge[point], mesh.cells[name][cells], elements.get(name)
-            if edge >= 0:
-                middle = [element.n_corners + edge] if element.order == 2 else []
-                nodes = nodes[:, [*element.edges[edge], *middle]]
-            parts.append(rows[in_group[nodes].all(axis=1)])
+        in_group, parts = np.isin(np.arange(mesh.n_points), members), [members]
+        for name, block in mesh.cells.items() if len(members) > 1 else ():
+            inside = (in_group[block][:, None] | ~_pattern(name).parents).all(axis=2)
+            parts.append(lattices[name][:, block.shape[1] :][inside])
         groups[group] = np.concatenate(parts)
     return groups
 

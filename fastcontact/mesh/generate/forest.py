@@ -193,22 +193,18 @@ class Forest:
         Cell groups contain the descendants of their cells. A new point belongs to the point groups that contain both ends of
         its edge.
         """
-        blocks: dict[str, list[AnyArray]] = {}
-        roots: dict[str, list[AnyArray]] = {}
-        owners: dict[str, list[AnyArray]] = {}
+        parts: dict[str, list[tuple[AnyArray, AnyArray, AnyArray]]] = {}  # cells with their roots and leaves
         first = 0
         for name, leaves in self._leaves.items():
             for kind, cells, leaf in self._green_cells(name, leaves.corners):
-                blocks.setdefault(kind, []).append(cells)
-                roots.setdefault(kind, []).append(leaves.root[leaf])
-                owners.setdefault(kind, []).append(first + leaf)
+                parts.setdefault(kind, []).append((cells, leaves.root[leaf], first + leaf))
             first += len(leaves.corners) if name != "line2" else 0
-        all_cells = {kind: np.concatenate(parts) for kind, parts in blocks.items()}
-        root = np.concatenate([np.concatenate(roots[kind]) for kind in all_cells])
+        joined = {kind: [np.concatenate(arrays) for arrays in zip(*parts[kind], strict=True)] for kind in parts}
+        root = np.concatenate([roots for _, roots, _ in joined.values()])
         groups = {group: np.flatnonzero(np.isin(root, members)) for group, members in self.initial.cell_groups.items()}
-        mesh = Mesh(self.points, all_cells, groups, self._groups)
+        mesh = Mesh(self.points, {kind: cells for kind, (cells, _, _) in joined.items()}, groups, self._groups)
         check_cells(mesh)
-        return mesh, np.concatenate([np.concatenate(owners[kind]) for kind in mesh.solids])
+        return mesh, np.concatenate([joined[kind][2] for kind in mesh.solids])
 
     def _green_cells(self, name: str, corners: AnyArray) -> list[tuple[str, AnyArray, AnyArray]]:
         """Return element types, cells and the leaf of each cell, after green refinement of leaves with divided edges."""

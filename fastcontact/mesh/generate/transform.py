@@ -187,12 +187,11 @@ def _by_name(groups_of_meshes: Iterable[Groups]) -> Groups:
 
 def _renumbering(mesh: Mesh, starts: dict[str, int]) -> AnyArray:
     """Return the number of each cell of `mesh` in the union, and advance `starts` by the numbers of its cells, in place."""
-    numbers = np.empty(mesh.n_cells, np.int64)
-    for name, start in mesh.offsets.items():
-        n = len(mesh.cells[name])
-        numbers[start : start + n] = starts[name] + np.arange(n)
-        starts[name] += n
-    return numbers
+    numbers = [np.empty(0, np.int64)]
+    for name, block in mesh.cells.items():
+        numbers.append(starts[name] + np.arange(len(block)))
+        starts[name] += len(block)
+    return np.concatenate(numbers)
 
 
 @typed(MeshError)

@@ -314,9 +314,7 @@ class ModelLoads(ModelHeat):
         return by_ramp
 
     def following_pressures(self) -> list[tuple[FollowingPressure, Table | None]]:
-        """Return the pressures that follow the deformed surface, with their histories; empty in small strain."""
-        if self.strain == "small":
-            return []
+        """Return the pressures, as loads that follow the deformed surface, with their histories."""
         pressures = [load for load in self.loads if isinstance(load, Pressure)]
         return [(FollowingPressure(self.mesh, self.kinematics, load), load.ramp) for load in pressures]
 

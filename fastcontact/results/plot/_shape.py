@@ -575,14 +575,11 @@ def _limits_of_steps(
     mesh: Mesh, steps: Sequence[StepResult], field: str, scale: float, mirrored: bool
 ) -> tuple[tuple[float, float], tuple[Array, Array]]:
     """Return the limits of the colour scale and the corners of the bounding box of the bodies over all steps."""
-    low, high = np.full(mesh.dim, np.inf), np.full(mesh.dim, -np.inf)
-    limits = (np.inf, -np.inf)
-    for step in steps:
-        smallest, largest = field_of(mesh, step, field).range
-        limits = min(limits[0], smallest), max(limits[1], largest)
-        points = displaced_points(mesh.points, scale, step.displacement)
-        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+    ranges = [field_of(mesh, step, field).range for step in steps]
+    positions = (displaced_points(mesh.points, scale, step.displacement) for step in steps)
+    boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in positions])
+    low, high = boxes.min(axis=0)[0], boxes.max(axis=0)[1]
     if mirrored and mesh.dim == 2:
         low[0], high[0] = min(low[0], -high[0]), max(high[0], -low[0])
     margin = 0.03 * float((high - low).max())
-    return limits, (low - margin, high + margin)
+    return (min(low for low, _ in ranges), max(high for _, high in ranges)), (low - margin, high + margin)

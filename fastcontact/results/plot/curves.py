@@ -164,11 +164,8 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mappin
     label = f"edges: {centre - inside:.4g} and {valued(centre + inside, units, 'length')}"
     if one_sided and before.size:  # the contact is a ring around an open middle
         ax.axvspan(before.max(), closed.min(), color=colour, alpha=0.15, lw=0)
-        inner, outer = (
-            f"{before.max():.4g} to {closed.min():.4g}",
-            f"{inside:.4g} to {valued(outside, units, 'length')}",
-        )
-        label = f"edges: {inner}, and {outer}"
+        outer = f"{inside:.4g} to {valued(outside, units, 'length')}"
+        label = f"edges: {before.max():.4g} to {closed.min():.4g}, and {outer}"
     elif abs(centre) <= 0.01 * outside:
         # The difference of the bounds may be smaller than the distance of two nodes, because constraints may lie between
         # nodes. Nodes beyond the contact are excluded, because on a curved surface their distance from the middle along the

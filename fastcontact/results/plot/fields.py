@@ -51,9 +51,7 @@ class Field:
     def range(self) -> tuple[float, float]:
         """Limits of the colours, which are symmetric about zero if the field is `signed`."""
         low, high = float(self.values.min()), float(self.values.max())
-        if self.signed:
-            return -max(-low, high), max(-low, high)
-        return low, high
+        return (-max(-low, high), max(-low, high)) if self.signed else (low, high)
 
     @property
     def signed(self) -> bool:

@@ -57,15 +57,8 @@ class Disk:
 
 
 @pytest.fixture
-def largest() -> int:
-    """Bytes of changes in one journal."""
-    return journal.LARGEST
-
-
-@pytest.fixture
-def recorded(largest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[tuple[str, object]], Path]:
+def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[tuple[str, object]], Path]:
     """All that was done to a file that takes six steps, each on the disk when its writing ends; and the begun file."""
-    monkeypatch.setattr(journal, "LARGEST", largest)
     events: list[tuple[str, object]] = []
     path, begun = tmp_path / "run.vtkhdf", tmp_path / "begun.vtkhdf"
     real = committed_file.CommittedFile
@@ -80,10 +73,6 @@ def recorded(largest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> t
             events.append(("size", size))
             super()._set_size(size)
 
-    def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
-        events.append(("size", max(os.fstat(descriptor).st_size, start + size)))
-        os.truncate(descriptor, max(os.fstat(descriptor).st_size, start + size))
-
     fsync = os.fsync
 
     def synchronise(descriptor: int) -> None:
@@ -94,7 +83,6 @@ def recorded(largest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> t
         patch.setattr(writer, "CommittedFile", Watched)
         with ResultWriter(path, MESH, synchronise=True) as out:
             shutil.copy(path, begun)
-            patch.setattr(writer, "reserve", reserve)
             patch.setattr(os, "fsync", synchronise)
             events.clear()
             for number in range(6):
@@ -106,16 +94,8 @@ def recorded(largest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> t
 SHARES = (0.0, 0.95)  # of what was written since the disk was synchronised
 
 
-@pytest.mark.parametrize(
-    ("largest", "shares"),
-    [
-        (journal.LARGEST, SHARES),
-        pytest.param(journal.LARGEST, 6 * SHARES, marks=pytest.mark.slow),
-        pytest.param(2100, (0.0, 0.5, 0.95), marks=pytest.mark.slow),
-    ],
-)
-def test_a_loss_of_power_costs_no_step(recorded, largest, shares, tmp_path: Path) -> None:
-    """Nor where a step changes more than fits into a journal, which is then written in several turns."""
+@pytest.mark.parametrize("shares", [SHARES, pytest.param(6 * SHARES, marks=pytest.mark.slow)])
+def test_a_loss_of_power_costs_no_step(recorded, shares, tmp_path: Path) -> None:
     events, begun = recorded
     random = np.random.default_rng(1)
     disk, steps, tried, repeated = Disk(bytearray(begun.read_bytes())), 0, 0, 0
@@ -177,13 +157,6 @@ def test_a_journal_counts_whole_or_not_at_all(tmp_path: Path, damage: str) -> No
     path.write_bytes(data + {"cut": log[:-1], "changed": log[:3] + b"x" + log[4:]}.get(damage, log))
     with open(path, "rb") as file:
         assert journal.pending(file) == (writes if damage == "none" else [])
-
-
-def test_changes_beyond_a_journal_are_made_in_turns(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(journal, "LARGEST", 4)
-    batches = list(journal.batches([(0, b"ab"), (7, b"c"), (10, b"0123456789"), (30, b"xy")]))
-    assert batches == [[(0, b"ab"), (7, b"c")], [(10, b"0123")], [(14, b"4567")], [(18, b"89"), (30, b"xy")]]
-    assert list(journal.batches([])) == [[]]
 
 
 @pytest.fixture

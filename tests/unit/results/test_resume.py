@@ -82,7 +82,7 @@ def test_every_write_may_be_the_last_one(
     assert len(writes) > begin + 50
     crashed = path.with_name("crashed.vtkhdf")
     with open(crashed, "r+b", buffering=0) as file:
-        file.truncate(path.stat().st_size + 100_000)  # what was reserved
+        file.truncate(path.stat().st_size + 100_000)  # the file may be longer than its contents
         for number, (place, data) in enumerate(writes, start=1):
             file.seek(place)
             file.write(data)
