@@ -9,7 +9,6 @@ from case_texts import case_of
 from models import elastic_model
 
 import fastcontact as fc
-from fastcontact import obstacles
 from fastcontact.cases.case import read_case
 from fastcontact.cases.summary import lines, of_step, summarise
 from fastcontact.cli import main
@@ -24,13 +23,13 @@ def block_under_a_ball(kinematics, element="quad4", centre=3.0, **options):
     left = 0.0 if kinematics == "axisymmetric" else -1.0
     model = elastic_model(block((2.0, 1.0), (16, 8), element, origin=(left, -1.0)), kinematics, BOTTOM="y")
     model.fix("LEFT" if kinematics == "axisymmetric" else "BOTTOM", "x")
-    model.add_obstacle("ball", secondary="TOP", obstacle=obstacles.Sphere((0.0, centre), 3.0), **options)
+    model.add_obstacle("ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, centre), 3.0), **options)
     return model
 
 
 def box_under_a_ball(element="hex8", **options):
     model = elastic_model(box((1.0, 1.0, 1.0), (6, 6, 3), element, (-0.5, -0.5, -1.0)), "3d", ZMIN="xyz")
-    model.add_obstacle("ball", secondary="ZMAX", obstacle=obstacles.Sphere((0.0, 0.0, 3.0), 3.0), **options)
+    model.add_obstacle("ball", secondary="ZMAX", obstacle=fc.obstacles.Sphere((0.0, 0.0, 3.0), 3.0), **options)
     return model
 
 
@@ -103,9 +102,9 @@ def test_a_meshed_surface_can_be_driven():
     angle = np.linspace(-0.6, 0.6, 41)
     arc = np.column_stack([3 * np.sin(angle), 3 - 3 * np.cos(angle)])
     lines_ = np.column_stack([np.arange(0, 40, 2), np.arange(2, 41, 2), np.arange(1, 41, 2)])
-    surface = obstacles.MeshedSurface(fc.Mesh(arc, {"line3": lines_}, {"ARC": np.arange(20)}), "ARC")
+    surface = fc.obstacles.MeshedSurface(fc.Mesh(arc, {"line3": lines_}, {"ARC": np.arange(20)}), "ARC")
     found = []
-    for shape in (surface, obstacles.Sphere((0.0, 3.0), 3.0)):
+    for shape in (surface, fc.obstacles.Sphere((0.0, 3.0), 3.0)):
         mesh = block((2.0, 1.0), (16, 8), "quad4", origin=(-1.0, -1.0))
         model = elastic_model(mesh, "plane_strain", BOTTOM="xy")
         model.add_obstacle("ball", secondary="TOP", obstacle=shape, force={"y": -15.0})
@@ -116,8 +115,8 @@ def test_a_meshed_surface_can_be_driven():
 def test_a_body_that_only_obstacles_hold():
     """A loose block on a fixed floor under a pushed ball: the force goes through."""
     model = elastic_model(block((2.0, 1.0), (16, 8), "quad4", origin=(-1.0, -1.0)), "plane_strain", BOTTOM="x")
-    model.add_obstacle("floor", secondary="BOTTOM", obstacle=obstacles.HalfSpace((0.0, -1.0), (0.0, 1.0)))
-    ball = obstacles.Sphere((0.0, 3.1), 3.0)
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, -1.0), (0.0, 1.0)))
+    ball = fc.obstacles.Sphere((0.0, 3.1), 3.0)
     model.add_obstacle("ball", secondary="TOP", obstacle=ball, force={"y": -10.0})
     contact = fc.solve(model, fc.linear_ramp(1))[-1].contact
     assert contact["ball"].force[1] == pytest.approx(-10.0, rel=1e-10)
@@ -132,7 +131,7 @@ def test_units_do_not_matter(length, pressure):
         mesh = block((2.0, 1.0), (8, 4), "quad4", origin=(-1.0, -1.0))
         model = elastic_model(mesh.replace(points=mesh.points * length), "plane_strain", E=1000.0 * pressure)
         model.fix("BOTTOM", "xy")
-        ball = obstacles.Sphere((0.0, 3.0 * length), 3.0 * length)
+        ball = fc.obstacles.Sphere((0.0, 3.0 * length), 3.0 * length)
         model.add_obstacle("ball", secondary="TOP", obstacle=ball, force={"y": -15.0 * pressure * length})
         return fc.solve(model, fc.linear_ramp(1))[-1]
 
@@ -177,7 +176,7 @@ def test_from_case_file_to_result_file(tmp_path):
         steps = fc.solve(case.model, case.ramp, on_step=out.write)
     contact = steps[-1].contact["plane"]
     moved = elastic_model(quarter_disc(), "axisymmetric", E=20_000.0, A1A2="x", A1B1="y")
-    plane = obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
+    plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
     down = {"y": float(contact.obstacle_displacement[1])}
     moved.add_obstacle("plane", secondary="CONT1", obstacle=plane, motion=down)
     there = fc.solve(moved, fc.linear_ramp(1))[-1].contact["plane"]

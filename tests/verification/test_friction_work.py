@@ -10,7 +10,6 @@ from fastcontact.analysis import touching
 from fastcontact.analysis.result_warnings import _slip_before_contact
 from fastcontact.analysis.state import State
 from fastcontact.analysis.work import Work
-from fastcontact.mesh.generate import box, renamed, union
 
 pytestmark = pytest.mark.each_value
 
@@ -28,10 +27,10 @@ def blocks(dim):
         ("LOWER", (4.0, 2.0, 0.5), (7, 3, 1), (-1.0, -0.5, -0.5)),
         ("UPPER", (2.0, 1.0, 1.0), (3, 2, 2), (0.0, 0.0, 0.0)),
     ):
-        part = box(size, divisions, "hex8", origin, name=name)
+        part = fc.generate.box(size, divisions, "hex8", origin, name=name)
         sides = {"ZMIN": "UPPER_BOTTOM", "ZMAX": "UPPER_TOP"} if name == "UPPER" else {"ZMAX": "LOWER_TOP"}
-        parts.append(renamed(part, {g: sides.get(g, f"{name}_{g}") for g in part.group_names if g != name}))
-    return union(*parts)
+        parts.append(fc.generate.renamed(part, {g: sides.get(g, f"{name}_{g}") for g in part.group_names if g != name}))
+    return fc.generate.union(*parts)
 
 
 def pushed_block(dim, formulation, ratio):

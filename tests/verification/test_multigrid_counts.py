@@ -8,7 +8,6 @@ from scipy.sparse import csr_array
 from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis.criteria import Criteria
 from fastcontact.cli.bench import suite
 from fastcontact.contact.configuration import Configuration
 
@@ -30,7 +29,7 @@ def sphere(size, formulation="node_to_segment"):
 
 
 def prepared(model, tolerance=1e-8, steps=1):
-    criteria = Criteria(relative=100 * tolerance, geometry=tolerance)
+    criteria = fc.Criteria(relative=100 * tolerance, geometry=tolerance)
     return Stepping(model, "amg", tolerance, criteria, fc.linear_ramp(steps))
 
 

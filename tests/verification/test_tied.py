@@ -7,7 +7,6 @@ from scipy.spatial.transform import Rotation
 from two_bodies import SIDES, blocks, boxes, rings, touching
 
 import fastcontact as fc
-from fastcontact.mesh.generate import merge_points
 
 pytestmark = pytest.mark.pairwise
 
@@ -126,7 +125,7 @@ def test_ties_are_determined_where_supports_hold_both_sides(element, formulation
 @pytest.mark.parametrize("make", [blocks, boxes])
 def test_matching_meshes_are_tied_as_if_they_were_one(make, formulation):
     mesh = make()
-    one = merge_points(mesh, tolerance=1e-9)
+    one = fc.generate.merge_points(mesh, tolerance=1e-9)
     models = []
     for m in (mesh, one):
         model = fc.Model(m, "3d" if m.dim == 3 else "plane_strain")

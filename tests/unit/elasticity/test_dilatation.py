@@ -7,13 +7,11 @@ import pytest
 from test_assembly import one_material, operators
 
 import fastcontact as fc
-from fastcontact import recovery
 from fastcontact._jit import parallel
 from fastcontact._jit.decorators import set_threads, threads
 from fastcontact.elasticity import dilatation
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.mesh import elements
-from fastcontact.mesh.topology import outer_facets
 from fastcontact.model.fingerprint import fingerprint
 
 pytestmark = pytest.mark.pairwise
@@ -43,7 +41,7 @@ def assembled(mesh, kinematics, averaged=AVERAGED, material=RUBBER):
 
 def stress_at_points(mesh, kinematics, u):
     moduli = RUBBER.moduli(kinematics)[None]
-    return recovery.stress_at_points(mesh, kinematics, moduli, one_material(mesh), u, AVERAGED)
+    return fc.recovery.stress_at_points(mesh, kinematics, moduli, one_material(mesh), u, AVERAGED)
 
 
 def parts(element, B, measures):
@@ -99,7 +97,7 @@ def test_stress_equals_its_numpy_twin_and_balances_the_stiffness(name, kinematic
         B, mean, rest, bulk, modulus = parts(element, B, measures)
         expected = B @ u[cell].ravel() @ RUBBER.moduli(kinematics) + (bulk * mean + modulus * rest) @ u[cell].ravel()
         assert np.abs(at_points[name][number] - expected).max() < 1e-10 * np.abs(expected).max()
-    force = recovery.internal_force(mesh, kinematics, at_points)
+    force = fc.recovery.internal_force(mesh, kinematics, at_points)
     assert np.abs(force.ravel() - assembled(mesh, kinematics) @ u.ravel()).max() < 1e-11 * np.abs(force).max()
 
 
@@ -124,7 +122,7 @@ def test_patch_test_through_the_solver(name, linear_solver):
     mesh = patch(name, 3)
     kinematics = "plane_strain" if mesh.dim == 2 else "3d"
     slope = np.array([[1.0, 0.4, -0.3], [-0.2, -2.0, 0.7], [0.5, 0.1, 1.2]])[: mesh.dim, : mesh.dim] * 1e-3
-    outer = np.unique(np.concatenate([f.ravel() for f in outer_facets(mesh).values()]))
+    outer = np.unique(np.concatenate([f.ravel() for f in fc.topology.outer_facets(mesh).values()]))
     model = fc.Model(mesh.with_groups(points={"OUTER": outer}), kinematics)
     model.add_material(RUBBER)
     model.prescribe("OUTER", **{axis: lambda x, row=row: x @ row for axis, row in zip("xyz", slope)})

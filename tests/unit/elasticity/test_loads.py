@@ -11,7 +11,6 @@ import fastcontact as fc
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
 from fastcontact.elasticity.multipoint_constraints import eliminate
 from fastcontact.mesh import elements, quadrature
-from fastcontact.mesh.topology import outer_facets
 
 pytestmark = pytest.mark.pairwise
 
@@ -38,7 +37,7 @@ def box(element, bend=True):
 def everywhere(mesh):
     """The mesh with a group OUTSIDE of all its outer facets, some of them the wrong way round."""
     blocks, outside, count = dict(mesh.solids), [], sum(map(len, mesh.solids.values()))
-    for name, facets in outer_facets(mesh).items():
+    for name, facets in fc.topology.outer_facets(mesh).items():
         turned = facets.copy()
         turned[::2] = turned[::2][:, list(elements.get(name).reversed)]
         blocks[name] = turned

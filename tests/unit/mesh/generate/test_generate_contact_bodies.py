@@ -7,8 +7,6 @@ import pytest
 from models import elastic_model
 
 import fastcontact as fc
-from fastcontact import topology
-from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import crowned_blocks, punched_block, rings, sphere_octant, sphere_on_block
 from fastcontact.mesh.generate._sphere import SOLIDS
@@ -104,7 +102,7 @@ def test_rings_have_their_areas_and_their_sides_stand_on_circles(element):
     ],
 )
 def test_wrong_arguments_are_named(make, words):
-    with pytest.raises(MeshError, match=words):
+    with pytest.raises(fc.MeshError, match=words):
         make()
 
 
@@ -136,7 +134,7 @@ def test_volumes(element):
 @pytest.mark.parametrize("element", SOLIDS)
 def test_groups_are_the_outside(element):
     mesh = sphere_on_block(element, **SIZES)
-    assert topology.bodies(mesh)[0] == 2
+    assert fc.topology.bodies(mesh)[0] == 2
     for group, column, at in (
         ("SYMMETRY_X", 0, 0.0),
         ("SYMMETRY_Z", 2, 0.0),
@@ -146,7 +144,7 @@ def test_groups_are_the_outside(element):
     ):
         assert np.abs(mesh.points[mesh.points_of(group), column] - at).max() < 1e-14
         assert (np.abs(mesh.points[:, column] - at) < 1e-12).sum() >= len(mesh.points_of(group))
-    outer = sum(map(len, topology.outer_facets(mesh).values()))
+    outer = sum(map(len, fc.topology.outer_facets(mesh).values()))
     named = np.unique(np.concatenate([mesh.cell_groups[g] for g in mesh.cell_groups if g not in ("SPHERE", "BLOCK")]))
     assert len(named) == outer == sum(map(len, mesh.facets.values()))
     for pole in ("POLE_SPHERE", "POLE_BLOCK"):
