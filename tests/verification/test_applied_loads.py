@@ -140,8 +140,7 @@ def test_a_coupled_face_under_a_force_is_a_rigid_plate(solver):
 
     def prepared():
         model = model_on(mesh, "plane_strain")
-        model.fix("BOTTOM", "xy")
-        return model
+        return supported(model, BOTTOM="xy")
 
     forced = prepared()
     forced.couple("TOP", "y")

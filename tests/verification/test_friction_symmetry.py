@@ -22,8 +22,7 @@ FIELDS = [("continuous", {}), ("mortar", {"multipliers": "standard"})]
 
 def spheres(element):
     mesh = fc.generate.half_spheres(element, **MESHES[element])
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": 2.0})
-    return model
+    return elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": 2.0})
 
 
 def pressed(element, formulation, steps=1, friction=0.3, criteria=None, **options):

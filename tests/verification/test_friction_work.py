@@ -316,9 +316,7 @@ def test_steps_as_a_whole_have_the_work_of_slip_before_nodes_touch():
 def test_nodes_that_touch_at_the_beginning_do_not_close_in_the_step():
     """A block that lies on another one is drawn over it in one step: slip counts from first contact."""
     mesh = fc.generate.block_on_block(divisions_lower=(4, 2), divisions_upper=(3, 2))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(1000.0, 0.3))
-    supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.05, "y": -0.05})
+    model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.05, "y": -0.05})
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.2, formulation="continuous")
     work = fc.solve(model, 1)[-1].work
     assert work["friction_work"] > 0.0

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import made_of, supported
 from scipy.integrate import quad
 from scipy.optimize import brentq, fsolve
 
@@ -29,8 +30,7 @@ def free_body(law, kinematics, element):
     else:
         origin = (1.0, 0.0) if kinematics == "axisymmetric" else (0.0, 0.0)
         mesh, faces = fc.generate.block((1.0, 1.0), (2, 2), element, origin), {"LEFT": "x", "BOTTOM": "y"}
-    model = fc.Model(mesh, kinematics, strain="small" if isinstance(law, fc.ElasticPlastic) else "finite")
-    model.add_material(law)
+    model = made_of(mesh, kinematics, law, strain="small" if isinstance(law, fc.ElasticPlastic) else "finite")
     for face, axis in list(faces.items())[kinematics == "axisymmetric" :]:
         model.fix(face, axis)
     return model
@@ -57,8 +57,7 @@ def test_given_temperatures_expand_as_computed_ones_and_axes_have_their_own():
     wood = {"E": (9.0, 5.0, 4.0), "nu": (0.2, 0.2, 0.2), "G": (2.0, 2.0, 2.0), "axes": [[1, 1, 0], [-1, 1, 0]]}
     model = free_body(fc.Orthotropic(**wood, expansion=(3e-3, 1e-3, 2e-3)), "plane_stress", "quad8")
     model.supports.clear()
-    model.fix("BOTTOM_LEFT", "xy")
-    model.fix("TOP_RIGHT", "x")
+    supported(model, BOTTOM_LEFT="xy", TOP_RIGHT="x")
     model.add_temperature(120.0, reference=20.0)
     step = fc.solve(model, [0.5, 1.0])[-1]
     assert np.abs(step.stress).max() < 1e-8

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, made_of
 from pairwise import first_of
 
 import fastcontact as fc
@@ -21,9 +21,7 @@ def membrane(element, n, nu=NU, volumetric="auto"):
     x, y = mesh.points.T
     x = x - x.min()
     mesh = mesh.replace(points=np.column_stack([48 * x, 44 * x + (y - y.min()) * (44 - 28 * x)]))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=250.0, nu=nu, volumetric=volumetric))
-    model.fix("LEFT", "xy")
+    model = made_of(mesh, "plane_strain", fc.LinearElastic(E=250.0, nu=nu, volumetric=volumetric), LEFT="xy")
     model.add_force("RIGHT", y=100.0)
     corner = np.linalg.norm(mesh.points - [48.0, 60.0], axis=1).argmin()
     return solved(model).displacement[corner, 1]

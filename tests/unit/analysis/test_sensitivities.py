@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model, supported, united
+from models import elastic_model, made_of, supported, united
 
 import fastcontact as fc
 
@@ -99,9 +99,9 @@ def test_every_formulation_between_bodies(formulation, element):
 
 
 def spheres(mesh, E=20_000.0, nu=0.3, moved=1.0, **options):
-    model = fc.Model(mesh, kinematics="axisymmetric")
-    model.add_material(fc.LinearElastic(E=E, nu=nu), "SPHHAU")
-    model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
+    model = made_of(
+        mesh, "axisymmetric", {"SPHHAU": fc.LinearElastic(E=E, nu=nu), "SPHBAS": fc.LinearElastic(E=30_000.0, nu=0.2)}
+    )
     supported(model, A1A2="x", A2B2={"y": -moved}, A1B1={"y": 1.0})
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
     return model
@@ -123,9 +123,7 @@ def test_in_space_with_factors_and_with_a_hierarchy(solver):
     mesh = united(L=lower, U=fc.generate.box((2.2, 2.4, 1.5), (2, 3, 1), "hex8", (0.83, 0.72, 2.0)))
 
     def make(E=1000.0, nu=0.3, moved=1.0, clearance=0.0):
-        model = fc.Model(mesh, kinematics="3d")
-        model.add_material(fc.LinearElastic(E=E, nu=nu), "LBOX")
-        model.add_material(fc.LinearElastic(E=2500.0, nu=0.22), "UBOX")
+        model = made_of(mesh, "3d", {"LBOX": fc.LinearElastic(E=E, nu=nu), "UBOX": fc.LinearElastic(E=2500.0, nu=0.22)})
         supported(model, LZMIN="xyz", UZMAX={"x": 0.01, "y": 0.004, "z": -0.05 * moved})
         model.add_contact("c", secondary="UZMIN", primary="LZMAX", clearance=clearance)
         return model

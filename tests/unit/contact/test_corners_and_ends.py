@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, supported, united
 
 import fastcontact as fc
 from fastcontact.contact.pairing import pair
@@ -31,8 +31,7 @@ def punch(dim=2, shift=0.55, nu=0.0, element=None, cells=(10, 7)):
         whole = np.concatenate([mesh.cell_groups[name] for name in ("U_BOTTOM", "U_LEFT", "U_RIGHT")])
         mesh = mesh.with_groups(cells={"U_WHOLE": whole})
     model = elastic_model(mesh, "plane_strain" if dim == 2 else "3d", nu=nu, L_BOTTOM="xyz"[:dim])
-    model.prescribe("U_TOP", **dict.fromkeys("xyz"[: dim - 1], 0.0), **{"xyz"[dim - 1]: -0.01})
-    return model
+    return supported(model, U_TOP={**dict.fromkeys("xyz"[: dim - 1], 0.0), **{"xyz"[dim - 1]: -0.01}})
 
 
 def pressed(model, secondary, primary, **options):

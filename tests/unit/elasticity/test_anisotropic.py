@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, made_of
 from test_assembly import FLAT, MESHES, plane_patch, twin
 
 import fastcontact as fc
@@ -172,8 +172,7 @@ def test_a_cylinder_in_axisymmetry_has_its_tangent_along_the_circumference():
     ],
 )
 def test_functions_that_return_no_axes_are_refused(axes, words):
-    model = fc.Model(fc.generate.block(divisions=(2, 2)), "plane_strain")
-    model.add_material(fc.Orthotropic(**WOOD, axes=axes))
+    model = made_of(fc.generate.block(divisions=(2, 2)), "plane_strain", fc.Orthotropic(**WOOD, axes=axes))
     with pytest.raises(fc.ModelError, match=words):
         model.check()
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, made_of
 
 import fastcontact as fc
 from fastcontact.elasticity.stiffness import rigid_modes, sparsity, stiffness
@@ -196,8 +196,7 @@ def test_pure_bending_is_exact_with_quadratic_cells(element):
 @pytest.mark.parametrize("element", SOLIDS)
 def test_bar_in_tension_is_exact(element, linear_solver):
     size, strain = (3.0, 1.0, 2.0), 2e-3
-    model = fc.Model(box(size, (3, 2, 2), element), "3d")
-    model.add_material(fc.LinearElastic(E, NU), "BOX")
+    model = made_of(box(size, (3, 2, 2), element), "3d", {"BOX": fc.LinearElastic(E, NU)})
     for group, axis in (("XMIN", "x"), ("YMIN", "y"), ("ZMIN", "z")):
         model.fix(group, axis)
     model.prescribe("XMAX", x=strain * size[0])

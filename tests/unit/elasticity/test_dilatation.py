@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from models import made_of
 from test_assembly import one_material, operators
 
 import fastcontact as fc
@@ -204,8 +205,7 @@ def test_two_materials_of_one_mesh_are_each_as_alone():
 def test_incompatible_modes_come_before_a_mean_dilatation():
     """In the elements that have them, which are not those of axisymmetry."""
     rubber = fc.LinearElastic(E=1.0, nu=0.4999, incompatible_modes=True)
-    model = fc.Model(fc.generate.block(), "plane_strain")
-    model.add_material(rubber)
+    model = made_of(fc.generate.block(), "plane_strain", rubber)
     field = model.material_field()
     assert rubber.averaged
     assert rubber.incompatible_modes
@@ -219,8 +219,7 @@ def test_modes_count_in_the_fingerprint_and_their_absence_does_not():
 
     prints = []
     for options in ({}, {"incompatible_modes": False}, {"incompatible_modes": True}):
-        model = fc.Model(fc.generate.block(), "plane_strain")
-        model.add_material(fc.LinearElastic(E=1.0, nu=0.3, **options))
+        model = made_of(fc.generate.block(), "plane_strain", fc.LinearElastic(E=1.0, nu=0.3, **options))
         prints.append(fingerprint(model))
     assert prints[0] == prints[1] != prints[2]
     assert "the incompatible modes" not in prints[1]

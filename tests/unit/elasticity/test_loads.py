@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from models import elastic_model
+from models import elastic_model, supported
 from scipy.sparse import csr_array
 
 import fastcontact as fc
@@ -221,8 +221,7 @@ def test_a_coupled_group_follows_one_node_which_a_support_may_prescribe():
 def model():
     mesh = block("quad4", bend=False)
     mesh = mesh.with_groups(points={"NONE": [], "TOP_NODES": mesh.points_of("TOP")})
-    model = elastic_model(mesh, "plane_strain", BOTTOM="xy")
-    return model
+    return elastic_model(mesh, "plane_strain", BOTTOM="xy")
 
 
 @pytest.mark.parametrize(
@@ -319,8 +318,7 @@ def test_relations_that_contradict_supports_or_each_other_are_refused(model, con
 
 
 def test_supports_with_other_histories_clash(model):
-    model.prescribe("TOP", x=0.1)
-    model.prescribe("TOP_LEFT", x=0.1)
+    supported(model, TOP={"x": 0.1}, TOP_LEFT={"x": 0.1})
     model.check()
     model.prescribe("TOP_RIGHT", x=0.1, ramp=[(0, 1), (1, 1)])
     with pytest.raises(fc.ModelError, match=r"with another ramp"):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from models import elastic_model
+from models import elastic_model, supported
 from scipy.sparse import bsr_array
 
 import fastcontact as fc
@@ -46,9 +46,7 @@ def test_a_block_on_springs_settles_by_load_over_stiffness_and_reactions_hold_th
 
 def test_a_support_beside_a_spring_bears_the_rest():
     model = block_on_springs()
-    model.fix("LEFT", "x")
-    model.prescribe("BOTTOM_LEFT", y=-0.1)
-    model.prescribe("BOTTOM_RIGHT", y=-0.1)
+    supported(model, LEFT="x", BOTTOM_LEFT={"y": -0.1}, BOTTOM_RIGHT={"y": -0.1})
     step = last(model)
     np.testing.assert_allclose(step.reaction[:, 1].sum(), PRESSURE * WIDTH, rtol=1e-12)  # of which springs bear 10
 

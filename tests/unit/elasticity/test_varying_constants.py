@@ -5,7 +5,7 @@ import dataclasses
 import mechanics
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, made_of, supported
 from pairwise import first_of
 
 import fastcontact as fc
@@ -280,9 +280,9 @@ def test_all_solvers_agree_on_a_graded_hertz_contact(solver):
 
 # ----------------------------------------------------------------------------- words and mistakes
 def block_model(**constants):
-    model = fc.Model(fc.generate.block((2.0, 1.0), (4, 2), "quad4"), "plane_strain")
-    model.add_material(fc.LinearElastic(**{**STEEL, **constants}))
-    return model
+    return made_of(
+        fc.generate.block((2.0, 1.0), (4, 2), "quad4"), "plane_strain", fc.LinearElastic(**{**STEEL, **constants})
+    )
 
 
 @pytest.mark.parametrize(
@@ -325,8 +325,7 @@ def test_as_many_cells_as_points_is_no_array():
     cells = [[8, i, (i + 1) % 8] for i in range(8)]
     wheel = fc.Mesh([*ring, [0, 0]], {"tri3": cells}, {"A": [0, 1]})
     for n in (2, 8, 9):
-        model = fc.Model(wheel, "plane_strain")
-        model.add_material(fc.LinearElastic(np.ones(n), 0.3), "A")
+        model = made_of(wheel, "plane_strain", {"A": fc.LinearElastic(np.ones(n), 0.3)})
         assert model.materials[0][0].E.varies_within_cells == (n == 9)
     lone = fc.Mesh([*ring, [0, 0], [5.0, 0.0]], {"tri3": [*cells, [0, 9, 1], [0, 7, 9]]})
     model = fc.Model(lone, "plane_strain")
@@ -390,9 +389,7 @@ def test_density_and_expansion_of_any_material_may_vary():
         (2.0, 1e-5),
         (np.full(16, 2.0), (lambda x: np.full(len(x), 1e-5), 1e-5, np.full(16, 1e-5))),
     ):
-        model = fc.Model(space("hex8"), "3d")
-        model.add_material(fc.Anisotropic(D, density=density, expansion=expansion))
-        model.fix("BOTTOM", "xyz")
+        model = made_of(space("hex8"), "3d", fc.Anisotropic(D, density=density, expansion=expansion), BOTTOM="xyz")
         model.add_gravity(y=-1.0)
         model.add_temperature(50.0)
         results.append(solved(model, linear_solver="direct"))
@@ -410,8 +407,7 @@ def test_the_contrast_of_materials_that_vary_is_that_of_their_cells():
     assert found[True] == pytest.approx(found[False])
     soft = {"E": (1e5, 5e4, 2e4), "nu": (0.0, 0.0, 0.0), "G": (1e4, 1e4, 1e4)}
     for axes in (None, fc.CylindricalAxes((-5.0, 0.5, 0.0), (0.0, 0.0, 1.0))):
-        model = fc.Model(fc.generate.box(divisions=(2, 2, 2)), "3d")
-        model.add_material(fc.Orthotropic(**soft, axes=axes))
+        model = made_of(fc.generate.box(divisions=(2, 2, 2)), "3d", fc.Orthotropic(**soft, axes=axes))
         assert model.material_field().contrast == pytest.approx((5.0 - 1.0) / 3.0, rel=0.01)
 
 

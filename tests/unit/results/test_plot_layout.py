@@ -185,9 +185,7 @@ def test_pictures_of_contacts_and_modes_show_the_units_of_the_model():
 
 
 def test_nodes_of_contact_zones_stay_in_place_when_the_contact_moves():
-    model = fc.Model(fc.generate.block((4.0, 2.0), (32, 8), origin=(-2.0, -2.0)), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("BOTTOM", "y")
+    model = elastic_model(fc.generate.block((4.0, 2.0), (32, 8), origin=(-2.0, -2.0)), "plane_strain", BOTTOM="y")
     model.prescribe("BOTTOM", x=-0.3, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
     down = {"motion": {"y": -0.04}, "ramp": [(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)]}
     model.add_obstacle("ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, 5.0), 5.0), **down)
