@@ -363,9 +363,3 @@ def test_mistakes_are_told(method, arguments, words):
     model = model_on(mesh.with_groups(points={"SIDE": side}))
     with pytest.raises(fc.ModelError, match=words):
         getattr(model, method)(**arguments)
-
-
-def test_no_force_acts_through_a_place_of_a_ring():
-    model = fc.Model(fc.generate.block((1.0, 1.0), (2, 2), "quad4", (1.0, 0.0)), "axisymmetric")
-    with pytest.raises(fc.ModelError, match="in axisymmetry a force cannot act at a point"):
-        model.add_force("TOP", y=1.0, at=(1.5, 1.0))

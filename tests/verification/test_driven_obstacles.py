@@ -457,13 +457,6 @@ def test_a_rotation_that_makes_no_sense_is_refused(message):
         model.add_obstacle("ball", secondary="TOP", obstacle=ball, rotation=REFUSED[message])
 
 
-def test_axisymmetric_models_have_no_turning_obstacles():
-    model = fc.Model(block(), "axisymmetric")
-    ball = fc.obstacles.Sphere((0.0, 3.0), 2.0)
-    with pytest.raises(fc.ModelError, match="no displacement around its axis"):
-        model.add_obstacle("ball", secondary="TOP", obstacle=ball, rotation={"angle": 1.0, "centre": (0.0, 0.0)})
-
-
 def test_an_axis_without_length_and_too_large_turns_are_refused():
     model = twisted_ball("node_to_segment", angle=4.0)
     with pytest.raises(fc.ModelError, match=r"turns by 2 radian in the step to 5, .* at least 2 steps"):

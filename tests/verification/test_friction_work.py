@@ -348,11 +348,6 @@ def test_nodes_beside_an_edge_of_the_other_side_were_not_open(dim, formulation, 
     assert not work["friction_while_touching"]
 
 
-def test_fraction_while_touching_is_checked():
-    with pytest.raises(fc.ModelError, match="friction_while_touching = 0 must be above 0"):
-        fc.Criteria(friction_while_touching=0)
-
-
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_nodes_that_face_nothing_do_not_disturb_the_increments_of_a_step():
     """The longer block is secondary; with multigrid the increments contain its nodes, also those beside the other block."""

@@ -89,22 +89,6 @@ def test_the_axis_may_lie_anywhere_in_space():
     np.testing.assert_allclose(next(iter(model.forces_by_ramp().values())).sum(axis=0), expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("add", "words"),
-    [
-        (lambda m: m.add_gravity(), "has no component"),
-        (lambda m: m.add_gravity(y=np.inf), "is inf, which is not a finite number"),
-        (lambda m: m.add_gravity("TOP", y=1.0), "contains no solid cells: no gravity can act on it"),
-        (lambda m: m.add_centrifugal(1.0, direction=(0, 0, 0)), "has no length"),
-        (lambda m: m.add_centrifugal(1.0, origin=(0,)), "needs three components"),
-        (lambda m: m.add_centrifugal("fast"), "must be a number, not the string 'fast'"),
-    ],
-)
-def test_what_cannot_act_is_refused(add, words):
-    with pytest.raises(fc.ModelError, match=words):
-        add(block("axisymmetric"))
-
-
 def test_oblique_axes_are_refused_in_the_plane():
     with pytest.raises(fc.ModelError, match="must lie in the plane or be normal"):
         block("plane_strain").add_centrifugal(1.0, direction=(1, 0, 1))

@@ -164,12 +164,6 @@ def test_a_rotation_that_makes_no_sense_is_refused(message: str) -> None:
         model.prescribe("RIGHT", **REFUSED[message])
 
 
-def test_rings_do_not_turn() -> None:
-    model = fc.Model(fc.generate.block(), "axisymmetric", strain="finite")
-    with pytest.raises(fc.ModelError, match="no displacement around its axis"):
-        model.prescribe("TOP", rotation={"angle": 1.0, "centre": (0.0, 0.0)})
-
-
 def test_an_analysis_of_a_turning_support_goes_on_from_its_file(tmp_path) -> None:
     model = bar("plane_strain", "quad8", 2.0)
     whole = fc.solve(model, 3)

@@ -237,23 +237,6 @@ def test_a_flat_punch_ends_at_its_edge():
     assert normal[:, 1].tolist() == [-1.0, -1.0, -1.0]
 
 
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: fc.obstacles.Sphere((0.0, 0.0), -1.0),
-        lambda: fc.obstacles.paraboloid(0.0),
-        lambda: fc.obstacles.cone(float("nan")),
-        lambda: fc.obstacles.FlatPunch(1.0, side="left"),
-        lambda: fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0)).distance(np.zeros((1, 2))),
-        lambda: fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 0.0)).distance(np.zeros((1, 2))),
-        lambda: fc.obstacles.Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0).distance(np.zeros((1, 2))),
-    ],
-)
-def test_wrong_arguments_are_refused(make):
-    with pytest.raises(fc.ContactError):
-        make()
-
-
 def test_at_the_tip_of_a_cone_the_normal_is_the_axis_up_to_round_off():
     points = np.array([[1e-19, 0.0], [-1e-19, 0.0], [1.0, 0.0]])
     normals = fc.obstacles.cone(0.3).distance(points)[1]

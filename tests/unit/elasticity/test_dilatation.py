@@ -175,11 +175,6 @@ def test_who_has_a_mean_dilatation(material, averaged):
     assert block(kinematics="plane_stress", **material).material_field().averaged.tolist() == [False]
 
 
-def test_an_unknown_choice_is_refused():
-    with pytest.raises(fc.ModelError, match=r"volumetric 'mean'.*mean_dilatation"):
-        fc.LinearElastic(E=1.0, nu=0.3, volumetric="mean")
-
-
 def test_only_what_the_choice_comes_to_changes_the_fingerprint():
     plain, chosen = block(nu=0.3, incompatible_modes=False), block(nu=0.3, volumetric="plain")
     assert fingerprint(plain) == fingerprint(chosen)

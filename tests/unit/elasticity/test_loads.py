@@ -225,32 +225,6 @@ def model():
 
 
 @pytest.mark.parametrize(
-    ("method", "arguments", "message"),
-    [
-        ("add_pressure", {"group": "TOP", "value": "1.0"}, r"argument value of .* not the string '1.0'"),
-        ("add_pressure", {"group": "TOP", "value": 1.0, "ramp": [(0, 0)]}, r"at least two points"),
-        ("add_pressure", {"group": "TOP", "value": 1.0, "ramp": [(0, 0), (1, float("inf"))]}, r"not finite"),
-        ("add_pressure", {"group": "TOP", "value": 1.0, "ramp": [1, 2]}, r"argument ramp of .* must be a Ramp"),
-        ("add_traction", {"group": "TOP"}, r"traction on 'TOP' has no component"),
-        ("add_traction", {"group": "TOP", "z": 1.0}, r"component 'z'"),
-        ("add_traction", {"group": "TOP", "x": float("inf")}, r"traction on 'TOP' is inf"),
-        ("add_force", {"group": "TOP", "x": lambda x: x[:, 0]}, r"must be a number: a function of position gives"),
-        ("couple", {"group": "TOP_LEFT", "component": "y"}, r"contains 1 points"),
-        ("couple", {"group": "TOP", "component": "z"}, r"component 'z'"),
-        ("couple", {"group": "TOP", "component": ""}, r"no component"),
-        ("relate", {"terms": []}, r"at least one displacement"),
-        ("relate", {"terms": [("TOP_LEFT", "y", float("nan"))]}, r"coefficient .* is nan"),
-        ("relate", {"terms": [(99, "y", 1.0)]}, r"point 99 is not in the mesh of 12 points"),
-        ("relate", {"terms": [("TOP_LEFT", "y", 1.0)], "value": float("nan")}, r"the value of .* is nan"),
-        ("prescribe", {"group": "TOP", "y": "a"}, r"argument y of .* not the string 'a'"),
-    ],
-)
-def test_wrong_loads_are_refused_at_once(model, method, arguments, message):
-    with pytest.raises((fc.MeshError, fc.ModelError), match=message):
-        getattr(model, method)(**arguments)
-
-
-@pytest.mark.parametrize(
     ("function", "message"),
     [
         (lambda x: x, r"pressure on 'TOP' is a function that returned float64 numbers of shape \(\d+, 2\)"),

@@ -116,29 +116,6 @@ def test_threads_do_not_change_bits(law: str, monkeypatch: pytest.MonkeyPatch) -
         assert all(np.array_equal(one, two) for one, two in zip(found[0], other, strict=True))
 
 
-@pytest.mark.parametrize(
-    ("make", "text"),
-    [
-        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=0.0), "the yield stress = 0.0 must be a positive number"),
-        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, hardening=[(0.0, 2.0)]), "hardening begins with"),
-        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, hardening=[1.0]), "must be pairs"),
-        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, hardening=[(0.2, 2.0), (0.1, 3.0)]), "ascending"),
-        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, hardening=[(0.1, 0.1)]), "falls faster"),
-        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, kinematic=-1.0), "must be zero or more"),
-        (lambda: fc.ElasticPlastic(E=lambda x: x, nu=0.3, yield_stress=1.0), "do not vary"),
-        (lambda: fc.MooneyRivlin(-1.0, 0.5, bulk=10.0), r"shear modulus 2 \(C10 \+ C01\) = -1 .* must be positive"),
-        (lambda: fc.Yeoh(1.0, 0.0, 0.0, bulk=0.0), "the bulk modulus = 0.0 must be a positive number"),
-        (lambda: fc.Ogden([1.0, 2.0], [2.0], bulk=10.0), "2 mu and 1 alpha"),
-        (lambda: fc.Ogden(1.0, 0.0, bulk=10.0), "no alpha zero"),
-        (lambda: model_with(PLASTIC, "finite"), "kinematic hardening requires small strains"),
-        (lambda: model_with(fc.LinearElastic(E=1.0, nu=0.4999), "finite"), "locks .*: use NeoHookean"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_is_refused(make, text: str) -> None:
-    with pytest.raises(fc.ModelError, match=text):
-        make()
-
-
 def model_with(law, strain: str = "small") -> fc.Model:
     return made_of(fc.generate.block(), "plane_strain", law, strain=strain)
 

@@ -166,28 +166,6 @@ def test_a_spring_shares_the_load_with_a_contact():
     assert step.contact["floor"].force[1] == pytest.approx(total - 100.0 * 0.1, rel=1e-10)
 
 
-@pytest.mark.parametrize(
-    ("groups", "stiffness", "words"),
-    [
-        ([0], {"x": 1.0, "direction": [1.0, 0.0]}, "has a direction, but no axial or transverse stiffness"),
-        ([0], {"axial": 1.0, "direction": [0.0, 0.0]}, "must be 2 numbers, not all zero"),
-        ([0], {"axial": 1.0, "direction": [1.0, 0.0, 0.0]}, "must be 2 numbers, not all zero"),
-        (["NOWHERE"], {}, "NOWHERE"),
-        (["BOTTOM"], {}, "has no component"),
-        (["BOTTOM"], {"z": 1.0}, "component"),
-        (["BOTTOM"], {"y": np.nan}, r"stiffness .*(positive|finite)"),
-        (["BOTTOM"], {"y": np.inf}, r"stiffness .*(positive|finite)"),
-        (["BOTTOM"], {"y": "stiff"}, "must be a number"),
-        (["BOTTOM", "BLOCK"], {"axial": 1.0}, "have 2 and 4 nodes: they must match"),
-        (["TOP_LEFT", "TOP_LEFT"], {"axial": 1.0}, "both ends are point"),
-    ],
-)
-def test_springs_that_cannot_be(groups, stiffness, words):
-    model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (1, 1)), "plane_strain")
-    with pytest.raises(fc.ModelError, match=words):
-        model.add_spring(*groups, **stiffness)
-
-
 @pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric"])
 def test_the_stiffness_of_the_ground_has_no_limit(kinematics):
     """It adds to the diagonal alone: a spring of any stiffness is a support."""

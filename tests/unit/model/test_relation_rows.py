@@ -174,18 +174,6 @@ def test_groups_are_related_along_their_normals():
     assert step.displacement[top[0], 1] < 0
 
 
-@pytest.mark.parametrize(("call", "words"), [
-    (lambda m: m.relate_groups("LEFT", "RIGHT", "x", translation=(1.0,)), "must be 2 numbers"),
-    (lambda m: m.relate_groups("LEFT", "RIGHT", "q"), "unknown component 'q'"),
-    (lambda m: m.relate_groups("LEFT", "RIGHT", "x", coefficients=(1.0,)), "needs two coefficients"),
-    (lambda m: m.relate_groups("LEFT", "RIGHT", "x", value=np.nan), "must be|finite|number"),
-    (lambda m: m.prescribe("TOP", normal=np.nan), "must be|finite|number"),
-])  # fmt: skip
-def test_what_cannot_be_related_is_refused(call, words):
-    with pytest.raises(fc.ModelError, match=words):
-        call(model_of(block(2)))
-
-
 def test_a_support_that_contradicts_a_normal_one_is_told():
     model = model_of(block(2))
     supported(model, LEFT="x", BOTTOM="y")
@@ -222,21 +210,6 @@ def test_a_ring_held_round_about_is_lames():
         model, step, ("displacement", mesh.point("TOP_RIGHT"), "y"), [("prescribed", "LEFT")], ramp=2
     )
     assert found.derivatives["prescribed", "LEFT"] == pytest.approx(found.value, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda m: m.fix("LEFT", "x", axes=(0.0, 0.0)), "the axes of the support of 'LEFT'"),
-        (lambda m: m.prescribe("LEFT", normal=0.0, axes=(1.0, 1.0)), "along its normals or along axes"),
-        (lambda m: m.fix("LEFT", "x", axes=((0.0, 1.0, 1.0), (1.0, 0.0, 0.0))), "components out of the plane"),
-        (lambda m: m.fix("BOTTOM", "x", axes=fc.CylindricalAxes()), "a node at .* lies on the line"),
-        (lambda m: m.fix("NOWHERE", "x", axes=(1.0, 1.0)), "unknown group 'NOWHERE'"),
-    ],
-)
-def test_axes_that_cannot_be(call, said):
-    with pytest.raises(fc.FastcontactError, match=said):
-        call(model_of(block(2)))
 
 
 def bar(cut=True):

@@ -121,24 +121,3 @@ def test_generators_need_no_argument_and_take_plain_values_only(name):
     assert "element" in inspect.signature(make).parameters
     for parameter in inspect.signature(make).parameters.values():
         assert isinstance(parameter.default, (str, int, float, tuple, type(None)))
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: fc.generate.block((1.0, 0.0)), r"size\[1\] = 0"),
-        (lambda: fc.generate.block((1.0,)), "size of block must be two numbers"),
-        (lambda: fc.generate.block(divisions=(0, 2)), r"divisions\[0\] = 0"),
-        (lambda: fc.generate.block(distortion=0.5), "distortion = 0.5 .* between 0 and 0.24"),
-        (lambda: fc.generate.block(element="quad44"), "did you mean 'quad4'"),
-        (lambda: fc.generate.block(origin=(math.inf, 0.0)), r"origin\[0\] must be a finite number"),
-        (lambda: fc.generate.block_on_block(shift=10.0), "shift = 10"),
-        (lambda: fc.generate.block_on_block(size_lower=(1.0, -1.0)), r"size_lower\[1\] = -1"),
-        (lambda: fc.generate.cylinder_on_block(size=40.0), "size = 40 .* at most R/2 = 25"),
-        (lambda: fc.generate.cylinder_on_block(size=2.0, contact_size=3.0), "contact_size = 3"),
-        (lambda: fc.generate.cylinder_on_block(block_size=(1.0, 0.0)), r"block_size\[1\] = 0"),
-    ],
-)
-def test_bad_arguments_are_named_with_their_range(make, words):
-    with pytest.raises(fc.MeshError, match=words):
-        make()

@@ -57,19 +57,3 @@ def test_quadratic_boxes_are_linear_ones_with_mid_nodes(element):
         reference = elements.get(name)
         expected = reference.corner_shape(reference.nodes) @ mesh.points[block[:, : reference.n_corners]]
         assert np.abs(mesh.points[block] - expected).max() < 1e-15
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"element": "hex9"}, r"'hex9'.*'hex8'"),
-        ({"element": "quad4"}, r"unknown element 'quad4'"),
-        ({"size": (1.0, -1.0, 1.0)}, r"size\[1\] = -1"),
-        ({"divisions": (1, 2)}, r"divisions of box must be three numbers"),
-        ({"divisions": (1, 2, 0)}, r"divisions\[2\] = 0"),
-        ({"origin": (0.0, float("nan"), 0.0)}, r"origin\[1\]"),
-    ],
-)
-def test_wrong_arguments(arguments, message):
-    with pytest.raises(fc.MeshError, match=message):
-        fc.generate.box(**arguments)

@@ -77,35 +77,6 @@ def test_rings_have_their_areas_and_their_sides_stand_on_circles(element):
     assert not set(mesh.points_of("CONT_INNER")) & set(mesh.points_of("CONT_OUTER"))
 
 
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: crowned_blocks("tri3"), "element 'tri3'"),
-        (lambda: crowned_blocks(R=10.0, extent=40.0), "at most R = 10"),
-        (lambda: crowned_blocks(growth=1.0), "growth = 1 is out of range"),
-        (lambda: crowned_blocks(contact_size=2.0), "contact_size = 2"),
-        (lambda: punched_block("tri3"), "element 'tri3'"),
-        (lambda: punched_block(extent=1.5), "at least 2 punch_radius = 2"),
-        (lambda: punched_block(growth=0.5), "growth = 0.5 is out of range"),
-        (lambda: punched_block(edge_size=3.0), "edge_size = 3"),
-        (lambda: rings(inner_radius=60.0), "must increase, not 60, 50, 100"),
-        (lambda: rings(divisions_inner=(0, 3)), r"divisions_inner\[0\] = 0"),
-        (lambda: rings("hex8"), "element 'hex8'"),
-        (lambda: sphere_on_block("quad4"), "unknown element 'quad4'"),
-        (lambda: sphere_on_block("pyramid5"), "unknown element 'pyramid5'"),
-        (lambda: sphere_on_block(R=-1.0), "R = -1 is out of range"),
-        (lambda: sphere_on_block(size=60.0), "size = 60 is out of range"),
-        (lambda: sphere_on_block(contact_size=20.0), r"contact_size = 20 .* size = 12.5"),
-        (lambda: sphere_on_block(contact_radius=30.0), "contact_radius = 30 is out of range"),
-        (lambda: sphere_on_block(block_size=(1.0, 2.0, 3.0)), "block_size of sphere_on_block must be two numbers"),
-        (lambda: sphere_on_block(block_size=(1.0, 0.0)), r"block_size\[1\] = 0 is out of range"),
-    ],
-)
-def test_wrong_arguments_are_named(make, words):
-    with pytest.raises(fc.MeshError, match=words):
-        make()
-
-
 SIZES = {"R": 2.0, "size": 1.0, "contact_size": 0.2, "contact_radius": 0.5}
 
 

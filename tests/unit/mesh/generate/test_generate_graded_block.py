@@ -53,22 +53,3 @@ def test_the_contact_is_the_finely_meshed_part_of_the_top():
     assert reach[2] == 0.0
     whole = fc.generate.graded_block("quad4", width=1.0, contact_radius=1.0)
     assert whole.cell_groups["CONTACT"].tolist() == whole.cell_groups["TOP"].tolist()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"element": "line2"}, "element"),
-        ({"width": 0.0}, "width = 0"),
-        ({"depth": -1.0}, "depth = -1"),
-        ({"contact_radius": 11.0}, "contact_radius = 11 .* at most width = 10"),
-        ({"contact_size": 3.0}, "contact_size = 3 .* at most size = 2.5"),
-        ({"size": 11.0}, "size = 11"),
-        ({"growth": 2.0}, "growth = 2"),
-        ({"contact_radius_y": 1.0}, "contact_radius_y = 1.0 has no effect on quad4"),
-        ({"element": "hex8", "contact_radius_y": 20.0}, "contact_radius_y = 20"),
-    ],
-)
-def test_bad_arguments_are_named(arguments, words):
-    with pytest.raises(fc.MeshError, match=words):
-        fc.generate.graded_block(**arguments)

@@ -222,32 +222,3 @@ def test_default_quadrangles_have_positive_jacobians_and_reasonable_angles(eleme
 
 
 # Arguments
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"element": "tri5"}, ["element 'tri5'", "tri3"]),
-        ({"body": "uper"}, ["did you mean 'upper'"]),
-        ({"R": 0.0}, ["R = 0", "greater than 0"]),
-        ({"R": math.nan}, ["R must be a finite number"]),
-        ({"R": "wide"}, ["R of half_spheres must be a number", "wide"]),
-        ({"size": -1.0}, ["size = -1", "greater than 0"]),
-        ({"size": 51.0}, ["size = 51", "at most R = 50"]),
-        ({"size": 2.0, "contact_size": 3.0}, ["contact_size = 3", "at most size = 2"]),
-        ({"contact_radius": 3.0}, ["contact_radius", "uniform"]),
-        ({"contact_size": 1.0, "contact_radius": 40.0}, ["contact_radius = 40", "between 0 and 25"]),
-        ({"segments": 3}, ["segments = 3", "tri3"]),
-        ({"element": "quad4", "size": 2.0}, ["size = 2", "quad4"]),
-        ({"element": "quad4", "segments": 0}, ["segments = 0", "at least 1"]),
-        ({"element": "quad4", "segments": 2.5}, ["segments = 2.5", "whole"]),
-        ({"element": "quad4", "arc_sizes": 0.2}, ["arc_sizes", "two numbers"]),
-        ({"element": "quad4", "arc_sizes": (0.2, 0.0)}, ["arc_sizes[1] = 0"]),
-        ({"element": "quad4", "radial_sizes": (30.0, 1.0)}, ["radial_sizes[0] = 30", "at most 25"]),
-    ],
-)
-def test_bad_arguments_are_named_with_their_range(arguments, words):
-    with pytest.raises(fc.MeshError) as error:
-        (fc.generate.quarter_disc if "body" in arguments else fc.generate.half_spheres)(**arguments)
-    for word in words:
-        assert word in str(error.value)

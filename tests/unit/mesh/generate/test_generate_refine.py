@@ -131,11 +131,6 @@ def test_new_points_of_an_arc_lie_on_it_and_join_its_ends():
     assert made.point("C1") == mesh.point("C1")
 
 
-def test_quadratic_cells_are_refused_with_the_remedy():
-    with pytest.raises(fc.MeshError, match="quad8 cannot be refined locally: use `linearised`"):
-        Forest(fc.generate.block((1.0, 1.0), (2, 2), "quad8"))
-
-
 R = 50.0
 ARCS = (Circle((0.0, -R), R, "CONT1"), Circle((0.0, -R), R, "D1B1"))
 

@@ -135,21 +135,3 @@ def test_mirroring_commutes_with_mid_nodes():
     first, second = mirrored(to_quadratic(mesh), "x"), to_quadratic(mirrored(mesh, "x"))
     centres = [mesh.points[mesh.cells["quad8"]].mean(axis=1) for mesh in (first, second)]
     assert centres[0] == pytest.approx(centres[1])
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda mesh: mirrored(mesh, "z"), "axis"),
-        (lambda mesh: transformed(mesh, scale=-1.0), "scale = -1"),
-        (lambda mesh: transformed(mesh, translate=(1.0,)), "translate must be 2 numbers"),
-        (lambda mesh: union(), "at least one mesh"),
-        (lambda mesh: union(mesh, fc.Mesh([[0, 0, 0.0]], {})), "one dimension"),
-        (lambda mesh: merge_points(mesh, -1.0), "tolerance = -1"),
-        (lambda mesh: merge_points(mesh, 0.6), "shortest edge"),
-        (lambda mesh: transformed(fc.Mesh([[0, 0, 0.0]], {}), rotate=3.0), "2D"),
-    ],
-)
-def test_bad_arguments_are_named(call, words):
-    with pytest.raises(fc.MeshError, match=words):
-        call(patch())
