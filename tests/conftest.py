@@ -1,7 +1,5 @@
 """Shared fixtures: locations of validation cases, and small models."""
 
-from __future__ import annotations
-
 import atexit
 import functools
 import gc

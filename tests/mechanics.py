@@ -4,8 +4,6 @@ Each function returns numbers that vanish in an exact solution, relative to the 
 ``bench/random_models.py`` say how far they may be from zero.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Read a file like a user, and judge the outcome."""
 
-from __future__ import annotations
-
 import warnings
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Small valid files of every supported format, from which the fuzzer starts."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import shutil

@@ -1,7 +1,5 @@
 """After a kill, every feature with a history resumes with the bits of an uninterrupted run, in every array."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

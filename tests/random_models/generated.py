@@ -1,7 +1,5 @@
 """Random models on meshes of the generators: discs, spheres, cylinders, rings, graded and crowned blocks."""
 
-from __future__ import annotations
-
 import numpy as np
 from bodies import FLAT, Random
 from drawing import Draft, add_contact, add_obstacle, materials

@@ -1,7 +1,5 @@
 """Contact zones of code_aster's specs: formulation, options, rigid surfaces, and unsupported features."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 

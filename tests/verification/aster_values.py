@@ -4,8 +4,6 @@ A value is read as code_aster writes it: LAGS_C and PRES are negative in compres
 per radian, a reduction runs over all nodes that carry the component.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

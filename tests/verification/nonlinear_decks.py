@@ -3,8 +3,6 @@
 ``PYTHONPATH=.:tests python tests/verification/nonlinear_decks.py`` runs CalculiX (``ccx``) on all and writes the file.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

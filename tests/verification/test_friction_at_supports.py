@@ -328,8 +328,7 @@ def quietly(model):
 def test_a_slice_and_a_side_that_is_drawn_are_determined():
     """Where the whole side is held, as in plane strain, there is no traction; where one slides over the other, friction."""
     model = elastic_model(blocks("hex8", 3), "3d")
-    for side in ("A_YMIN", "A_YMAX", "B_YMIN", "B_YMAX", "A_ZMAX", "B_ZMIN"):
-        model.fix(side, "y")
+    supported(model, A_YMIN="y", A_YMAX="y", B_YMIN="y", B_YMAX="y", A_ZMAX="y", B_ZMIN="y")
     supported(model, A_ZMIN="xz", A_ZMAX="x", B_ZMIN={"x": 0.1}, B_ZMAX={"x": 0.1, "z": -0.01})
     model.add_contact("c", secondary="B_ZMIN", primary="A_ZMAX", friction=0.2)
     (step,) = quietly(model)

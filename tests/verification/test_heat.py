@@ -195,10 +195,7 @@ def column(conductance, gap, alpha=1e-5, k=(50.0, 20.0), E=2e11):
     model = fc.Model(mesh, "plane_strain")
     for body, own in zip(("UPPER", "LOWER"), k, strict=True):
         model.add_material(fc.LinearElastic(E=E, nu=0.0, expansion=alpha, conductivity=own), body)
-    for group in ("LOWER_BOTTOM", "UPPER_TOP"):
-        model.fix(group, "y")
-    for group in ("LOWER", "UPPER"):
-        model.fix(group, "x")
+    supported(model, LOWER_BOTTOM="y", UPPER_TOP="y", LOWER="x", UPPER="x")
     model.fix_temperature("UPPER_TOP", 100.0)
     model.fix_temperature("LOWER_BOTTOM", 0.0)
     model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", clearance=gap, conductance=conductance)

@@ -105,8 +105,7 @@ def column(alpha, conductance=law_of_contact, element="quad8"):
     for body, own in K.items():
         model.add_material(fc.LinearElastic(E=STIFFNESS, nu=0.0, expansion=alpha, conductivity=own), body)
         model.fix(body, "x")
-    for group in ("LOWER_BOTTOM", "UPPER_TOP"):
-        model.fix(group, "y")
+    supported(model, LOWER_BOTTOM="y", UPPER_TOP="y")
     model.fix_temperature("UPPER_TOP", 100.0)
     model.fix_temperature("LOWER_BOTTOM", 0.0)
     model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", conductance=conductance)
@@ -200,8 +199,8 @@ def test_a_plastic_law_that_does_not_yield_exchanges_heat_as_a_linear_one():
         mesh = fc.generate.block_on_block("quad4", **BARS)
         model = fc.Model(mesh, "axisymmetric")
         model.add_material(law(E=2e11, nu=0.3, expansion=1e-5, conductivity=50.0, volumetric="mean_dilatation"))
-        for group in ("LOWER_BOTTOM", "UPPER_TOP"):
-            model.fix(group, "y")
+        model.fix("LOWER_BOTTOM", "y")
+        model.fix("UPPER_TOP", "y")
         model.fix_temperature("UPPER_TOP", 100.0)
         model.add_film("LOWER_BOTTOM", 500.0, 0.0)
         model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.3, conductance=law_of_contact)

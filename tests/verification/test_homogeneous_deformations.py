@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from models import made_of
+from models import made_of, supported
 from pairwise import first_of
 from scipy.optimize import brentq
 
@@ -177,9 +177,7 @@ def sphere(element: str, n: int) -> tuple[float, float, float]:
     towards = np.column_stack([np.tan(0.25 * np.pi * place[:, :2]), np.ones(mesh.n_points)])
     towards /= np.linalg.norm(towards, axis=1)[:, None]
     mesh = mesh.replace(points=towards * (1.0 + place[:, 2:]))
-    model = made_of(mesh, "3d", LAW, strain="finite")
-    for group in ("XMIN", "YMIN", "XMAX", "YMAX"):
-        model.fix(group, "normal")
+    model = made_of(mesh, "3d", LAW, strain="finite", XMIN="normal", YMIN="normal", XMAX="normal", YMAX="normal")
     blown = {axis: lambda points, k=k: (FAR - 1.0) * points[:, k] for k, axis in enumerate("xyz")}
     model.prescribe("ZMIN", **blown)
     step = fc.solve(model, 3)[-1]
@@ -213,9 +211,7 @@ def squeezed(element: str, n: int) -> tuple[float, float]:
     """Squeeze a block between rough plates by a fifth of its height; return the force [force] and max |J - 1| of cells."""
     mesh = fc.generate.box((1.0, 1.0, 0.5), (n, n, n // 2), element=element)
     model = made_of(mesh, "3d", LAW, strain="finite", ZMIN="z", ZMAX="xy")
-    model.prescribe("ZMAX", z=-0.1)
-    for group, axis in (("XMIN", "x"), ("YMIN", "y")):
-        model.fix(group, axis)
+    supported(model, ZMAX={"z": -0.1}, XMIN="x", YMIN="y")
     step = fc.solve(model, 2)[-1]
     return -step.reaction[mesh.points_of("ZMAX"), 2].sum(), float(np.abs(step.cell_fields["J"] - 1.0).max())
 

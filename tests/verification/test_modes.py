@@ -288,8 +288,7 @@ def test_sides_that_repeat_each_other_at_a_corner_hold_once():
     found = model.add_contacts(kind="tied")
     assert len(found) >= 2
     alone = model_of(parts[2], "plane_strain")
-    for side in ("BOTTOM", "LEFT"):
-        alone.fix(side, "xy")
+    supported(alone, BOTTOM="xy", LEFT="xy")
     assert fc.modes(model, n=3).frequencies == pytest.approx(fc.modes(alone, n=3).frequencies, rel=1e-9)
 
 

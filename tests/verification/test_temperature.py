@@ -94,10 +94,7 @@ def test_a_held_body_is_pressed_by_its_expansion(element):
     for nu in (0.3, 0.4999):
         material = fc.LinearElastic(E, nu, expansion=ALPHA)
         model = made_of(plane(element, "plane_strain"), "plane_strain", material)
-        for side in ("LEFT", "RIGHT"):
-            model.fix(side, "x")
-        for side in ("TOP", "BOTTOM"):
-            model.fix(side, "y")
+        supported(model, LEFT="x", RIGHT="x", TOP="y", BOTTOM="y")
         model.add_temperature(np.full(model.mesh.n_points, RISE), ramp=[(0.0, 0.0), (0.5, 2.0), (1.0, -1.0)])
         steps = fc.solve(model, fc.linear_ramp(2))
         pressure = E / (1 - 2 * nu) * ALPHA * RISE

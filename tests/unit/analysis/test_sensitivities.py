@@ -1,7 +1,5 @@
 """Sensitivities compared with differences of solutions, in every formulation, dimension and kind of parameter."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -217,8 +215,8 @@ def test_sides_that_end_in_planes_of_symmetry(angle, multipliers, secondary):
         model = fc.Model(mesh, kinematics="plane_strain")
         model.add_material(fc.LinearElastic(E=E, nu=0.3), "INNER")
         model.add_material(fc.LinearElastic(E=70e3, nu=0.33), "OUTER")
-        for plane, axis in (("SYMMETRY_X", "x"), ("SYMMETRY_Y", "y")):
-            model.prescribe(plane, **{"normal" if angle else axis: 0.0})
+        model.prescribe("SYMMETRY_X", **{"normal" if angle else "x": 0.0})
+        model.prescribe("SYMMETRY_Y", **{"normal" if angle else "y": 0.0})
         model.add_pressure("BORE", 20.0 * load)
         sides = {"secondary": f"CONT_{secondary}", "primary": f"CONT_{other}"}
         options = {"clearance": clearance, "formulation": "mortar", "multipliers": multipliers}
@@ -439,9 +437,7 @@ def test_bolts_before_and_after_their_lock():
         "CUT", lambda x: np.abs(x[:, 1] - 1.0) < 1e-9, between=True
     )
     mesh = fc.generate.cut(mesh, "CUT")
-    model = elastic_model(mesh, "plane_stress", nu=0.0)
-    for end in ("BOTTOM", "TOP"):
-        model.fix(end, "xy")
+    model = elastic_model(mesh, "plane_stress", nu=0.0, BOTTOM="xy", TOP="xy")
     model.add_pretension("bolt", "CUT", force=3.0, locked_from=1.0, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)])
     point = int(np.argmax(mesh.points[:, 1] * (mesh.points[:, 1] < 0.6)))  # half a length from the bottom
     first = fc.solve(model, [1.0])[-1]

@@ -1,7 +1,5 @@
 """Any value of any key of a case file is read, or one line names the file and the key."""
 
-from __future__ import annotations
-
 import copy
 import functools
 import math

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, made_of
+from models import elastic_model, made_of, supported
 
 import fastcontact as fc
 from fastcontact.elasticity.stiffness import rigid_modes, sparsity, stiffness
@@ -197,9 +197,7 @@ def test_pure_bending_is_exact_with_quadratic_cells(element):
 def test_bar_in_tension_is_exact(element, linear_solver):
     size, strain = (3.0, 1.0, 2.0), 2e-3
     model = made_of(box(size, (3, 2, 2), element), "3d", {"BOX": fc.LinearElastic(E, NU)})
-    for group, axis in (("XMIN", "x"), ("YMIN", "y"), ("ZMIN", "z")):
-        model.fix(group, axis)
-    model.prescribe("XMAX", x=strain * size[0])
+    supported(model, XMIN="x", YMIN="y", ZMIN="z", XMAX={"x": strain * size[0]})
     steps = fc.solve(model, fc.linear_ramp(2), linear_solver=linear_solver)
     expected = model.mesh.points * [strain, -NU * strain, -NU * strain]
     assert np.abs(steps[1].displacement - expected).max() < 1e-8 * strain

@@ -171,8 +171,7 @@ def test_the_stiffness_of_the_ground_has_no_limit(kinematics):
     """It adds to the diagonal alone: a spring of any stiffness is a support."""
     held, hung = block_on_springs(1e30, kinematics), block_on_springs(1.0, kinematics)
     hung.springs.clear()
-    for corner in ("BOTTOM_LEFT", "BOTTOM_RIGHT"):
-        hung.fix(corner, "y")
+    supported(hung, BOTTOM_LEFT="y", BOTTOM_RIGHT="y")
     for model in (held, hung):
         model.fix("LEFT", "x")
     np.testing.assert_allclose(last(held).displacement, last(hung).displacement, rtol=1e-10, atol=1e-15)

@@ -230,9 +230,7 @@ def test_an_obstacle_that_moves_into_held_nodes():
 
 
 def test_an_interference_between_nodes_that_are_held_on_both_sides():
-    model = elastic_model(block_on_block())
-    for group in ("LOWER_BOTTOM", "UPPER_TOP", "LOWER_LEFT", "UPPER_LEFT"):
-        model.fix(group, "xy")
+    model = elastic_model(block_on_block(), LOWER_BOTTOM="xy", UPPER_TOP="xy", LOWER_LEFT="xy", UPPER_LEFT="xy")
     model.add_contact("pair", secondary="CONT_LOWER", primary="CONT_UPPER", clearance=-0.02)
     (text,) = told(model)
     assert "supports push 1 of the 9 nodes of 'CONT_LOWER' into 'CONT_UPPER', contact 'pair', by up to 0.02" in text

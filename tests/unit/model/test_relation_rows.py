@@ -197,8 +197,8 @@ def test_a_ring_held_round_about_is_lames():
     radius, angle = 1.0 + mesh.points[:, 0], 0.3 + 0.9 * mesh.points[:, 1]
     mesh = mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
     model, round_about = model_of(mesh), fc.CylindricalAxes()
-    for end in ("BOTTOM", "TOP"):
-        model.fix(end, "y", axes=round_about)
+    model.fix("BOTTOM", "y", axes=round_about)
+    model.fix("TOP", "y", axes=round_about)
     model.prescribe("LEFT", x=0.01, axes=round_about)
     step = last(model)
     # u = A r + B / r without stress outside: A / (1 - 2 nu) = B / 4.
@@ -215,10 +215,7 @@ def test_a_ring_held_round_about_is_lames():
 def bar(cut=True):
     mesh = fc.generate.block((1.0, 2.0), (2, 4))
     mesh = mesh.with_facet_group("CUT", lambda x: np.abs(x[:, 1] - 1.0) < 1e-9, between=True)
-    model = elastic_model(fc.generate.cut(mesh, "CUT") if cut else mesh, "plane_stress")
-    for end in ("TOP", "BOTTOM"):
-        model.fix(end, "xy")
-    return model
+    return elastic_model(fc.generate.cut(mesh, "CUT") if cut else mesh, "plane_stress", TOP="xy", BOTTOM="xy")
 
 
 @pytest.mark.parametrize(

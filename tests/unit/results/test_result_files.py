@@ -1,7 +1,5 @@
 """Result files: bitwise round trip, readable by other programs, and no step lost by failures."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import importlib.util

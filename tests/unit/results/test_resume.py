@@ -1,7 +1,5 @@
 """Result files survive any end of their writer, can be continued, and hold many steps."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import os

@@ -1,7 +1,5 @@
 """Tables and short displays of results, meshes, models, studies and pictures."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import io

@@ -1,7 +1,5 @@
 """XDMF sidecars and Grace project files: other programs read the same numbers."""
 
-from __future__ import annotations
-
 import math
 import os
 import re
