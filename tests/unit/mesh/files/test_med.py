@@ -1,5 +1,6 @@
 """MED files: compared with the MED library and medcoupling, files of code_aster, and round trips."""
 
+import contextlib
 import dataclasses
 import json
 import shutil
@@ -31,6 +32,15 @@ def all_elements():
     return mesh.with_groups(
         {"everything": every, "upper row": every[1::2], "one": [3], "nobody": []}, {"P": [0], "Q": [0, 5, 7], "R": [5]}
     )
+
+
+@contextlib.contextmanager
+def changed(path):
+    """Write a mesh of all elements; give its group in the file, and that of its only step, to be changed."""
+    write_med_mesh(path, all_elements())
+    with h5py.File(path, "a") as file:
+        mesh = file["ENS_MAA/mesh"]
+        yield mesh, next(iter(mesh.values()))
 
 
 def some_steps(mesh, count=3):
@@ -377,10 +387,7 @@ def test_reads_med_2_as_the_med_library_converts_it(tmp_path):
 
 def test_first_of_several_time_steps_is_read(tmp_path):
     path = tmp_path / "moving.med"
-    write_med_mesh(path, all_elements())
-    with h5py.File(path, "a") as file:
-        mesh = file["ENS_MAA/mesh"]
-        first = next(iter(mesh))
+    with changed(path) as (mesh, first):
         mesh.copy(first, f"{1:020d}{-1:020d}")
         later = mesh[f"{1:020d}{-1:020d}"]
         later.attrs["NDT"] = 1
@@ -390,10 +397,8 @@ def test_first_of_several_time_steps_is_read(tmp_path):
 
 def test_numbers_and_families_may_be_absent(tmp_path):
     path = tmp_path / "bare.med"
-    write_med_mesh(path, all_elements())
-    with h5py.File(path, "a") as file:
-        del file["FAS"]
-        step = next(iter(file["ENS_MAA/mesh"].values()))
+    with changed(path) as (mesh, step):
+        del mesh.file["FAS"]
         for entry in [step["NOE"], *step["MAI"].values()]:
             del entry["FAM"]
     mesh = read_med(path).mesh
@@ -448,11 +453,9 @@ def test_no_mesh_and_two_meshes(tmp_path):
 
 def test_unknown_kinds_are_named_and_counted(tmp_path):
     path = tmp_path / "foreign.med"
-    write_med_mesh(path, all_elements())
-    with h5py.File(path, "a") as file:
-        cells = next(iter(file["ENS_MAA/mesh"].values()))["MAI"]
-        cells.move("TR6", "TR7")
-        cells.create_dataset("POG/INN", data=[1, 4, 8, 13])
+    with changed(path) as (_, step):
+        step["MAI"].move("TR6", "TR7")
+        step["MAI"].create_dataset("POG/INN", data=[1, 4, 8, 13])
     with pytest.raises(MeshError, match=r"3 cells of kind POG, 2 cells of kind TR7.*use only.* SE2"):
         read_med(path)
 
@@ -460,9 +463,8 @@ def test_unknown_kinds_are_named_and_counted(tmp_path):
 @pytest.mark.parametrize(("attribute", "value", "message"), [("TYP", 1, "structured grid"), ("REP", 1, "cylindrical")])
 def test_meshes_of_another_kind(tmp_path, attribute, value, message):
     path = tmp_path / "other.med"
-    write_med_mesh(path, all_elements())
-    with h5py.File(path, "a") as file:
-        file["ENS_MAA/mesh"].attrs[attribute] = value
+    with changed(path) as (mesh, _):
+        mesh.attrs[attribute] = value
     with pytest.raises(MeshError, match=f"mesh 'mesh' of .*{message}"):
         read_med(path)
 
@@ -483,9 +485,7 @@ def test_meshes_of_another_kind(tmp_path, attribute, value, message):
 )
 def test_damage_is_named(tmp_path, where, values, message):
     path = tmp_path / "damaged.med"
-    write_med_mesh(path, all_elements())
-    with h5py.File(path, "a") as file:
-        step = next(iter(file["ENS_MAA/mesh"].values()))
+    with changed(path) as (_, step):
         attributes = dict(step[where].attrs)
         del step[where]
         if values is not None:
@@ -497,9 +497,8 @@ def test_damage_is_named(tmp_path, where, values, message):
 
 def test_family_that_is_not_described_is_counted(tmp_path):
     path = tmp_path / "family.med"
-    write_med_mesh(path, all_elements())
-    with h5py.File(path, "a") as file:
-        next(iter(file["ENS_MAA/mesh"].values()))["NOE/FAM"][:3] = 77
+    with changed(path) as (_, step):
+        step["NOE/FAM"][:3] = 77
     with pytest.warns(FastcontactWarning, match="3 cells or points belong to family 77"):
         read_med(path)
 
@@ -516,10 +515,9 @@ def test_links_out_of_the_file_are_refused(tmp_path):
 def test_values_in_another_file_are_refused(tmp_path):
     path = tmp_path / "outside.med"
     for make in ("external", "virtual"):
-        write_med_mesh(path, all_elements())
         np.zeros(140).tofile(tmp_path / "numbers.bin")
-        with h5py.File(path, "a") as file:
-            points = next(iter(file["ENS_MAA/mesh"].values()))["NOE"]
+        with changed(path) as (_, step):
+            points = step["NOE"]
             del points["COO"]
             if make == "external":
                 points.create_dataset("COO", 140, float, external=[(str(tmp_path / "numbers.bin"), 0, 140 * 8)])
@@ -533,10 +531,9 @@ def test_values_in_another_file_are_refused(tmp_path):
 
 def test_soft_links_inside_the_file_are_followed(tmp_path):
     path = tmp_path / "soft.med"
-    write_med_mesh(path, all_elements())
-    with h5py.File(path, "a") as file:
-        file.move("ENS_MAA/mesh", "elsewhere")
-        file["ENS_MAA/mesh"] = h5py.SoftLink("/elsewhere")
+    with changed(path) as (mesh, _):
+        mesh.file.move("ENS_MAA/mesh", "elsewhere")
+        mesh.file["ENS_MAA/mesh"] = h5py.SoftLink("/elsewhere")
     assert read_med(path).mesh.n_points == 70
 
 
