@@ -14,7 +14,6 @@ from stepping import Stepping
 import fastcontact as fc
 from fastcontact.analysis import active_set
 from fastcontact.analysis.active_dofs import ActiveDofs
-from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
@@ -115,7 +114,7 @@ def started(related=False, friction=0.0, name="direct"):
         model.couple("CONT2", "y")
     model.prescribe("A2B2", y=-2.0)
     model.add_contact("c", secondary="CONT1", primary="CONT2", formulation="node_to_segment", friction=friction)
-    return Stepping(model, name, 1e-14, Criteria(geometry=1e-8), fc.linear_ramp(2))
+    return Stepping(model, name, 1e-14, fc.Criteria(geometry=1e-8), fc.linear_ramp(2))
 
 
 def contact_dofs(analysis):

@@ -8,7 +8,6 @@ from scipy.sparse.linalg import splu
 from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis.criteria import Criteria
 from fastcontact.elasticity.constrained_system import supports_apart
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.linear import choice as linear
@@ -236,7 +235,7 @@ def test_only_a_few_loads_are_kept():
 
 def test_a_ramp_costs_one_factorisation_and_a_solution_a_step(forma04):
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(2.0, 4.0), radial_sizes=(2.0, 6.0), segments=5)
-    analysis = Stepping(forma04(mesh), "direct", 1e-10, Criteria(), fc.linear_ramp(5))
+    analysis = Stepping(forma04(mesh), "direct", 1e-10, fc.Criteria(), fc.linear_ramp(5))
     updates = [analysis.step(k, k / 5).iterations["geometry_updates"] for k in range(1, 6)]
     assert min(updates) >= 2
     assert analysis.solver.counters.setups == 1

@@ -25,7 +25,6 @@ from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh.files import meshio_process
 from fastcontact.mesh.files.med import add_field, write_med_mesh
 from fastcontact.mesh.files.meshio_content import Block, build_mesh
-from fastcontact.results.med import write_med_results
 
 HEAP = b"GCOL\x01\0\0\0"
 
@@ -350,7 +349,7 @@ def test_data_sets_that_are_too_large_together(tmp_path, results):
     """A few kilobytes can hold any number of names of one data set of zeros."""
     mesh = tmp_path / "mesh.med"
     write_med_mesh(mesh, MESH)
-    write_med_results(tmp_path / "fields.rmed", MESH, [step_result(1)])
+    fc.write_med_results(tmp_path / "fields.rmed", MESH, [step_result(1)])
     for path in (mesh, tmp_path / "fields.rmed", results):
         with h5py.File(path, "r+") as file:
             file.create_dataset("zeros", (1 << 24,), "f8", chunks=(1 << 20,), compression="gzip")
