@@ -87,7 +87,7 @@ def test_a_clearance_is_not_a_penetration_beside_the_facets():
         fc.generate.block((50.0, 2.0), (50, 2), "quad8"), "plane_strain", E=200e3, LEFT="x", RIGHT="xy"
     )
     model.add_pressure("TOP", 5.0)
-    floor = obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, clearance=0.5)
     step = fc.solve(model, 1)[-1]
     assert step.contact["floor"].normal_force > 100.0
