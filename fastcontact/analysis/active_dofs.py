@@ -40,8 +40,6 @@ class ActiveDofs:
 
     Attributes
     ----------
-    condensed : bool
-        Whether the stiffness is condensed to the active unknowns.
     compared : ndarray of int
         Positions, among the active components, of those on which contact depends.
     determined : ndarray of int
@@ -51,7 +49,6 @@ class ActiveDofs:
     def __init__(
         self, system: System, contact_dofs: Indices, springs: Indices, unknowns: Indices | None = None
     ) -> None:
-        self.condensed = unknowns is not None
         involved, all_dofs = np.union1d(contact_dofs, springs), np.arange(len(system.free))
         self._dofs, self._unknowns = (all_dofs, all_dofs) if unknowns is None else (involved, unknowns)
         self.compared, self.determined = (np.searchsorted(self._dofs, dofs) for dofs in (contact_dofs, involved))

@@ -17,7 +17,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
 from fastcontact.linear.delassus import InverseColumns, check_rows, solve_multipliers, symmetric
 from fastcontact.linear.field_compliance import FieldCompliance
-from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
+from fastcontact.linear.protocol import Counters, LinearSolver, Loaded, Monitor
 from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
@@ -173,7 +173,7 @@ class FactorSolver(LinearSolver):
         return self.factors.solve(f)
 
 
-class LoadedFactor:
+class LoadedFactor(Loaded):
     """The factors of a `FactorSolver` with a right-hand side f (n,); see `linear.protocol.Loaded`.
 
     `free` (n,) is the solution without equations [length].
@@ -190,20 +190,11 @@ class LoadedFactor:
         if B.shape[0] == 0:
             return self._free, np.empty(0)
         multiplier = solve_multipliers(self._solver.columns.of_rows(B), c - B @ self._free, C)
-        return self.involved_solution(B.T @ multiplier, guess), multiplier
+        return self.full_solution(B.T @ multiplier), multiplier
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
         return R @ self._free, self._solver.columns.of_rows(R)
-
-    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
-        """See `Loaded`."""
-        change = self._change_of_last(force) if elsewhere is not None else None
-        if elsewhere is None or change is None:
-            return self.full_solution(force)
-        u, last = elsewhere.copy(), self._solver.last
-        u[last] = self._free[last] + change
-        return u
 
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
@@ -211,26 +202,19 @@ class LoadedFactor:
             return self._solver.refined(self._f + force)
         if not force.any():
             return self._free.copy()
-        change = self._change_of_last(force)
-        if change is None:
-            return self._solver.back_substitute(self._f + force)
-        self._solver.counters.iterations += 1
-        return self._free + self._solver.factors.harmonic_extension(change)
-
-    def condensed(self) -> CondensedProblem | None:
-        """See `Loaded`."""
-        last = self._solver.last
-        return None if last is None else CondensedProblem(self._solver.inverse, self._free[last])
-
-    def _change_of_last(self, force: Array) -> Array | None:
-        """Return the displacements (m,) of the unknowns `last` due to forces (n,); None if they act on other unknowns."""
         last = self._solver.last
         if last is None or np.count_nonzero(force) != np.count_nonzero(force[last]):
-            return None
-        return np.asarray(self._solver.inverse @ force[last])
+            return self._solver.back_substitute(self._f + force)
+        self._solver.counters.iterations += 1
+        return self._free + self._solver.factors.harmonic_extension(self._solver.inverse @ force[last])
+
+    def condensed(self) -> Loaded:
+        """See `Loaded`."""
+        last = self._solver.last
+        return self if last is None else CondensedProblem(self._solver.inverse, self._free[last])
 
 
-class CondensedProblem:
+class CondensedProblem(Loaded):
     """The system after static condensation to the k unknowns that equations may involve; see `linear.protocol.Loaded`.
 
     All vectors have the length k.
@@ -262,14 +246,6 @@ class CondensedProblem:
         """See `Loaded`."""
         return R @ self._free, symmetric(R @ (R @ self._inverse).T)
 
-    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
-        """See `Loaded`."""
-        return np.asarray(self._free + self._inverse @ force)
-
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
-        return self.involved_solution(force, None)
-
-    def condensed(self) -> CondensedProblem:
-        """See `Loaded`."""
-        return self
+        return np.asarray(self._free + self._inverse @ force)
