@@ -216,19 +216,19 @@ def test_loads_that_others_combine_to_cost_nothing():
         solved.append(f)
         return np.linalg.solve(A, f)
 
-    known, (f, g) = KnownLoads(), np.random.default_rng(5).normal(size=(2, 8))
+    known, (f, g) = KnownLoads(8), np.random.default_rng(5).normal(size=(2, 8))
     for load in (f, 0.3 * f, g, 2.0 * f - 0.1 * g, 0.0 * f):
         np.testing.assert_allclose(A @ known.solution(load, solve), load, atol=1e-14)
     assert len(solved) == 2
-    other = KnownLoads()
-    other.put_back(known.snapshot(), 8, solve)
+    other = KnownLoads(8)
+    other.put_back(known.snapshot(), solve)
     solved.clear()
     np.testing.assert_array_equal(other.solution(f + g, solve), known.solution(f + g, solve))
     assert not solved
 
 
 def test_only_a_few_loads_are_kept():
-    known, rng = KnownLoads(), np.random.default_rng(6)
+    known, rng = KnownLoads(20), np.random.default_rng(6)
     for _ in range(7):
         known.solution(rng.normal(size=20), lambda f: f)
     assert len(known.snapshot()) == 4
