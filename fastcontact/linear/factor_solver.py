@@ -192,7 +192,7 @@ class LoadedFactor(Loaded):
         if B.shape[0] == 0:
             return self._free, np.empty(0)
         multiplier = solve_multipliers(self._solver.columns.of_rows(B), c - B @ self._free, C)
-        return self.full_solution(B.T @ multiplier), multiplier
+        return self.involved_solution(B.T @ multiplier, guess), multiplier
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
@@ -209,6 +209,15 @@ class LoadedFactor(Loaded):
             return self._solver.back_substitute(self._f + force)
         self._solver.counters.iterations += 1
         return self._free + self._solver.factors.harmonic_extension(self._solver.inverse @ force[last])
+
+    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
+        """See `Loaded`."""
+        last = self._solver.last
+        if elsewhere is None or last is None or np.count_nonzero(force) != np.count_nonzero(force[last]):
+            return self.full_solution(force)
+        u = elsewhere.copy()
+        u[last] = self._free[last] + self._solver.inverse @ force[last]
+        return u
 
     def condensed(self) -> Loaded:
         """See `Loaded`."""

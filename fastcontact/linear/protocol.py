@@ -97,6 +97,14 @@ class Loaded(Protocol):
         `u` (n,) is the result of `solve` with the same forces, if available [length].
         """
 
+    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
+        """Return ``K^-1 (f + force)`` (n,) [length], valid only at the `involved` unknowns of `LinearSolver.prepare`.
+
+        If computing the other unknowns takes additional work, a solver copies them from `elsewhere` (n,), if this is given.
+        Likewise, `solve` copies them from its `guess`.
+        """
+        return self.full_solution(force)
+
     def condensed(self) -> Loaded:
         """Return the system after static condensation to the `involved` unknowns of `LinearSolver.prepare`.
 

@@ -59,7 +59,8 @@ def solve(
     accuracy : Accuracy
         Tolerances and limits.
     u : ndarray (n,)
-        Initial guess of iterative solvers [length].
+        Initial guess of iterative solvers, and values of the unknowns that constraints do not involve, see
+        `Loaded.involved_solution` [length].
     guess : Solution, optional
         Solution of a similar problem, from whose forces to start; ignored if its number of constraints is different.
     path : Path, optional
@@ -77,7 +78,7 @@ def solve(
     included = usable if coupled else usable & initial
     iterations = 0
     while True:
-        solution = _with_included(included, loaded, constraints, closed, forces, path)
+        solution = _with_included(included, loaded, constraints, closed, u, forces, path)
         solution.gap[~usable], solution.slip[~usable] = np.inf, 0.0
         iterations += solution.iterations
         missing = usable & ~included & (solution.gap < 0.0)
@@ -139,8 +140,8 @@ def _lag(loaded: Loaded, constraints: Constraints, path: Path, y: Array) -> Arra
 
 
 def _with_included(
-    included: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, forces: Array | None, path: Path | None
-) -> Solution:
+    included: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None, path: Path | None
+) -> Solution:  # fmt: skip
     """Return the solution with only the `included` constraints (m,), by the dense Delassus operator.
 
     The gaps and slips of the other constraints follow from the displacements. The other parameters are those of `solve`, with
@@ -187,7 +188,7 @@ def _with_included(
     y = result.y
     if Q is not None:
         y, gaps_of_included = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ gaps_of_included.ravel()).reshape(y.shape)
-    u = loaded.full_solution(R.T @ y.ravel())
+    u = loaded.involved_solution(R.T @ y.ravel(), u)
     all_forces = np.zeros((1 + k, m))
     gaps = gaps_at_rest + np.stack([matrix @ u for matrix in (constraints.B, *constraints.tangents)])
     all_forces[:, rows], gaps[:, rows] = y, gaps_of_included

@@ -219,6 +219,7 @@ class _Loaded(LoadedMultigrid):
 
     solve = _with_fallback(LoadedMultigrid.solve)
     delassus = _with_fallback(LoadedMultigrid.delassus)
+    involved_solution = _with_fallback(LoadedMultigrid.involved_solution)
     full_solution = _with_fallback(LoadedMultigrid.full_solution)
 
     @functools.cached_property
