@@ -117,7 +117,7 @@ def test_texts_in_a_mesh_file_are_not_read(tmp_path):
             {"shape": (4,), "maxshape": (None,), "dtype": "u1", "chunks": (2**30,)},
             r"1.07e\+09 bytes",
         ),
-        ("fastcontact/mesh/elements", {"shape": (10**6,), "dtype": h5py.string_dtype()}, "1000000 texts or references"),
+        ("fastcontact/mesh/elements", {"shape": (10**6,), "dtype": h5py.string_dtype()}, "1000000 strings or"),
         ("fastcontact/versions", {"data": ["{}"], "dtype": h5py.string_dtype()}, "is not a string"),
         ("fastcontact/case", {"data": "x", "dtype": h5py.string_dtype(), "chunks": None}, "Expecting value"),
         ("fastcontact/mesh/cell_groups/sizes", {"data": np.zeros(10**6, np.int64)}, r"6 names for sizes of shape"),
