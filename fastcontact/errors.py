@@ -106,8 +106,8 @@ LONGEST_NAME = 120  # largest number of characters of an unknown name in a messa
 MAX_SHOWN = 20  # largest number of known names in the message about an unknown one
 # Smallest similarity ratio (difflib) of a name that is suggested; that of "loads" and "nodes" is 0.6.
 SIMILARITY = 0.65
-# Names in fastcontact, separated by blanks, by words that users may know from other programs or from other parts of
-# fastcontact.
+# Words that users may know from other programs or from other parts of fastcontact, with the corresponding names in
+# fastcontact, separated by spaces.
 OTHER_WORDS = {
     "slave": "secondary", "master": "primary", "mu": "friction", "interference": "clearance", "gap": "clearance",
     "h": "coefficient", "k": "coefficient", "plane": "half_space", "circle": "sphere", "ball": "sphere",

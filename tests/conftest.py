@@ -1,7 +1,5 @@
 """Shared fixtures: locations of validation cases, and small models."""
 
-from __future__ import annotations
-
 import atexit
 import functools
 import gc
@@ -14,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from models import elastic_model
 from pairwise import mark_the_rest
 
 import fastcontact as fc
@@ -176,11 +175,7 @@ def forma04():
     """A function that sets up the training case on a mesh."""
 
     def make(mesh: fc.Mesh, formulation: str = "node_to_segment", *, contact: bool = True, **options) -> fc.Model:
-        model = fc.Model(mesh, kinematics="axisymmetric")
-        model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-        model.fix("A1A2", "x")
-        model.prescribe("A2B2", y=-2.0)
-        model.prescribe("A1B1", y=+2.0)
+        model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": +2.0})
         if contact:
             model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation, **options)
         return model

@@ -4,8 +4,6 @@ Each function returns numbers that vanish in an exact solution, relative to the 
 ``bench/random_models.py`` say how far they may be from zero.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +36,7 @@ def out_of_balance(model: fc.Model, step: fc.StepResult, factor: float, toleranc
     internal = (K @ step.displacement.ravel()).reshape(step.displacement.shape)
     external = sum((factor * model.load_vector(load) for load in model.loads), np.zeros_like(internal))
     external = sum((factor * heat for heat in model.thermal_forces_by_ramp().values()), external)
-    contact = contact_forces(model, step)
+    contact = contact_forces(step)
     largest = max(np.abs(part).max(initial=0.0) for part in (external, contact, step.reaction))
     noise = max(ROUND_OFF, 10 * tolerance) * (abs(K) @ np.abs(step.displacement).ravel()).max(initial=0.0)
     residual = float(np.abs(internal - contact - external - step.reaction).max())
@@ -55,9 +53,9 @@ def stiffness_of(model: fc.Model) -> csr_array:
     return stiffness(model.mesh, model.kinematics, field.moduli, field.loops, None, field.treatment)
 
 
-def contact_forces(model: fc.Model, step: fc.StepResult) -> np.ndarray:
+def contact_forces(step: fc.StepResult) -> np.ndarray:
     """Return the contact forces (n_points, dim) on all nodes, those of both sides [force]."""
-    total = np.zeros(model.mesh.points.shape)
+    total = np.zeros(step.displacement.shape)
     for found in step.contact.values():
         np.add.at(total, found.points, found.force_vectors)
         np.add.at(total, found.primary_points, found.primary_force_vectors)

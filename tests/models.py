@@ -9,13 +9,20 @@ import fastcontact as fc
 from fastcontact.mesh import elements
 
 
-def elastic_model(mesh, kinematics=None, E=1000.0, nu=0.3, **held):
+def elastic_model(mesh, kinematics=None, E=1000.0, nu=0.3, **given):
     """Return a model of one elastic material with supports, as for `supported`: ``elastic_model(mesh, ZMIN="xyz")``.
 
     Meshes of the plane are in plane strain unless told otherwise.
     """
-    model = fc.Model(mesh, kinematics or ("3d" if mesh.dim == 3 else "plane_strain"))
-    model.add_material(fc.LinearElastic(E=E, nu=nu))
+    kinematics = kinematics or ("3d" if mesh.dim == 3 else "plane_strain")
+    return made_of(mesh, kinematics, fc.LinearElastic(E=E, nu=nu), **given)
+
+
+def made_of(mesh, kinematics, material, strain="small", reference_temperature=0.0, **held):
+    """Return a model of one material, or of one for each group in a dictionary, with supports, as for `supported`."""
+    model = fc.Model(mesh, kinematics, strain=strain, reference_temperature=reference_temperature)
+    for group, given in (material if isinstance(material, dict) else {None: material}).items():
+        model.add_material(given, group)
     return supported(model, **held)
 
 

@@ -5,11 +5,11 @@ import subprocess
 import sys
 
 
-def printed(code, *arguments, folder=None, given=None, **environment):
-    """Return what code prints in a new process, with further variables in its environment and `given` on standard input."""
-    command, variables = (
-        [sys.executable, "-c", code, *arguments],
-        os.environ | {k: str(v) for k, v in environment.items()},
-    )
-    done = subprocess.run(command, input=given, capture_output=True, text=True, check=True, env=variables, cwd=folder)
-    return done.stdout
+def printed(code, *arguments, folder=None, given=None, timeout=None, **environment):
+    """Return what code prints in a new process within `timeout` seconds.
+
+    Its environment has further variables, and its standard input is `given`.
+    """
+    how = {"env": os.environ | {name: str(value) for name, value in environment.items()}, "cwd": folder, "input": given}
+    command = [sys.executable, "-c", code, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=True, timeout=timeout, **how).stdout

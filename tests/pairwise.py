@@ -6,8 +6,6 @@ with the mark `pairwise` runs a covering array of its cases by default, all of t
 pairs (those of elements and formulations: `test_every_solver` and the patch tests).
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Sequence
 from itertools import combinations

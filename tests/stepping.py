@@ -1,7 +1,5 @@
 """Single load steps, for tests of the analysis."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from unittest.mock import patch

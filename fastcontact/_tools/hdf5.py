@@ -1,4 +1,4 @@
-"""Safe reading of HDF5 files from untrusted sources, and writing of HDF5 files with write errors that Python can handle.
+"""Safe reading of HDF5 files from untrusted sources, and writing that reports a write error as a Python exception.
 
 No data outside a file are read, and damage is reported. All groups and data sets are checked before any data are read. Only
 numbers and strings of fixed length are read: strings of variable length are stored in a heap of the file, and HDF5 does not
@@ -55,9 +55,9 @@ def open_hdf5(path: PathLike) -> Iterator[Any]:
 def check_contents(file: Any, path: PathLike) -> None:
     """Check an open HDF5 file before anything in it is read.
 
-    Raises FileError if a link or the values of a data set refer to another file, if a data set needs an external filter, if
-    the data sets need more memory than is plausible for a file of this size, or if groups are nested cyclically or too
-    deeply.
+    Raises FileError if a link refers to another file, if the values of a data set are stored in another file, if a data set
+    needs an external filter, if the data sets need more memory than is plausible for a file of this size, or if groups are
+    nested cyclically or too deeply.
     """
     from h5py import h5d, h5g, h5o
     from h5py.h5l import TYPE_HARD, TYPE_SOFT
@@ -88,7 +88,7 @@ def check_contents(file: Any, path: PathLike) -> None:
             elif isinstance(item, h5g.GroupID):
                 address = h5o.get_info(item).addr
                 if address in seen or depth >= DEEPEST:
-                    raise FileError(f"'{path}' has cyclic or too deep groups, at '{name[:80]}': write it again")
+                    raise FileError(f"'{path}' has cyclic or too deeply nested groups at '{name[:80]}': write it again")
                 seen.add(address)
                 waiting.append((item, name, depth + 1))
 
@@ -105,7 +105,7 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
     size = count * item
     # Each string or reference becomes a Python object, and takes space in the file.
     if count > max(FEW_OBJECTS, file_size // 8) and dataset.dtype.hasobject:
-        raise FileError(f"{where} declares {count} texts or references, which its file cannot hold: write it again")
+        raise FileError(f"{where} declares {count} strings or references, which its file cannot hold: write it again")
     if layout == h5d.CHUNKED:
         chunk = int(np.prod([int(n) for n in settings.get_chunk()], dtype=object)) * item
         built_in = (h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SZIP,
@@ -113,7 +113,7 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
         filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
         # HDF5 would search the shared libraries of the system for an unknown filter.
         if not set(filters) <= set(built_in):
-            raise FileError(f"{where} is packed by the filter {filters[0]}, which HDF5 may lack: use gzip")
+            raise FileError(f"{where} is compressed with the filter {filters[0]}, which HDF5 may lack: use gzip")
         if dataset.get_storage_size() > 2 * (size + chunk) + PLAUSIBLE_BYTES:
             raise FileError(f"{where} is larger compressed than uncompressed: the file is damaged, write it again")
         size = max(size, chunk)

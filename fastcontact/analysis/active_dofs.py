@@ -40,8 +40,8 @@ class ActiveDofs:
 
     Attributes
     ----------
-    condensed : bool
-        Whether the stiffness is condensed to the active unknowns.
+    active : ndarray of int (k,)
+        The active components.
     compared : ndarray of int
         Positions, among the active components, of those on which contact depends.
     determined : ndarray of int
@@ -51,13 +51,12 @@ class ActiveDofs:
     def __init__(
         self, system: System, contact_dofs: Indices, springs: Indices, unknowns: Indices | None = None
     ) -> None:
-        self.condensed = unknowns is not None
         involved, all_dofs = np.union1d(contact_dofs, springs), np.arange(len(system.free))
-        self._dofs, self._unknowns = (all_dofs, all_dofs) if unknowns is None else (involved, unknowns)
-        self.compared, self.determined = (np.searchsorted(self._dofs, dofs) for dofs in (contact_dofs, involved))
+        self.active, self._unknowns = (all_dofs, all_dofs) if unknowns is None else (involved, unknowns)
+        self.compared, self.determined = (np.searchsorted(self.active, dofs) for dofs in (contact_dofs, involved))
         free = diags_array(system.free.astype(float), format="csr")
         T = free if system.T is None else system.T @ free
-        self._system, self._T = system, csr_array(csr_array(T)[self._dofs][:, self._unknowns])
+        self._system, self._T = system, csr_array(csr_array(T)[self.active][:, self._unknowns])
         self._transpose = csr_array(self._T.T)
 
     # The largest absolute value of the unknowns that are condensed; set by `for_step`.
@@ -70,15 +69,6 @@ class ActiveDofs:
         condensed[self._unknowns] = 0.0
         step._largest_condensed = largest(condensed)
         return step
-
-    def of(self, u: Array) -> Array:
-        """Return the active components (k,) of `u`."""
-        return u[self._dofs]
-
-    def put(self, u: Array, active: Array) -> Array:
-        """Replace the active components of all displacements `u` by `active`, in place; return `u`."""
-        u[self._dofs] = active
-        return u
 
     def constraints(self, constraints: Constraints, lift: Array, start: Array) -> Constraints:
         """Return constraints on all displacements as constraints on the active unknowns.
@@ -97,10 +87,10 @@ class ActiveDofs:
             return without_remnants(csr_array(reduced[:, self._unknowns]), rows, NOTABLE), offset
 
         B, gap0 = on_unknowns(constraints.B, constraints.gap0)
-        slips = [slip - T @ start for T, slip in zip(constraints.tangents, constraints.slip0, strict=True)]
-        pairs = [on_unknowns(T, slip) for T, slip in zip(constraints.tangents, slips, strict=True)]
-        slip0 = np.reshape([slip for _, slip in pairs], constraints.slip0.shape)
-        return replace(constraints, B=B, gap0=gap0, tangents=tuple(T for T, _ in pairs), slip0=slip0)
+        tangents, slip0 = list(constraints.tangents), np.empty_like(constraints.slip0)
+        for k, T in enumerate(constraints.tangents):
+            tangents[k], slip0[k] = on_unknowns(T, constraints.slip0[k] - T @ start)
+        return replace(constraints, B=B, gap0=gap0, tangents=tuple(tangents), slip0=slip0)
 
     def unknowns(self, u: Array, lift: Array) -> Array:
         """Return the active unknowns (l,) of displacements `u` that satisfy supports and multi-point constraints."""
@@ -108,7 +98,7 @@ class ActiveDofs:
 
     def displacement(self, v: Array, lift: Array) -> Array:
         """Return the active components (k,) for active unknowns `v`."""
-        return np.asarray(lift[self._dofs] + self.varied(v))
+        return np.asarray(lift[self.active] + self.varied(v))
 
     def varied(self, v: Array) -> Array:
         """Return the change (k,) of the active components due to a change `v` of the active unknowns."""
@@ -116,7 +106,7 @@ class ActiveDofs:
 
     def reduced(self, force: Array) -> Array:
         """Return the generalised forces (l,) on the active unknowns, given nodal forces (n,) [force]."""
-        return np.asarray(self._transpose @ force[self._dofs])
+        return np.asarray(self._transpose @ force[self.active])
 
     def numbers(self, unknowns: Indices) -> Indices:
         """Return the positions (k,) of `unknowns` (k,), numbers of unknowns of the system, among the active unknowns."""

@@ -13,7 +13,7 @@ The pressure of a fluid between the contact surfaces is a term.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,7 +24,6 @@ from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, largest
-from fastcontact.elasticity.constrained_system import Stiffness
 from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies
 from fastcontact.elasticity.springs import Springs, ground_force, spring_force, spring_stiffness
 from fastcontact.errors import ConvergenceError
@@ -45,35 +44,11 @@ class Term(Protocol):
     def residual(self, u: Array) -> tuple[Array, Energies]:
         """Return the nodal forces (n_dofs,) of the term at u [force], and its energies."""
 
-    def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array | csr_array | None:
+    def tangent(self, u: Array) -> bsr_array | csr_array:
         """Return the derivative (n, n) of the nodal forces with respect to the n displacements of points [force / length].
 
-        The caller may modify the matrix. None means that the derivative is constant, and included in the matrix that
-        `problem.prepare` passed to the linear solver. `geometric` selects how much of the geometric stiffness is included,
-        see `NonlinearBodies.at`.
+        The caller may modify the matrix.
         """
-
-    def commit(self, u: Array, state: State) -> State:
-        """Return `state` with the history variables of the term at u, the end of the load step.
-
-        By default a term has no history variables, and the state is returned unchanged.
-        """
-        return state
-
-
-class LinearBodies(Term):
-    """Linear bodies and springs, with the constant stiffness matrix K (n_dofs, n_dofs) of the problem [force / length]."""
-
-    def __init__(self, K: Stiffness) -> None:
-        self._K = K
-
-    def residual(self, u: Array) -> tuple[Array, Energies]:
-        """See `Term`."""
-        force = self._K @ u
-        return force, (0.5 * float(u @ force), 0.0)
-
-    def tangent(self, u: Array, geometric: int = WHOLE) -> None:
-        """See `Term`."""
 
 
 class Bodies(Term):
@@ -111,15 +86,11 @@ class Bodies(Term):
         return force, (bodies.energy, bodies.plastic_work)
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
-        """See `Term`."""
+        """See `Term`; `geometric` selects how much of the geometric stiffness is included, see `NonlinearBodies.at`."""
         if geometric < WHOLE or u is self._tangent_passed_at:
             return self._problem.deformed(u, self._start, self._rise, geometric=geometric).K
         self._tangent_passed_at = u
         return self.at(u).K
-
-    def commit(self, u: Array, state: State) -> State:
-        """See `Term`."""
-        return replace(state, history=self.at(u).history)
 
 
 class SpringForces(Term):
@@ -135,7 +106,7 @@ class SpringForces(Term):
         force[: self._n] = spring_force(self._springs, mesh_displacement)
         return force, (0.5 * float(force[: self._n] @ mesh_displacement), 0.0)
 
-    def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
+    def tangent(self, u: Array) -> csr_array:
         """See `Term`."""
         return self._K
 
@@ -172,13 +143,13 @@ class FollowingForce(Term):
         force[: current.size] = -self._factor * (current - self._included).ravel()
         return force, (0.0, 0.0)
 
-    def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
+    def tangent(self, u: Array) -> csr_array:
         """See `Term`."""
         return self._factor * self._stiffness(self._displacement(u))
 
 
 class Terms:
-    """The sum of the terms of a load step.
+    """The sum of the terms of a load step; for linear bodies and springs, the product of the stiffness and u.
 
     Parameters
     ----------
@@ -195,18 +166,22 @@ class Terms:
 
     def __init__(self, problem: Problem, start: State, load: StepLoad) -> None:
         self.bodies = None if problem.bodies is None else Bodies(problem, start, load)
-        self._terms: list[Term] = [LinearBodies(problem.system.K)]
+        self._terms: list[Term] = []
+        self._K = problem.system.K
         if self.bodies is not None:
             springs, n = problem.model.springs, problem.model.n_dofs
-            self._terms = [self.bodies, *([SpringForces(springs, n)] if springs else [])]
+            self._terms = [SpringForces(springs, n)] if springs else []
             for (pressure, _), factor in zip(problem.following, load.following, strict=True):
                 force, tangent = (lambda u, index=index, at=pressure.at: at(u)[index] for index in (0, 1))
                 self._terms.append(FollowingForce(problem, force, tangent, np.zeros_like(start.u), factor))
 
     def residual(self, u: Array, others: Sequence[Term] = ()) -> tuple[Array, Energies]:
         """Return the sums of the nodal forces and of the energies of all terms, including the terms `others`; see `Term`."""
-        force, energy = self._terms[0].residual(u)
-        for term in (*self._terms[1:], *others):
+        if self.bodies is None:
+            force = self._K @ u
+            return force, (0.5 * float(u @ force), 0.0)
+        force, energy = self.bodies.residual(u)
+        for term in (*self._terms, *others):
             added, stored = term.residual(u)
             force, energy = force + added, (energy[0] + stored[0], energy[1] + stored[1])
         return force, energy
@@ -215,16 +190,9 @@ class Terms:
         """Return the sum of the tangents, see `Term`, of nonlinear bodies and all other terms."""
         assert self.bodies is not None
         K = self.bodies.tangent(u, geometric)
-        for term in self._terms[1:]:
-            if (tangent := term.tangent(u)) is not None:
-                K = sum_of_blocks(K, tangent)
-        return K
-
-    def commit(self, u: Array, state: State) -> State:
-        """See `Term`."""
         for term in self._terms:
-            state = term.commit(u, state)
-        return state
+            K = sum_of_blocks(K, term.tangent(u))
+        return K
 
 
 @dataclass(frozen=True, eq=False)

@@ -179,7 +179,8 @@ def _settle(
             )  # fmt: skip
             return replace(settled, scatter=scatter)
         next_pairing = mixing.next(settled, last_update, displacement, tolerances)
-        iterate.u = iterate.u if next_pairing is None else step.dofs.put(iterate.u, next_pairing)
+        if next_pairing is not None:
+            iterate.u[step.dofs.active] = next_pairing
         tolerances.tighten(last_update.relative, solution.residual)
         late = update >= max(limit // 2, PATIENT_UPDATES) and not iterate.rounded
         if late and any(pair.alternates(constraints.parts[name]) for name, pair in problem.pairs.items()):
@@ -188,7 +189,8 @@ def _settle(
             mixing.restart()
             window.forget()
     if problem.until_settled:
-        change = step.dofs.put(np.zeros_like(iterate.u), displacement - last_update.before)
+        change = np.zeros_like(iterate.u)
+        change[step.dofs.active] = displacement - last_update.before
         raise ConvergenceError(geometry_moves(problem, iterate.history, change, limit), iterate.history)
     touching.check(step, constraints, solution, 0.0, 0.0, iterate.u)
     if touching.due or touching.unfinished:
@@ -224,8 +226,8 @@ def _store_solution(
     step: StepContext, iterate: Iterate, constraints: StackedConstraints, solution: Solution, displacement: Array
 ) -> _Update:
     """Store a solution, and its displacements (k,) of the components of `step.dofs` [length], in the iterate."""
-    before = step.dofs.of(iterate.u)
-    iterate.u = step.dofs.put(iterate.u, displacement)
+    before = iterate.u[step.dofs.active]
+    iterate.u[step.dofs.active] = displacement
     # The unknowns of the solution do not include rigid-body motions of floating bodies, which may be much larger.
     size = max(step.dofs.size(solution.u), largest(step.load.lift))
     change = largest(displacement - before)
@@ -317,7 +319,8 @@ def newton_step(
     nodes : SharedNodes, optional
         Nodes that several pairs, or both ends of a period, share.
     """
-    u = step.dofs.put(step.state.u.copy(), image)
+    u = step.state.u.copy()
+    u[step.dofs.active] = image
     displacement = step.problem.displacement(u)
     if nodes is not None:
         solution = nodes.with_distributed_forces(solution, constraints, u)
@@ -327,15 +330,13 @@ def newton_step(
         respond = solution.response()
     except LinAlgError:
         return None
-    n_dofs, where = len(step.load.lift), step.dofs.compared
-    gaps = np.zeros((1 + len(constraints.tangents), len(constraints)))
+    where, gaps = step.dofs.compared, np.zeros((1 + len(constraints.tangents), len(constraints)))
 
     def response_along(v: Array) -> Array:
         """Return the active components (k,) of ``S'(u) v`` for the components v on which contact depends."""
-        active = np.zeros_like(image)
-        active[where] = v
-        u = step.dofs.put(np.zeros(n_dofs), active)
-        force, nodal = np.zeros(n_dofs), step.problem.displacement(u)
+        u, force = np.zeros((2, len(step.load.lift)))
+        u[step.problem.contact_dofs] = v
+        nodal = step.problem.displacement(u)
         for rows, part in parts:
             forces, slips = part.along(nodal)
             gaps[: len(slips), rows] = slips

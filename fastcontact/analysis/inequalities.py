@@ -261,7 +261,8 @@ def _with_floating_bodies(
         nonlocal last_active, guess
         shifted_lift = lift + bodies.rigid(anchor)
         solution = _solve(step, constraints, iterate, last_active, accuracy, shifted_lift, guess)
-        last_active, guess = solution.wanted, dofs.put(guess.copy(), dofs.displacement(solution.u, shifted_lift))
+        last_active, guess = solution.wanted, guess.copy()
+        guess[dofs.active] = dofs.displacement(solution.u, shifted_lift)
         return solution
 
     def failure(text: str, **options: bool) -> ConvergenceError:

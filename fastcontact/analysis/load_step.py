@@ -103,8 +103,9 @@ def _end_of_step(
         start, u=u, largest_force=balance.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
         instant=instant[1], rise=None if heat_solution is None else heat_solution.rise,
     )  # fmt: skip
-    end = solution.terms.commit(u, end)
     bodies = None if solution.terms.bodies is None else solution.terms.bodies.at(u)
+    if bodies is not None:
+        end = replace(end, history=bodies.history)
     # In the first step, which begins without a history, the path is unknown.
     flows = problem.bodies is not None and problem.bodies.flows_freely and load.rise is None
     if problem.bodies is not None and bodies is not None and flows and start.history:

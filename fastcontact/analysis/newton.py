@@ -340,9 +340,8 @@ class _Newton:
             u0, bodies = self._iterate.u, problem.floating_bodies
             lift = load.lift if bodies is None else load.lift + bodies.rigid(u0[bodies.dofs])
             dofs = problem.dofs.for_step(u0, lift)
-            reduced = loaded.condensed() if dofs.condensed else loaded
-            assert reduced is not None  # a solver that condenses has chosen these degrees of freedom
-            step = replace(self._begin, problem=problem, load=load, loaded=reduced, dofs=dofs, extrapolation=start)
+            condensed = loaded.condensed()
+            step = replace(self._begin, problem=problem, load=load, loaded=condensed, dofs=dofs, extrapolation=start)
             paired = self._settled if self._moved_fully and problem.linearised_at is None else None
             settled = settle_geometry(step, self._iterate, paired)
             self._iterate = settled.iterate

@@ -155,8 +155,7 @@ def solve_steps(
         prepare, ramp=ramp, criteria=criteria, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
         linear_precision=linear_precision,
     )  # fmt: skip
-    earlier = _touched_pairs(resume), _peaks(resume)
-    return _solved_steps(model, ramp, prepare_model, instants, case, last, earlier)
+    return _solved_steps(model, ramp, prepare_model, instants, case, last, _peaks(resume))
 
 
 def _kernel_sets(model: Model, linear_solver: str) -> list[str]:
@@ -165,17 +164,6 @@ def _kernel_sets(model: Model, linear_solver: str) -> list[str]:
     default = chosen(dim, model.mesh.n_points * dim, quadratic=quadratic_and_linear(model))[0]
     multigrid = "amg" in (linear_solver, default if linear_solver == "auto" else "")
     return [f"{dim}d", *([f"{dim}d amg"] if multigrid else [])]
-
-
-def _touched_pairs(steps: Sequence[StepResult]) -> frozenset[str]:
-    """Return the names of the contact pairs that were closed at the end of any of the steps."""
-    touched: set[str] = set()
-    # In reverse order, because in most analyses all pairs are closed in the last step.
-    for step in reversed(steps):
-        touched |= {name for name, contact in step.contact.items() if contact.active.any()}
-        if len(touched) == len(step.contact):
-            break
-    return frozenset(touched)
 
 
 def _peaks(steps: Iterable[StepResult], earlier: Mapping[str, Peak] | None = None) -> dict[str, Peak]:
@@ -190,9 +178,9 @@ def _peaks(steps: Iterable[StepResult], earlier: Mapping[str, Peak] | None = Non
 
 def _solved_steps(
     model: Model, ramp: Ramp, prepare_model: Callable[[Model], Problem], instants: list[float], case: dict[str, Any],
-    last: StepResult | None, earlier: tuple[frozenset[str], dict[str, Peak]],
+    last: StepResult | None, peaks: dict[str, Peak],
 ) -> Iterator[StepResult]:  # fmt: skip
-    """Yield the steps at `instants`, after the step `last`; `earlier` holds the `_touched_pairs` and `_peaks` until then."""
+    """Yield the steps at `instants`, after the step `last`; `peaks` are the `_peaks` until then."""
     model_texts = model_warnings(model, ramp)
     for text in model_texts if last is None else ():
         warn(text)
@@ -200,7 +188,7 @@ def _solved_steps(
     for text in problem.warnings if last is None else ():  # before the first step: the warning may explain its failure
         warn(text)
     model_texts += problem.warnings
-    touched, peaks = earlier
+    touched = frozenset(name for name, (_, _, contact) in peaks.items() if contact[name].active.any())
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
     begin, last_index = problem.ramp.table[0][0], 0
     # The first step in which the positions of bodies are undetermined, and their names.

@@ -78,11 +78,11 @@ def response(loaded: Loaded, R: csr_array, rows: Indices, forces_of: Callable[[A
         Function that returns the change ((1 + k) q,) of their normal and tangential forces [force], given a change
         ((1 + k) q,) of their gaps and slips [length].
     """
-    at_rest, transpose = loaded.involved_solution(np.zeros(R.shape[1]), None), csr_array(R.T)
+    at_rest, transpose = loaded.full_solution(np.zeros(R.shape[1])), csr_array(R.T)
 
     def respond(force: Array, gaps: Array) -> Array:
-        u = loaded.involved_solution(force, None) - at_rest
-        return u + loaded.involved_solution(transpose @ forces_of(R @ u + gaps[:, rows].ravel()), None) - at_rest
+        u = loaded.full_solution(force) - at_rest
+        return u + loaded.full_solution(transpose @ forces_of(R @ u + gaps[:, rows].ravel())) - at_rest
 
     return respond
 

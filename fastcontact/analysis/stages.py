@@ -1,7 +1,7 @@
 """The model of a load step, if parts of it are temporary.
 
-Pretension sections are locked from an instant on, and constraints, prescribed temperatures and convection films may act
-only in some load steps. The model of a step contains those that act in this step.
+Pretension sections are locked from a given instant on, and constraints, prescribed temperatures and convection films may
+act only in some load steps. The model of a step, called its stage, contains those that act in this step.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def next_stage(
 
 
 def _names(model: Model) -> list[str]:
-    """Return the names of the constraints, and of the temporary temperatures and films, of a model."""
+    """Return the names of the constraints of a model and of its temporary temperatures and films."""
     temporary = [load for load in model.heat_loads if isinstance(load, TemporaryHeat)]
     return [*(relation.name for relation in model.relations), *(load.label for load in temporary)]
 

@@ -191,9 +191,7 @@ class State:
 
 
 def _as_list(value: Any) -> Any:
-    """Return the value of an attribute as a list if it is a tuple or a `Worn`, and unchanged otherwise."""
-    if isinstance(value, Worn):
-        return [value.depth, value.pressure, value.largest_rate]
+    """Return the value of an attribute as a list if it is a tuple, such as a `Worn`, and unchanged otherwise."""
     return list(value) if isinstance(value, tuple) else value
 
 

@@ -6,7 +6,7 @@ distance. In this module m is the number of secondary nodes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,7 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.results.step import ContactResult
 
 
-@dataclass(frozen=True, eq=False)
-class Worn:
+class Worn(NamedTuple):
     """Wear of a contact pair at the end of a load step.
 
     Attributes

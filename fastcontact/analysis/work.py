@@ -189,7 +189,11 @@ def contact_work(
     directions = np.stack(constraints.directions, axis=1) if k else no_tangents
     force, slips = (np.einsum("mk,mkd->md", values, directions) for values in (tangents, slip))
     after = _forces(pair, constraints, normal, tangents, force, contact, _added_gaps(pair, configuration, contact))
-    before = before or _no_forces(after)
+    if before is None:  # no forces before the first step
+        before = replace(
+            after, positions=after.positions[:0], rows=(np.empty(0), np.empty(0, np.int32), np.zeros(1, np.int32)),
+            energy=after.energy[:0], tangential=0.0 * after.tangential, pressing=0.0 * after.pressing, stored=0.0,
+        )  # fmt: skip
     areas = constraints.finite_areas
     pressure, traction = before.at(constraints.positions)
     ratio = np.divide(pressure * areas, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
@@ -265,16 +269,6 @@ def _forces(
         constraints.positions, normal * inverse_area, force * inverse_area[:, None], penetration * normal,
         (rows.data, rows.indices, rows.indptr), nodal_forces.reshape(-1, dim),
         np.einsum("nd,nd->n", force_vectors, normals), added, 0.5 * (stored + float((amplitudes**2).sum())),
-    )  # fmt: skip
-
-
-def _no_forces(forces: ContactForces) -> ContactForces:
-    """Return contact forces that are zero, with the sizes of `forces`, as the state before the first step."""
-    dim = forces.positions.shape[1]
-    rows = np.empty(0), np.empty(0, np.int32), np.zeros(1, np.int32)
-    return ContactForces(
-        np.empty((0, dim)), np.empty(0), np.empty((0, dim)), np.empty(0), rows, np.zeros_like(forces.tangential),
-        np.zeros_like(forces.pressing), forces.added, 0.0,
     )  # fmt: skip
 
 

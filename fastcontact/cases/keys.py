@@ -1,4 +1,4 @@
-"""Keys of case files and the types of their values, with the checks of tables against both."""
+"""Keys of case files and the types of their values, and checks of tables against them."""
 
 from __future__ import annotations
 
@@ -82,9 +82,9 @@ TOP: dict[str, Any] = {
 
 
 def check_keys(where: str, data: Any, known: Mapping[str, Any], required: Iterable[str] = ()) -> None:
-    """Raise CaseError unless `data` is a table with all `required` keys and only keys and types of values listed in `known`.
+    """Raise CaseError unless `data` is a table with all `required` keys and no keys other than those in `known`.
 
-    The type None admits any value.
+    The values must have the types in `known`. The type None admits any value.
     """
     if not isinstance(data, dict):
         raise CaseError(f"'{where}' must be a table of keys, not {repr(data)}")

@@ -16,24 +16,24 @@ ARGUMENTS = {
     **_results.ARGUMENTS,
     "--png FILE": "write the picture to this file",
     "": {
-        "--history": "force and contact radius over the load steps instead",
+        "--history": "force and contact radius over the load steps instead of the mesh",
         "--axis": "stresses along the axis below the contact, compared with theory",
-        "--zones": "where the contact is open, closed and slides, over the load steps",
+        "--zones": "where the contact is open, closed or sliding, over the load steps",
         "--map": "pressure and shear (or --field contact_slip) over the contact (3D)",
         "--section PLANE": "a section, such as y=0 or x=12.5 (3D)",
-        "--animate FILE": "an animation over the load steps: .gif, with ffmpeg .mp4",
+        "--animate FILE": "an animation over the load steps: .gif, or .mp4 if ffmpeg is installed",
         "--view": "an interactive window (PyVista) instead of a picture",
     },
     "--field NAME": (
         "von_mises",
         "field that colours the mesh: von_mises (default), stress.xx, stress.principal_min, contact_damage ...",
     ),
-    "--phases N": (int, "with --animate: one period of vibration with the shape of --step, in N pictures"),
-    "--zoom LENGTH": (float, "half width of the part around the largest value to draw"),
+    "--phases N": (int, "with --animate: one period of the vibration mode selected by --step, in N frames"),
+    "--zoom LENGTH": (float, "half-width of the region that is drawn around the largest value"),
     "--mirrored": "draw the mirror image about the axis as well",
     "--scale SCALE": (
         float,
-        "factor on the displacements (default 1; a tenth of the size of the mesh for mode shapes)",
+        "factor on the displacements (default 1; mode shapes are scaled to a tenth of the mesh size)",
     ),
 }
 
@@ -68,7 +68,7 @@ def run(options: Namespace) -> int:
 
 
 def _plane(text: str) -> tuple[int, float]:
-    """Return the axis and the coordinate [length] of a plane such as ``y=0``; CaseError for other texts."""
+    """Return the axis and the coordinate [length] of a plane such as ``y=0``; CaseError for any other text."""
     name, _, value = text.partition("=")
     try:
         return "xyz".index(name.strip()), float(value)

@@ -53,7 +53,7 @@ class MaterialField:
     evaluations : sequence of EvaluationPoints
         Points at which varying materials are evaluated.
     owner : ndarray of int (n_moduli,)
-        Number of the material of each of the moduli.
+        Number of the material to which each matrix in `moduli` belongs.
     number, rows : dict of str to ndarray of int (n_cells,)
         Number of the material of each cell, and its row in `moduli` (that of the cell centre if the material varies), by
         solid element type.
@@ -78,13 +78,13 @@ class MaterialField:
 
     @cached_property
     def averaged(self) -> Mask:
-        """Which moduli (n_moduli,) have a mean dilatation; none in plane stress, where elements do not lock."""
+        """Mask (n_moduli,) of moduli used with a mean dilatation; none in plane stress, where elements do not lock."""
         averaged = np.array([material.averaged for material in self.materials], bool)
         return np.asarray(averaged[self.owner] & (self.kinematics != "plane_stress"))
 
     @cached_property
     def treatment(self) -> AnyArray:
-        """Codes (n_moduli,) of the strain treatment: 1 for a mean dilatation, 2 for incompatible modes, 0 for neither.
+        """Codes (n_moduli,) of the treatment of locking: 1 for a mean dilatation, 2 for incompatible modes, 0 for neither.
 
         3 means incompatible modes in the elements that support them, and a mean dilatation in others. In axisymmetry there
         are no incompatible modes.
@@ -114,7 +114,7 @@ class MaterialField:
 
     @cached_property
     def expansion(self) -> Array:
-        """Thermal strains (n_moduli, n_components) [1 / temperature]; NaN for materials without expansion."""
+        """Thermal expansion coefficients (n_moduli, n_components) [1 / temperature]; NaN for materials without expansion."""
         return self._evaluated(np.zeros(self.moduli.shape[:2]), "expansion_at")
 
     def _evaluated(self, values: Array, method: str) -> Array:
@@ -136,7 +136,7 @@ class MaterialField:
         Parameters
         ----------
         rise : ndarray (n_points,), optional
-            Temperature rise over the reference temperature [temperature]; zero by default.
+            Temperature rise above the reference temperature [temperature]; zero by default.
         states : sequence of (float, InitialState)
             Initial stresses and strains, each with its multiplier.
         n_points : int
@@ -157,9 +157,9 @@ class MaterialField:
 
     @cached_property
     def distinct(self) -> dict[str, Numbers]:
-        """Material numbers (n_cells,) by element type, equal for materials between which the stress is continuous.
+        """Material numbers (n_cells,) by element type; equal materials share one number.
 
-        These materials have the same moduli, axes and expansion.
+        Equal materials have the same moduli, axes and expansion, so that the stress is continuous across their interface.
         """
         first_number: dict[object, int] = {}
         laws = [_law(material, moduli) for material, moduli in zip(self.materials, self.moduli, strict=False)]
@@ -214,7 +214,7 @@ def material_field(
 
 
 def _law(material: Material, moduli: Array) -> tuple[object, ...]:
-    """Return a key that is equal for two materials if the stress is continuous between them."""
+    """Return a key that is equal for two materials if the stress is continuous across their interface."""
     constants = tuple(getattr(material, name, None) for name in MODULI) if material.graded else None
     compliance = b"" if material.graded else material.local_compliance.tobytes()
     if not material.varies:

@@ -17,7 +17,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
 from fastcontact.linear.delassus import InverseColumns, check_rows, solve_multipliers, symmetric
 from fastcontact.linear.field_compliance import FieldCompliance
-from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
+from fastcontact.linear.protocol import Counters, LinearSolver, Loaded, Monitor
 from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
@@ -34,9 +34,8 @@ STORED_LOADS = 4
 class KnownLoads:
     """The last right-hand sides and their solutions, for right-hand sides that are linear combinations of them."""
 
-    def __init__(self) -> None:
-        self._loads: list[Array] = []
-        self._solutions: list[Array] = []
+    def __init__(self, n: int) -> None:
+        self._loads = self._solutions = np.empty((0, n))
 
     def solution(self, f: Array, solve: Callable[[Array], Array]) -> Array:
         """Return the solution (n,) for the right-hand side f (n,).
@@ -46,32 +45,35 @@ class KnownLoads:
         norm = float(np.linalg.norm(f))
         if norm == 0.0:
             return np.zeros_like(f)
-        if self._loads:  # the least-squares approximation of f
+        if len(self._loads):  # the least-squares approximation of f
             weights, error = np.zeros(len(self._loads)), f
-            gram = np.array([[row @ column for column in self._loads] for row in self._loads])
             for _ in range(2):  # The second pass removes the error of the normal equations.
-                weights = weights + np.linalg.lstsq(gram, [load @ error for load in self._loads], rcond=None)[0]
-                error = f - sum((w * load for w, load in zip(weights, self._loads, strict=True)), np.zeros_like(f))
+                gram, right_side = self._loads @ self._loads.T, self._loads @ error
+                weights = weights + np.linalg.lstsq(gram, right_side, rcond=None)[0]
+                error = f - weights @ self._loads
             if np.linalg.norm(error) <= SUM_ROUND_OFF * norm:
-                return sum((w * u for w, u in zip(weights, self._solutions, strict=True)), np.zeros_like(f))
+                return np.asarray(weights @ self._solutions)
         f = f / norm
         u = solve(f)
-        self._loads, self._solutions = [*self._loads[1 - STORED_LOADS :], f], [*self._solutions[1 - STORED_LOADS :], u]
+        self._loads = np.vstack([self._loads[1 - STORED_LOADS :], f])
+        self._solutions = np.vstack([self._solutions[1 - STORED_LOADS :], u])
         return norm * u
 
     def snapshot(self) -> list[dict[str, Any]]:
         """Return the stored right-hand sides: the indices ``places`` and the ``values`` of their nonzero entries."""
         return [{"places": np.flatnonzero(f), "values": f[f != 0.0]} for f in self._loads]
 
-    def put_back(self, snapshot: Sequence[Mapping[str, Any]], n: int, solve: Callable[[Array], Array]) -> None:
+    def put_back(self, snapshot: Sequence[Mapping[str, Any]], solve: Callable[[Array], Array]) -> None:
         """Restore the right-hand sides of a `snapshot` for the same matrix (n, n); `solve` computes missing solutions."""
-        loads, solutions = [], []
-        for entry in snapshot:
-            f = np.zeros(n)
+        loads = np.zeros((len(snapshot), self._loads.shape[1]))
+        for f, entry in zip(loads, snapshot, strict=True):
             f[entry["places"]] = entry["values"]
-            stored = [u for load, u in zip(self._loads, self._solutions, strict=True) if np.array_equal(load, f)]
-            loads.append(f)
-            solutions.append(stored[0] if stored else solve(f))
+        if np.array_equal(loads, self._loads):
+            return
+        solutions = np.empty_like(loads)
+        for f, u in zip(loads, solutions, strict=True):
+            stored = np.flatnonzero((self._loads == f).all(axis=1))
+            u[:] = self._solutions[stored[0]] if len(stored) else solve(f)
         self._loads, self._solutions = loads, solutions
 
 
@@ -127,7 +129,7 @@ class FactorSolver(LinearSolver):
         last = np.empty(0, np.intp) if involved is None or len(involved) > LAST_UP_TO else involved
         self.factors = self._factorised(K, last)
         self.counters.setups += 1
-        self.columns, self.known_loads = InverseColumns(self.n, self.factors.inverse_entries), KnownLoads()
+        self.columns, self.known_loads = InverseColumns(self.n, self.factors.inverse_entries), KnownLoads(self.n)
         self.last = last if len(last) else None
         if self.last is not None:
             self.inverse = self.factors.last_inverse()
@@ -152,7 +154,7 @@ class FactorSolver(LinearSolver):
         """See `LinearSolver.put_back`."""
         self.refines = snapshot.get("refines", False)
         self.columns.put_back(snapshot["asked"])
-        self.known_loads.put_back(snapshot["loads"], self.n, self.factors.solve)
+        self.known_loads.put_back(snapshot["loads"], self.factors.solve)
 
     def improve(self, excess: float) -> bool:
         """Apply one step of iterative refinement in later solutions; see `LinearSolver.improve`."""
@@ -173,7 +175,7 @@ class FactorSolver(LinearSolver):
         return self.factors.solve(f)
 
 
-class LoadedFactor:
+class LoadedFactor(Loaded):
     """The factors of a `FactorSolver` with a right-hand side f (n,); see `linear.protocol.Loaded`.
 
     `free` (n,) is the solution without equations [length].
@@ -196,41 +198,34 @@ class LoadedFactor:
         """See `Loaded`."""
         return R @ self._free, self._solver.columns.of_rows(R)
 
-    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
-        """See `Loaded`."""
-        change = self._change_of_last(force) if elsewhere is not None else None
-        if elsewhere is None or change is None:
-            return self.full_solution(force)
-        u, last = elsewhere.copy(), self._solver.last
-        u[last] = self._free[last] + change
-        return u
-
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
         if self._solver.refines:
             return self._solver.refined(self._f + force)
         if not force.any():
             return self._free.copy()
-        change = self._change_of_last(force)
-        if change is None:
-            return self._solver.back_substitute(self._f + force)
-        self._solver.counters.iterations += 1
-        return self._free + self._solver.factors.harmonic_extension(change)
-
-    def condensed(self) -> CondensedProblem | None:
-        """See `Loaded`."""
-        last = self._solver.last
-        return None if last is None else CondensedProblem(self._solver.inverse, self._free[last])
-
-    def _change_of_last(self, force: Array) -> Array | None:
-        """Return the displacements (m,) of the unknowns `last` due to forces (n,); None if they act on other unknowns."""
         last = self._solver.last
         if last is None or np.count_nonzero(force) != np.count_nonzero(force[last]):
-            return None
-        return np.asarray(self._solver.inverse @ force[last])
+            return self._solver.back_substitute(self._f + force)
+        self._solver.counters.iterations += 1
+        return self._free + self._solver.factors.harmonic_extension(self._solver.inverse @ force[last])
+
+    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
+        """See `Loaded`."""
+        last = self._solver.last
+        if elsewhere is None or last is None or np.count_nonzero(force) != np.count_nonzero(force[last]):
+            return self.full_solution(force)
+        u = elsewhere.copy()
+        u[last] = self._free[last] + self._solver.inverse @ force[last]
+        return u
+
+    def condensed(self) -> Loaded:
+        """See `Loaded`."""
+        last = self._solver.last
+        return self if last is None else CondensedProblem(self._solver.inverse, self._free[last])
 
 
-class CondensedProblem:
+class CondensedProblem(Loaded):
     """The system after static condensation to the k unknowns that equations may involve; see `linear.protocol.Loaded`.
 
     All vectors have the length k.
@@ -262,14 +257,6 @@ class CondensedProblem:
         """See `Loaded`."""
         return R @ self._free, symmetric(R @ (R @ self._inverse).T)
 
-    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
-        """See `Loaded`."""
-        return np.asarray(self._free + self._inverse @ force)
-
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
-        return self.involved_solution(force, None)
-
-    def condensed(self) -> CondensedProblem:
-        """See `Loaded`."""
-        return self
+        return np.asarray(self._free + self._inverse @ force)

@@ -91,24 +91,27 @@ class Loaded(Protocol):
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """Return ``R K^-1 f`` (m,) [length] and the Delassus operator ``R K^-1 R.T`` (m, m) [length / force] for R (m, n)."""
 
+    def full_solution(self, force: Array, u: Array | None = None) -> Array:
+        """Return ``K^-1 (f + force)`` (n,) [length].
+
+        `u` (n,) is the result of `solve` with the same forces, if available [length].
+        """
+
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """Return ``K^-1 (f + force)`` (n,) [length], valid only at the `involved` unknowns of `LinearSolver.prepare`.
 
         If computing the other unknowns takes additional work, a solver copies them from `elsewhere` (n,), if this is given.
         Likewise, `solve` copies them from its `guess`.
         """
+        return self.full_solution(force)
 
-    def full_solution(self, force: Array, u: Array | None = None) -> Array:
-        """Return ``K^-1 (f + force)`` (n,) [length].
+    def condensed(self) -> Loaded:
+        """Return the system after static condensation to the `involved` unknowns of `LinearSolver.prepare`.
 
-        `u` (n,) is the result of `involved_solution` or `solve` with the same forces, if available [length].
+        The unknowns of the condensed system are the involved ones, in the order of `involved`. A solver that does not
+        condense returns the system itself.
         """
-
-    def condensed(self) -> Loaded | None:
-        """Return the system after static condensation to the `involved` unknowns; None if the solver does not condense.
-
-        The unknowns of the condensed system are the involved ones, in the order of `involved`.
-        """
+        return self
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,8 +71,7 @@ def nodal_rows(nodes: NDArray[np.integer], values: Array, n_dofs: int) -> csr_ar
     """Return rows (m, n_dofs) with the entries `values` (m, k, dim) in the columns of `nodes` (m, k)."""
     m, k, dim = values.shape
     columns = nodes[:, :, None].astype(np.intp) * dim + np.arange(dim)
-    rows = csr_array((values.flatten(), columns.ravel(), k * dim * np.arange(m + 1)), shape=(m, n_dofs))
-    rows.sum_duplicates()
+    rows = shapes_at(values.reshape(m, k * dim), columns.reshape(m, k * dim), n_dofs)
     rows.eliminate_zeros()
     return rows
 

@@ -17,7 +17,7 @@ from fastcontact.results.step import StepResult
 
 # Index of each MED component in the order xx, yy, zz, xy, yz, xz of this package; in MED files xz precedes yz.
 STRESSES = {"SIXX": 0, "SIYY": 1, "SIZZ": 2, "SIXY": 3, "SIXZ": 5, "SIYZ": 4}
-# Names of MED fields with contact fields, and of their components.
+# For each contact field, the name of the MED field and of its component.
 CONTACT = {
     "contact_pressure": ("PRES_CONT", "PRES"),
     "contact_wear": ("USUR_CONT", "USUR"),
@@ -30,8 +30,8 @@ CONTACT = {
 def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *, mesh_name: str = "mesh") -> None:
     """Write a mesh and the nodal results of all steps to a MED file, for Salome and ParaVis.
 
-    The file contains the following fields. Their instants are the load factors, and their order numbers the indices of the
-    steps:
+    The file contains the following fields. Their instants are the load factors, and their order numbers are the indices
+    of the steps:
 
     - DEPL (DX, DY [, DZ]): displacement [length].
     - SIEF_NOEU (SIXX, SIYY, SIZZ, SIXY [, SIXZ, SIYZ]): stress, in axisymmetry radial, axial, hoop and shear [pressure].
@@ -39,8 +39,9 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
     - REAC_NODA (DX, DY [, DZ]): reactions [force]. In axisymmetry they are integrated over the full circle, in code_aster
       over one radian.
     - PRES_CONT (PRES): contact pressure, zero at nodes outside the contact surfaces [pressure].
-    - USUR_CONT (USUR), ENDO_CONT (ENDO), PRES_FLUI (PRES), in models with wear, cohesive layers or adhesion, and fluid
-      pressures: depth of wear [length], damage [-] and fluid pressure [pressure], zero at the other nodes.
+    - USUR_CONT (USUR), in models with wear: depth of wear, zero at nodes outside the contact surfaces [length].
+    - ENDO_CONT (ENDO), in models with cohesive layers or adhesion: damage, zero at the same nodes [-].
+    - PRES_FLUI (PRES), in models with fluid pressures: fluid pressure, zero at the same nodes [pressure].
     - TEMP (TEMP), with heat conduction: temperature [temperature].
 
     Parameters

@@ -11,8 +11,6 @@ refer to the docstring of another function or class, the name of a type to the d
 the modules under these paths of the package, and what is missing.
 """
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import re

@@ -10,8 +10,6 @@ the option ``caption: NAME`` is the file NAME. A block that needs something says
 ``python tests/docs/pages.py`` runs all pages that show pictures and stores the pictures that their commands made.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import io

@@ -1,6 +1,6 @@
 """Docstrings: examples run, and every array argument and result has a shape and a unit."""
 
-from __future__ import annotations
+from __future__ import annotations  # as in the package: the measure reads them as text
 
 import doctest
 import importlib

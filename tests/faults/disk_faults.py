@@ -1,7 +1,5 @@
 """Test harness for commands on a failing disk: build the library, run the worker, judge each fault."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

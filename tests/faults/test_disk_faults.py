@@ -1,7 +1,5 @@
 """If a disk fails at any call of a command: one line, exit code 1, no data lost, no files left behind."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Byte-level damage: the same seed gives the same damage."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

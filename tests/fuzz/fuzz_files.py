@@ -1,7 +1,5 @@
 """A damaged file from a seed and a number, always the same."""
 
-from __future__ import annotations
-
 import contextlib
 import shutil
 import zlib

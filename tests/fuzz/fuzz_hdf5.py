@@ -1,7 +1,5 @@
 """Damage inside valid HDF5 files: other shapes, types, links, attributes, storage."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Read a file like a user, and judge the outcome."""
 
-from __future__ import annotations
-
 import warnings
 from pathlib import Path
 
@@ -9,7 +7,6 @@ import numpy as np
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
-from fastcontact.errors import FastcontactError
 
 FIELDS = ("DEPL", "SIEF_NOEU", "PRES_CONT")
 # What HDF5 says where it could not get the memory it wanted for values. It also asks for room for its own blocks, of a
@@ -86,7 +83,7 @@ def outcome(path: Path) -> tuple[str, str]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             read(path)
-    except FastcontactError as error:
+    except fc.FastcontactError as error:
         message = str(error)
         if "\n" in message.strip("\n") or not message.strip() or len(message) > 2000:
             return "many lines", message

@@ -1,7 +1,5 @@
 """Fuzzing run: seeds, workers that may die, outcomes of all files."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

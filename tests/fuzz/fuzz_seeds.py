@@ -1,7 +1,5 @@
 """Small valid files of every supported format, from which the fuzzer starts."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import shutil
@@ -12,7 +10,6 @@ import numpy as np
 
 import fastcontact as fc
 from fastcontact.mesh.files.med import write_med_mesh
-from fastcontact.results.med import write_med_results
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 
@@ -178,7 +175,7 @@ def make_seeds(folder: Path) -> dict[str, Path]:
     write_med_mesh(seeds["solid.med"], solid_mesh())
     model, steps = contact_case()
     seeds["fields.rmed"] = folder / "fields.rmed"
-    write_med_results(seeds["fields.rmed"], model.mesh, steps)
+    fc.write_med_results(seeds["fields.rmed"], model.mesh, steps)
     seeds["results.vtkhdf"] = folder / "results.vtkhdf"
     with fc.ResultWriter(seeds["results.vtkhdf"], model) as out:
         for step in steps:

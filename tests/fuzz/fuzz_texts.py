@@ -1,7 +1,5 @@
 """Damage to well-formed texts: decks, sections of Gmsh, XML of VTK."""
 
-from __future__ import annotations
-
 import base64
 import copy
 import struct

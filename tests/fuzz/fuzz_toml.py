@@ -1,7 +1,5 @@
 """Damage to case files that remain valid TOML: other values and types, missing and additional keys."""
 
-from __future__ import annotations
-
 import copy
 import json
 import tomllib

@@ -3,8 +3,6 @@
 Takes numbers from its standard input, a line each, and answers with a line of JSON.
 """
 
-from __future__ import annotations
-
 import ctypes
 import json
 import os

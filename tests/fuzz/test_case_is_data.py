@@ -11,7 +11,6 @@ import pytest
 import fastcontact as fc
 from fastcontact._tools.toml_text import dump
 from fastcontact.cases.case import read_case
-from fastcontact.errors import FastcontactError
 
 # Texts that mean something to Python, to a shell, to templates, to YAML, to a path.
 CODE = [
@@ -88,7 +87,7 @@ def read(path, data):
     path.write_text(text_of(data), encoding="utf-8")
     try:
         return read_case(path)
-    except FastcontactError:
+    except fc.FastcontactError:
         return None
 
 
@@ -111,7 +110,7 @@ def test_no_text_at_any_place_is_more_than_a_text(tmp_path, monkeypatch, heard, 
         heard.events, heard.on = [], True
         try:
             found = read_case(path)
-        except FastcontactError:
+        except fc.FastcontactError:
             found = None
         finally:
             heard.on = False
@@ -140,7 +139,7 @@ def test_a_mesh_file_that_is_none_is_refused(tmp_path, place, key):
         data["obstacle"] = {"table": {"secondary": "CONT1", "shape": {"kind": "mesh", "file": place, "group": "CONT2"}}}
     path = tmp_path / "place.toml"
     path.write_text(text_of(data), encoding="utf-8")
-    with pytest.raises(FastcontactError):
+    with pytest.raises(fc.FastcontactError):
         read_case(path)
 
 

@@ -1,7 +1,5 @@
 """Small cases of all features with a history: nonlinear bodies, heat, cohesion, fluid, modes, supports that begin later."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from case_texts import COMING, CUBE, case_of, contact_pair, pressed, supports

@@ -1,7 +1,5 @@
 """Cases whose runs are killed: with and without friction, in two and three dimensions."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

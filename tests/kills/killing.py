@@ -1,7 +1,5 @@
 """Runs killed at random instants: what the file contains, and how they end after resuming."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import shutil

@@ -1,7 +1,5 @@
 """After a kill, every feature with a history resumes with the bits of an uninterrupted run, in every array."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -12,7 +10,6 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
-from fastcontact.results.reader import open_results
 
 pytestmark = pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
 
@@ -49,7 +46,7 @@ def test_a_killed_run_goes_on_with_the_same_bits(name: str, stop: int, tmp_path:
     write(case, whole, parts, stop)
     write(read_case(feature_cases.written(name, tmp_path)), parts)
     assert killing.differing(whole, parts) == []
-    with open_results(whole) as one, open_results(parts) as other:
+    with fc.open_results(whole) as one, fc.open_results(parts) as other:
         assert len(one) == len(other) == 6
         for step, again in zip(one, other, strict=True):
             assert (step.index, step.load_factor, step.warnings) == (again.index, again.load_factor, again.warnings)

@@ -1,7 +1,5 @@
 """Result files of all features with a history, forged data set by data set: read, or refused with one line."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -7,8 +7,6 @@ import library
 from case_texts import contact_pair, supports
 
 import fastcontact as fc
-from fastcontact import generate
-from fastcontact.mesh.generate import block, block_on_block
 
 
 class Doubt(NamedTuple):
@@ -40,7 +38,7 @@ def of(*parts, kinematics="plane_strain", steps=1):
 
 
 def raised(height):
-    mesh = block_on_block()
+    mesh = fc.generate.block_on_block()
     points = mesh.points.copy()
     points[mesh.points_of("UPPER"), 1] += height
     return mesh.replace(points=points)
@@ -48,7 +46,7 @@ def raised(height):
 
 def lacking():
     """Two blocks of which the lower one has but some of its facets in its contact group."""
-    mesh = block_on_block()
+    mesh = fc.generate.block_on_block()
     lower = mesh.cell_groups["CONT_LOWER"]
     kept = {**mesh.cell_groups, "CONT_LOWER": lower[: len(lower) // 2]}
     points = {name: numbers for name, numbers in mesh.point_groups.items() if name != "CONT_LOWER"}
@@ -71,7 +69,7 @@ def turned(angle):
 DOUBTS = [
     Doubt(
         "too few geometry updates are requested",
-        lambda: generate.half_spheres("tri3", size=5.0),
+        lambda: fc.generate.half_spheres("tri3", size=5.0),
         of(STEEL, SPHERES, "[solve]\ngeometry_updates = 1\n", kinematics="axisymmetric"),
         (
             r"the contact geometry had not converged after the requested number of updates, 1: the last one changed the displacement by \d\.\d% of its largest component\. Allow more geometry_updates, or omit the option",
@@ -79,7 +77,7 @@ DOUBTS = [
     ),
     Doubt(
         "contact opens again",
-        block_on_block,
+        fc.generate.block_on_block,
         of(STEEL, BLOCKS, PAIR, steps=4).replace(
             "ramp.steps = 4", "ramp = { steps = 4, table = [[0.0, 0.0], [0.5, 1.0], [1.0, -1.0]] }"
         ),
@@ -95,14 +93,14 @@ DOUBTS = [
             r"bodies '\w+' and '\w+' interpenetrate by 0\.009 near \[.*\], and no contact is defined between them: add_contact for the groups that meet",
         ),
     ),
-    Doubt("strains are large", lambda: block((1.0, 1.0), (2, 2)), of(STEEL, supports(BOTTOM="xy", TOP={"y": 0.3})),
+    Doubt("strains are large", lambda: fc.generate.block((1.0, 1.0), (2, 2)), of(STEEL, supports(BOTTOM="xy", TOP={"y": 0.3})),
           (r"the largest equivalent strain is 0\.\d+, beyond the 0\.1 up to which linear kinematics are accurate",)),
-    Doubt("plastic strains are large", lambda: block((1.0, 1.0), (2, 2)),
+    Doubt("plastic strains are large", lambda: fc.generate.block((1.0, 1.0), (2, 2)),
           of(STEEL + 'law = "elastic_plastic"\nyield_stress = 3.0\n', supports(LEFT="x", BOTTOM="y", TOP={"y": -0.7})),
           (r"the largest plastic strain is 0\.\d+, beyond the 0\.2 up to which linear kinematics are valid: contact pressures there are too low, under a ball by 10 % at 0\.2; strain='finite' has no such limit",)),
     Doubt(
         "rotations are large",
-        lambda: block((1.0, 1.0), (1, 1)),
+        lambda: fc.generate.block((1.0, 1.0), (1, 1)),
         of(STEEL, turned(0.5)),
         (
             r"the largest rotation is 0\.500 radian, near \[0\.5 0\.5\]: linear kinematics treat it as small, which neglects strains of about 0\.125",
@@ -125,7 +123,7 @@ DOUBTS = [
     ),
     Doubt("a cell is poor", library.uneven, of(STEEL, supports(BOTTOM="xy")),
           (r"cell \d+ \(tri6 .*\) is poor: its smallest Jacobian is 0\.0\d+ of its largest; move its nodes or remesh",)),
-    Doubt("the mesh does not resolve the contact", lambda: generate.half_spheres("tri3", size=5.0),
+    Doubt("the mesh does not resolve the contact", lambda: fc.generate.half_spheres("tri3", size=5.0),
           of(STEEL, SPHERES, kinematics="axisymmetric"),
           (r"contact 'pair' has only \d elements? across its radius: its pressure needs 4 or more; refine 'CONT1'",)),
     Doubt(
@@ -138,7 +136,7 @@ DOUBTS = [
     ),
     Doubt(
         "nearly incompressible elements lock",
-        lambda: block((1.0, 1.0), (6, 6)),
+        lambda: fc.generate.block((1.0, 1.0), (6, 6)),
         of(
             STEEL.replace("0.3", '0.499\nvolumetric = "plain"'),
             supports(BOTTOM="xy"),
@@ -150,7 +148,7 @@ DOUBTS = [
     ),
     Doubt(
         "pressures that follow facets instead of arcs",
-        lambda: generate.rings("quad4", divisions_inner=(2, 12), divisions_outer=(2, 8)),
+        lambda: fc.generate.rings("quad4", divisions_inner=(2, 12), divisions_outer=(2, 8)),
         of(
             STEEL,
             supports(SYMMETRY_X="x", SYMMETRY_Y="y"),
@@ -163,8 +161,8 @@ DOUBTS = [
     ),
     Doubt(
         "nodes were not merged",
-        lambda: generate.union(
-            block((0.5, 1.0), (2, 2), name="A"), block((0.5, 1.0), (2, 2), origin=(0.5, 0.0), name="B")
+        lambda: fc.generate.union(
+            fc.generate.block((0.5, 1.0), (2, 2), name="A"), fc.generate.block((0.5, 1.0), (2, 2), origin=(0.5, 0.0), name="B")
         ),
         of(STEEL, supports(BOTTOM="xy")),
         (
@@ -173,7 +171,7 @@ DOUBTS = [
     ),
     Doubt(
         "E is in Pa where the case names MPa",
-        lambda: block((1.0, 1.0), (2, 2)),
+        lambda: fc.generate.block((1.0, 1.0), (2, 2)),
         of(STEEL.replace("1000.0", "2.1e11"), supports(BOTTOM="xy")),
         (
             r"Young's modulus E = 2\.1e\+11 MPa of all cells is 1\.05e\+05 times that of diamond: is it in another unit\?",
@@ -181,7 +179,7 @@ DOUBTS = [
     ),
     Doubt(
         "the loads are in another unit than E",
-        lambda: block((1.0, 1.0), (2, 2)),
+        lambda: fc.generate.block((1.0, 1.0), (2, 2)),
         of(STEEL, supports(BOTTOM="xy"), '[[pressure]]\ngroup = "TOP"\nvalue = 1e-10\n'),
         (
             r"the loads strain the model by about 1e-13 \(total force over E times the cross-section of the model\): are loads, lengths and E in consistent units\?",
@@ -189,7 +187,7 @@ DOUBTS = [
     ),
     Doubt(
         "a penalty is too soft",
-        block_on_block,
+        fc.generate.block_on_block,
         of(STEEL, BLOCKS, PAIR, "penalty = 1000.0\n"),
         (
             r"contact 'pair' penetrates by 0\.\d+, which is \d+\.\d% of the largest displacement: raise its penalty from 1000 to about \S+, or omit it",
@@ -197,7 +195,7 @@ DOUBTS = [
     ),
     Doubt(
         "a spring that is a thousand times too stiff",
-        lambda: block_on_block(divisions_upper=(8, 4)),
+        lambda: fc.generate.block_on_block(divisions_upper=(8, 4)),
         of(STEEL, BLOCKS, '[[spring]]\ngroup = "CONT_UPPER"\nto = "CONT_LOWER"\ny = 1e10\n'),
         (
             r"the spring between 'CONT_UPPER' and 'CONT_LOWER' is 1\.7e\+07 times as stiff as the body at one of its ends \(577\): results lose up to 7 of 16 digits, and with contact its force is accurate only to this ratio times the convergence criteria; use 6e\+06 or less, or a multi-point constraint \(relate, relate_groups\), which is exact",
@@ -205,7 +203,7 @@ DOUBTS = [
     ),
     Doubt(
         "a coefficient of wear in another unit",
-        lambda: block((8.0, 2.0), (24, 6), origin=(-4.0, -2.0)),
+        lambda: fc.generate.block((8.0, 2.0), (24, 6), origin=(-4.0, -2.0)),
         of(
             STEEL,
             '[[support]]\ngroup = "BOTTOM"\nx = 0.0\ny = 0.0\n',
@@ -226,7 +224,7 @@ DOUBTS = [
     ),
     Doubt(
         "a contact group against an obstacle lacks facets",
-        lambda: block((1.0, 1.0), (8, 8)).with_facet_group("HALF", lambda x: (x[:, 1] > 0.999) & (x[:, 0] < 0.51)),
+        lambda: fc.generate.block((1.0, 1.0), (8, 8)).with_facet_group("HALF", lambda x: (x[:, 1] > 0.999) & (x[:, 0] < 0.51)),
         of(
             STEEL,
             supports(BOTTOM="xy"),
@@ -239,7 +237,7 @@ DOUBTS = [
     ),
     Doubt(
         "a contact group against an obstacle lacks facets while it is pressed",
-        lambda: block((1.0, 1.0), (8, 8)).with_facet_group("HALF", lambda x: (x[:, 1] > 0.999) & (x[:, 0] < 0.51)),
+        lambda: fc.generate.block((1.0, 1.0), (8, 8)).with_facet_group("HALF", lambda x: (x[:, 1] > 0.999) & (x[:, 0] < 0.51)),
         of(
             STEEL,
             supports(BOTTOM="xy"),
@@ -253,8 +251,8 @@ DOUBTS = [
     ),
     Doubt(
         "nodes nearly coincide",
-        lambda: generate.union(
-            block((0.5, 1.0), (2, 2), name="A"), block((0.5, 1.0), (2, 2), origin=(0.5 + 1e-7, 0.0), name="B")
+        lambda: fc.generate.union(
+            fc.generate.block((0.5, 1.0), (2, 2), name="A"), fc.generate.block((0.5, 1.0), (2, 2), origin=(0.5 + 1e-7, 0.0), name="B")
         ),
         of(STEEL, supports(BOTTOM="xy")),
         (
@@ -263,7 +261,7 @@ DOUBTS = [
     ),
     Doubt(
         "friction in percent",
-        block_on_block,
+        fc.generate.block_on_block,
         of(STEEL, BLOCKS, PAIR, "friction = 30.0\n"),
         (
             r"the friction of contact 'pair' is 30, but surfaces have at most 3: is it in percent\? To exclude sliding, use kind='tied'",
@@ -279,7 +277,7 @@ DOUBTS = [
     ),
     Doubt(
         "a load without a ramp beside one that has one",
-        lambda: block((1.0, 1.0), (2, 2)),
+        lambda: fc.generate.block((1.0, 1.0), (2, 2)),
         of(
             STEEL,
             supports(BOTTOM="xy"),

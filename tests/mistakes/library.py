@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from models import elastic_model, supported
 
 import fastcontact as fc
 from fastcontact import generate, topology
@@ -27,8 +28,7 @@ def blocks(mesh=None, *, contact=True, supports=True, materials=True):
     if materials:
         model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
     if supports:
-        model.fix("LOWER_BOTTOM", "xy")
-        model.fix("UPPER_TOP", "x")
+        supported(model, LOWER_BOTTOM="xy", UPPER_TOP="x")
         model.prescribe("UPPER_TOP", y=-0.01)
     if contact:
         model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")
@@ -70,8 +70,7 @@ def turned(cells):
 
 def held(mesh, kinematics="plane_strain", **supports):
     """A body of one material whose groups are fixed."""
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(mesh, kinematics)
     for group, components in supports.items():
         model.fix(group, components)
     return model
@@ -118,8 +117,7 @@ def with_orphan():
         points=np.vstack([mesh.points, [[20.0, 0.0]]]), point_groups={**mesh.point_groups, "LONE": [lone]}
     )
     model = blocks(mesh)
-    model.fix("LONE", "x")
-    return model
+    return supported(model, LONE="x")
 
 
 def with_load(add, **options):
@@ -277,17 +275,14 @@ MATERIALS = [
 
 
 def pushed(E, pressure):
-    model = fc.Model(block((1.0, 1.0), (2, 2)), "plane_strain")
-    model.add_material(fc.LinearElastic(E=E, nu=0.3))
-    model.fix("BOTTOM", "xy")
+    model = elastic_model(block((1.0, 1.0), (2, 2)), "plane_strain", E=E, BOTTOM="xy")
     model.add_pressure("TOP", pressure)
     return model
 
 
 def stretched(length):
     model = square(BOTTOM="xy")
-    model.prescribe("TOP", y=length)
-    return model
+    return supported(model, TOP={"y": length})
 
 
 # fmt: off
@@ -329,15 +324,12 @@ def on_axis(add):
 
 def sliding():
     model = blocks(supports=False)
-    model.fix("LOWER_BOTTOM", "xy")
-    model.prescribe("UPPER_TOP", y=-0.01)
-    return model
+    return supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"y": -0.01})
 
 
 def contradicting():
     model = blocks()
-    model.prescribe("UPPER_TOP", y=0.5)
-    return model
+    return supported(model, UPPER_TOP={"y": 0.5})
 
 
 def split_in_two():
@@ -357,16 +349,13 @@ def pairs_overlap():
 
 def pushed_into_each_other():
     model = blocks(supports=False)
-    model.fix("CONT_LOWER", "xy")
-    model.fix("CONT_UPPER", "x")
-    model.prescribe("CONT_UPPER", y=-0.02)
-    return model
+    supported(model, CONT_LOWER="xy", CONT_UPPER="x")
+    return supported(model, CONT_UPPER={"y": -0.02})
 
 
 def corner_pushed():
     model = with_obstacle(1.0)
-    model.prescribe("LEFT", y=0.0)
-    return model
+    return supported(model, LEFT={"y": 0.0})
 
 
 # fmt: off
@@ -443,8 +432,7 @@ def inner_contact():
 
 def lifted():
     model = blocks(supports=False)
-    model.fix("LOWER_BOTTOM", "xy")
-    model.fix("UPPER_TOP", "x")
+    supported(model, LOWER_BOTTOM="xy", UPPER_TOP="x")
     model.couple("UPPER_TOP", "y")
     model.add_force("UPPER_TOP", y=10.0)
     return model
@@ -509,8 +497,7 @@ RAMP = [
 
 def short_history():
     model = blocks()
-    model.prescribe("LOWER_LEFT", x=0.0, ramp=[(0.0, 0.0), (0.5, 1.0)])
-    return model
+    return supported(model, LOWER_LEFT={"x": 0.0, "ramp": [(0.0, 0.0), (0.5, 1.0)]})
 
 
 # fmt: off

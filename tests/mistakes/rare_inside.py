@@ -16,7 +16,6 @@ from rare_files import refusing
 from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
-from fastcontact import generate
 from fastcontact._tools import hdf5
 from fastcontact.analysis.floating_bodies import FloatingBodies
 from fastcontact.cases.case import read_case
@@ -37,7 +36,6 @@ from fastcontact.results import reader
 from fastcontact.studies import execute
 from fastcontact.studies import report as render
 from fastcontact.studies import settings as levels
-from fastcontact.studies.runs import convergence_study, parameter_sweep
 from fastcontact.studies.settings import Combination, recipe, settings
 
 REPEATED = re.escape(str(pivot_order.RepeatedError()))
@@ -110,8 +108,8 @@ def copied_to_a_full_disk(patch, folder):
 
 def distorted_facets(patch):
     patch.setattr(_cut_faces._cut_faces_kernels, "integrate", lambda *_: 0)
-    lower, upper = generate.box(divisions=(2, 2, 2)), generate.box(divisions=(2, 2, 2), origin=(0.0, 0.0, 1.0))
-    mesh = generate.union(renamed(lower, lambda name: f"A_{name}"), renamed(upper, lambda name: f"B_{name}"))
+    lower, upper = fc.generate.box(divisions=(2, 2, 2)), fc.generate.box(divisions=(2, 2, 2), origin=(0.0, 0.0, 1.0))
+    mesh = fc.generate.union(renamed(lower, lambda name: f"A_{name}"), renamed(upper, lambda name: f"B_{name}"))
     model = fc.Model(mesh, "3d")
     model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
     model.add_contact("pair", secondary="B_ZMIN", primary="A_ZMAX", formulation="mortar")
@@ -131,7 +129,7 @@ def indefinite():
 
 def no_triangulation(patch):
     patch.setattr(_triangulate, "_attempt", lambda *_: None)
-    generate.half_spheres(size=21.0)  # of no other test: the suite makes each mesh once
+    fc.generate.half_spheres(size=21.0)  # of no other test: the suite makes each mesh once
 
 
 def no_finer_meshes(patch):
@@ -151,12 +149,12 @@ def failing(jobs, **_):
 
 def no_level(patch):
     patch.setattr(execute, "run_all", failing)
-    convergence_study("forma04a", 1, ["tri3"], ["node_to_segment"])
+    fc.convergence_study("forma04a", 1, ["tri3"], ["node_to_segment"])
 
 
 def no_point(patch):
     patch.setattr(execute, "run_all", failing)
-    parameter_sweep("forma04a", {"approach": [1.0]})
+    fc.parameter_sweep("forma04a", {"approach": [1.0]})
 
 
 def packed_beyond_its_size(folder, patch):
@@ -168,7 +166,7 @@ def packed_beyond_its_size(folder, patch):
 
 
 def name_too_long(folder):
-    fc.ResultWriter(folder / ("a" * 300 + ".vtkhdf"), generate.box())
+    fc.ResultWriter(folder / ("a" * 300 + ".vtkhdf"), fc.generate.box())
 
 
 def profile_beyond_the_mesh(folder):
@@ -179,7 +177,7 @@ def profile_beyond_the_mesh(folder):
 
 
 def parts_that_do_not_fit(folder, patch):
-    fc.write_mesh(folder / "a.vtk", generate.box())
+    fc.write_mesh(folder / "a.vtk", fc.generate.box())
 
     def fail(*_):
         raise TypeError("of another kind")

@@ -8,12 +8,9 @@ import numpy as np
 from library import Mistake, blocks, pair_of, square, with_load
 
 import fastcontact as fc
-from fastcontact import topology
 from fastcontact.contact.configuration import Configuration
 from fastcontact.linear import choice as linear
 from fastcontact.mesh.generate import block, box, half_spheres
-from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot import contact_zones
 from fastcontact.results.plot.curves import stresses_on_axis
 
 
@@ -41,9 +38,9 @@ def spring_nowhere():
 
 
 def two_lines(start=None, ends=((0, 1), (2, 3))):
-    mesh = Mesh([[0, 0], [1, 0], [2, 0], [3, 0], [4, 0]], {"line2": list(ends)})
+    mesh = fc.Mesh([[0, 0], [1, 0], [2, 0], [3, 0], [4, 0]], {"line2": list(ends)})
     mesh = mesh.with_groups(cells={"LINE": range(len(ends))}, points={"MIDDLE": [1]})
-    return topology.ordered_line(mesh, "LINE", start)
+    return fc.topology.ordered_line(mesh, "LINE", start)
 
 
 def line_and_ring():
@@ -53,7 +50,7 @@ def line_and_ring():
 
 def no_lines():
     mesh = block((1.0, 1.0), (2, 2))
-    return topology.ordered_line(mesh, "BLOCK")
+    return fc.topology.ordered_line(mesh, "BLOCK")
 
 
 def without(patch, *modules):
@@ -127,9 +124,9 @@ MISTAKES = [
             r"the spring between 'A' and 'B': points 0 and 9 coincide, and have no line between them: give x, y or z"),
     Mistake("moduli of unknown kinematics", lambda: fc.LinearElastic(E=1.0, nu=0.3).moduli("4d"), fc.ModelError,
             r"unknown kinematics '4d': expected one of 3d, "),
-    Mistake("cells of broken numbers", lambda: Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 1.5]]}), fc.MeshError,
+    Mistake("cells of broken numbers", lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 1.5]]}), fc.MeshError,
             r"must be whole numbers, counted from 0, not float64 values"),
-    Mistake("cells of numbers beyond 32 bits", lambda: Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2**40]]}),
+    Mistake("cells of numbers beyond 32 bits", lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2**40]]}),
             fc.MeshError, r"contain the number 1099511627776: the largest that a mesh can hold is 2147483647"),
     Mistake("an order of what is no line", no_lines, fc.MeshError,
             r"group 'BLOCK' contains no line cells, so its nodes have no order along a line"),
@@ -145,7 +142,7 @@ MISTAKES = [
             r"the interactive view needs PyVista: pip install 'fastcontact\[view\]'"),
     Mistake("a linear solver that is not installed", solver_without_package, fc.ModelError,
             r"linear solver '\w+' needs the package \w+: pip install 'fastcontact\[\w+\]'"),
-    Mistake("a picture of no steps", lambda: contact_zones([], "pair"), fc.errors.FastcontactError,
+    Mistake("a picture of no steps", lambda: fc.plot.contact_zones([], "pair"), fc.errors.FastcontactError,
             r"there are no steps to draw"),
     Mistake("stresses on the axis of a solid in space", solid_stress_on_axis, fc.errors.FastcontactError,
             r"stresses along the axis need a two-dimensional mesh: in three dimensions draw a section"),

@@ -14,12 +14,8 @@ from fastcontact.cases.checks import Check, check_target
 from fastcontact.cli import _study
 from fastcontact.cli._main import parser
 from fastcontact.cli._outputs import write_text
-from fastcontact.mesh.generate import block, box, half_spheres, merge_points
-from fastcontact.mesh.generate._refine import Circle, refined
 from fastcontact.studies import execute, fit
-from fastcontact.studies.adaptive import adaptive_study
 from fastcontact.studies.case_parameters import law_value
-from fastcontact.studies.runs import convergence_study
 from fastcontact.studies.settings import combinations, make_mesh, settings
 
 CASES = [
@@ -52,7 +48,7 @@ COMMANDS = [
 
 def solid_case():
     case = read_case("forma04a")
-    object.__setattr__(case, "mesh", box())
+    object.__setattr__(case, "mesh", fc.generate.box())
     return case
 
 
@@ -112,7 +108,7 @@ def case_of(**parts):
 
 
 def unknown_quantity():
-    convergence_study("forma04a", 1, ["tri3"], ["node_to_segment"], quantities=["forse"], workers=1)
+    fc.convergence_study("forma04a", 1, ["tri3"], ["node_to_segment"], quantities=["forse"], workers=1)
 
 
 def interrupted(patch, command):
@@ -134,7 +130,7 @@ CALLS = [
     ("a sweep that is interrupted", lambda patch: interrupted(patch, "parameter_sweep"), fc.errors.FastcontactError, r"stopped; with --store DIR the same command would continue where it stopped"),
     ("formulations without contact", lambda: combinations(replace(settings(read_case("forma04a")), pair=None), None, ["mortar"]), fc.errors.CaseError, r"this case has no contact pair, so there are no formulations to compare"),
     ("a law beyond all numbers", lambda: law_value("value^400", 1e300, "study.parameters.a"), fc.errors.CaseError, r"study\.parameters\.a = 'value\^400' is too large a number for 1e\+300"),
-    ("adaptive meshes in space", lambda: adaptive_study(solid_case(), tolerance=0.1), fc.errors.CaseError, r"adaptive refinement is for triangles and quadrangles in two dimensions; this case is in 3D"),
+    ("adaptive meshes in space", lambda: fc.adaptive_study(solid_case(), tolerance=0.1), fc.errors.CaseError, r"adaptive refinement is for triangles and quadrangles in two dimensions; this case is in 3D"),
     ("sizes without values", lambda: fit.fit_limit([1.0, 0.5], [1.0]), fc.errors.CaseError, r"mesh sizes and values must be lists of equal length, not \(2,\) and \(1,\)"),
     ("a limit of two meshes", lambda: fit.fit_limit([1.0, 0.5], [1.0, 2.0]), fc.errors.CaseError, r"a limit needs the values of at least 3 meshes, not 2: compute more levels"),
     ("one size twice", lambda: fit.fit_limit([1.0, 0.5, 0.5], [1.0, 2.0, 3.0]), fc.errors.CaseError, r"the mesh sizes must be positive and all different, not \[1\.0, 0\.5, 0\.5\]"),
@@ -145,8 +141,8 @@ CALLS = [
     ("no worker starts", no_worker_starts, fc.errors.FastcontactError, r"no worker process could start: in a script, put the call of the study under if __name__ == '__main__':"),
     ("a text on a read-only disk", protected_text, fc.errors.FileError, r"'a\.json' cannot be written \(Read-only file system\)"),
     ("a file where the store should be", file_for_a_store, fc.errors.FileError, r"the folder 'runs' cannot be created: File exists; choose another folder"),
-    ("refining solids in space", lambda: refined(box()), fc.MeshError, r"cells of hex8 cannot be refined: only lines, triangles and quadrangles are divided here"),
-    ("a curve elsewhere", lambda: refined(block((1.0, 1.0), (2, 2)), curves=[Circle((50.0, 50.0), 1.0)]), fc.MeshError, r"no outer facet has all its nodes on .*: check its centre and radius"),
-    ("a negative tolerance of merging", lambda: merge_points(half_spheres(size=20.0), -1.0), fc.MeshError, r"tolerance = -1 is out of range: it must be at least 0"),
-    ("a tolerance that is no number", lambda: merge_points(half_spheres(size=20.0), np.nan), fc.MeshError, r"tolerance must be a finite number, not nan"),
+    ("refining solids in space", lambda: fc.generate.refined(fc.generate.box()), fc.MeshError, r"cells of hex8 cannot be refined: only lines, triangles and quadrangles are divided here"),
+    ("a curve elsewhere", lambda: fc.generate.refined(fc.generate.block((1.0, 1.0), (2, 2)), curves=[fc.generate.Circle((50.0, 50.0), 1.0)]), fc.MeshError, r"no outer facet has all its nodes on .*: check its centre and radius"),
+    ("a negative tolerance of merging", lambda: fc.generate.merge_points(fc.generate.half_spheres(size=20.0), -1.0), fc.MeshError, r"tolerance = -1 is out of range: it must be at least 0"),
+    ("a tolerance that is no number", lambda: fc.generate.merge_points(fc.generate.half_spheres(size=20.0), np.nan), fc.MeshError, r"tolerance must be a finite number, not nan"),
 ]  # fmt: skip

@@ -7,7 +7,6 @@ import h5py
 import numpy as np
 
 import fastcontact as fc
-from fastcontact import generate
 
 
 def moved(change):
@@ -68,7 +67,7 @@ def with_a_copy(mesh):
 
 
 def in_space(source, target):
-    fc.write_mesh(target, generate.box())
+    fc.write_mesh(target, fc.generate.box())
 
 
 # fmt: off

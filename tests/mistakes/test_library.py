@@ -9,8 +9,6 @@ import pytest
 from fastcontact import errors
 from fastcontact.analysis import problem
 
-KINDS = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, errors.FastcontactError)]
-
 
 def told(mistake):
     """Make a mistake and return what is said about it: the only error, or the warnings."""

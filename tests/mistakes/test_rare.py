@@ -3,6 +3,7 @@
 import inspect
 import re
 
+import arguments
 import pytest
 import rare_files
 import rare_inside
@@ -10,7 +11,7 @@ import rare_models
 import rare_studies
 from test_mistakes import case_text, folder, refused  # noqa: F401 (a fixture)
 
-CALLS = [*rare_models.MISTAKES, *rare_studies.CALLS, *rare_files.CALLS, *rare_inside.CALLS]
+CALLS = [*arguments.CALLS, *rare_models.MISTAKES, *rare_studies.CALLS, *rare_files.CALLS, *rare_inside.CALLS]
 
 
 @pytest.mark.parametrize(("make", "kind", "pattern"), [c[1:] for c in CALLS], ids=[c[0] for c in CALLS])

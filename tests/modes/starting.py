@@ -1,7 +1,5 @@
 """Start Python in another mode: environment variables for threads, cache folder, compilation."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import subprocess

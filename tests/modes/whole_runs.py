@@ -4,8 +4,6 @@ Usage: python whole_runs.py NAME ... with the names of `RUNS`. The environment c
 folder, compiled or not.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import sys

@@ -1,7 +1,5 @@
 """Small random contact problems: two blocks pressed together, one with a crowned and tilted face."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

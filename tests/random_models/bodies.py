@@ -1,7 +1,5 @@
 """Bodies for random models: graded, crowned, bent, rotated and translated blocks and boxes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

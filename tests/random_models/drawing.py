@@ -1,7 +1,5 @@
 """A random contact model from a seed."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Random models of sectors, periods, rotating obstacles, plates, orthotropic rings, bolts, couplings and heat."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

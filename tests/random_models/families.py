@@ -1,7 +1,5 @@
 """Families of random models: stacked layers, adjacent punches, and meshes of the generators."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial

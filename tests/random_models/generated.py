@@ -1,14 +1,11 @@
 """Random models on meshes of the generators: discs, spheres, cylinders, rings, graded and crowned blocks."""
 
-from __future__ import annotations
-
 import numpy as np
 from bodies import FLAT, Random
 from drawing import Draft, add_contact, add_obstacle, materials
 from wording import SpokenModel
 
 import fastcontact as fc
-from fastcontact.mesh import generate
 
 SQUARE, CUT = ("quad4", "quad8", "quad9"), ("hex8", "hex20", "hex27", "tet4", "tet10")
 
@@ -45,13 +42,13 @@ def disc_options(random: Random, element: str, R: float) -> dict:
 def discs(random: Random) -> Draft:
     """Two half-spheres, or half-cylinders."""
     R, element, part = sizes(random)
-    parts = [generate.quarter_disc(element, body="lower", R=R, **disc_options(random, element, R))]
+    parts = [fc.generate.quarter_disc(element, body="lower", R=R, **disc_options(random, element, R))]
     options = disc_options(random, element, R) if random.random() < 0.5 else None
-    other = generate.quarter_disc(element, body="upper", R=R, **options) if options else generate.mirrored(
+    other = fc.generate.quarter_disc(element, body="upper", R=R, **options) if options else fc.generate.mirrored(
         parts[0], "y", rename={"SPHBAS": "SPHHAU", "CONT1": "CONT2", "A1B1": "A2B2"}
     )  # fmt: skip
     kinematics = str(random.choice(["axisymmetric", "axisymmetric", "plane_strain", "plane_stress"]))
-    draft = begun(random, generate.union(*parts, other), kinematics, ["SPHBAS", "SPHHAU"], R, element)
+    draft = begun(random, fc.generate.union(*parts, other), kinematics, ["SPHBAS", "SPHHAU"], R, element)
     model = draft.model
     model.fix("A1A2", "x")
     model.fix("A1B1", "y")
@@ -68,7 +65,7 @@ def cylinder(random: Random) -> Draft:
     """Half a cylinder on a block."""
     R, element, part = sizes(random)
     near = R / random.integers(10, 40)
-    mesh = generate.cylinder_on_block(
+    mesh = fc.generate.cylinder_on_block(
         element, R=R, size=R / random.integers(3, 7), contact_size=near, block_size=(1.5 * R, R)
     )
     kinematics = str(random.choice(["plane_strain", "plane_stress", "axisymmetric"]))
@@ -90,7 +87,7 @@ def sphere(random: Random) -> Draft:
     R, _, part = sizes(random)
     element = str(random.choice(CUT, p=[0.35, 0.1, 0.05, 0.4, 0.1]))
     quadratic = element not in ("hex8", "tet4")
-    mesh = generate.sphere_on_block(
+    mesh = fc.generate.sphere_on_block(
         element, R=R, size=R / (1.5 if quadratic else random.uniform(2, 3)),
         contact_size=R / (3 if quadratic else random.uniform(5, 8)), contact_radius=R / 5, growth=1.0,
         block_size=(0.8 * R, 0.5 * R),
@@ -109,7 +106,7 @@ def rings(random: Random) -> Draft:
     """A press fit, or a ring pressed outward against another one."""
     R, element, part = sizes(random)
     n = random.integers(4, 14, 2) if random.random() < 0.6 else np.full(2, random.integers(4, 14))
-    mesh = generate.rings(
+    mesh = fc.generate.rings(
         element, inner_radius=R * random.uniform(0.3, 0.8), interface_radius=R, outer_radius=R * random.uniform(1.2, 2.0),
         divisions_inner=(int(random.integers(1, 5)), int(n[0])), divisions_outer=(int(random.integers(1, 5)), int(n[1])),
     )  # fmt: skip
@@ -133,7 +130,7 @@ def crowned(random: Random) -> Draft:
     R, _, part = sizes(random)
     element = str(random.choice(SQUARE))
     a = R * np.sqrt(part)
-    mesh = generate.crowned_blocks(
+    mesh = fc.generate.crowned_blocks(
         element, R=R, extent=4 * a, contact_radius=a, contact_size=a / random.integers(3, 7), growth=2.0
     )
     draft = begun(random, mesh, str(random.choice(["plane_strain", "plane_stress"])), ["LOWER", "UPPER"], R, element)
@@ -148,7 +145,7 @@ def on_obstacle(random: Random) -> Draft:
     """Half a cylinder or sphere on a rigid shape that moves up."""
     R, element, part = sizes(random)
     if random.random() < 0.6:
-        mesh = generate.quarter_disc(element, R=R, **disc_options(random, element, R))
+        mesh = fc.generate.quarter_disc(element, R=R, **disc_options(random, element, R))
         kinematics = str(random.choice(["plane_strain", "plane_stress", "axisymmetric"]))
         draft = begun(random, mesh, kinematics, ["SPHBAS"], R, element)
         draft.model.fix("A1A2", "x")
@@ -167,7 +164,7 @@ def on_obstacle(random: Random) -> Draft:
         add_obstacle(random, draft, "CONT1", shape, part * R, driven)
         return draft
     element = str(random.choice(["hex8", "tet4"]))
-    mesh = generate.sphere_octant(
+    mesh = fc.generate.sphere_octant(
         element, R=R, size=R / 3, contact_size=R / random.uniform(6, 12), contact_radius=R / 5
     )
     draft = begun(random, mesh, "3d", ["SPHERE"], R, element)
@@ -185,7 +182,7 @@ def indented(random: Random) -> Draft:
     solid = random.random() < 0.4
     element = str(random.choice(CUT, p=[0.4, 0.1, 0.05, 0.35, 0.1]) if solid else random.choice(FLAT))
     fine = 0.1 if not solid else 0.25
-    mesh = generate.graded_block(
+    mesh = fc.generate.graded_block(
         element, width=width, contact_radius=0.25 * width, contact_size=fine * 0.5 * width, size=0.3 * width, growth=1.0
     )
     kinematics = "3d" if solid else str(random.choice(["plane_strain", "plane_stress", "axisymmetric"]))
@@ -218,7 +215,7 @@ def punched(random: Random) -> Draft:
     """A block under a flat punch whose edge is a node."""
     a, _, part = sizes(random)
     element = str(random.choice(SQUARE))
-    mesh = generate.punched_block(
+    mesh = fc.generate.punched_block(
         element, punch_radius=a, extent=8 * a, edge_size=a / random.integers(4, 15), growth=random.uniform(1.5, 2.5)
     )
     kinematics = str(random.choice(["plane_strain", "plane_stress", "axisymmetric"]))

@@ -1,7 +1,5 @@
 """Supports and loads of random models."""
 
-from __future__ import annotations
-
 import numpy as np
 from bodies import Body, Placement, Random
 from drawing import Draft, add_obstacle

@@ -5,8 +5,6 @@ Of two blocks, the second may be of another material, and be pressed by a force 
 `python tests/random_models/nonlinear.py FIRST COUNT` prints a line for each seed.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 import warnings

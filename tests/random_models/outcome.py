@@ -1,7 +1,5 @@
 """Outcome of a random model: a checked result, an error of the package, or a finding."""
 
-from __future__ import annotations
-
 import re
 import time
 import traceback

@@ -1,7 +1,5 @@
 """Equivalent models: rotated, renumbered, with supports along normals, along axes, or as multi-point constraints."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -98,35 +98,6 @@ def test_nothing_but_our_own_errors(name, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("make", "text"),
-    [
-        (lambda: fc.open_results(None), "the argument path of open_results must be a string or a path, not None"),
-        (lambda: fc.solve(model(), resume=[1, 2]), "the argument resume of solve must be a sequence of StepResults"),
-        (lambda: model(False).add_contact(**SIDES, friction="0.3"), "friction of contact 'h' must be a number"),
-        (lambda: fc.solve("model"), "the argument model of solve must be a Model, not the string 'model'"),
-        (lambda: fc.Criteria(max_geometry_updates=2.5), "max_geometry_updates = 2.5 must be a whole number >= 0"),
-        (lambda: fc.Criteria(geometry_updates=1.5), "geometry_updates = 1.5 must be None or a whole number >= 0"),
-        (lambda: fc.Criteria(max_active_set_iterations=9.5), "max_active_set_iterations = 9.5 must be a whole number >= 1"),
-        (lambda: fc.Ramp([np.float64(0.5), np.float64(0.2)]), r"must ascend, not \[0\.5, 0\.2\]"),
-        (lambda: fc.generate.block({"on": np.True_, "x": np.float64(1.5)}), r"the dict {'on': True, 'x': 1\.5}"),
-        (lambda: fc.Model("a.med", "3d"), "the argument mesh of Model must be a Mesh, not the string 'a.med'"),
-        (lambda: fc.plot.pressure_profile(CONTACT, theory=5), "a theory needs a pressure, .* but 5 has none"),
-        (lambda: fc.plot.pressure_profile(CONTACT, ax="ax"), "drawn on axes of Matplotlib, not on 'ax'"),
-        (lambda: fc.write_csv("a.csv", np.zeros(3)), "a table is an array with named columns"),
-        (lambda: fc.generate.union(fc.generate.block(), 3), r"argument meshes\[1\] of union must be a Mesh, not the int 3"),
-    ],
-)  # fmt: skip
-def test_the_message_names_the_argument(make, text):
-    with pytest.raises(fc.FastcontactError, match=text):
-        make()
-
-
-def test_numbers_in_quotation_marks_are_recognised():
-    with pytest.raises(fc.ModelError, match="write 2e5 without quotation marks"):
-        fc.LinearElastic(E="2e5", nu=0.3)
-
-
-@pytest.mark.parametrize(
     ("annotation", "good", "bad"),
     [
         (float, (1, 2.0, np.float32(1), np.int64(3), np.array(2.0)), (True, "1", None, [1.0], 1j)),

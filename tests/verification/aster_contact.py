@@ -1,7 +1,5 @@
 """Contact zones of code_aster's specs: formulation, options, rigid surfaces, and unsupported features."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -12,7 +10,6 @@ from scipy.spatial import cKDTree
 
 import fastcontact as fc
 from fastcontact.contact.integration import nodal_areas
-from fastcontact.contact.obstacles import HalfSpace
 from fastcontact.contact.surface import surface
 
 # How code_aster iterates, and how it describes the same thing to itself.
@@ -190,7 +187,7 @@ def _excluded_nodes(
     return {"excluded": [name for name in groups if np.isin(mesh.points_of(name), excluded).any()]}
 
 
-def _obstacle(mesh: fc.Mesh, zone: Entry, supports: Sequence[Support]) -> HalfSpace:
+def _obstacle(mesh: fc.Mesh, zone: Entry, supports: Sequence[Support]) -> fc.obstacles.HalfSpace:
     """Return the half-space behind a flat master surface without a solid that stands still."""
     nodes, slave = (nodes_of(mesh, {"GROUP_MA": zone[side]}) for side in ("master", "slave"))
     for axis in "xyz"[: mesh.dim]:
@@ -204,7 +201,7 @@ def _obstacle(mesh: fc.Mesh, zone: Entry, supports: Sequence[Support]) -> HalfSp
     # The body lies on the side where its own solid is.
     behind = np.concatenate([b[np.isin(b, slave).any(axis=1)].ravel() for b in mesh.solids.values()])
     normal = directions[-1] * np.sign((mesh.points[behind].mean(axis=0) - centre) @ directions[-1])
-    return HalfSpace(tuple(centre), tuple(normal))
+    return fc.obstacles.HalfSpace(tuple(centre), tuple(normal))
 
 
 def criteria_of(contact: Entry) -> fc.Criteria:

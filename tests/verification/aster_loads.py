@@ -1,7 +1,5 @@
 """Loads of code_aster's specs: prescribed displacements and forces, with their histories."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any

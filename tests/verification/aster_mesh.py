@@ -1,7 +1,5 @@
 """Meshes of code_aster's specs: groups of its command files, and points of its keywords."""
 
-from __future__ import annotations
-
 import functools
 import re
 from pathlib import Path

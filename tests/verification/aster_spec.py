@@ -4,8 +4,6 @@
 translated raises `MissingError` with the reason; nothing is left out in silence.
 """
 
-from __future__ import annotations
-
 import functools
 import json
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Springs of code_aster's specs: discrete elements with a diagonal translational stiffness."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from aster_mesh import Entry, MissingError, listed, nodes_of

@@ -4,14 +4,13 @@ A value is read as code_aster writes it: LAGS_C and PRES are negative in compres
 per radian, a reduction runs over all nodes that carry the component.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from aster_mesh import Entry, MissingError, nodes_of
 from aster_spec import Problem
+from mechanics import contact_forces
 from scipy.spatial import cKDTree
 
 import fastcontact as fc
@@ -200,17 +199,8 @@ def _element_stress(problem: Problem, step: fc.StepResult, component: str, test:
     """Return stresses of the elements at their own nodes: of one cell, or the mean over the elements at each node."""
     if component not in STRESS or STRESS[component] >= step.stress.shape[1]:
         raise MissingError(f"needs SIGM_ELNO {component}")
-    mesh = problem.mesh
-    moduli, material = problem.model.material_numbers()
-    at_points = fc.recovery.stress_at_points(mesh, problem.model.kinematics, moduli, material, step.displacement)
     group = (test.get("location") or {}).get("GROUP_MA")
-    chosen = None if group is None else mesh.split(mesh.cell_groups[group])
-    total, count = np.zeros(mesh.n_points), np.zeros(mesh.n_points)
-    for name, stress in fc.recovery.stress_at_element_nodes(at_points).items():
-        rows = np.arange(len(stress)) if chosen is None else chosen.get(name, np.empty(0, int))
-        np.add.at(total, mesh.cells[name][rows], stress[rows, :, STRESS[component]])
-        np.add.at(count, mesh.cells[name][rows], 1.0)
-    return {int(node): float(total[node] / count[node]) for node in np.flatnonzero(count)}
+    return _mean_of_elements(problem, step, lambda stress: stress[..., STRESS[component]], group)
 
 
 def _equivalent(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
@@ -218,13 +208,22 @@ def _equivalent(problem: Problem, step: fc.StepResult, component: str, test: Ent
     equivalent = {"VMIS": fc.recovery.von_mises, "VMIS_SG": fc.recovery.von_mises_signed}.get(component)
     if equivalent is None:
         raise MissingError(f"needs SIEQ_NOEU {component}")
-    mesh, kinematics = problem.mesh, problem.model.kinematics
+    return _mean_of_elements(problem, step, equivalent)
+
+
+def _mean_of_elements(
+    problem: Problem, step: fc.StepResult, of: Callable[[np.ndarray], np.ndarray], group: str | None = None
+) -> Field:
+    """Return the mean over the elements at each node, those of a group alone, of a function of their stresses."""
+    mesh = problem.mesh
     moduli, material = problem.model.material_numbers()
-    at_points = fc.recovery.stress_at_points(mesh, kinematics, moduli, material, step.displacement)
+    at_points = fc.recovery.stress_at_points(mesh, problem.model.kinematics, moduli, material, step.displacement)
+    chosen = None if group is None else mesh.split(mesh.cell_groups[group])
     total, count = np.zeros(mesh.n_points), np.zeros(mesh.n_points)
     for name, stress in fc.recovery.stress_at_element_nodes(at_points).items():
-        np.add.at(total, mesh.cells[name], equivalent(stress))
-        np.add.at(count, mesh.cells[name], 1.0)
+        rows = np.arange(len(stress)) if chosen is None else chosen.get(name, np.empty(0, int))
+        np.add.at(total, mesh.cells[name][rows], of(stress[rows]))
+        np.add.at(count, mesh.cells[name][rows], 1.0)
     return {int(node): float(total[node] / count[node]) for node in np.flatnonzero(count)}
 
 
@@ -277,21 +276,24 @@ def _contact_values(step: fc.StepResult, of: Callable[[fc.ContactResult], np.nda
     return found
 
 
+OF_CONTACT_ELEMENTS: dict[str, Callable[[fc.ContactResult], np.ndarray]] = {
+    "PRES": lambda contact: -contact.pressure,
+    "JEU": lambda contact: contact.gap,
+    "CONT": lambda contact: contact.active,
+}
+
+
 def _contact_element(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
     """Return the fields of code_aster's mortar facets, at the nodes: a uniform one is the same there."""
-    if component == "PRES":
-        return _contact_values(step, lambda contact: -contact.pressure)
-    if component == "JEU":
-        return _contact_values(step, lambda contact: contact.gap)
-    if component == "CONT":
-        return _contact_values(step, lambda contact: contact.active)
-    raise MissingError(f"needs CONT_ELEM {component}")
+    if component not in OF_CONTACT_ELEMENTS:
+        raise MissingError(f"needs CONT_ELEM {component}")
+    return _contact_values(step, OF_CONTACT_ELEMENTS[component])
 
 
 def _contact_node(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
     per_radian = _per_radian(problem)
     if component == "JEU":
-        return _contact_values(step, lambda contact: contact.gap)
+        return _contact_values(step, OF_CONTACT_ELEMENTS["JEU"])
     if component == "CONT":
         return _status(problem, step)
     if component in ("RX", "RY", "RZ"):
@@ -335,13 +337,9 @@ def _projection(problem: Problem, contact: fc.ContactResult, step: fc.StepResult
 def _reaction(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
     """Return forces of supports, relations and contact, on both sides of it; code_aster counts springs as elements."""
     axis = ("DX", "DY", "DZ").index(component)
-    total = step.reaction[:, axis].copy()
-    for contact in step.contact.values():
-        np.add.at(total, contact.points, contact.force_vectors[:, axis])
-        np.add.at(total, contact.primary_points, contact.primary_force_vectors[:, axis])
     if any(springs.grounded for springs in problem.model.springs):
         raise MissingError("needs REAC_NODA with springs to the ground")
-    return dict(enumerate(total * _per_radian(problem)))
+    return dict(enumerate((step.reaction + contact_forces(step))[:, axis] * _per_radian(problem)))
 
 
 def _internal(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:

@@ -31,13 +31,16 @@ def solved(path, folder, numbers, limit=120.0, asked="U, RF"):
     text = END_OF_STEP.sub(lambda found: f"*NODE PRINT, NSET=COMPARED\n{asked}\n{found[0]}", text)
     for beside in path.parent.glob("*.inc"):
         shutil.copy(beside, folder)
+    return printed(run(text, folder, limit))
+
+
+def run(text, folder, limit):
+    """Run a deck in `folder`; return what CalculiX prints for the user."""
     (folder / "run.inp").write_text(text, encoding="utf-8")
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    done = subprocess.run(
-        [CCX, "run"], cwd=folder, env=environment, capture_output=True, text=True, timeout=limit, check=False
-    )
+    command, environment = [CCX, "run"], {**os.environ, "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=limit)
     assert "Job finished" in done.stdout, done.stdout[-2000:]
-    return printed((folder / "run.dat").read_text(encoding="utf-8"))
+    return (folder / "run.dat").read_text(encoding="utf-8")
 
 
 def frequencies(folder):

@@ -3,18 +3,14 @@
 ``PYTHONPATH=.:tests python tests/verification/nonlinear_decks.py`` runs CalculiX (``ccx``) on all and writes the file.
 """
 
-from __future__ import annotations
-
 import json
-import os
 import re
-import subprocess
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from calculix import CCX, TYPES, deck_of
+from calculix import TYPES, deck_of, run
 from models import united
 
 import fastcontact as fc
@@ -221,13 +217,7 @@ def by_calculix(name: str) -> list[dict]:
         text = given.text.replace("0., 0.\n*SOLID", "1.E12, 1.E12\n*SOLID").replace(
             "-1.5, .2, 0.\n", "-1.5, .2, 1.E12\n"
         )
-        (Path(folder) / "run.inp").write_text(text, encoding="utf-8")
-        environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-        done = subprocess.run(
-            [CCX, "run"], cwd=folder, env=environment, capture_output=True, text=True, timeout=1200, check=False
-        )
-        assert "Job finished" in done.stdout, done.stdout[-1500:]
-        return read_dat((Path(folder) / "run.dat").read_text(encoding="utf-8"), kind_of(name))
+        return read_dat(run(text, Path(folder), 1200), kind_of(name))
 
 
 def here(name: str) -> list[dict]:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import made_of, supported
 
 import fastcontact as fc
 from fastcontact.mesh import elements
@@ -13,11 +14,9 @@ SOLIDS = [e.name for e in elements.ELEMENTS.values() if e.dim == 3]
 def held_everywhere(mesh, kinematics, material, field):
     """A model with the displacement `field` prescribed on the whole outside."""
     outer = np.unique(np.concatenate([f.ravel() for f in fc.topology.outer_facets(mesh).values()]))
-    model = fc.Model(mesh.with_groups(points={"OUTER": outer}), kinematics)
-    model.add_material(material)
+    model = made_of(mesh.with_groups(points={"OUTER": outer}), kinematics, material)
     axes = "xyz"[: mesh.dim]
-    model.prescribe("OUTER", **{a: (lambda x, k=k: field(x)[:, k]) for k, a in enumerate(axes)})
-    return model
+    return supported(model, OUTER={**{a: (lambda x, k=k: field(x)[:, k]) for k, a in enumerate(axes)}})
 
 
 @pytest.mark.parametrize("element", ["tet4", "hex8", "wedge6", "hex20", "tet10", "pyramid13"])
@@ -49,8 +48,7 @@ def test_tension_off_the_axes(kinematics, element):
     model.add_material(fc.Orthotropic(E, NU, G, axes=(c, s)))
     model.add_traction("RIGHT", x=stress)
     model.add_traction("LEFT", x=-stress)
-    model.fix("CORNER", "xy")
-    model.fix("OTHER", "y")
+    supported(model, CORNER="xy", OTHER="y")
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     np.testing.assert_allclose(
         step.stress[:, [0, 1, 3]], np.broadcast_to([stress, 0, 0], (len(step.stress), 3)), atol=1e-12

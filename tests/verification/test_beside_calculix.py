@@ -12,7 +12,6 @@ from calculix import deck_of, needs_calculix
 from models import united
 
 import fastcontact as fc
-from fastcontact.mesh.generate import box
 
 pytestmark = needs_calculix
 # CalculiX prints seven digits, of numbers that iterations leave with about as many.
@@ -50,7 +49,7 @@ def reaction_differs(step, RF, points, axis):
 
 
 def bar(element):
-    return box((40.0, 8.0, 6.0), (5, 2, 2), element)
+    return fc.generate.box((40.0, 8.0, 6.0), (5, 2, 2), element)
 
 
 @pytest.mark.parametrize("element", ["hex20", "tet4", "tet10"])
@@ -88,8 +87,8 @@ def test_a_heated_bar_between_walls(element, tmp_path):
 
 
 def stacked(element, lower, upper, top=4.0):
-    low = box((10.0, 10.0, 5.0), lower, element)
-    return united(L_=low, U_=box((10.0, 10.0, top), upper, element, (0.0, 0.0, 5.0)))
+    low = fc.generate.box((10.0, 10.0, 5.0), lower, element)
+    return united(L_=low, U_=fc.generate.box((10.0, 10.0, top), upper, element, (0.0, 0.0, 5.0)))
 
 
 def stack_deck(mesh, between):
@@ -163,7 +162,7 @@ def test_a_sector_of_a_wheel(element, tmp_path):
 
     On tetrahedra CalculiX integrates the centrifugal force less exactly.
     """
-    sectors, mesh = 12, box((1.0, 1.0, 0.4), (4, 3, 1), element)
+    sectors, mesh = 12, fc.generate.box((1.0, 1.0, 0.4), (4, 3, 1), element)
     s, t, _ = mesh.points.T
     radius, angle = 20.0 + 20.0 * t, (0.5 - s) * 2.0 * np.pi / sectors + 0.3 * t
     mesh, held, text = sector(mesh, radius, angle, sectors)
@@ -187,7 +186,7 @@ def test_a_sector_whose_ends_have_other_meshes(element, differ, tmp_path):
 
     Free expansion, linear in space, is exact here; what the pressure does differs by the interpolation.
     """
-    sectors, mesh = 12, box((1.0, 1.0, 0.4), (4, 3, 2), element)
+    sectors, mesh = 12, fc.generate.box((1.0, 1.0, 0.4), (4, 3, 2), element)
     s, t, _ = mesh.points.T
     radius, angle = 20.0 + 20.0 * (t + 0.3 * s * t * (1.0 - t)), (0.5 - s) * 2.0 * np.pi / sectors
     mesh, _, text = sector(mesh, radius, angle, sectors)
@@ -252,7 +251,7 @@ def on_faces(text, surface, letter, values):
 )
 def test_frequencies_of_a_loaded_bar(load, nlgeom, tmp_path):
     """A pull that follows the end of the bar lowers its first frequency, one that keeps its direction raises it."""
-    mesh = box((60.0, 4.0, 3.0), (8, 1, 1), "hex20")
+    mesh = fc.generate.box((60.0, 4.0, 3.0), (8, 1, 1), "hex20")
     text = deck_of(mesh, ["BOX"], ["XMIN", "XMAX"], ["XMAX"]) + MATERIAL + BLOCK.format("BOX")
     text += f"*BOUNDARY\nXMIN, 1, 3\n*STEP{nlgeom}\n*STATIC\n{load}*END STEP\n"
     (tmp_path / "deck.inp").write_text(text + "*STEP, PERTURBATION\n*FREQUENCY\n5\n*END STEP\n", encoding="utf-8")

@@ -93,10 +93,7 @@ def test_an_obstacle_may_be_a_guide(formulation):
 
 def test_a_body_may_hang_on_a_bilateral_pair():
     """Nothing but the contact holds the upper block up."""
-    model = elastic_model(blocks(upper=(4, 3)), "plane_strain")
-    for side in ("LOWER", "UPPER"):
-        model.fix(f"{side}_LEFT", "x")
-    model.fix("LOWER_BOTTOM", "y")
+    model = elastic_model(blocks(upper=(4, 3)), "plane_strain", LOWER_LEFT="x", UPPER_LEFT="x", LOWER_BOTTOM="y")
     model.add_traction("UPPER_TOP", y=2.0)
     touching(model, "mortar", kind="bilateral")
     last = fc.solve(model, fc.linear_ramp(2))[-1]
@@ -268,8 +265,6 @@ def test_friction_along_one_direction_alone(formulation, along, expected):
 
 @pytest.mark.parametrize(("options", "words"), [
     ({"friction": 0.2, "frictionless_along": (0.0, 0.0)}, "must be a vector of 2 numbers, not all zero"),
-    ({"excluded": "LOWER_BOTTOM"}, "'LOWER_BOTTOM', excluded in contact 'pair', has no nodes on the secondary side"),
-    ({"excluded": "CONT_UPPER"}, "contact 'pair' excludes all nodes of 'CONT_UPPER'"),
     ({"frictionless": 3}, "frictionless = 3 of contact 'pair' must be a group or a list of groups"),
 ])  # fmt: skip
 def test_wrong_groups_are_named(options, words):

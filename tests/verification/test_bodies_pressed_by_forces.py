@@ -3,7 +3,7 @@
 import warnings
 
 import pytest
-from models import supported
+from models import made_of
 
 import fastcontact as fc
 
@@ -83,9 +83,7 @@ def test_a_force_takes_the_way_of_the_displacement(kinematics: str, element: str
 def test_a_force_beyond_the_limit_load_is_told_as_such(strain: str) -> None:
     """A strip without hardening bears 2 / sqrt(3) of its yield stress."""
     mesh = fc.generate.block((1.0, 1.0), (2, 2))
-    model = fc.Model(mesh, "plane_strain", strain=strain)
-    model.add_material(PERFECT)
-    supported(model, BOTTOM="y", LEFT="x")
+    model = made_of(mesh, "plane_strain", PERFECT, strain=strain, BOTTOM="y", LEFT="x")
     model.add_traction("TOP", y=2.0 * PERFECT.yield_stress)
     with pytest.raises(
         fc.ConvergenceError, match=r"largest plastic strain is .* may not carry larger forces: prescribe"
@@ -102,9 +100,7 @@ def test_sides_that_overlap_at_the_start_are_told_where_the_motion_is_along_them
         fc.generate.renamed(mesh, {side: f"{side}{i}" for side in ("LEFT", "RIGHT", "TOP", "BOTTOM")})
         for i, mesh in enumerate((stub, cap))
     ]
-    model = fc.Model(fc.generate.union(*bodies), "plane_strain")
-    model.add_material(STEEL)
-    supported(model, LEFT0="xy", RIGHT1={"x": 0.0, "y": -0.5})
+    model = made_of(fc.generate.union(*bodies), "plane_strain", STEEL, LEFT0="xy", RIGHT1={"x": 0.0, "y": -0.5})
     model.add_contact("bead", secondary="LEFT1", primary="RIGHT0")
     with warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always")

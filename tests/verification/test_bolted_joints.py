@@ -4,7 +4,7 @@ import contextlib
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 
@@ -22,9 +22,7 @@ def bar(kinematics="plane_stress", element="quad4"):
         mesh = fc.generate.block((1.0, LENGTH), (2, 4), element)
     mesh = mesh.with_facet_group("CUT", lambda x: np.abs(x[:, 1] - LENGTH / 2) < 1e-9, between=True)
     model = elastic_model(fc.generate.cut(mesh, "CUT"), kinematics, E=E, nu=0.0)
-    for end in ("BOTTOM", "TOP"):
-        model.fix(end, "xyz"[: mesh.dim])
-    return model
+    return supported(model, BOTTOM="xyz"[: mesh.dim], TOP="xyz"[: mesh.dim])
 
 
 AREAS = {"plane_stress": 1.0, "plane_strain": 1.0, "axisymmetric": np.pi, "3d": 1.0}
@@ -92,8 +90,8 @@ def joint(pull, formulation="mortar", locked_from=1.0, first=1.0, tight=1.0):
     mesh = mesh.with_facet_group("CUT", lambda x: (np.abs(x[:, 1] - half) < 1e-9) & (x[:, 0] < 1.5), between=True)
     mesh = mesh.with_facet_group("HEAD", lambda x: np.abs(x[:, 1] - LENGTH) < 1e-9)
     model = elastic_model(fc.generate.cut(mesh, "CUT"), "plane_stress", E=E, nu=0.0)
-    for group in ("BOLT BOTTOM", "LOW BOTTOM"):
-        model.fix(group, "xy")
+    model.fix("BOLT BOTTOM", "xy")
+    model.fix("LOW BOTTOM", "xy")
     model.fix("UP", "x")
     model.couple("HEAD", "y")
     model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", formulation=formulation)

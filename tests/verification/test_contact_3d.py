@@ -107,15 +107,13 @@ def on_rigid_plate(element, formulation, **sizes):
     sphere = sphere_octant(element, **sizes)
     plate = box((30.0, 10.0, 30.0), (1, 1, 1), "hex8", (0.0, -10.0, 0.0), name="PLATE")
     model = sphere_model(union(sphere, renamed(plate, {"YMAX": "CONT_BLOCK"})), formulation)
-    model.fix("PLATE", "xyz")
-    return model
+    return supported(model, PLATE="xyz")
 
 
 def on_elastic_block(element, formulation, contact_size, swap=False):
     mesh = sphere_on_block(element, size=12.5, contact_size=contact_size, contact_radius=6.0)
     model = sphere_model(mesh, formulation, swap)
-    model.fix("BLOCK_BOTTOM", "y")
-    return model
+    return supported(model, BLOCK_BOTTOM="y")
 
 
 def measured(contact):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -14,10 +15,7 @@ def pressed(element: str, size: float, obstacle, top, formulation: str | None) -
     x, y, z = mesh.points.T
     depth = -z.min()
     mesh = mesh.replace(points=np.column_stack([x, y, z - top(x) * (z + depth) / depth]))
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    for side, axes in (("SYMMETRY_X", "x"), ("SYMMETRY_Y", "y"), ("BOTTOM", "z")):
-        model.fix(side, axes)
+    model = elastic_model(mesh, "3d", SYMMETRY_X="x", SYMMETRY_Y="y", BOTTOM="z")
     options = {} if formulation is None else {"formulation": formulation}
     model.add_obstacle("pair", secondary="CONTACT", obstacle=obstacle, force={"z": -FORCE / 4.0}, **options)
     return fc.solve(model, 1, linear_solver="direct")[-1].contact["pair"]

@@ -253,8 +253,7 @@ def sliding(cells):
     """Return the model of a block that a rigid floor presses while it slides."""
     model = elastic_model(fc.generate.block((2.0, 1.0), (cells, 2)), "plane_strain", nu=0.0)
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0)))
-    model.prescribe("TOP", x=1.0, y=-0.01)
-    return model
+    return supported(model, TOP={"x": 1.0, "y": -0.01})
 
 
 def test_steps_of_another_model_or_order_are_refused():

@@ -294,8 +294,7 @@ def test_springs_join_the_nodes_of_two_groups(element, kind):
     given = {"axes": {"y": 30.0}, "axial": {"axial": 30.0}, "direction": {"axial": 30.0, "direction": (0.0, 1.0)}}[kind]
     model.add_spring("TOP", "BOTTOM2", **given)
     assert model.springs[0].stiffness.tolist() == [30.0] * n
-    for group in ("LOW", "UP"):
-        model.fix(group, "x")
+    supported(model, LOW="x", UP="x")
     supported(model, LOW="y", UP={"y": -0.01})
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     assert step.reaction[mesh.points_of("UP"), 1].sum() == pytest.approx(-30.0 * n * 0.01, rel=1e-12)
@@ -363,9 +362,3 @@ def test_mistakes_are_told(method, arguments, words):
     model = model_on(mesh.with_groups(points={"SIDE": side}))
     with pytest.raises(fc.ModelError, match=words):
         getattr(model, method)(**arguments)
-
-
-def test_no_force_acts_through_a_place_of_a_ring():
-    model = fc.Model(fc.generate.block((1.0, 1.0), (2, 2), "quad4", (1.0, 0.0)), "axisymmetric")
-    with pytest.raises(fc.ModelError, match="in axisymmetry a force cannot act at a point"):
-        model.add_force("TOP", y=1.0, at=(1.5, 1.0))

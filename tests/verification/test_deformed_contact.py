@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, made_of, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -29,8 +29,7 @@ def stack(kinematics: str, element: str, law, **options):
     upper = fc.generate.transformed(upper, translate=(*[0.0] * (lower.dim - 1), 0.5))
     names = {faces[0]: "BASE", faces[1]: "JOINT"}, {faces[0]: "SOLE", faces[1]: "HEAD"}
     mesh = fc.generate.union(*(fc.generate.renamed(part, own) for part, own in zip((lower, upper), names, strict=True)))
-    model = fc.Model(mesh, kinematics, strain="finite")
-    model.add_material(law)
+    model = made_of(mesh, kinematics, law, strain="finite")
     for group, component in (("LEFT", "x"), ("XMIN", "x"), ("YMIN", "y"), ("BASE", axis)):
         if group in mesh.cell_groups:
             model.fix(group, component)
@@ -85,9 +84,7 @@ def test_a_ball_slides_over_a_rubber_block(element: str, formulation: str | None
     """Pressed in by a quarter of the height, then the block is drawn on by three nodes; friction of 0.5."""
     divisions = {"quad4": (40, 10), "quad8": (20, 5)}[element]  # as many nodes along the surface
     mesh = fc.generate.block((4.0, 1.0), divisions, element=element, origin=(-2.0, 0.0))
-    model = fc.Model(mesh, "plane_strain", strain="finite")
-    model.add_material(fc.NeoHookean(E=1.0, nu=0.4995))
-    model.fix("BOTTOM", "y")
+    model = made_of(mesh, "plane_strain", fc.NeoHookean(E=1.0, nu=0.4995), strain="finite", BOTTOM="y")
     model.prescribe("BOTTOM", x=-0.3, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
     model.add_obstacle(
         "ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, 1.5), 0.5), friction=0.5, motion={"y": -0.25},
@@ -127,8 +124,7 @@ def ring(free: bool):
     if free:
         mesh = fc.generate.union(mesh, fc.generate.mirrored(mesh, "y"))
     mesh = fc.generate.transformed(fc.generate.merge_points(mesh, 1e-6), translate=(25.0, 0.0))
-    model = fc.Model(mesh, "axisymmetric", strain="finite")
-    model.add_material(fc.NeoHookean(E=6.0, nu=0.4995))
+    model = made_of(mesh, "axisymmetric", fc.NeoHookean(E=6.0, nu=0.4995), strain="finite")
     if free:
         model.add_obstacle("floor", secondary="CONT1", obstacle=fc.obstacles.HalfSpace((0.0, -2.5), (0.0, 1.0)))
     else:
@@ -168,8 +164,7 @@ def groove(friction: float, ramp: list[tuple[float, float]] | None = None) -> fc
     mesh = cord(2.5, 25.0, 0.7, 0.7)
     mesh = mesh.with_facet_group("CORD", lambda x: np.hypot(x[:, 0] - 25.0, x[:, 1]) > 2.4)
     mesh = mesh.with_facet_group("INSIDE", lambda x: np.hypot(x[:, 0] - 22.5, x[:, 1]) < 0.9)
-    model = fc.Model(mesh, "axisymmetric", strain="finite")
-    model.add_material(fc.NeoHookean(E=6.0, nu=0.4995))
+    model = made_of(mesh, "axisymmetric", fc.NeoHookean(E=6.0, nu=0.4995), strain="finite")
     for name, side, point, normal, motion in (
         ("floor", "LOWER", (0.0, -2.5), (0.0, 1.0), None),
         ("lid", "UPPER", (0.0, 2.5), (0.0, -1.0), {"y": -1.25}),
@@ -251,8 +246,7 @@ def test_fluid_pushes_a_ring_along_its_groove_until_the_wall_stops_it() -> None:
             lambda x, sign=sign: (sign * (x[:, 0] - centre) > -1e-9) & (np.hypot(x[:, 0] - centre, x[:, 1]) > 0.98 * r),
         )
     mesh = mesh.with_facet_group("BELOW", lambda x: np.hypot(x[:, 0] - centre, x[:, 1] + r) < 0.35 * r)
-    model = fc.Model(mesh, "axisymmetric", strain="finite")
-    model.add_material(fc.MooneyRivlin(C10=110.0, C01=22.0, bulk=2e5))
+    model = made_of(mesh, "axisymmetric", fc.MooneyRivlin(C10=110.0, C01=22.0, bulk=2e5), strain="finite")
     for name, side, point, normal, motion in (
         ("inner", "INNER", (0.492, 0.0), (1.0, 0.0), {"x": 0.008}),
         ("outer", "OUTER", (0.632, 0.0), (-1.0, 0.0), {"x": -0.021}),

@@ -125,7 +125,7 @@ def check_mechanics(described, step, friction, obstacle=False):
         assert forces < 1e-8
         # What a penalty lets penetrate stands apart.
         assert moments < 1e-8 + np.abs(contact.gap[contact.active]).max(initial=0.0)
-    outer = step.reaction + contact_forces(described, step)  # those of both sides balance each other
+    outer = step.reaction + contact_forces(step)  # those of both sides balance each other
     size = np.abs(step.reaction).sum()
     if described.kinematics == "axisymmetric":
         assert abs(outer[:, 1].sum()) < 1e-8 * size

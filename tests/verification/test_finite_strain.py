@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import supported
+from models import elastic_model, made_of, supported
 from pairwise import first_of
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -145,8 +145,7 @@ def test_a_plastic_body_in_simple_shear(kinematics: str, element: str, count: in
     mesh = fc.generate.box((1.0,) * 3, (1, 1, 1), element=element) if kinematics == "3d" else fc.generate.block(
         element=element, origin=(float(kinematics == "axisymmetric"), 0.0)
     )  # fmt: skip
-    model = fc.Model(mesh, kinematics, strain="finite")
-    model.add_material(law)
+    model = made_of(mesh, kinematics, law, strain="finite")
     bodies = NonlinearBodies(mesh, kinematics, "finite", model.material_field())
     along, across = (1, 0) if kinematics == "axisymmetric" else (0, 1)
     moved, step = np.zeros_like(mesh.points), 1.0 / count
@@ -167,8 +166,7 @@ def test_plastic_history_turns_with_the_body() -> None:
     """A block that yields, turns and is deformed further has the stress of one that does not turn, turned."""
     law = fc.ElasticPlastic(E=200.0, nu=0.3, yield_stress=1.0, hardening=[(0.0, 1.0), (2.0, 21.0)])
     mesh = fc.generate.box((1.0, 1.0, 1.0), (1, 1, 1), element="hex20")
-    model = fc.Model(mesh, "3d", strain="finite")
-    model.add_material(law)
+    model = made_of(mesh, "3d", law, strain="finite")
     bodies = NonlinearBodies(mesh, "3d", "finite", model.material_field())
     rng = np.random.default_rng(0)
     first, second = (np.eye(3) + 0.2 * rng.normal(size=(3, 3)) for _ in range(2))
@@ -193,8 +191,7 @@ def test_simple_shear(kinematics: str, element: str, law: str) -> None:
     material, energy = LAWS[law]
     solid = kinematics == "3d"
     mesh = fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), element=element) if solid else fc.generate.block(element=element)
-    model = fc.Model(mesh, kinematics, strain="finite")
-    model.add_material(material)
+    model = made_of(mesh, kinematics, material, strain="finite")
     bottom, top, sides = ("YMIN", "YMAX", ("XMIN", "XMAX")) if solid else ("BOTTOM", "TOP", ("LEFT", "RIGHT"))
     model.fix(bottom, "x")
     model.prescribe(top, x=0.4)
@@ -214,10 +211,7 @@ def test_simple_shear(kinematics: str, element: str, law: str) -> None:
 def tube(element: str, count: int) -> fc.Model:
     """Return the wall of a tube, 1 to 2, that keeps its length: nearly incompressible, of shear modulus 1."""
     mesh = fc.generate.block((1.0, 0.05), (count, 1), element=element, origin=(1.0, 0.0))
-    model = fc.Model(mesh, "axisymmetric", strain="finite")
-    model.add_material(fc.NeoHookean(E=2.0 * 1.4999, nu=0.4999))
-    supported(model, BOTTOM="y", TOP="y")
-    return model
+    return made_of(mesh, "axisymmetric", fc.NeoHookean(E=2.0 * 1.4999, nu=0.4999), strain="finite", BOTTOM="y", TOP="y")
 
 
 def pressure_of_tube(inner: float) -> float:
@@ -248,9 +242,7 @@ def test_the_elastica(element: str) -> None:
     """Mattiasson (1981): the tip of a cantilever under P L^2 / E I = 10."""
     length, depth, E = 10.0, 0.1, 1e6
     mesh = fc.generate.block((length, depth), (40, 1), element=element)
-    model = fc.Model(mesh, "plane_stress", strain="finite")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
-    model.fix("LEFT", "xy")
+    model = elastic_model(mesh, "plane_stress", E=E, nu=0.0, strain="finite", LEFT="xy")
     model.add_traction("RIGHT", y=-10.0 * E * depth**3 / 12.0 / length**2 / depth)
     tip = fc.solve(model, 5)[-1].displacement[mesh.points_of("RIGHT")].mean(axis=0)
     assert -tip / length == pytest.approx([0.55500, 0.81061], rel=2e-3)
@@ -259,8 +251,7 @@ def test_the_elastica(element: str) -> None:
 @pytest.mark.filterwarnings("ignore:a displacement of 2 is prescribed")
 def test_rigid_rotation_by_90_degrees_leaves_no_stress() -> None:
     mesh = fc.generate.block((1.0, 1.0), (3, 3), element="quad8")
-    model = fc.Model(mesh, "plane_strain", strain="finite")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    model = elastic_model(mesh, "plane_strain", E=1.0, strain="finite")
     for side in ("BOTTOM", "TOP", "LEFT", "RIGHT"):
         model.prescribe(
             side, x=lambda points: -points[:, 0] - points[:, 1], y=lambda points: points[:, 0] - points[:, 1]
@@ -332,9 +323,7 @@ def test_iterations_with_contact_converge_as_far_as_its_geometry_is_settled(law:
 
 def balls(law, strain: str, approach: float, **options):
     mesh = fc.generate.half_spheres(element="quad4")
-    model = fc.Model(mesh, "axisymmetric", strain=strain)
-    model.add_material(law)
-    supported(model, A1A2="x", A1B1="y", A2B2={"y": -approach})
+    model = made_of(mesh, "axisymmetric", law, strain=strain, A1A2="x", A1B1="y", A2B2={"y": -approach})
     model.add_contact("pair", secondary="CONT1", primary="CONT2", **options)
     return fc.solve(model, 4), model
 
@@ -357,8 +346,7 @@ def test_two_balls_squeezed_flat(formulation: str | None) -> None:
 def test_two_balls_squeezed_until_contact_is_two_thirds_as_wide(element: str, error: float) -> None:
     """Against quad8 half as large, of which coarser ones differ by 6e-5; the deformed radius is 33 of 50."""
     mesh = fc.generate.half_spheres(element=element, segments=8, arc_sizes=(1.6, 1.6))
-    model = fc.Model(mesh, "axisymmetric", strain="finite")
-    model.add_material(fc.NeoHookean(E=20_000.0, nu=0.3))
+    model = made_of(mesh, "axisymmetric", fc.NeoHookean(E=20_000.0, nu=0.3), strain="finite")
     supported(model, A1A2="x", A1B1="y", A2B2={"y": -36.0})
     model.add_contact("pair", secondary="CONT1", primary="CONT2")
     contact = fc.solve(model, 4)[-1].contact["pair"]
@@ -430,9 +418,7 @@ def cook(element: str, n: int, law, force: float, steps: int, strain: str) -> fl
     block = fc.generate.block((1.0, 1.0), (n, n), element)
     x, y = block.points.T
     mesh = block.replace(points=np.column_stack([48.0 * x, 44.0 * x + y * (44.0 - 28.0 * x)]))
-    model = fc.Model(mesh, "plane_strain", strain=strain)
-    model.add_material(law)
-    model.fix("LEFT", "xy")
+    model = made_of(mesh, "plane_strain", law, strain=strain, LEFT="xy")
     model.add_force("RIGHT", y=force)
     corner = np.linalg.norm(mesh.points - [48.0, 60.0], axis=1).argmin()
     return fc.solve(model, steps)[-1].displacement[corner, 1]
@@ -468,9 +454,7 @@ def test_cooks_membrane_yields(element: str, n: int) -> None:
 
 def test_multigrid_with_forcing_terms_unloads_a_body_to_rest():
     mesh, found = fc.generate.box((1.0, 1.0, 1.0), (6, 6, 6), "hex8"), {}
-    model = fc.Model(mesh, "3d", strain="finite")
-    model.add_material(fc.NeoHookean(E=2.5, nu=0.3))
-    model.fix("ZMIN", "xyz")
+    model = made_of(mesh, "3d", fc.NeoHookean(E=2.5, nu=0.3), strain="finite", ZMIN="xyz")
     model.add_traction("ZMAX", x=0.1, y=0.0, z=0.2)
     ramp = fc.Ramp([1.0, 2.0, 3.0, 4.0], [(0.0, 0.0), (1.0, 1.0), (2.0, 0.0), (3.0, -0.5), (4.0, 0.0)])
     for solver in ("amg", "direct"):

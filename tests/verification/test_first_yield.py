@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import made_of
 
 import fastcontact as fc
 
@@ -12,10 +13,7 @@ def test_first_yield_under_a_ball() -> None:
     modulus = E / (1.0 - NU**2)
     unit = np.pi * R * Y / (2.0 * modulus)  # contact radius where the largest pressure is Y
     mesh = fc.generate.graded_block(element="quad8", width=20.0 * unit, contact_radius=2.0 * unit)
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.ElasticPlastic(E=E, nu=NU, yield_stress=Y))
-    model.fix("SYMMETRY_X", "x")
-    model.fix("BOTTOM", "y")
+    model = made_of(mesh, "axisymmetric", fc.ElasticPlastic(E=E, nu=NU, yield_stress=Y), SYMMETRY_X="x", BOTTOM="y")
     force = 4.0 / 3.0 * modulus / R * unit**3  # p0 = Y; it grows with the third power
     model.add_obstacle("ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, R), R), force={"y": -force})
     pressures = np.array([1.5, 1.55, 1.6, 1.65, 1.7])

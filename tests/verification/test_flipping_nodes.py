@@ -5,7 +5,6 @@ import pytest
 from models import elastic_model
 
 import fastcontact as fc
-from fastcontact.mesh.generate import box, renamed, union
 
 
 def spheres(**options):
@@ -30,18 +29,18 @@ def pressed(element, cells, swapped, friction):
     parts = []
     for name, size, count, bend in (("LOW", 1.4, cells[0], 0.08), ("UP", 1.0, cells[1], 0.1)):
         lower = name == "LOW"
-        mesh = box(
+        mesh = fc.generate.box(
             (size, size, 0.7), (count, count, 2), element, (-size / 2, -size / 2, -0.7 if lower else 0.0), name=name
         )
         points = np.array(mesh.points)
         share = (points[:, 2] + 0.7) / 0.7 if lower else 1.0
         points[:, 2] += bend * share * (points[:, :2] ** 2).sum(axis=1)
         parts.append(
-            renamed(
+            fc.generate.renamed(
                 mesh.replace(points=points), {group: f"{name}_{group}" for group in mesh.group_names if group != name}
             )
         )
-    model = elastic_model(union(*parts), "3d", LOW_ZMIN="xyz", UP_ZMAX={"x": 0.0, "y": 0.0, "z": -0.02})
+    model = elastic_model(fc.generate.union(*parts), "3d", LOW_ZMIN="xyz", UP_ZMAX={"x": 0.0, "y": 0.0, "z": -0.02})
     sides = ("LOW_ZMAX", "UP_ZMIN") if swapped else ("UP_ZMIN", "LOW_ZMAX")
     model.add_contact(
         "pair", secondary=sides[0], primary=sides[1], formulation="node_to_segment", normals="facet", friction=friction

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -123,9 +123,7 @@ def test_fluid_round_a_disc_comes_as_far_as_the_contact_presses_less(element):
     sizes = {"size": 0.5, "contact_size": 0.2} if element == "tri6" else {"arc_sizes": (0.1, 0.3), "segments": 8}
     mesh = fc.generate.quarter_disc(element, R=2.5, **sizes)
     mesh = fc.generate.renamed(mesh, {"CONT1": "ARC", "D1B1": "ARC"})
-    model = fc.Model(mesh, kinematics="plane_strain")
-    model.add_material(fc.LinearElastic(E=100.0, nu=0.3))
-    supported(model, A1A2="x", A1B1="y")
+    model = elastic_model(mesh, "plane_strain", E=100.0, A1A2="x", A1B1="y")
     plate = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
     model.add_obstacle("plate", secondary="ARC", obstacle=plate, motion={"y": -0.1}, ramp=HELD)
     model.add_fluid_pressure("plate", 1.5, source="B1", ramp=FLUID)

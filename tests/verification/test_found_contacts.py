@@ -4,7 +4,7 @@ import copy
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, made_of
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case
@@ -162,8 +162,7 @@ def test_distance_angle_and_groups():
 
 def test_softer_bodies_are_secondary_and_pairs_by_name_stay():
     mesh = stacked("quad4", 2, 2, 2)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3), ["C"])
+    model = made_of(mesh, "plane_strain", {"C": fc.LinearElastic(E=1.0, nu=0.3)})
     model.add_material(fc.LinearElastic(E=9.0, nu=0.3), ["A", "B"])
     model.add_contact("named", secondary="A TOP", primary="B BOTTOM")
     found = model.add_contacts(friction=0.2, kind=None)

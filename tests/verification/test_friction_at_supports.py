@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, supported, united
 
 import fastcontact as fc
 
@@ -308,8 +308,7 @@ TOLD = "supports hold 2 of the 6 facets of 'CONT_UPPER'"
 )
 def test_tractions_between_facets_that_supports_hold_are_told_to_be_undetermined(options, held, told):
     model = elastic_model(fc.generate.block_on_block(divisions_lower=(6, 3), divisions_upper=(6, 3)), "plane_strain")
-    model.fix("LOWER_BOTTOM", "xy")
-    model.prescribe("UPPER_TOP", x=0.01, y=-0.01)
+    supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.01, "y": -0.01})
     points, width = model.mesh.points, np.ptp(model.mesh.points[:, 0])
     sides = np.concatenate([model.mesh.points_of(group) for group in ("CONT_LOWER", "CONT_UPPER")])
     for point in sides[points[sides, 0] < points[:, 0].min() + 0.34 * width]:
@@ -329,12 +328,8 @@ def quietly(model):
 def test_a_slice_and_a_side_that_is_drawn_are_determined():
     """Where the whole side is held, as in plane strain, there is no traction; where one slides over the other, friction."""
     model = elastic_model(blocks("hex8", 3), "3d")
-    for side in ("A_YMIN", "A_YMAX", "B_YMIN", "B_YMAX", "A_ZMAX", "B_ZMIN"):
-        model.fix(side, "y")
-    model.fix("A_ZMIN", "xz")
-    model.fix("A_ZMAX", "x")
-    model.prescribe("B_ZMIN", x=0.1)
-    model.prescribe("B_ZMAX", x=0.1, z=-0.01)
+    supported(model, A_YMIN="y", A_YMAX="y", B_YMIN="y", B_YMAX="y", A_ZMAX="y", B_ZMIN="y")
+    supported(model, A_ZMIN="xz", A_ZMAX="x", B_ZMIN={"x": 0.1}, B_ZMAX={"x": 0.1, "z": -0.01})
     model.add_contact("c", secondary="B_ZMIN", primary="A_ZMAX", friction=0.2)
     (step,) = quietly(model)
     assert abs(step.contact["c"].force[0]) == pytest.approx(0.2 * abs(step.contact["c"].force[2]), rel=1e-3)
@@ -347,9 +342,7 @@ def test_facets_that_meet_a_plane_of_symmetry_at_an_angle_do_not_penetrate(frict
     mesh = fc.generate.rings("quad4", divisions_inner=(1, 2), divisions_outer=(1, 2))
     forces = []
     for mu in (None, friction):
-        model = elastic_model(mesh, "plane_strain")
-        model.fix("SYMMETRY_X", "x")
-        model.fix("SYMMETRY_Y", "y")
+        model = elastic_model(mesh, "plane_strain", SYMMETRY_X="x", SYMMETRY_Y="y")
         model.add_pressure("BORE", 1.0)
         options = {"formulation": "continuous", "integration": "node", "surface_smoothing": False}
         model.add_contact("fit", secondary="CONT_INNER", primary="CONT_OUTER", friction=mu, **options)

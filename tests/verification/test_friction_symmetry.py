@@ -12,7 +12,6 @@ import pytest
 from models import elastic_model
 
 import fastcontact as fc
-from fastcontact.mesh.generate import block, box, renamed, union
 
 pytestmark = pytest.mark.each_value
 
@@ -23,8 +22,7 @@ FIELDS = [("continuous", {}), ("mortar", {"multipliers": "standard"})]
 
 def spheres(element):
     mesh = fc.generate.half_spheres(element, **MESHES[element])
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": 2.0})
-    return model
+    return elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": 2.0})
 
 
 def pressed(element, formulation, steps=1, friction=0.3, criteria=None, **options):
@@ -147,13 +145,13 @@ def test_press_fit_between_planes_of_symmetry_sticks_without_shear(elements, tur
     ends = ("YMIN", "YMAX", "ZMIN", "ZMAX") if space else ("BOTTOM", "TOP")
     for name, inside, cells in (("A", 1.0, 6), ("B", 2.0, 5)):
         if space:
-            mesh = box((1.0, 1.0, 0.2), (3, cells, 1), elements)
+            mesh = fc.generate.box((1.0, 1.0, 0.2), (3, cells, 1), elements)
         else:
-            mesh = block((1.0, 1.0), (4, cells), elements)
+            mesh = fc.generate.block((1.0, 1.0), (4, cells), elements)
         r, t = inside + mesh.points[:, 0], turned + angle * mesh.points[:, 1]
         mesh = mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t), mesh.points[:, 2:]]))
-        parts.append(renamed(mesh, {group: name + group for group in mesh.group_names}))
-    model = elastic_model(union(*parts), "3d" if space else "plane_strain")
+        parts.append(fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names}))
+    model = elastic_model(fc.generate.union(*parts), "3d" if space else "plane_strain")
     for name in "AB":
         for end in ends:
             model.fix(name + end, "normal")

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from case_texts import case_of, contact_pair
-from models import supported
+from models import made_of, supported
 from pairwise import first_of
 from scipy.optimize import brentq
 
@@ -87,9 +87,7 @@ def test_uniform_flux_of_other_formulations_and_by_multigrid():
 
 def cylinder_wall(element, count, k=15.0):
     mesh = fc.generate.block((1.0, 0.2), (count, 1), element, (1.0, 0.0))
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=k))
-    model.fix("BOTTOM", "y")
+    model = made_of(mesh, "axisymmetric", fc.LinearElastic(E=1.0, nu=0.3, conductivity=k), BOTTOM="y")
     return mesh, model
 
 
@@ -164,8 +162,7 @@ def error_of_manufactured(kinematics, element, count):
     else:
         mesh = fc.generate.block((1.0, 1.0), (count,) * 2, element, (0.5, 0.0), distortion=0.1)
         sides = ["LEFT", "RIGHT", "TOP", "BOTTOM"]
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=7.0))
+    model = made_of(mesh, kinematics, fc.LinearElastic(E=1.0, nu=0.3, conductivity=7.0))
     model.fix(sides[0], "xyz"[: mesh.dim])
     for side in sides:
         model.fix_temperature(side, exact)
@@ -198,10 +195,7 @@ def column(conductance, gap, alpha=1e-5, k=(50.0, 20.0), E=2e11):
     model = fc.Model(mesh, "plane_strain")
     for body, own in zip(("UPPER", "LOWER"), k, strict=True):
         model.add_material(fc.LinearElastic(E=E, nu=0.0, expansion=alpha, conductivity=own), body)
-    for group in ("LOWER_BOTTOM", "UPPER_TOP"):
-        model.fix(group, "y")
-    for group in ("LOWER", "UPPER"):
-        model.fix(group, "x")
+    supported(model, LOWER_BOTTOM="y", UPPER_TOP="y", LOWER="x", UPPER="x")
     model.fix_temperature("UPPER_TOP", 100.0)
     model.fix_temperature("LOWER_BOTTOM", 0.0)
     model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", clearance=gap, conductance=conductance)
@@ -274,8 +268,7 @@ def test_heat_of_friction_leaves_through_films():
 def test_hot_hertz_contact_passes_conductance_times_force():
     # Where bodies conduct much better than the contact each has one temperature, and by h = c p all heat is c F dT.
     mesh = fc.generate.half_spheres(size=4.0)
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3, expansion=1e-5, conductivity=1e7))
+    model = made_of(mesh, "axisymmetric", fc.LinearElastic(E=20_000.0, nu=0.3, expansion=1e-5, conductivity=1e7))
     supported(model, A1A2="x", A2B2={"y": -1.0}, A1B1={"y": 1.0})
     model.fix_temperature("A2B2", 20.0)
     model.fix_temperature("A1B1", 320.0)
@@ -328,9 +321,7 @@ def test_spans_that_cannot_be_are_refused():
 
 def test_ends_of_a_period_have_one_temperature():
     mesh = fc.generate.block((1.0, 4.0), (2, 8), "quad4")
-    model = fc.Model(mesh, "plane_stress")
-    model.add_material(fc.LinearElastic(E=2e5, nu=0.3, conductivity=40.0))
-    model.fix("BOTTOM", "xy")
+    model = made_of(mesh, "plane_stress", fc.LinearElastic(E=2e5, nu=0.3, conductivity=40.0), BOTTOM="xy")
     model.add_periodicity("LEFT", "RIGHT", x=0.0, y=0.0)
     model.fix_temperature("BOTTOM", 0.0)
     model.fix_temperature("TOP_LEFT", 10.0)
@@ -361,10 +352,8 @@ def test_result_files_and_restarts_hold_the_heat(tmp_path):
 
 
 def bar(**constants):
-    model = fc.Model(fc.generate.block_on_block("quad4"), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, **constants))
-    supported(model, LOWER_BOTTOM="xy", UPPER_TOP="xy")
-    return model
+    model = made_of(fc.generate.block_on_block("quad4"), "plane_strain", fc.LinearElastic(E=1.0, nu=0.3, **constants))
+    return supported(model, LOWER_BOTTOM="xy", UPPER_TOP="xy")
 
 
 def joined(model, **options):
@@ -493,8 +482,7 @@ def test_heat_crosses_to_a_rigid_obstacle(formulation, kinematics):
         mesh, bottom, top = fc.generate.box((2.0, 2.0, 4.0), (2, 2, 3)), "ZMIN", "ZMAX"
     else:
         mesh, bottom, top = fc.generate.block((2.0, 4.0), (3, 3)), "BOTTOM", "TOP"
-    model = fc.Model(mesh, kinematics, reference_temperature=20.0)
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0, conductivity=50.0))
+    model = made_of(mesh, kinematics, fc.LinearElastic(E=1000.0, nu=0.0, conductivity=50.0), reference_temperature=20.0)
     model.add_pressure(top, 10.0)
     model.fix(top, "xyz"[: mesh.dim - 1])
     model.fix_temperature(top, 100.0)
@@ -524,8 +512,7 @@ LAWS = {
 @pytest.mark.parametrize("law", LAWS)
 def test_a_layer_conducts_until_it_breaks_and_a_seal_until_a_fluid_opens_it(law, formulation):
     mesh = fc.generate.block_on_block(divisions_lower=(4, 2), divisions_upper=(4, 2))
-    model = fc.Model(mesh, kinematics="plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0, conductivity=10.0))
+    model = made_of(mesh, "plane_strain", fc.LinearElastic(E=1000.0, nu=0.0, conductivity=10.0))
     supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.0})
     pulled = [(0, 0), (1, 1e-4), (2, 0.1)] if law != "fluid" else [(0, 0), (1, -0.01), (2, -0.01)]
     model.prescribe("UPPER_TOP", y=1.0, ramp=pulled)

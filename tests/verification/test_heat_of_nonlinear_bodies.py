@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import made_of, supported
 from scipy.integrate import quad
 from scipy.optimize import brentq, fsolve
 
@@ -29,8 +30,7 @@ def free_body(law, kinematics, element):
     else:
         origin = (1.0, 0.0) if kinematics == "axisymmetric" else (0.0, 0.0)
         mesh, faces = fc.generate.block((1.0, 1.0), (2, 2), element, origin), {"LEFT": "x", "BOTTOM": "y"}
-    model = fc.Model(mesh, kinematics, strain="small" if isinstance(law, fc.ElasticPlastic) else "finite")
-    model.add_material(law)
+    model = made_of(mesh, kinematics, law, strain="small" if isinstance(law, fc.ElasticPlastic) else "finite")
     for face, axis in list(faces.items())[kinematics == "axisymmetric" :]:
         model.fix(face, axis)
     return model
@@ -57,8 +57,7 @@ def test_given_temperatures_expand_as_computed_ones_and_axes_have_their_own():
     wood = {"E": (9.0, 5.0, 4.0), "nu": (0.2, 0.2, 0.2), "G": (2.0, 2.0, 2.0), "axes": [[1, 1, 0], [-1, 1, 0]]}
     model = free_body(fc.Orthotropic(**wood, expansion=(3e-3, 1e-3, 2e-3)), "plane_stress", "quad8")
     model.supports.clear()
-    model.fix("BOTTOM_LEFT", "xy")
-    model.fix("TOP_RIGHT", "x")
+    supported(model, BOTTOM_LEFT="xy", TOP_RIGHT="x")
     model.add_temperature(120.0, reference=20.0)
     step = fc.solve(model, [0.5, 1.0])[-1]
     assert np.abs(step.stress).max() < 1e-8
@@ -106,8 +105,7 @@ def column(alpha, conductance=law_of_contact, element="quad8"):
     for body, own in K.items():
         model.add_material(fc.LinearElastic(E=STIFFNESS, nu=0.0, expansion=alpha, conductivity=own), body)
         model.fix(body, "x")
-    for group in ("LOWER_BOTTOM", "UPPER_TOP"):
-        model.fix(group, "y")
+    supported(model, LOWER_BOTTOM="y", UPPER_TOP="y")
     model.fix_temperature("UPPER_TOP", 100.0)
     model.fix_temperature("LOWER_BOTTOM", 0.0)
     model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", conductance=conductance)
@@ -201,8 +199,8 @@ def test_a_plastic_law_that_does_not_yield_exchanges_heat_as_a_linear_one():
         mesh = fc.generate.block_on_block("quad4", **BARS)
         model = fc.Model(mesh, "axisymmetric")
         model.add_material(law(E=2e11, nu=0.3, expansion=1e-5, conductivity=50.0, volumetric="mean_dilatation"))
-        for group in ("LOWER_BOTTOM", "UPPER_TOP"):
-            model.fix(group, "y")
+        model.fix("LOWER_BOTTOM", "y")
+        model.fix("UPPER_TOP", "y")
         model.fix_temperature("UPPER_TOP", 100.0)
         model.add_film("LOWER_BOTTOM", 500.0, 0.0)
         model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.3, conductance=law_of_contact)

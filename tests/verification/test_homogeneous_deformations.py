@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from models import made_of, supported
 from pairwise import first_of
 from scipy.optimize import brentq
 
@@ -90,8 +91,7 @@ def check(mesh: fc.Mesh, kinematics: str, bodies: NonlinearBodies, F: np.ndarray
 def test_stress_is_the_derivative_of_the_energy(kinematics: str, element: str, law: str) -> None:
     material, energy = LAWS[law]
     mesh = distorted(kinematics, element)
-    model = fc.Model(mesh, kinematics, strain="finite")
-    model.add_material(material)
+    model = made_of(mesh, kinematics, material, strain="finite")
     bodies = NonlinearBodies(mesh, kinematics, "finite", model.material_field())
     amounts = (0.1, -0.1) if law == "Saint Venant-Kirchhoff" else (0.6, -0.3)
     for mode in ("uniaxial", "equibiaxial", "shear"):
@@ -119,8 +119,7 @@ def test_plastic_flow_along_a_straight_path(kinematics: str, element: str, strai
     """Linear hardening: p = (3 G e - Y) / (3 G + H + C) for a deviatoric strain of size e; finite strains are logarithmic."""
     mesh, law, finite = distorted(kinematics, element), PLASTIC, strains == "finite"
     law = dataclasses.replace(law, kinematic=0.0) if finite else law
-    model = fc.Model(mesh, kinematics, strain=strains)
-    model.add_material(law)
+    model = made_of(mesh, kinematics, law, strain=strains)
     bodies = NonlinearBodies(mesh, kinematics, strains, model.material_field())
     G, bulk = law.shear_modulus, law.bulk_modulus
     for mode in ("uniaxial", "equibiaxial", "shear"):
@@ -151,8 +150,7 @@ def test_plastic_flow_along_a_straight_path(kinematics: str, element: str, strai
 @pytest.mark.parametrize(("kinematics", "element"), [cell for cell in CELLS if cell[0] != "axisymmetric"])
 def test_a_rotation_by_90_degrees_leaves_no_stress(kinematics: str, element: str, law: str) -> None:
     mesh, material = distorted(kinematics, element), dataclasses.replace(PLASTIC, kinematic=0.0)
-    model = fc.Model(mesh, kinematics, strain="finite")
-    model.add_material(material if law == "plastic" else LAWS[law][0])
+    model = made_of(mesh, kinematics, material if law == "plastic" else LAWS[law][0], strain="finite")
     bodies = NonlinearBodies(mesh, kinematics, "finite", model.material_field())
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     turn = turn @ turn.T[[1, 2, 0]][:, [1, 2, 0]] if kinematics == "3d" else turn
@@ -179,10 +177,7 @@ def sphere(element: str, n: int) -> tuple[float, float, float]:
     towards = np.column_stack([np.tan(0.25 * np.pi * place[:, :2]), np.ones(mesh.n_points)])
     towards /= np.linalg.norm(towards, axis=1)[:, None]
     mesh = mesh.replace(points=towards * (1.0 + place[:, 2:]))
-    model = fc.Model(mesh, "3d", strain="finite")
-    model.add_material(LAW)
-    for group in ("XMIN", "YMIN", "XMAX", "YMAX"):
-        model.fix(group, "normal")
+    model = made_of(mesh, "3d", LAW, strain="finite", XMIN="normal", YMIN="normal", XMAX="normal", YMAX="normal")
     blown = {axis: lambda points, k=k: (FAR - 1.0) * points[:, k] for k, axis in enumerate("xyz")}
     model.prescribe("ZMIN", **blown)
     step = fc.solve(model, 3)[-1]
@@ -215,13 +210,8 @@ def test_a_thick_sphere_is_blown_up(element: str) -> None:
 def squeezed(element: str, n: int) -> tuple[float, float]:
     """Squeeze a block between rough plates by a fifth of its height; return the force [force] and max |J - 1| of cells."""
     mesh = fc.generate.box((1.0, 1.0, 0.5), (n, n, n // 2), element=element)
-    model = fc.Model(mesh, "3d", strain="finite")
-    model.add_material(LAW)
-    model.fix("ZMIN", "z")
-    model.fix("ZMAX", "xy")
-    model.prescribe("ZMAX", z=-0.1)
-    for group, axis in (("XMIN", "x"), ("YMIN", "y")):
-        model.fix(group, axis)
+    model = made_of(mesh, "3d", LAW, strain="finite", ZMIN="z", ZMAX="xy")
+    supported(model, ZMAX={"z": -0.1}, XMIN="x", YMIN="y")
     step = fc.solve(model, 2)[-1]
     return -step.reaction[mesh.points_of("ZMAX"), 2].sum(), float(np.abs(step.cell_fields["J"] - 1.0).max())
 
@@ -246,8 +236,7 @@ def test_linear_triangles_and_tetrahedra_lock_and_a_warning_says_so(element: str
         mesh, bottom, top = fc.generate.box((1.0, 1.0, 0.5), (4, 4, 2), element=element), "ZMIN", "ZMAX"
     else:
         mesh, bottom, top = fc.generate.block((1.0, 0.5), (4, 2), element=element), "BOTTOM", "TOP"
-    model = fc.Model(mesh, "3d" if solid else "plane_strain", strain="finite" if law is LAW else "small")
-    model.add_material(law)
+    model = made_of(mesh, "3d" if solid else "plane_strain", law, strain="finite" if law is LAW else "small")
     model.fix(bottom, "xyz"[: mesh.dim])
     model.fix(top, "xy"[: mesh.dim - 1])
     model.prescribe(top, **{"xyz"[mesh.dim - 1]: -0.05})

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import supported
+from models import made_of, supported
 
 import fastcontact as fc
 
@@ -12,9 +12,9 @@ E, NU, RHO = 210e3, 0.3, 7.85e-9
 
 
 def block(kinematics, size=(2.0, 3.0), element="quad8", origin=(0.0, 0.0), density=RHO):
-    model = fc.Model(fc.generate.block(size, (8, 3), element, origin=origin), kinematics)
-    model.add_material(fc.LinearElastic(E, NU, density=density))
-    return model
+    return made_of(
+        fc.generate.block(size, (8, 3), element, origin=origin), kinematics, fc.LinearElastic(E, NU, density=density)
+    )
 
 
 @pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric"])
@@ -81,29 +81,12 @@ def test_a_rotating_cylinder_that_cannot_lengthen():
 def test_the_axis_may_lie_anywhere_in_space():
     """The force on a body is that on its mass at its centre."""
     mesh = fc.generate.box((2.0, 1.0, 1.0), (3, 2, 2), "hex8")
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E, NU, density=2.0))
+    model = made_of(mesh, "3d", fc.LinearElastic(E, NU, density=2.0))
     model.add_centrifugal(3.0, origin=(5.0, 1.0, -2.0), direction=(1.0, 2.0, 3.0))
     along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
     arm = np.array([1.0, 0.5, 0.5]) - (5.0, 1.0, -2.0)
     expected = 4.0 * 9.0 * (arm - (arm @ along) * along)
     np.testing.assert_allclose(next(iter(model.forces_by_ramp().values())).sum(axis=0), expected, rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("add", "words"),
-    [
-        (lambda m: m.add_gravity(), "has no component"),
-        (lambda m: m.add_gravity(y=np.inf), "is inf, which is not a finite number"),
-        (lambda m: m.add_gravity("TOP", y=1.0), "contains no solid cells: no gravity can act on it"),
-        (lambda m: m.add_centrifugal(1.0, direction=(0, 0, 0)), "has no length"),
-        (lambda m: m.add_centrifugal(1.0, origin=(0,)), "needs three components"),
-        (lambda m: m.add_centrifugal("fast"), "must be a number, not the string 'fast'"),
-    ],
-)
-def test_what_cannot_act_is_refused(add, words):
-    with pytest.raises(fc.ModelError, match=words):
-        add(block("axisymmetric"))
 
 
 def test_oblique_axes_are_refused_in_the_plane():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from two_bodies import blocks, boxes, held, touching
 
 import fastcontact as fc
@@ -95,10 +96,7 @@ def changes(model, name, first=1):
 @pytest.mark.parametrize("options", [OF_CONSTANT_LOAD[i] for i in (0, 2, 3, 4)], ids=str)
 def test_ball_on_block(elements, options):
     mesh = fc.generate.graded_block(elements, width=10.0, depth=10.0, contact_radius=1.2, contact_size=0.2)
-    model = fc.Model(mesh, kinematics="axisymmetric")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("SYMMETRY_X", "x")
-    model.fix("BOTTOM", "xy")
+    model = elastic_model(mesh, "axisymmetric", SYMMETRY_X="x", BOTTOM="xy")
     ball = fc.obstacles.Sphere(centre=(0, 10.0), R=10.0)
     model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, motion={"y": -0.1}, friction=0.3, **options)
     assert changes(model, "ball") < 1e-4
@@ -111,8 +109,7 @@ def test_stiff_body_on_soft_one(elements, options):
     """Pressed on each other and pulled along, so that some parts of the sides slide and others stick."""
     space = elements == "hex8"
     mesh = boxes(elements, (3, 2, 2), (4, 3, 2)) if space else blocks(elements, (8, 4), (6, 3))
-    model = fc.Model(mesh, "3d" if space else "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(mesh, "3d" if space else "plane_strain")
     below, above = ("L_ZMIN", "U_ZMAX") if space else ("LOWER_BOTTOM", "UPPER_TOP")
     model.add_material(fc.LinearElastic(E=5000.0, nu=0.1), "U_BOX" if space else "UPPER")
     model.fix(below, "xyz" if space else "xy")

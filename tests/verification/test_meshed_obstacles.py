@@ -7,8 +7,6 @@ from pairwise import first_of
 
 import fastcontact as fc
 from fastcontact import obstacles
-from fastcontact.mesh.generate import block, box, quarter_disc, sphere_octant, union
-from fastcontact.mesh.mesh import Mesh
 
 
 def lines(points, element, group="TOOL"):
@@ -16,11 +14,11 @@ def lines(points, element, group="TOOL"):
     step = 1 if element == "line2" else 2
     k = np.arange(0, len(points) - step, step)
     cells = np.column_stack([k, k + step] + ([k + 1] if step == 2 else []))
-    return Mesh(points, {element: cells}, cell_groups={group: np.arange(len(cells))})
+    return fc.Mesh(points, {element: cells}, cell_groups={group: np.arange(len(cells))})
 
 
 def half_sphere(obstacle, formulation="continuous", element="quad4"):
-    model = elastic_model(quarter_disc(element), "axisymmetric", E=20_000.0, A1A2="x", A1B1={"y": 2.0})
+    model = elastic_model(fc.generate.quarter_disc(element), "axisymmetric", E=20_000.0, A1A2="x", A1B1={"y": 2.0})
     model.add_obstacle("tool", secondary="CONT1", obstacle=obstacle, formulation=formulation)
     return fc.solve(model, fc.linear_ramp(2))[-1]
 
@@ -41,7 +39,7 @@ def test_a_meshed_plane_is_a_plane(formulation, element, facet):
 
 
 def pressed_block(obstacle, formulation="continuous"):
-    mesh = block((8.0, 4.0), (32, 16), "quad8", origin=(0.0, -4.0))
+    mesh = fc.generate.block((8.0, 4.0), (32, 16), "quad8", origin=(0.0, -4.0))
     model = elastic_model(mesh, "axisymmetric", LEFT="x", BOTTOM="y")
     model.add_obstacle("ball", secondary="TOP", obstacle=obstacle, motion={"y": -0.1}, formulation=formulation)
     return fc.solve(model, fc.linear_ramp(2))[-1].contact["ball"]
@@ -62,8 +60,8 @@ def test_a_meshed_ball_becomes_a_ball_as_its_facets_shrink():
 
 @pytest.mark.parametrize("facet", first_of(1, ["hex8", "tet4", "hex20"]))
 def test_a_meshed_plane_in_three_dimensions_is_a_plane(facet):
-    ball = sphere_octant("hex8", R=2.0, size=0.8, contact_size=0.12, contact_radius=0.4)
-    tool = box((2.5, 1.0, 2.5), (3, 1, 4), facet, (0.0, -1.0, 0.0))
+    ball = fc.generate.sphere_octant("hex8", R=2.0, size=0.8, contact_size=0.12, contact_radius=0.4)
+    tool = fc.generate.box((2.5, 1.0, 2.5), (3, 1, 4), facet, (0.0, -1.0, 0.0))
 
     def pressed(obstacle):
         model = elastic_model(ball, "3d", SYMMETRY_X="x", SYMMETRY_Z="z", SPHERE_TOP={"y": -0.04})
@@ -78,9 +76,9 @@ def test_a_meshed_plane_in_three_dimensions_is_a_plane(facet):
 
 def test_a_meshed_ball_presses_a_block_in_three_dimensions():
     """A rigid octant of quadratic facets against the exact ball."""
-    ball = sphere_octant("hex20", R=2.0, size=0.8, contact_size=0.3, contact_radius=0.5)
+    ball = fc.generate.sphere_octant("hex20", R=2.0, size=0.8, contact_size=0.3, contact_radius=0.5)
     ball = ball.merged_groups("BALL", ("CONT_SPHERE", "SPHERE_SIDE"))
-    body = box((2.0, 1.0, 2.0), (12, 4, 12), "hex8", (0.0, -1.0, 0.0))
+    body = fc.generate.box((2.0, 1.0, 2.0), (12, 4, 12), "hex8", (0.0, -1.0, 0.0))
 
     def pressed(obstacle):
         model = elastic_model(body, "3d", XMIN="x", ZMIN="z", YMIN="y")
@@ -93,9 +91,9 @@ def test_a_meshed_ball_presses_a_block_in_three_dimensions():
 
 
 def test_a_rigid_surface_may_be_part_of_the_models_own_mesh():
-    body = block((1.0, 1.0), (4, 4), "quad4")
+    body = fc.generate.block((1.0, 1.0), (4, 4), "quad4")
     tool = lines(np.array([[-0.5, 1.02], [0.5, 1.0], [1.5, 1.02]]), "line2")
-    mesh = union(body, tool)
+    mesh = fc.generate.union(body, tool)
     model = elastic_model(mesh, "plane_strain", BOTTOM="xy")
     surface = obstacles.MeshedSurface(mesh, "TOOL")
     model.add_obstacle("tool", secondary="TOP", obstacle=surface, motion={"y": -0.02}, formulation="node_to_segment")

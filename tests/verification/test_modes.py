@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 from fastcontact.cli import main
@@ -80,8 +80,7 @@ def test_a_free_body_moves_rigidly_and_vibrates(kinematics, rigid, solver):
 def test_a_clamped_disc_and_a_ring():
     """``10.2158 / (2 pi R^2) sqrt(D / (density h))`` of a thin plate; ``sqrt(E / density) / (2 pi R)`` of a thin ring."""
     plate = model_of(block((1.0, 0.02), (60, 2), "quad8"), "axisymmetric", 0.3)
-    plate.fix("RIGHT", "xy")
-    plate.fix("LEFT", "x")
+    supported(plate, RIGHT="xy", LEFT="x")
     stiff = 0.02**3 / (12 * (1 - 0.09))
     assert fc.modes(plate, n=1).frequencies[0] == pytest.approx(10.2158 / (2 * np.pi) * np.sqrt(stiff / 0.02), rel=1e-3)
     ring = model_of(block((0.01, 0.01), (1, 1), "quad8", origin=(0.995, 0.0)), "axisymmetric", 0.3)
@@ -256,8 +255,7 @@ def test_what_is_open_is_free_and_penalties_are_springs():
     for options in FORMULATIONS:
         model = model_of(mesh, "plane_strain")
         model.fix("LOW BOTTOM", "xy")
-        model.prescribe("LOW", x=0.0)
-        model.prescribe("UP", x=0.0)
+        supported(model, LOW={"x": 0.0}, UP={"x": 0.0})
         model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", penalty=1.5, **options)
         model.add_pressure("UP TOP", 1e-3)
         (step,) = fc.solve(model, 1)
@@ -304,13 +302,11 @@ def test_sides_that_repeat_each_other_at_a_corner_hold_once():
         for part, name in zip(parts, ("FLOOR", "WALL", "BODY"))
     ]
     model = model_of(union(*named), "plane_strain")
-    model.fix("FLOOR", "xy")
-    model.fix("WALL", "xy")
+    supported(model, FLOOR="xy", WALL="xy")
     found = model.add_contacts(kind="tied")
     assert len(found) >= 2
     alone = model_of(parts[2], "plane_strain")
-    for side in ("BOTTOM", "LEFT"):
-        alone.fix(side, "xy")
+    supported(alone, BOTTOM="xy", LEFT="xy")
     assert fc.modes(model, n=3).frequencies == pytest.approx(fc.modes(alone, n=3).frequencies, rel=1e-9)
 
 

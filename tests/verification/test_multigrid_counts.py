@@ -8,7 +8,6 @@ from scipy.sparse import csr_array
 from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis.criteria import Criteria
 from fastcontact.cli.bench import suite
 from fastcontact.contact.configuration import Configuration
 
@@ -30,7 +29,7 @@ def sphere(size, formulation="node_to_segment"):
 
 
 def prepared(model, tolerance=1e-8, steps=1):
-    criteria = Criteria(relative=100 * tolerance, geometry=tolerance)
+    criteria = fc.Criteria(relative=100 * tolerance, geometry=tolerance)
     return Stepping(model, "amg", tolerance, criteria, fc.linear_ramp(steps))
 
 
@@ -84,8 +83,7 @@ def test_twenty_steps_with_converged_geometry_cost_few_linear_solutions(toleranc
 def test_precision_is_an_option_that_changes_no_digit_that_counts():
     model = sphere(0.18)
     single, double = (
-        fc.solve(model, fc.linear_ramp(1), linear_solver="amg", linear_precision=precision)[-1]
-        for precision in ("single", "double")
+        fc.solve(model, 1, linear_solver="amg", linear_precision=precision)[-1] for precision in ("single", "double")
     )
     assert np.abs(single.displacement - double.displacement).max() < 1e-8 * np.abs(double.displacement).max()
     with pytest.raises(fc.ModelError, match="'single' or 'double', not 'half'"):
@@ -94,9 +92,7 @@ def test_precision_is_an_option_that_changes_no_digit_that_counts():
 
 def test_left_solutions_and_extrapolated_starts_end_where_the_direct_solver_does():
     model = sphere(0.18)
-    steps = [
-        fc.solve(model, fc.linear_ramp(6), linear_solver=name, linear_tolerance=1e-10)[-1] for name in ("direct", "amg")
-    ]
+    steps = [fc.solve(model, 6, linear_solver=name, linear_tolerance=1e-10)[-1] for name in ("direct", "amg")]
     direct, amg = steps
     assert np.abs(amg.displacement - direct.displacement).max() < 1e-8 * np.abs(direct.displacement).max()
     assert (

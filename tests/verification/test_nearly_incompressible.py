@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, made_of
 from pairwise import first_of
 
 import fastcontact as fc
@@ -11,22 +11,16 @@ NU = 0.4999
 pytestmark = pytest.mark.filterwarnings("ignore:the largest")  # equivalent strain, rotation: linear all the same
 
 
-def solved(model, **options):
-    return fc.solve(model, fc.linear_ramp(1), **options)[-1]
-
-
 def membrane(element, n, nu=NU, volumetric="auto"):
     """Deflection of the upper right corner of Cook's membrane (Cook, 1974), in plane strain."""
     mesh = fc.generate.block((1.0, 1.0), (n, n), element)
     x, y = mesh.points.T
     x = x - x.min()
     mesh = mesh.replace(points=np.column_stack([48 * x, 44 * x + (y - y.min()) * (44 - 28 * x)]))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=250.0, nu=nu, volumetric=volumetric))
-    model.fix("LEFT", "xy")
+    model = made_of(mesh, "plane_strain", fc.LinearElastic(E=250.0, nu=nu, volumetric=volumetric), LEFT="xy")
     model.add_force("RIGHT", y=100.0)
     corner = np.linalg.norm(mesh.points - [48.0, 60.0], axis=1).argmin()
-    return solved(model).displacement[corner, 1]
+    return fc.solve(model, 1)[-1].displacement[corner, 1]
 
 
 @pytest.mark.parametrize(
@@ -56,7 +50,7 @@ def pad(element, n, kinematics="plane_strain", solver="direct"):
     model.prescribe(top, **{up: -0.01})
     for group, axis in (("XMIN", "x"), ("YMIN", "y")) if solid else (("LEFT", "x"),):
         model.fix(group, axis)  # symmetry
-    return -solved(model, linear_solver=solver).reaction[mesh.points_of(top), "xyz".index(up)].sum()
+    return -fc.solve(model, 1, linear_solver=solver)[-1].reaction[mesh.points_of(top), "xyz".index(up)].sum()
 
 
 @pytest.mark.parametrize(
@@ -85,7 +79,7 @@ def hertz(element, nu, coarseness):
     )
     model = elastic_model(mesh, "axisymmetric", E=20_000.0, nu=nu, A1A2="x", A2B2={"y": -1.0}, A1B1={"y": 1.0})
     model.add_contact("hertz", secondary="CONT1", primary="CONT2")
-    contact = solved(model).contact["hertz"]
+    contact = fc.solve(model, 1)[-1].contact["hertz"]
     return np.array([np.abs(contact.force[1]), contact.pressure.max()])
 
 

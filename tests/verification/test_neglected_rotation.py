@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from models import elastic_model
 from pairwise import first_of
 
 import fastcontact as fc
@@ -16,8 +17,7 @@ def belt(strain):
     strip = fc.generate.block((1.0, THICKNESS), (60, 1), "quad8")
     angle, radius = (1.0 - strip.points[:, 0]) * np.pi / 2, RADIUS + strip.points[:, 1]
     mesh = strip.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
-    model = fc.Model(mesh, kinematics="plane_strain", strain=strain)
-    model.add_material(fc.LinearElastic(E=3000.0, nu=0.4))
+    model = elastic_model(mesh, "plane_strain", E=3000.0, nu=0.4, strain=strain)
     model.add_traction("LEFT", x=-SLACK / THICKNESS)
     model.prescribe("RIGHT", y=-2.0)
     pulley = fc.obstacles.Sphere((0.0, 0.0), RADIUS)
@@ -40,10 +40,7 @@ def test_a_belt_drawn_far_needs_finite_strains():
 def test_bending_stresses_do_no_work_on_neglected_strains(kinematics):
     """A slender bar or thin ring bends by twice its thickness, which linear kinematics describe well."""
     mesh = fc.generate.block((20.0, 0.5), (40, 2), "quad8", origin=(1000.0, 0.0))
-    model = fc.Model(mesh, kinematics=kinematics)
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LEFT", "xy")
-    model.prescribe("RIGHT", y=-1.0)
+    model = elastic_model(mesh, kinematics, LEFT="xy", RIGHT={"y": -1.0})
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         fc.solve(model, 1)
@@ -78,8 +75,7 @@ def rings(dim):
 def torque(dim, turned, angle, strain="small", **options):
     """Return the torque that turns the rim or bore of a press fit until it slips all around, and the warnings."""
     mesh = rings(dim)
-    model = fc.Model(mesh, "plane_stress" if dim == 2 else "3d", strain=strain)
-    model.add_material(fc.LinearElastic(E=210e3, nu=0.3))
+    model = elastic_model(mesh, "plane_stress" if dim == 2 else "3d", E=210e3, strain=strain)
     model.add_cyclic_symmetry("FIRST", "SECOND", sectors=4 if dim == 2 else 12)
     for group, radius in (("RIM", 50.0), ("BORE", 10.0)):
         turn = angle * radius * (group == turned)
@@ -120,9 +116,7 @@ def test_the_torque_of_a_press_fit_that_turns(dim, turned, angle, options, error
 @pytest.mark.filterwarnings("ignore:the energy of these load steps")
 def test_a_block_that_slides_far_needs_no_finite_strains():
     mesh = fc.generate.block_on_block(shift=-1.0)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LOWER_BOTTOM", "xy")
+    model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy")
     model.add_pressure("UPPER_TOP", 1.0, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)])
     model.prescribe("UPPER_TOP", x=1.0, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
     model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.1)

@@ -25,9 +25,7 @@ def test_a_uniform_pressure_passes_up_to_the_end_of_the_primary_side(element, ki
     lower, upper = block((1.0, 0.5), (4, 2), element), block((width, 0.5), (3, 2), element, (0.0, 0.5))
     model = elastic_model(named(lower, upper), kinematics, nu=0.0, U_LEFT="x", L_LEFT="x")
     # The lower block is held by its surface: it does not bend beside the upper one.
-    for group in ("L_TOP", "L_BOTTOM"):
-        model.fix(group, "y")
-    model.prescribe("U_TOP", y=-0.005)
+    supported(model, L_TOP="y", L_BOTTOM="y", U_TOP={"y": -0.005})
     model.add_contact("pair", secondary="L_TOP", primary="U_BOTTOM", formulation="mortar")
     last = fc.solve(model, fc.linear_ramp(1), criteria=fc.Criteria(geometry=1e-12))[-1]
     upper_nodes = model.mesh.points_of("U_TOP")
@@ -93,9 +91,7 @@ def test_fields_are_as_rich_as_what_takes_part_determines(element, axisymmetric)
 def test_contact_at_the_nodes_holds_the_node_on_the_axis(element, kind):
     mesh = fc.generate.block_on_block(element, divisions_lower=(6, 3), divisions_upper=(5, 3))
     model = elastic_model(mesh, "axisymmetric")
-    for group in ("LOWER_LEFT", "UPPER_LEFT"):
-        model.fix(group, "x")
-    supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"y": -0.2})
+    supported(model, LOWER_LEFT="x", UPPER_LEFT="x", LOWER_BOTTOM="xy", UPPER_TOP={"y": -0.2})
     options = {"friction": 0.3} if kind == "friction" else {"kind": kind}
     model.add_contact(
         "pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation="continuous", integration="node", **options

@@ -7,7 +7,6 @@ from pairwise import first_of
 from two_bodies import YOUNG, blocks, boxes, held, touching
 
 import fastcontact as fc
-from fastcontact.analysis.criteria import Criteria
 
 pytestmark = pytest.mark.each_value
 
@@ -291,7 +290,7 @@ def sheared(formulation, sideways, dim=2, penalty=STIFFNESS, **options):
 
 
 def solved(model, ramp=(1.0, 2.0, 3.0, 4.0, 5.0), **options):
-    criteria = Criteria(keep_pairing=True)  # the sides stay flat and opposite to each other
+    criteria = fc.Criteria(keep_pairing=True)  # the sides stay flat and opposite to each other
     return fc.solve(model, fc.Ramp(ramp, ((0.0, 0.0), (5.0, 1.0))), criteria=criteria, **options)
 
 

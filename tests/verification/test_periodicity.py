@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from images import Image, image_of
+from models import made_of, supported
 from pairwise import first_of
 
 import fastcontact as fc
@@ -61,9 +62,7 @@ def loaded(model, names):
 
 
 def ring(mesh, kinematics="plane_strain"):
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=E, nu=NU, density=2.0))
-    return model
+    return made_of(mesh, kinematics, fc.LinearElastic(E=E, nu=NU, density=2.0))
 
 
 @pytest.mark.parametrize(("sectors", "swapped"), [(2, False), (5, False), (5, True), (12, False)])
@@ -168,8 +167,7 @@ def wavy(begin, form, periodic=True, divisions=(96, 32)):
         model.add_periodicity("LEFT", "RIGHT")
         model.fix("TOP_LEFT", "x")
     else:
-        model.fix("LEFT", "x")
-        model.fix("RIGHT", "x")
+        supported(model, LEFT="x", RIGHT="x")
     return model
 
 
@@ -448,8 +446,7 @@ def test_one_period_of_two_layers_in_contact(joined):
         model.relate_groups("L", "R", "xy")
     else:
         model.add_periodicity("L", "R")
-    model.fix("LOWER_BOTTOM", "xy")
-    model.prescribe("UPPER_TOP", x=0.0, y=-0.02)
+    supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.0, "y": -0.02})
     model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER")
     step = fc.solve(model, 1)[-1]
     exact = 0.002 * E * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU))

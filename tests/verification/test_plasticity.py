@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import supported
+from models import made_of, supported
 from pairwise import first_of
 
 import fastcontact as fc
@@ -18,8 +18,7 @@ def bar(kinematics: str, element: str, law, ramp, strain: str = "small"):
         mesh, side, axis = fc.generate.box((1.0, 1.0, 1.0), (2, 1, 2), element=element), "ZMAX", 2
     else:
         mesh, side, axis = fc.generate.block((1.0, 1.0), (2, 2), element=element), "TOP", 1
-    model = fc.Model(mesh, kinematics, strain=strain)
-    model.add_material(law)
+    model = made_of(mesh, kinematics, law, strain=strain)
     for group, component in (("XMIN", "x"), ("YMIN", "y"), ("ZMIN", "z"), ("LEFT", "x"), ("BOTTOM", "y")):
         if group in mesh.cell_groups:
             model.fix(group, component)
@@ -111,9 +110,7 @@ def test_a_tube_yields_from_inside(element: str, count: int, bound: float) -> No
 def indented(element: str, formulation: str, **options):
     """Press a ball into a plastic block; return the last step and the model."""
     mesh = fc.generate.block((2.0, 2.0), (12, 12), element=element)
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.ElasticPlastic(E=200.0, nu=0.3, yield_stress=1.0))
-    model.fix("BOTTOM", "y")
+    model = made_of(mesh, "axisymmetric", fc.ElasticPlastic(E=200.0, nu=0.3, yield_stress=1.0), BOTTOM="y")
     model.add_obstacle(
         "ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, 3.0), 1.0), motion={"y": -0.05},
         formulation=formulation, **options,
@@ -174,8 +171,7 @@ def flattened(instants: list[float], size: float):
     hardness = (0.454 + 0.41 * ratio) * 2.8 * limit
     at_yield = (0.5 * np.pi * hardness * (1.0 - ratio**2) / modulus) ** 2 * R
     mesh = fc.generate.quarter_disc("tri6", R=R, contact_size=size, contact_radius=0.05)
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.ElasticPlastic(E=modulus, nu=ratio, yield_stress=limit))
+    model = made_of(mesh, "axisymmetric", fc.ElasticPlastic(E=modulus, nu=ratio, yield_stress=limit))
     supported(model, A1B1="y", A1A2="x")
     flat = fc.obstacles.HalfSpace(point=(0.0, mesh.points[:, 1].max()), normal=(0.0, -1.0))
     model.add_obstacle("flat", secondary="CONT1", obstacle=flat, motion={"y": -at_yield})

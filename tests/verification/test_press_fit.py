@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, made_of
 from two_bodies import rings
 
 import fastcontact as fc
@@ -23,10 +23,7 @@ LAME = fc.analytic.press_fit_cylinders(
 def quarter(element, shaft, hub, formulation, swap=False, overlap=0.0, **options):
     """A quarter of shaft and hub in plane strain, with so many facets on each; errors of pressure and displacement."""
     mesh = rings(element, inner=(1.0, 2.0 + overlap), divisions=((shaft, shaft // 3), (hub, hub // 3)))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(SHAFT, "SHAFT")
-    model.add_material(HUB, "HUB")
-    supported(model, XAXIS="y", YAXIS="x")
+    model = made_of(mesh, "plane_strain", {"SHAFT": SHAFT, "HUB": HUB}, XAXIS="y", YAXIS="x")
     sides = ("SHAFT_OUTER", "HUB_INNER") if swap else ("HUB_INNER", "SHAFT_OUTER")
     model.add_contact("fit", secondary=sides[0], primary=sides[1], formulation=formulation, **options)
     return model, fc.solve(model, fc.linear_ramp(1))[-1]
@@ -97,9 +94,7 @@ def tubes(element, n, along):
         fc.generate.renamed(m, {g: f"{p}_{g}" for g in ("LEFT", "RIGHT", "TOP", "BOTTOM")})
         for m, p in ((shaft, "SHAFT"), (hub, "HUB"))
     ]  # fmt: skip
-    model = fc.Model(fc.generate.union(*named), "axisymmetric")
-    model.add_material(SHAFT, "SHAFT")
-    model.add_material(HUB, "HUB")
+    model = made_of(fc.generate.union(*named), "axisymmetric", {"SHAFT": SHAFT, "HUB": HUB})
     for part in ("SHAFT", "HUB"):
         model.fix(f"{part}_TOP", "y")
         model.fix(f"{part}_BOTTOM", "y")
@@ -178,8 +173,7 @@ def test_a_strip_one_facet_wide_is_smoothed_as_one_two_facets_wide(element, pres
             r, t, z = inside + mesh.points[:, 0], np.pi / 3.0 * mesh.points[:, 1], mesh.points[:, 2]
             mesh = mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t), z]))
             parts.append(renamed(mesh, {group: name + group for group in mesh.group_names if group != name}))
-        model = fc.Model(union(*parts), "3d")
-        model.add_material(SHAFT)
+        model = made_of(union(*parts), "3d", SHAFT)
         for name in "AB":
             model.fix(f"{name}YMIN", "y")
             model.fix(f"{name}YMAX", "normal")
@@ -209,8 +203,7 @@ def test_friction_between_planes_of_symmetry_has_no_shear(options, element, coun
         r, t = inside + mesh.points[:, 0], angle * mesh.points[:, 1]
         mesh = mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t)]))
         parts.append(renamed(mesh, {group: name + group for group in mesh.group_names if group != name}))
-    model = fc.Model(union(*parts), "plane_strain")
-    model.add_material(SHAFT)
+    model = made_of(union(*parts), "plane_strain", SHAFT)
     for name in "AB":
         model.fix(f"{name}BOTTOM", "y")
         model.fix(f"{name}TOP", "normal")

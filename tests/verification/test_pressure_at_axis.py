@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from models import elastic_model, made_of
 from pairwise import first_of
 
 import fastcontact as fc
@@ -17,10 +18,7 @@ FORMULATIONS = ["node_to_segment", "continuous", "mortar"]
 def pressed_ball(element, size, material, force, n_steps, strain="small", **options):
     """Return the contact and the recovered normal stress in a block under a rigid ball of radius 5 mm."""
     block = fc.generate.graded_block(element, width=30.0, contact_radius=10.0 * size, contact_size=size)
-    model = fc.Model(block, kinematics="axisymmetric", strain=strain)
-    model.add_material(material)
-    model.fix("BOTTOM", "xy")
-    model.fix("SYMMETRY_X", "x")
+    model = made_of(block, "axisymmetric", material, strain=strain, BOTTOM="xy", SYMMETRY_X="x")
     ball = fc.obstacles.Sphere((0.0, 5.0), 5.0)
     model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, force={"y": -force}, **options)
     step = fc.solve(model, n_steps)[-1]
@@ -142,9 +140,7 @@ def test_quadratic_facets_with_accurate_pressures_are_not_told(element, inner, o
 @pytest.mark.parametrize(("depth", "oscillates"), [(0.0, False), (1e-3, True)])
 def test_pressures_oscillate_where_every_second_node_is_open(depth, oscillates):
     """Grooves at the nodes between corners, as wear may leave them."""
-    model = fc.Model(fc.generate.block((8.0, 2.0), (16, 4), "quad8"), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.prescribe("TOP", x=0.0, y=-1e-3)
+    model = elastic_model(fc.generate.block((8.0, 2.0), (16, 4), "quad8"), "plane_strain", TOP={"x": 0.0, "y": -1e-3})
     floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     grooves = lambda x: depth * (np.mod(x[:, 0] / 0.5, 1.0) > 0.25)  # noqa: E731
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, formulation="continuous", clearance=grooves)
@@ -173,10 +169,7 @@ def test_the_remedy_for_oscillating_pressures_suits_the_cells_there(element, cou
         mesh = mesh.with_facet_group(
             group, lambda x, sign=sign: (x[:, 1] == 0.0) & (sign * (abs(x[:, 0]) - 4.0) > -1e-9), of="H_HEAD"
         )
-    model = fc.Model(mesh, "plane_stress")
-    model.add_material(fc.LinearElastic(E=210e3, nu=0.3))
-    model.fix("P_BOTTOM", "xy")
-    model.fix("SHANK", "x")
+    model = elastic_model(mesh, "plane_stress", E=210e3, P_BOTTOM="xy", SHANK="x")
     model.add_traction("SHANK", y=-500.0)
     model.add_contact("seat", secondary="SEAT", primary="P_TOP")
     with warnings.catch_warnings():

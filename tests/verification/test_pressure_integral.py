@@ -11,7 +11,6 @@ from two_bodies import blocks, boxes, held, touching
 import fastcontact as fc
 from fastcontact.analysis import contact_result
 from fastcontact.contact.integration import nodal_areas
-from fastcontact.mesh.generate import box, half_spheres, renamed, union
 
 pytestmark = pytest.mark.each_value
 
@@ -92,8 +91,8 @@ def test_a_bulging_block_in_the_plane(method, element, kinematics, swap, carried
 
 def bulging_boxes(element):
     """Two boxes, the lower side of the upper one bulging."""
-    low = box((4.0, 4.0, 2.0), (5, 5, 2), element, (0.0, 0.0, -2.0))
-    up = box((4.0, 4.0, 2.0), (4, 4, 2), element)
+    low = fc.generate.box((4.0, 4.0, 2.0), (5, 5, 2), element, (0.0, 0.0, -2.0))
+    up = fc.generate.box((4.0, 4.0, 2.0), (4, 4, 2), element)
     points = up.points.copy()
     points[:, 2] += 0.02 * (points[:, :2] ** 2).sum(axis=1) * (1.0 - 0.5 * points[:, 2])
     return united(L_=low, U_=up.replace(points=points))
@@ -152,7 +151,7 @@ def test_the_training_case(method, element, carried, forma04):
     if method == "node" and element in ("tri6", "quad8"):
         pytest.skip("normals that jump between quadratic facets do not settle")
     options = dict(METHODS[method])
-    model = forma04(half_spheres(element, **sizes), options.pop("formulation"), **options)
+    model = forma04(fc.generate.half_spheres(element, **sizes), options.pop("formulation"), **options)
     check(solved(model, 2), carried)
 
 
@@ -163,7 +162,7 @@ def pin_in_hole(secondary, primary, **options):
         divisions_outer=(8, 50),
     )  # fmt: skip
     below = fc.generate.mirrored(quarter, "y", rename={"SYMMETRY_Y": "BY"})
-    mesh = union(renamed(quarter, {"SYMMETRY_Y": "QY"}), below)
+    mesh = fc.generate.union(fc.generate.renamed(quarter, {"SYMMETRY_Y": "QY"}), below)
     points, pin = mesh.points.copy(), mesh.points_of("INNER")
     points[pin] *= 1 - 0.05 / 10.0
     mesh = fc.generate.merge_points(mesh.replace(points=points), 1e-9)
@@ -197,12 +196,10 @@ def test_barely_covered_faces_have_no_wild_pressure(element, multipliers, carrie
     """A punch on a wider block: nothing physical depends on where its edge lies in the faces of the block."""
     largest = []
     for offset in (0.0, 0.09, 0.0999):
-        low = box((2.0, 1.0, 1.0), (10, 2, 3), element, (0.0, 0.0, -1.0))
-        up = box((1.0, 1.0, 1.0), (7, 3, 3), element, (0.5 + offset, 0.0, 0.0))
+        low = fc.generate.box((2.0, 1.0, 1.0), (10, 2, 3), element, (0.0, 0.0, -1.0))
+        up = fc.generate.box((1.0, 1.0, 1.0), (7, 3, 3), element, (0.5 + offset, 0.0, 0.0))
         model = elastic_model(united(L_=low, U_=up), "3d", nu=0.0)
-        for group in ("L_YMIN", "L_YMAX", "U_YMIN", "U_YMAX"):
-            model.fix(group, "y")
-        supported(model, L_ZMIN="xz", U_ZMAX={"x": 0.0, "z": -0.01})
+        supported(model, L_YMIN="y", L_YMAX="y", U_YMIN="y", U_YMAX="y", L_ZMIN="xz", U_ZMAX={"x": 0.0, "z": -0.01})
         steps = solved(touching(model, "mortar", swap=True, multipliers=multipliers))
         check(steps, carried)
         largest.append(steps[-1].contact["pair"].pressure_max)

@@ -9,7 +9,6 @@ from graded import graded_block, lines
 from models import elastic_model
 
 import fastcontact as fc
-from fastcontact.mesh.generate import renamed, union
 
 E, NU, FORCE = 1000.0, 0.3, 0.01  # per length, of the half x >= 0
 LENGTH = 8.0  # of half the layer, which is 1 thick; it lifts off far before
@@ -18,7 +17,7 @@ LENGTH = 8.0  # of half the layer, which is 1 thick; it lifts off far before
 def layer(size):
     mesh = graded_block(lines(size, 3.0, LENGTH), np.linspace(0.0, 1.0, round(1.0 / size) + 1), "quad4", name="LAYER")
     names = {"LAYER": "LAYER", "BOTTOM": "CONT_LAYER", "LEFT": "AXIS", "TOP": "TOP", "TOP_LEFT": "LOADED"}
-    return renamed(mesh, names.get)
+    return fc.generate.renamed(mesh, names.get)
 
 
 def pressed(model, steps=4):
@@ -38,8 +37,8 @@ def on_elastic_base(formulation, size, ratio):
     """The layer is `ratio` times as stiff as its base, a large block."""
     x, depth = lines(0.8 * size, 3.0, 200.0, growth=1.3), lines(size, 0.0, 200.0, growth=1.3)
     names = {"BLOCK": "BASE", "TOP": "CONT_BASE", "BOTTOM": "FAR", "LEFT": "AXIS"}
-    base = renamed(graded_block(x, -depth[::-1], "quad4"), names.get)
-    model = fc.Model(union(base, layer(size)), "plane_strain")
+    base = fc.generate.renamed(graded_block(x, -depth[::-1], "quad4"), names.get)
+    model = fc.Model(fc.generate.union(base, layer(size)), "plane_strain")
     model.add_material(fc.LinearElastic(E=E, nu=NU), "LAYER")
     model.add_material(fc.LinearElastic(E=E / ratio, nu=NU), "BASE")
     model.fix("FAR", "y")

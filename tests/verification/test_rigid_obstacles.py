@@ -6,7 +6,6 @@ from models import elastic_model
 from pairwise import first_of
 
 import fastcontact as fc
-from fastcontact import obstacles
 
 pytestmark = pytest.mark.pairwise
 
@@ -15,7 +14,7 @@ FORCE, PRESSURE, RADIUS = 659_773.142, 2910.4071, 10.358557
 
 def half_sphere_on_plane(mesh, formulation, **options):
     model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A1B1={"y": 2.0})
-    plane = obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
+    plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
     model.add_obstacle("plane", secondary="CONT1", obstacle=plane, formulation=formulation, **options)
     return model
 
@@ -35,7 +34,7 @@ def test_moving_the_plane_is_moving_the_body():
     mesh = fc.generate.quarter_disc("quad4")
     held = half_sphere_on_plane(mesh, "continuous")
     moved = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A1B1="y")
-    plane = obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
+    plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
     moved.add_obstacle("plane", secondary="CONT1", obstacle=plane, motion={"y": -2.0})
     one, other = (fc.solve(model, fc.linear_ramp(3))[-1] for model in (held, moved))
     assert np.abs(one.stress - other.stress).max() < 1e-9 * np.abs(one.stress).max()
@@ -72,7 +71,7 @@ def hertz_box(element, n, kinematics="plane_strain"):
 def test_a_flat_punch_leaves_the_surface_beside_it_free():
     mesh = fc.generate.block((4.0, 4.0), (32, 32), "quad4", origin=(0.0, -4.0))
     model = elastic_model(mesh, "axisymmetric", LEFT="x", BOTTOM="y")
-    punch = obstacles.FlatPunch(0.5)
+    punch = fc.obstacles.FlatPunch(0.5)
     model.add_obstacle("punch", secondary="TOP", obstacle=punch, motion={"y": -0.01}, formulation="node_to_segment")
     last = fc.solve(model, fc.linear_ramp(1))[-1]
     contact = last.contact["punch"]
@@ -88,7 +87,7 @@ def test_a_clearance_is_not_a_penetration_beside_the_facets():
         fc.generate.block((50.0, 2.0), (50, 2), "quad8"), "plane_strain", E=200e3, LEFT="x", RIGHT="xy"
     )
     model.add_pressure("TOP", 5.0)
-    floor = obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, clearance=0.5)
     step = fc.solve(model, 1)[-1]
     assert step.contact["floor"].normal_force > 100.0
@@ -98,7 +97,7 @@ def test_a_clearance_is_not_a_penetration_beside_the_facets():
 def test_a_plane_drawn_along_drags_by_friction():
     mesh = fc.generate.block((1.0, 1.0), (4, 4), "quad4")
     model = elastic_model(mesh, "plane_strain", nu=0.0, TOP="xy")
-    plane = obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("plane", secondary="BOTTOM", obstacle=plane, motion={"x": 0.01, "y": 1e-3}, friction=0.2)
     contact = fc.solve(model, fc.linear_ramp(5))[-1].contact["plane"]
     assert contact.force[0] / contact.force[1] == pytest.approx(0.2, rel=1e-9)
@@ -107,8 +106,8 @@ def test_a_plane_drawn_along_drags_by_friction():
 
 def test_wrong_obstacles_are_refused():
     model = elastic_model(fc.generate.block((1.0, 1.0), (2, 2), "quad4"), "plane_strain", E=1.0)
-    plane = obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     with pytest.raises(fc.ModelError, match="motion of obstacle 'p'"):
         model.add_obstacle("p", secondary="BOTTOM", obstacle=plane, motion={"z": 1.0})
     with pytest.raises(fc.ContactError, match="2 finite numbers"):
-        model.add_obstacle("p", secondary="BOTTOM", obstacle=obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0)))
+        model.add_obstacle("p", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0)))

@@ -4,8 +4,6 @@ Measured: the bar and the identities hold to round-off; Lamé's force by interfe
 of the mesh; Hertz's powers of the force to 7 %.
 """
 
-from __future__ import annotations
-
 import pytest
 from models import elastic_model, supported
 

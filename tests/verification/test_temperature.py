@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import supported
+from models import made_of, supported
 from two_bodies import rings
 
 import fastcontact as fc
@@ -15,18 +15,15 @@ STEEL = fc.LinearElastic(E, NU, expansion=ALPHA)
 
 def free(mesh, kinematics, material):
     """A model held against rigid motions alone."""
-    model = fc.Model(mesh, kinematics)
-    model.add_material(material)
+    model = made_of(mesh, kinematics, material)
     low = mesh.points.min(axis=0)
     places = {"A": low, "B": np.where(np.arange(mesh.dim) == 0, mesh.points.max(axis=0), low)}
     if mesh.dim == 3:
         places["C"] = np.array([low[0], mesh.points[:, 1].max(), low[2]])
     nodes = {name: [int(np.abs(mesh.points - place).sum(axis=1).argmin())] for name, place in places.items()}
-    model = fc.Model(mesh.with_groups(points=nodes), kinematics)
-    model.add_material(material)
+    model = made_of(mesh.with_groups(points=nodes), kinematics, material)
     if kinematics == "axisymmetric":
-        model.fix("A", "y")
-        return model
+        return supported(model, A="y")
     supported(model, A="xyz"[: mesh.dim], B="yz"[: mesh.dim - 1])
     if mesh.dim == 3:
         model.fix("C", "z")
@@ -96,12 +93,8 @@ def test_a_held_body_is_pressed_by_its_expansion(element):
     """By 3 K alpha T on all sides; the temperature has a history of its own, and an array gives the same."""
     for nu in (0.3, 0.4999):
         material = fc.LinearElastic(E, nu, expansion=ALPHA)
-        model = fc.Model(plane(element, "plane_strain"), "plane_strain")
-        model.add_material(material)
-        for side in ("LEFT", "RIGHT"):
-            model.fix(side, "x")
-        for side in ("TOP", "BOTTOM"):
-            model.fix(side, "y")
+        model = made_of(plane(element, "plane_strain"), "plane_strain", material)
+        supported(model, LEFT="x", RIGHT="x", TOP="y", BOTTOM="y")
         model.add_temperature(np.full(model.mesh.n_points, RISE), ramp=[(0.0, 0.0), (0.5, 2.0), (1.0, -1.0)])
         steps = fc.solve(model, fc.linear_ramp(2))
         pressure = E / (1 - 2 * nu) * ALPHA * RISE

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 from scipy.spatial.transform import Rotation
 from two_bodies import SIDES, blocks, boxes, rings, touching
 
 import fastcontact as fc
-from fastcontact.mesh.generate import merge_points
 
 pytestmark = pytest.mark.pairwise
 
@@ -126,7 +125,7 @@ def test_ties_are_determined_where_supports_hold_both_sides(element, formulation
 @pytest.mark.parametrize("make", [blocks, boxes])
 def test_matching_meshes_are_tied_as_if_they_were_one(make, formulation):
     mesh = make()
-    one = merge_points(mesh, tolerance=1e-9)
+    one = fc.generate.merge_points(mesh, tolerance=1e-9)
     models = []
     for m in (mesh, one):
         model = fc.Model(m, "3d" if m.dim == 3 else "plane_strain")
@@ -204,8 +203,7 @@ def test_a_tied_pair_is_linear_and_sits_beside_contact_with_friction():
     mesh = fc.generate.union(blocks(), moved(blocks(), 20.0))
     secondary, primary = SIDES["plane"]
     model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy", R_LOWER_BOTTOM="xy")
-    for side in ("UPPER_TOP", "R_UPPER_TOP"):
-        model.prescribe(side, x=0.05, y=-0.02)
+    supported(model, UPPER_TOP={"x": 0.05, "y": -0.02}, R_UPPER_TOP={"x": 0.05, "y": -0.02})
     model.add_contact("slides", secondary=secondary, primary=primary, formulation="node_to_segment", friction=0.2)
     model.add_contact("glued", secondary="R_" + secondary, primary="R_" + primary, formulation="mortar", kind="tied")
     both = fc.solve(model, fc.linear_ramp(2))[-1]

@@ -5,7 +5,6 @@ import pytest
 from models import elastic_model
 
 import fastcontact as fc
-from fastcontact.mesh.generate import rings
 
 pytestmark = pytest.mark.pairwise
 
@@ -87,7 +86,7 @@ def test_shear_across_the_gap_keeps_its_moment(element, formulation, options, ga
 @pytest.mark.parametrize("formulation", ["continuous", "mortar"])
 def test_rings_with_a_seam_turn_as_one(formulation):
     """Two rings on their circles, a seam of glue between them, turned about their middle."""
-    mesh = rings("quad8", divisions_inner=(3, 12), divisions_outer=(3, 9))
+    mesh = fc.generate.rings("quad8", divisions_inner=(3, 12), divisions_outer=(3, 9))
     inner = np.zeros(mesh.n_points, bool)
     inner[mesh.points_of("INNER")] = True
     points = mesh.points * np.where(inner, 0.99, 1.0)[:, None]

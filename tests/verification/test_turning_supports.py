@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import made_of
 
 import fastcontact as fc
 from fastcontact.contact.obstacles.rigid_side import Rotation
@@ -25,8 +26,7 @@ def bar(
     solid = kinematics == "3d"
     size, divisions = ((2.0, 1.0, 1.0), (3, 2, 2)) if solid else ((2.0, 1.0), (4, 2))
     mesh = (fc.generate.box if solid else fc.generate.block)(size, divisions, element=element)
-    model = fc.Model(mesh, kinematics, strain=strain)
-    model.add_material(law)
+    model = made_of(mesh, kinematics, law, strain=strain)
     rotation = {"angle": angle, "centre": CENTRE[: mesh.dim], **({"axis": AXIS} if solid else {})}
     for group in (("XMIN", "XMAX") if solid else ("LEFT", "RIGHT"))[:ends]:
         model.prescribe(group, rotation=rotation)
@@ -84,8 +84,7 @@ def test_a_bent_bar_is_turned_with_its_stress() -> None:
 def test_a_block_is_carried_round_between_two_turning_plates(element: str, formulation: str | None) -> None:
     """Nothing but friction holds it; after a whole turn it is where it was, and forces have turned all the way."""
     mesh = fc.generate.block((2.0, 1.0), (6, 3), element=element, origin=(-1.0, -0.5))
-    model = fc.Model(mesh, "plane_strain", strain="finite")
-    model.add_material(NEO_HOOKEAN)
+    model = made_of(mesh, "plane_strain", NEO_HOOKEAN, strain="finite")
     rotation = {"angle": 2.0 * np.pi, "centre": (0.5, 0.2), "ramp": TURN}
     for group, side in (("TOP", 1.0), ("BOTTOM", -1.0)):
         plate = fc.obstacles.HalfSpace((0.0, 0.45 * side), (0.0, -side))
@@ -111,8 +110,7 @@ def test_two_blocks_pressed_together_with_friction_turn_as_one(element: str) -> 
     lower = fc.generate.renamed(make(size, fine, element=element), {bottom: "BASE", top: "JOINT"})
     upper = make(size, coarse, element=element, origin=(*[0.0] * (lower.dim - 1), 0.5))
     mesh = fc.generate.union(lower, fc.generate.renamed(upper, {bottom: "SOLE", top: "HEAD"}))
-    model = fc.Model(mesh, "3d" if solid else "plane_strain", strain="finite")
-    model.add_material(NEO_HOOKEAN)
+    model = made_of(mesh, "3d" if solid else "plane_strain", NEO_HOOKEAN, strain="finite")
     down = np.eye(mesh.dim)[-1]
     rotation = {"angle": 2.0 * np.pi, "ramp": TURN, **({"axis": AXIS} if solid else {})}
     model.prescribe("BASE", rotation={**rotation, "centre": CENTRE[: mesh.dim]})
@@ -164,12 +162,6 @@ def test_a_rotation_that_makes_no_sense_is_refused(message: str) -> None:
     model = bar("plane_strain", "quad8", 1.0)
     with pytest.raises(fc.ModelError, match=message):
         model.prescribe("RIGHT", **REFUSED[message])
-
-
-def test_rings_do_not_turn() -> None:
-    model = fc.Model(fc.generate.block(), "axisymmetric", strain="finite")
-    with pytest.raises(fc.ModelError, match="no displacement around its axis"):
-        model.prescribe("TOP", rotation={"angle": 1.0, "centre": (0.0, 0.0)})
 
 
 def test_an_analysis_of_a_turning_support_goes_on_from_its_file(tmp_path) -> None:

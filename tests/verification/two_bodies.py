@@ -33,9 +33,7 @@ def held(mesh, kinematics="plane_strain", approach=0.02):
             model.fix(f"{side}_YMIN", "y")
         supported(model, L_ZMIN="z", U_ZMAX={"z": -approach})
     else:
-        for side in ("LOWER", "UPPER"):
-            model.fix(f"{side}_LEFT", "x")
-        supported(model, LOWER_BOTTOM="y", UPPER_TOP={"y": -approach})
+        supported(model, LOWER_LEFT="x", UPPER_LEFT="x", LOWER_BOTTOM="y", UPPER_TOP={"y": -approach})
     return model
 
 

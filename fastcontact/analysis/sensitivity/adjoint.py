@@ -36,7 +36,7 @@ class Gradient:
     multiplier : ndarray (k,)
         Derivative with respect to the multipliers of active constraints [unit of the quantity / force].
     sample : ndarray, optional
-        Derivative with respect to `Sample.all`, which depends on the pairing; None for zero.
+        Derivative with respect to `MovingContact.at`, which depends on the pairing; None for zero.
     reaction : ndarray (n_dofs,), optional
         Derivative with respect to the forces of supports [unit of the quantity / force]; None for zero.
     """
@@ -59,7 +59,7 @@ class Change:
     lift : ndarray (n_dofs,)
         Derivative of the prescribed displacements [length / unit of the parameter].
     sample : ndarray
-        Derivative of `Sample.all` [its unit / unit of the parameter].
+        Derivative of `MovingContact.at` [its unit / unit of the parameter].
     """
 
     residual: Array
@@ -75,7 +75,7 @@ class Adjoint:
     contact : MovingContact
     gradient : Gradient
     moving : csr_array
-        Derivative of `Sample.all` with respect to the configuration at which surfaces are paired; see
+        Derivative of `MovingContact.at` with respect to the configuration at which surfaces are paired; see
         `MovingContact.derivatives`.
     """
 

@@ -39,30 +39,6 @@ INCREMENT = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Sample:
-    """Contact forces, gaps and pressures at one configuration.
-
-    Attributes
-    ----------
-    force : ndarray (n_dofs,)
-        Nodal contact forces [force].
-    gap : ndarray (k,)
-        Gaps of the active constraints, compliance included [length].
-    pressure : ndarray (n_nodes,)
-        Nodal pressures of one pair, empty if not requested [pressure].
-    """
-
-    force: Array
-    gap: Array
-    pressure: Array
-
-    @property
-    def all(self) -> Array:
-        """All values, concatenated."""
-        return np.concatenate([self.force, self.gap, self.pressure])
-
-
-@dataclass(frozen=True, eq=False)
 class MovingContact:
     """The contact of a load step with fixed multipliers, for any pairing of its surfaces.
 
@@ -107,8 +83,12 @@ class MovingContact:
         """Return the constraints of surfaces paired at displacements u (n_dofs,) [length]."""
         return pair_surfaces(self.problem, self.state, self.load, Iterate(u.copy(), {}, {}))
 
-    def at(self, u: Array) -> Sample:
-        """Return forces, gaps and pressures for the pairing at u (n_dofs,), while displacements stay `self.u` [length]."""
+    def at(self, u: Array) -> Array:
+        """Return forces, gaps and pressures for the pairing at u (n_dofs,), while displacements stay `self.u` [length].
+
+        The result contains the nodal contact forces (n_dofs,) [force], then the gaps (k,) of the active constraints with
+        their compliance [length], then the nodal pressures (n_nodes,) of the pair if they are requested.
+        """
         constraints, multiplier = self.constraints_at(u), self.solution.multiplier
         if len(constraints) != len(multiplier):
             raise ModelError(
@@ -118,7 +98,8 @@ class MovingContact:
         gap = constraints.gap0 + constraints.B @ self.u
         if constraints.normal_compliance is not None:
             gap = gap + constraints.normal_compliance.apply(multiplier)
-        return Sample(constraints.force(multiplier), gap[self.active], self.pressure(multiplier, constraints))
+        pressure = self.pressure(multiplier, constraints)
+        return np.concatenate([constraints.force(multiplier), gap[self.active], pressure])
 
     def pressure(self, multiplier: Array, constraints: StackedConstraints | None = None) -> Array:
         """Return the nodal pressures (n_nodes,) of the pair for multipliers (m,) [force] [pressure]."""
@@ -131,10 +112,8 @@ class MovingContact:
         return closed_node_pressures(part, forces, self.closed, self.problem.pairs[self.pair].secondary)[1]
 
     def parameter_derivative(self, modified: Callable[[float], MovingContact], increment: float) -> Array:
-        """Return the derivative of `Sample.all` with respect to a parameter, which `modified(d)` increases by d."""
-        return np.asarray(
-            (modified(increment).at(self.u).all - modified(-increment).at(self.u).all) / (2.0 * increment)
-        )
+        """Return the derivative of `at` with respect to a parameter, which `modified(d)` increases by d."""
+        return np.asarray((modified(increment).at(self.u) - modified(-increment).at(self.u)) / (2.0 * increment))
 
     @cached_property
     def step(self) -> float:
@@ -150,7 +129,7 @@ class MovingContact:
         return [side for pair in pairs for side in (pair.secondary, pair.primary) if isinstance(side, Surface)]
 
     def derivatives(self, lifts: Sequence[Array]) -> tuple[csr_array, csr_array]:
-        """Return forward and backward derivatives (n, n_dofs + q) of `Sample.all` with respect to the paired configuration.
+        """Return forward and backward derivatives (n, n_dofs + q) of `at` with respect to the paired configuration.
 
         The first columns belong to the unknowns of the system. The others belong to the q `lifts` (n_dofs,), divided by their
         largest component. Points are only moved as the supports allow: if both sides end in a plane of symmetry, a point that
@@ -237,17 +216,17 @@ class MovingContact:
 
     @cached_property
     def _base(self) -> Array:
-        return self.at(self.u).all
+        return self.at(self.u)
 
     def _one_sided(self, motion: Array) -> tuple[Array, Array]:
-        """Return the forward and the backward derivative of `Sample.all` along a motion (n_dofs,) of the points."""
+        """Return the forward and the backward derivative of `at` along a motion (n_dofs,) of the points."""
         increment = self.step / (largest(motion) or 1.0)
 
         def at(distance: float) -> Array:
             shift = distance * motion
             # Displacements of force-driven obstacles that are prescribed are taken from the load.
             load = replace(self.load, lift=self.load.lift + np.where(self.problem.system.fixed, shift, 0.0))
-            return replace(self, load=load).at(self.u + shift).all
+            return replace(self, load=load).at(self.u + shift)
 
         return (at(increment) - self._base) / increment, (self._base - at(-increment)) / increment
 

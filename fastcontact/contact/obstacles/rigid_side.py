@@ -60,7 +60,7 @@ class RigidSide:
         return gap, normal, paired, offset
 
     def _distance(self, points: Array) -> tuple[Array, Array]:
-        """Return gap (n,) [length] and normals (n, dim) [-] of `points` (n, dim) [length] from the obstacle at rest."""
+        """Return gaps (n,) [length] and normals (n, dim) [-] at `points` (n, dim) [length] before any motion."""
         distance_and_normal = self.obstacle.distance(points)
         if is_masked(distance_and_normal):
             raise ContactError(f"the distance from a rigid obstacle {REFUSAL}; an infinite gap excludes a point")
@@ -72,9 +72,9 @@ class RigidSide:
         """Return the displacements (n, dim) of points on the surface of the obstacle due to its motion [length].
 
         The slip of a point that moves from `before` to `positions` (n, dim) [length] is its displacement minus this result.
-        The slip equals the change of the position relative to the obstacle, in the frame rotated by half the angle, and
-        scaled from the chord to the arc. It vanishes where a point sticks, and is tangential to the circle for a point at
-        rest.
+        The slip is the change of the position relative to the obstacle, expressed in the frame that is rotated by half the
+        angle, and multiplied by the ratio of the arc to the chord. It vanishes where a point sticks, and is tangential to
+        the circle for a point at rest.
         """
         angle, shift = pose.angle - pose0.angle, np.tile(pose.displacement - pose0.displacement, (len(positions), 1))
         if self.rotation is None or angle == 0.0:
@@ -98,7 +98,7 @@ class Rotation:
     Attributes
     ----------
     centre : tuple of float (dim,)
-        A point of the axis before any motion [length].
+        A point on the axis before any motion [length].
     axis : tuple of float (3,)
         Direction of the axis, of any length [-]; (0, 0, 1) in 2D.
     angle : float
@@ -143,7 +143,7 @@ class Rotation:
         return axes[:, :dim, :dim]
 
     def torque(self, arms: Array, forces: Array) -> float:
-        """Return the moment about the axis of `forces` (n, dim) [force] at `arms` (n, dim) from its point [length]."""
+        """Return the moment about the axis of `forces` (n, dim) [force] at `arms` (n, dim) from a point on it [length]."""
         if arms.shape[1] == 2:
             return float((arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum())
         return float(np.cross(arms, forces).sum(axis=0) @ self.direction)

@@ -18,94 +18,39 @@ Offsets = NDArray[np.int64]
 
 
 @interpretable_kernel
-def parents(start: Numbers, rows: Numbers, parent: Numbers) -> None:
-    """Fill `parent` (n,) with the elimination tree."""
-    n = len(parent)
-    ancestor = np.full(n, -1, np.int32)  # like the parent, but with path compression
-    for j in range(n):
-        parent[j] = -1
-        for k in range(start[j], start[j + 1]):
-            i = rows[k]
-            while i != -1 and i < j:
-                above = ancestor[i]
-                ancestor[i] = j
-                if above == -1:
-                    parent[i] = j
-                i = above
+def tree_and_counts(start: Numbers, rows: Numbers, parent: Numbers, count: Numbers) -> None:
+    """Fill `parent` (n,) with the elimination tree, and `count` (n,) with the number of entries of each column of the factor.
 
-
-@interpretable_kernel
-def postordered(parent: Numbers, order: Numbers) -> None:
-    """Fill `order` (n,) with a postorder: columns of each subtree are contiguous, with children before their parent."""
-    n, count = len(parent), 0
-    first, sibling, stack = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.empty(n, np.int32)
-    for j in range(n - 1, -1, -1):
-        if parent[j] != -1:
-            sibling[j] = first[parent[j]]
-            first[parent[j]] = j
-    for root in range(n):
-        if parent[root] != -1:
-            continue
-        stack[0], top = root, 0
-        while top >= 0:
-            child = first[stack[top]]
-            if child == -1:
-                order[count] = stack[top]
-                count += 1
-                top -= 1
-            else:
-                first[stack[top]] = sibling[child]
-                top += 1
-                stack[top] = child
-
-
-@interpretable_kernel
-def counts(start: Numbers, rows: Numbers, parent: Numbers, order: Numbers, count: Numbers) -> None:
-    """Fill `count` (n,) with the number of entries of each column of the factor, including the diagonal.
-
-    `order` (n,) is the result of `postordered`. The algorithm counts leaves of row subtrees (Gilbert, Ng and Peyton, 1994).
+    Row i of the factor consists of the paths in the tree from the entries of row i of A to i (Davis, 2006, section 4.5).
+    The number includes the diagonal.
     """
+    visited = np.empty(len(parent), np.int32)  # the last row whose paths contain a column
+    for i in range(len(parent)):
+        parent[i], count[i], visited[i] = -1, 1, i
+        for k in range(start[i], start[i + 1]):
+            j = rows[k]
+            while j < i and visited[j] != i:
+                if parent[j] == -1:
+                    parent[j] = i
+                count[j] += 1
+                visited[j] = i
+                j = parent[j]
+
+
+@interpretable_kernel
+def postordered(parent: Numbers, position: Numbers) -> None:
+    """Fill `position` (n,) with the places in a postorder: columns of each subtree are contiguous, with the parent last."""
     n = len(parent)
-    first, farthest, last = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.full(n, -1, np.int32)
-    ancestor = np.arange(n).astype(np.int32)
-    for k in range(n):
-        j = order[k]
-        count[j] = 1 if first[j] == -1 else 0
-        while j != -1 and first[j] == -1:
-            first[j] = k
-            j = parent[j]
-    for k in range(n):
-        j = order[k]
-        if parent[j] != -1:
-            count[parent[j]] -= 1
-        for at in range(start[j], start[j + 1]):
-            i = rows[at]
-            if i <= j or first[j] <= farthest[i]:
-                continue
-            # Column j is a leaf of the subtree of row i; its common path with the previous leaf counts once.
-            farthest[i] = first[j]
-            before, last[i] = last[i], j
-            count[j] += 1
-            if before != -1:
-                count[_root(before, ancestor)] -= 1
-        if parent[j] != -1:
-            ancestor[j] = parent[j]
+    # Columns of a subtree that have no place yet are before `end` of its root; the last entry is for the roots themselves.
+    size, end = np.ones(n, np.int32), np.empty(n + 1, np.int32)
     for j in range(n):
         if parent[j] != -1:
-            count[parent[j]] += count[j]
-
-
-@inlined_kernel
-def _root(j: int, ancestor: Numbers) -> int:
-    """Return the root of the set of j, with path compression."""
-    root = j
-    while root != ancestor[root]:
-        root = ancestor[root]
-    while j != root:
-        above = ancestor[j]
-        ancestor[j] = root
-        j = above
-    return root
+            size[parent[j]] += size[j]
+    end[n] = n
+    for j in range(n - 1, -1, -1):
+        above = parent[j] if parent[j] != -1 else n
+        position[j] = end[j] = end[above] - 1
+        end[above] -= size[j]
 
 
 @interpretable_kernel

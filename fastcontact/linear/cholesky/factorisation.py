@@ -213,11 +213,10 @@ class Supernodes(NamedTuple):
 def elimination_tree(A: csc_array) -> Tree:
     """Return the elimination tree of a symmetric matrix (n, n)."""
     n = A.shape[0]
-    parent, order, count, position = (np.empty(n, np.intc) for _ in range(4))
-    elimination_tree_kernels.parents(A.indptr, A.indices, parent)
-    elimination_tree_kernels.postordered(parent, order)
-    elimination_tree_kernels.counts(A.indptr, A.indices, parent, order, count)
-    position[order] = np.arange(n, dtype=np.intc)
+    parent, count, position, order = (np.empty(n, np.intc) for _ in range(4))
+    elimination_tree_kernels.tree_and_counts(A.indptr, A.indices, parent, count)
+    elimination_tree_kernels.postordered(parent, position)
+    order[position] = np.arange(n, dtype=np.intc)
     ordered_parent = parent[order]
     return Tree(order, position, np.where(ordered_parent < 0, np.intc(-1), position[ordered_parent]), count[order])
 

@@ -15,7 +15,7 @@ from fastcontact.linear.delassus import solve_multipliers
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.elimination.pivot_order import RepeatedError
 from fastcontact.linear.field_compliance import FieldCompliance
-from fastcontact.linear.protocol import LinearSolver, Monitor
+from fastcontact.linear.protocol import LinearSolver, Loaded, Monitor
 from fastcontact.round_off import SUM_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
@@ -23,7 +23,7 @@ log = logging.getLogger("fastcontact")
 REDUCTION = 0.1
 
 
-class LoadedIteration:
+class LoadedIteration(Loaded):
     """A prepared matrix of an iterative solver with a right-hand side; see `linear.protocol.Loaded`.
 
     Parameters
@@ -69,17 +69,11 @@ class LoadedIteration:
         """See `Loaded`."""
         return R @ self._unconstrained, self._solver.columns.of_rows(R)
 
-    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
-        """See `Loaded`."""
-        return self._solver.solution(self._f + force, None, None) if force.any() else self._unconstrained
-
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
-        return self.involved_solution(force, None) if u is None else u
-
-    def condensed(self) -> None:
-        """See `Loaded`."""
-        return None
+        if u is not None:
+            return u
+        return np.asarray(self._solver.solution(self._f + force, None, None)) if force.any() else self._unconstrained
 
 
 def tighten(solver: LinearSolver, excess: float) -> bool:

@@ -5,16 +5,12 @@ Sums are taken over chunks of fixed length. Kernels process the chunks, or the e
 `_jit.parallel.parallel_for`.
 """
 
-import numpy as np
-
 from fastcontact._jit.decorators import kernel
 
 # Length of the chunks.
 CHUNK = 4096
 # Work of kernels per entry, see `_jit.parallel.portions`.
 WORK_OF_NUMBER = 0.5
-# First index of a whole range. With a literal 0 or an unsigned integer, Numba would compile another copy of `stretch_dot`.
-FIRST = np.int64(0)
 
 
 @kernel

@@ -34,7 +34,7 @@ def row_times_plain(
     indices : ndarray of int (n_blocks,)
         Block columns.
     numbers : tuple of ndarray (n_blocks * m * n,)
-        The blocks, one after the other, split or not: see `split_matrix_kernels`.
+        The blocks, one after the other, split or not: see `symmetric_storage_kernels`.
     x : ndarray (n_columns * n,)
     begin, end : int
         The blocks of the row are those from `begin` to ``end - 1``.

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Kernels of the multigrid cycle: products with block matrices, smoothing steps, and dense Cholesky factors.
+"""Kernels of the multigrid cycle: products with block matrices, smoothing steps, and inverses of blocks.
 
 A block matrix is passed as ``indptr`` (n_rows + 1,), ``indices`` (n_blocks,) and ``data`` (n_blocks * m * n,), see
 `matrix.BlockMatrix`. The block size (m, n) is passed as two tuples of zeros, ``rows`` of length m and ``cols`` of length n,
@@ -12,7 +12,6 @@ Each row is summed by one thread in a fixed order, so that results do not depend
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
-from fastcontact.linear.krylov.krylov_kernels import FIRST, stretch_dot
 from fastcontact.linear.multigrid.block_products import row_times
 
 
@@ -22,7 +21,7 @@ def multiply(low, high, indptr, indices, numbers, x, factor, z_factor, z, y, row
 
     If `z_factor` is zero, z need not be initialised.
 
-    The `numbers` are the entries of A, as a tuple of one or two arrays, see `split_matrix_kernels`.
+    The `numbers` are the entries of A, as a tuple of one or two arrays, see `symmetric_storage_kernels`.
     """
     m = len(rows)
     for i in range(low, high):
@@ -53,43 +52,6 @@ def relax(low, high, inverse, r, first, second, d, x, rows, begin):
                 x[m * i + a] = step
             else:
                 x[m * i + a] += step
-
-
-@kernel
-def factorise_dense(A, reciprocal):
-    """Replace the lower triangle of a symmetric positive semidefinite `A` (n, n) by its Cholesky factor.
-
-    `reciprocal` (n,) receives the reciprocals of the diagonal of the factor. It is zero for unknowns without stiffness, and
-    for unknowns that are linearly dependent on earlier ones; `solve_dense` then sets these unknowns to zero.
-    """
-    n = A.shape[0]
-    largest = 0.0
-    for i in range(n):
-        largest = max(largest, A[i, i])
-    for i in range(n):
-        for j in range(i):
-            A[i, j] = (A[i, j] - stretch_dot(A[i], A[j], FIRST, j)) * reciprocal[j]
-        pivot = A[i, i] - stretch_dot(A[i], A[i], FIRST, i)
-        if pivot > 1e-12 * A[i, i] and A[i, i] > 1e-12 * largest:
-            reciprocal[i] = 1.0 / np.sqrt(pivot)
-        else:
-            reciprocal[i] = 0.0
-
-
-@kernel
-def solve_dense(L, reciprocal, b, work, x):
-    """Fill `x` (n,) with the solution for the right-hand side `b` (n,).
-
-    `L` and `reciprocal` are the results of `factorise_dense`, and `work` (n,) is overwritten.
-    """
-    n = L.shape[0]
-    for i in range(n):
-        work[i] = (b[i] - stretch_dot(L[i], work, FIRST, i)) * reciprocal[i]
-    for i in range(n - 1, -1, -1):
-        value = work[i] * reciprocal[i]
-        x[i] = value
-        for j in range(i):
-            work[j] -= L[i, j] * value
 
 
 @kernel

@@ -2,8 +2,8 @@
 """Set-up of a multigrid hierarchy: smoothed prolongators and Galerkin products.
 
 Block matrices are given by arrays, see `matrix.BlockMatrix`, and block sizes m and n by tuples of zeros, `rows` and `cols`.
-Numbers that may be split are tuples, see `split_matrix_kernels`. `storage` defines which blocks of the symmetric matrix A are
-stored, see `symmetric_storage_kernels`. Kernels compute rows `low` to ``high - 1`` in ascending order.
+Numbers that may be split are tuples, and `storage` defines which blocks of the symmetric matrix A are stored, see
+`symmetric_storage_kernels`. Kernels compute rows `low` to ``high - 1`` in ascending order.
 """
 
 import numpy as np

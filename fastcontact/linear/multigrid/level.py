@@ -5,8 +5,8 @@ smoother is a Chebyshev iteration, preconditioned by D, that reduces the compone
 between ``SMOOTHED * bound`` and `bound` (Adams, Brezina, Hu and Tuminaro, 2003). Unlike with the Gauss-Seidel method, results
 do not depend on the number of threads. `Level.relax` makes one step.
 
-The matrix of the coarsest level has a dense Cholesky factor or, if it is large because aggregation stopped early, sparse
-factors by SuperLU.
+The matrix of the coarsest level has a dense inverse or, if it is large because aggregation stopped early, sparse factors by
+SuperLU.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ SAFETY = 1.08
 # Ratio of the lower to the upper end of the interval of eigenvalues that is smoothed, and number of Chebyshev steps.
 SMOOTHED = 1 / 24
 DEGREE = 3
-# Number of unknowns up to which a level is not coarsened, and has dense factors.
+# Number of unknowns up to which a level is not coarsened, and has a dense inverse.
 COARSEST = 200
 
 
@@ -227,15 +227,14 @@ class CoarseLevel:
     def __init__(self, A: csc_array) -> None:
         self.n, self.matrix = A.shape[0], A
         self._lu: Any = None
-        self._factor: AnyArray = np.empty((0, 0))
-        self._reciprocal, self._work = np.empty(self.n), np.empty(self.n)
+        self._inverse = np.empty((self.n, self.n) if self.n <= COARSEST else 0)
         self._changed = True
         self.set(None)
 
     @property
     def nbytes(self) -> int:
-        """Memory of the factors [bytes]."""
-        return self._factor.nbytes if self._lu is None else 12 * int(self._lu.nnz)
+        """Memory of the inverse or of the factors [bytes]."""
+        return self._inverse.nbytes if self._lu is None else 12 * int(self._lu.nnz)
 
     def set(self, change: csc_array | None) -> None:
         """Factorise the sum of the matrix and the symmetric matrix `change` (n, n); None means zero."""
@@ -244,8 +243,7 @@ class CoarseLevel:
         self._changed = change is not None
         A = self.matrix if change is None else csc_array(self.matrix + change)
         if self.n <= COARSEST:
-            self._factor = A.toarray(order="C")
-            cycle_kernels.factorise_dense(self._factor, self._reciprocal)
+            cycle_kernels.invert_blocks(A.toarray().ravel(), self.n, self._inverse.reshape(-1))
             return
         diagonal = A.diagonal()
         self._unstiffened = np.flatnonzero(diagonal <= ROUND_OFF * diagonal.max())
@@ -257,7 +255,7 @@ class CoarseLevel:
     def solve(self, b: AnyArray, x: AnyArray) -> None:
         """Fill `x` (n,) with the solution for the right-hand side `b` (n,)."""
         if self._lu is None:
-            cycle_kernels.solve_dense(self._factor, self._reciprocal, b, self._work, x)
+            x[:] = self._inverse @ b
             return
         x[:] = self._lu.solve(b.astype(float))
         x[self._unstiffened] = 0.0

@@ -49,8 +49,9 @@ class LoadedMultigrid(LoadedIteration):
         if C is not None and len(c) and (isinstance(C, FieldCompliance) or C.ndim == 1):
             try:
                 if isinstance(C, FieldCompliance):
-                    return self._field_solution(B, c, C, guess, monitor, tolerance)
-                parts = self._parts(B, c, C, nodes)
+                    parts = _FieldParts.of_points(B, c, C, self._solver.K.blocksize[0])
+                else:
+                    parts = self._parts(B, c, C, nodes)
             except RepeatedError as repeated:
                 log.info("%s: their compliance is formed", repeated)
         if parts is None:
@@ -86,41 +87,34 @@ class LoadedMultigrid(LoadedIteration):
     ) -> tuple[Array, Array]:
         """Return u (n,) [length] and the multipliers (m,) [force] under equations without friction."""
         solver, elimination, springs = self._solver, parts.elimination, parts.springs
-        f = parts.with_spring_forces(self._f, c)
+        f, at_edge = parts.with_spring_forces(self._f, c), np.empty(0)
 
         def check(u: Array, multiplier: Array, error: float) -> bool:
             assert monitor is not None
             return monitor(u, parts.multiplier(u, multiplier, c), error)
 
-        u = solver.solution(f, elimination, guess, monitor and check, tolerance, springs)
-        return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), c)
-
-    def _field_solution(
-        self, B: csr_array, c: Array, C: FieldCompliance, guess: Array | None, monitor: Monitor | None,
-        tolerance: float | None,
-    ) -> tuple[Array, Array]:  # fmt: skip
-        """Return u (n,) [length] and the point forces (m,) [force] for a pressure field; see `field_compliance`."""
-        solver, parts = self._solver, _FieldParts.of(B, c, C, self._solver.K.blocksize[0])
-        elimination, springs, border = parts.elimination, parts.springs, parts.border()
-        f = parts.with_spring_forces(self._f, c)
-
-        def check(u: Array, inside: Array, error: float) -> bool:
-            assert monitor is not None
-            return monitor(u, parts.multiplier(u, inside, np.empty(0), c), error)
-
-        if border is None:
-            u, at_edge = solver.solution(f, elimination, guess, monitor and check, tolerance, springs), np.empty(0)
-        else:
-            start, field = np.zeros(C.P.shape[1]), parts.field
-            if guess is not None and len(self._at_edge) == len(start):
-                start = self._at_edge
-            u, at_edge = solver.bordered_solution(
-                f, elimination, springs, border, guess, start[field.at] / field.units, tolerance
-            )
-            self._at_edge = np.zeros(len(start))
-            self._at_edge[field.at] = field.units * at_edge
+        if isinstance(parts, _FieldParts) and parts.field.edge.any():
+            border = parts.border()
+            u, at_edge = self._bordered_solution(parts, border, f, guess, tolerance)
             f = f + border.rows.T @ at_edge
-        return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), at_edge, c)
+        else:
+            u = solver.solution(f, elimination, guess, monitor and check, tolerance, springs)
+        multipliers = np.concatenate([solver.multiplier(elimination, u, f, springs), at_edge])
+        return u, parts.multiplier(u, multipliers, c)
+
+    def _bordered_solution(
+        self, parts: _FieldParts, border: Border, f: Array, guess: Array | None, tolerance: float | None
+    ) -> tuple[Array, Array]:
+        """Return u (n,) [length] and the multipliers of the equations at the edge of the contact."""
+        field, start = parts.field, np.zeros(parts.C.P.shape[1])
+        if guess is not None and len(self._at_edge) == len(start):
+            start = self._at_edge
+        u, at_edge = self._solver.bordered_solution(
+            f, parts.elimination, parts.springs, border, guess, start[field.at] / field.units, tolerance
+        )
+        self._at_edge = np.zeros(len(start))
+        self._at_edge[field.at] = field.units * at_edge
+        return u, at_edge
 
     def _parts(
         self, B: csr_array, c: Array, C: Array | None, nodes: Indices | None, through: csr_array | None = None
@@ -203,28 +197,25 @@ class _Parts:
 
 
 @dataclass(frozen=True, eq=False)
-class _FieldParts:
+class _FieldParts(_Parts):
     """Equations of m points as equations of a pressure field, and springs; see `field_compliance`.
+
+    None of the equations of points is eliminated, but those of the field that are not at the edge of the contact are. The
+    springs at the points are for the part of the compliance that the field does not represent.
 
     Attributes
     ----------
     field : FieldEquations
         Equations of the values of the field.
-    elimination : Elimination or None
-        Elimination of the equations that are not at the edge of the contact.
-    springs : Springs
-        Springs at the points, for the part of the compliance that the field does not represent.
-    weights : ndarray (m,)
-        Areas of the points [area].
+    C : FieldCompliance
+        Compliance of the points.
     """
 
     field: FieldEquations
-    elimination: Elimination | None
-    springs: Springs
-    weights: Array
+    C: FieldCompliance
 
     @classmethod
-    def of(cls, B: csr_array, c: Array, C: FieldCompliance, size: int) -> _FieldParts:
+    def of_points(cls, B: csr_array, c: Array, C: FieldCompliance, size: int) -> _FieldParts:
         """Return the equations ``B u + C multiplier = c`` of the points.
 
         `size` is the number of unknowns of a node. A RepeatedError is raised if equations are linearly dependent.
@@ -233,28 +224,22 @@ class _FieldParts:
         if not field.edge.all():
             rows = csr_array(field.rows[~field.edge])
             elimination = eliminate(rows, field.right[~field.edge], None, _nodes_of_rows(rows, size), size)
-        springs = scaled(B, (C.stiffness > 0.0).astype(float))
-        return cls(field, elimination, Springs(springs, C.stiffness), C.weights)
+        springs = Springs(scaled(B, (C.stiffness > 0.0).astype(float)), C.stiffness)
+        return cls(np.zeros(len(c), bool), elimination, springs, field, C)
 
-    def border(self) -> Border | None:
-        """Return the equations at the edge of the contact, which are not eliminated; None if there are none."""
+    def border(self) -> Border:
+        """Return the equations at the edge of the contact, which are not eliminated."""
         field = self.field
-        if not field.edge.any():
-            return None
         return Border(csr_array(field.rows[field.edge]), field.right[field.edge], field.compliance)
 
-    def with_spring_forces(self, f: Array, c: Array) -> Array:
-        """Return f (n,) plus the forces of the springs at u = 0 [force]; c (m,) are the right-hand sides."""
-        return f + self.springs.rows.T @ (self.springs.stiffness * c)
-
-    def multiplier(self, u: Array, inside: Array, at_edge: Array, c: Array) -> Array:
+    def multiplier(self, u: Array, eliminated: Array, c: Array) -> Array:
         """Return the forces (m,) of the points [force].
 
-        `inside` contains the multipliers of the equations of the field that are eliminated, and `at_edge` the others.
+        `eliminated` contains the multipliers of the eliminated equations of the field, then of those at the edge.
         """
-        p = np.empty(len(self.field.right))
-        p[~self.field.edge], p[self.field.edge] = inside, at_edge
-        return self.weights * (self.field.P @ p) + self.springs.stiffness * (c - self.springs.rows @ u)
+        p = np.empty(len(eliminated))
+        p[np.argsort(self.field.edge, kind="stable")] = eliminated
+        return self.C.weights * (self.field.P @ p) + super().multiplier(u, np.empty(0), c)
 
 
 def _nodes_of_rows(rows: csr_array, size: int) -> Indices:

@@ -1,9 +1,9 @@
 """Block matrices of multigrid, and the stiffness matrix K, which is stored once for two precisions.
 
 The multigrid cycle uses K in single precision, and the outer iteration uses it in double precision. Each number of K is
-therefore stored as the sum of two numbers in single precision, a high and a low part (see `split_matrix_kernels`). The
-cycle reads the high part only. This takes 8 bytes per number instead of 12. Since K is symmetric, most of its blocks are
-stored only once for both triangles (see `symmetric_storage_kernels`).
+therefore stored as the sum of two numbers in single precision, a high and a low part. The cycle reads the high part only.
+This takes 8 bytes per number instead of 12. Since K is symmetric, most of its blocks are stored only once for both triangles
+(see `symmetric_storage_kernels`).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit.parallel import parallel_for
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
-from fastcontact.linear.multigrid import cycle_kernels, split_matrix_kernels, symmetric_storage_kernels
+from fastcontact.linear.multigrid import cycle_kernels, symmetric_storage_kernels
 
 Storage = tuple[Numbers, Numbers, Numbers, int]
 
@@ -120,7 +120,7 @@ class BlockMatrix:
         starts = np.concatenate([[0], np.cumsum(count)])
         blocks = np.repeat(self.indptr[node] - starts[:-1], count) + np.arange(starts[-1])
         columns, data = self.indices[blocks][:, None] * size + np.arange(size), np.empty(starts[-1] * size)
-        split_matrix_kernels.rows_of(dofs, self.indptr, self.indices, self.storage, self.exact, size, data)
+        symmetric_storage_kernels.rows_of(dofs, self.indptr, self.indices, self.storage, self.exact, size, data)
         rows = csr_array((data, columns.ravel(), size * starts), shape=(len(dofs), (len(self.indptr) - 1) * size))
         rows.eliminate_zeros()
         return rows
@@ -212,11 +212,7 @@ class ScaledMatrix:
 
     def forces_at(self, dofs: Indices, u: Array, f: Array) -> Array:
         """Return ``(K @ u - f)[dofs]`` (m,) [force]."""
-        A, out = self.scaled, np.empty(len(dofs))
-        split_matrix_kernels.forces_at(
-            dofs, A.indptr, A.indices, A.storage, A.exact, 1.0 / self.unit, len(A.rows), u, f, out
-        )  # fmt: skip
-        return out
+        return np.asarray(self.scaled.rows_of(dofs) @ u / self.unit - f[dofs])
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of K [force / length]."""

@@ -9,8 +9,11 @@ are stored.
 The storage is a tuple ``storage = (start, upper, columns, length)``. The stored blocks of row i are ``start[i]`` to
 ``start[i + 1] - 1``, `columns` contains their block columns, and `length` is the number of rows of a part. Blocks between
 parts come first, then the diagonal block, and from ``upper[i]`` on the blocks of the upper triangle; each group has ascending
-columns. ``length = 0`` means that all blocks of the pattern ``indptr``, ``indices`` are stored, in its order. `numbers` is
-a tuple of arrays, see `split_matrix_kernels`. Kernels with the arguments `low` and `high` process rows `low` to ``high - 1``.
+columns. ``length = 0`` means that all blocks of the pattern ``indptr``, ``indices`` are stored, in its order.
+
+Double-precision numbers may be split into two of single precision, whose sum has 48 of their 53 bits. Kernels receive
+`numbers` as a tuple: (high, low) if they are split, otherwise (numbers,). Kernels with the arguments `low` and `high` process
+rows `low` to ``high - 1``.
 """
 
 import numpy as np
@@ -118,6 +121,20 @@ def expand(low, high, indptr, indices, storage, numbers, size, out):
             for a in range(size):
                 for b in range(size):
                     out[(k * size + a) * size + b] = entry_of(numbers, slot, a, b, size)
+
+
+@kernel
+def rows_of(dofs, indptr, indices, storage, numbers, size, out):
+    """Fill `out` with rows `dofs` (m,) of the matrix, one row after the other."""
+    at = 0
+    for p in range(dofs.shape[0]):
+        i, a = dofs[p] // size, dofs[p] % size
+        part = part_of(storage, i)
+        for k in range(indptr[i], indptr[i + 1]):
+            slot = slot_of(storage, part, i, indices[k], k)
+            for b in range(size):
+                out[at] = entry_of(numbers, slot, a, b, size)
+                at += 1
 
 
 @kernel

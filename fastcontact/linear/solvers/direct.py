@@ -26,12 +26,7 @@ class Direct(FactorSolver):
     def __repr__(self) -> str:
         if not self.n:
             return "Direct(not prepared)"
-        return f"Direct(Cholesky, {self.n} unknowns, {self.factors.nnz} entries, {self.nbytes / 1e6:.1f} MB)"
-
-    @property
-    def nbytes(self) -> int:
-        """Memory of the factors [bytes]."""
-        return self.factors.nbytes
+        return f"Direct(Cholesky, {self.n} unknowns, {self.factors.nnz} entries, {self.factors.nbytes / 1e6:.1f} MB)"
 
     def _factorised(self, K: bsr_array, last: Indices) -> SymmetricFactors:
         symbolic = self._symbolic.get(self._of_tangents)

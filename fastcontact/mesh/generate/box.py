@@ -16,7 +16,7 @@ from fastcontact.mesh.generate.blocks import block as rectangle
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 
-# Steps per edge of a hexahedron of the lattice that contains the nodes of all elements, also the mid-side nodes of pyramids.
+# Steps per edge of a hexahedron of the lattice that contains the nodes of all elements, even the mid-side nodes of pyramids.
 STEPS = 4
 _HEX = elements.get("hex8")
 _CORNERS = ((_HEX.nodes + 1) / 2 * STEPS).astype(np.int64)

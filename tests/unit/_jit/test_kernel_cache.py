@@ -345,5 +345,5 @@ print(digest.hexdigest())
 
 @pytest.mark.slow
 def test_a_run_that_compiles_has_the_bits_of_later_ones(tmp_path):
-    answers = [printed(WHOLE, NUMBA_CACHE_DIR=tmp_path, NUMBA_DISABLE_JIT=0) for _ in range(2)]
+    answers = [printed(WHOLE, timeout=1500, NUMBA_CACHE_DIR=tmp_path, NUMBA_DISABLE_JIT=0) for _ in range(2)]
     assert answers[0] == answers[1]

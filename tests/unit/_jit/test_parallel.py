@@ -11,7 +11,6 @@ from models import elastic_model
 from scipy.sparse import bsr_array
 
 import fastcontact as fc
-from fastcontact import recovery
 from fastcontact._jit import decorators as _jit
 from fastcontact._jit import parallel
 from fastcontact.elasticity import constrained_system, stiffness
@@ -134,8 +133,8 @@ def test_assembly_and_recovery_give_the_same_bits_for_any_number_of_threads(thre
     for count in (1, 2, 3, 5):
         threads(count)
         K = stiffness.stiffness(mesh, kinematics, moduli, material)
-        stress = recovery.stress_at_points(mesh, kinematics, moduli, material, u)
-        nodal = recovery.nodal_stress(mesh, kinematics, moduli, material, u)
+        stress = fc.recovery.stress_at_points(mesh, kinematics, moduli, material, u)
+        nodal = fc.recovery.nodal_stress(mesh, kinematics, moduli, material, u)
         found.append((K.data.tobytes(), stress[element].tobytes(), nodal.tobytes()))
     assert len(set(found)) == 1
 
@@ -144,7 +143,7 @@ def test_every_node_belongs_to_one_part_of_a_nodal_average(threads):
     cells = fc.generate.box((1.0, 1.0, 1.0), (24, 24, 24), "hex8").cells["hex8"]
     for count in (1, 2, 4):
         threads(count)
-        average = recovery.NodalAverage(25**3, 6)
+        average = fc.recovery.NodalAverage(25**3, 6)
         parts = average._node_ranges(cells)
         assert len(parts) == count
         assert [k for low, high in parts for k in range(low, high)] == list(range(25**3))
@@ -155,13 +154,13 @@ def test_every_node_belongs_to_one_part_of_a_nodal_average(threads):
 
 @pytest.mark.parametrize("batch", [0, 1000, 10**9])
 def test_nodal_stresses_are_the_average_whatever_is_computed_at_a_time(batch, monkeypatch):
-    monkeypatch.setattr(recovery, "BATCH", batch)
+    monkeypatch.setattr(fc.recovery, "BATCH", batch)
     model = elastic_model(fc.generate.block_on_block("quad4"), "plane_strain", E=1.0)
     mesh, (moduli, material) = model.mesh, model.material_numbers()
     u = np.random.default_rng(3).random(mesh.points.shape)
     given = (mesh, "plane_strain", moduli, material, u)
-    expected = recovery.nodal_average(mesh, recovery.stress_at_points(*given))
-    np.testing.assert_array_equal(recovery.nodal_stress(*given), expected)
+    expected = fc.recovery.nodal_average(mesh, fc.recovery.stress_at_points(*given))
+    np.testing.assert_array_equal(fc.recovery.nodal_stress(*given), expected)
 
 
 def test_a_degenerate_cell_is_named_by_its_lowest_number_whatever_the_threads(threads):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model, supported, united
+from models import elastic_model, made_of, supported, united
 from stepping import Stepping
 
 import fastcontact as fc
@@ -114,9 +114,7 @@ def test_what_round_off_of_a_stiff_body_leaves_is_told_with_its_number(solver):
 def test_a_stiff_body_that_moves_until_it_just_touches(solver, kinematics):
     """Round-off of its own stiffness is more than the criterion allows of a force that is small by itself."""
     mesh = united(A=block((10, 4), (8, 4), "quad8"), B=block((6, 4), (5, 3), "quad8", (0, 4.05)))
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(1e3, 0.3), "ABLOCK")
-    model.add_material(fc.LinearElastic(2e5, 0.3), "BBLOCK")
+    model = made_of(mesh, kinematics, {"ABLOCK": fc.LinearElastic(1e3, 0.3), "BBLOCK": fc.LinearElastic(2e5, 0.3)})
     supported(model, ABOTTOM="xy", BTOP={"x": 0.0, "y": -1.0})
     model.add_contact("c", secondary="BBOTTOM", primary="ATOP")
     with pytest.warns(fc.FastcontactWarning, match="by round-off of a stiff body"):
@@ -129,9 +127,7 @@ def test_a_stiff_body_that_moves_until_it_just_touches(solver, kinematics):
 @pytest.mark.parametrize("solver", ["direct", "amg", "pyamg"])
 def test_bodies_that_only_move_have_no_forces_to_balance(solver):
     model = stacked(friction=0.0, dim=2, unit="N-m")
-    moved = elastic_model(model.mesh, "plane_strain", E=2e11)
-    for group in ("L_BOTTOM", "U_TOP"):
-        moved.prescribe(group, x=1.0, y=2.0)
+    moved = elastic_model(model.mesh, "plane_strain", E=2e11, L_BOTTOM={"x": 1.0, "y": 2.0}, U_TOP={"x": 1.0, "y": 2.0})
     step = solved(moved, solver)
     assert np.abs(step.displacement - [1.0, 2.0]).max() < 1e-8
 

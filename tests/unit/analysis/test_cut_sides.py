@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from mechanics import contact_forces
 from models import elastic_model, supported, united
 from pairwise import first_of
 
@@ -49,15 +50,6 @@ def solved(*described, solver, **more):
     return fc.solve(pressed(*described, **more), fc.linear_ramp(2), linear_solver=solver)[-1]
 
 
-def forces(step):
-    """Return the contact forces (n_points, dim) of all pairs, those of both sides."""
-    total = np.zeros_like(step.displacement)
-    for contact in step.contact.values():
-        np.add.at(total, contact.points, contact.force_vectors)
-        np.add.at(total, contact.primary_points, contact.primary_force_vectors)
-    return total
-
-
 def parts(contact, nodes):
     """Return normal (n,) and tangential forces (n, dim) of a pair on nodes (n,)."""
     rows = np.searchsorted(np.sort(contact.points), nodes)
@@ -67,8 +59,9 @@ def parts(contact, nodes):
 
 
 def check_same(one, cut):
-    size = np.abs(forces(one)).max()
-    assert np.abs(forces(cut) - forces(one)).max() <= SAME * size
+    expected = contact_forces(one)
+    size = np.abs(expected).max()
+    assert np.abs(contact_forces(cut) - expected).max() <= SAME * size
     assert np.abs(cut.displacement - one.displacement).max() <= SAME * np.abs(one.displacement).max()
     whole = one.contact["pair0"]
     order, largest = np.argsort(whole.points), np.abs(whole.pressure).max()

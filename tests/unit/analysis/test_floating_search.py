@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, plates, united
+from models import elastic_model, made_of, plates, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -227,8 +227,7 @@ def stack(dim, weakest, angle, options):
     mesh = fc.generate.union(*boxes)
     mesh = mesh.replace(points=mesh.points @ turn.T)
     low, high, side = ("BOTTOM", "TOP", "RIGHT") if dim == 2 else ("ZMIN", "ZMAX", "XMAX")
-    model = fc.Model(mesh, "plane_strain" if dim == 2 else "3d")
-    model.add_material(fc.LinearElastic(E=50.0, nu=0.3, density=1e-9))
+    model = made_of(mesh, "plane_strain" if dim == 2 else "3d", fc.LinearElastic(E=50.0, nu=0.3, density=1e-9))
     model.add_gravity(**dict(zip("xyz", -1e4 * turn[:, -1], strict=False)), ramp=[(0, 0), (1, 1), (4, 1)])
     drive = dict(zip("xyz", 5.0 * turn[:, 0], strict=False))
     model.prescribe(f"A_{low}", **drive, ramp=[(0, 0), (1, 0), (2, 1), (4, -1)])
@@ -275,8 +274,7 @@ def test_a_crate_slides_on_a_driven_incline_until_a_spring_holds_it(angle, stiff
         for body, box in (("A", base), ("B", crate))
     ]
     mesh, slope = fc.generate.transformed(fc.generate.union(*boxes), rotate=-angle), np.radians(angle)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1e8, nu=0.3, density=600.0))
+    model = made_of(mesh, "plane_strain", fc.LinearElastic(E=1e8, nu=0.3, density=600.0))
     model.add_gravity(y=-9.81, ramp=[(0, 0), (1, 1), (2, 1)])
     top = mesh.points_of("B_TOP")
     model.add_spring("B_TOP", x=stiffness / len(top))
@@ -305,8 +303,7 @@ def test_a_soft_penalty_holds_a_stiff_block(penalty):
 def test_a_nearly_incompressible_ring_that_friction_holds_by_few_sliding_points_settles():
     """Three walls of a groove: points that slide by round-off must not replace Newton's method."""
     mesh = fc.generate.block((4.0, 4.0), (8, 8), "quad8", (20.0, 0.0))
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=10.0, nu=0.4995))
+    model = elastic_model(mesh, "axisymmetric", E=10.0, nu=0.4995)
     lid, ramp = {"motion": {"y": -0.1}}, [(0, 0), (1, 1), (2, 1)]
     for side, point, normal, motion in (
         ("TOP", (0.0, 4.0), (0.0, -1.0), lid), ("BOTTOM", (0.0, 0.0), (0.0, 1.0), {}), ("LEFT", (20.0, 0.0), (1.0, 0.0), {}),

@@ -7,10 +7,8 @@ from scipy.sparse import csr_array, vstack
 from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.friction import eliminated
 from fastcontact.contact.configuration import Configuration
-from fastcontact.errors import ConvergenceError
 from fastcontact.linear.multigrid import solver
 from fastcontact.linear.protocol import FrictionTerms
 from fastcontact.linear.solvers import amg
@@ -52,7 +50,7 @@ def test_small_blocks_slide_in_any_direction():
 def test_elimination_and_compliance_agree_and_no_column_is_asked_for(formulation, mu):
     model = rubbing(formulation, mu)
     exact = fc.solve(model, fc.linear_ramp(6), linear_solver="direct")
-    analysis = Stepping(model, "amg", 1e-10, Criteria(), fc.linear_ramp(6))
+    analysis = Stepping(model, "amg", 1e-10, fc.Criteria(), fc.linear_ramp(6))
     slid = 0
     for index, (one, instant) in enumerate(zip(exact, analysis.ramp.instants, strict=True), start=1):
         other = analysis.step(index, instant)
@@ -78,7 +76,7 @@ def test_what_fails_on_eliminated_constraints_is_solved_on_their_compliance(monk
 
 
 def test_nonsymmetric_equations_with_springs_against_a_dense_solution():
-    analysis = Stepping(rubbing(), "amg", 1e-12, Criteria())
+    analysis = Stepping(rubbing(), "amg", 1e-12, fc.Criteria())
     solver, n = analysis.solver, analysis.model.n_dofs
     rng = np.random.default_rng(5)
     f = np.where(analysis.system.free, rng.normal(size=n), 0.0)
@@ -100,12 +98,12 @@ def test_nonsymmetric_equations_with_springs_against_a_dense_solution():
 
 def test_an_iteration_that_does_not_end_is_told(monkeypatch):
     monkeypatch.setattr(solver, "MAX_ITERATIONS", 1)
-    analysis = Stepping(rubbing(), "amg", 1e-12, Criteria())
+    analysis = Stepping(rubbing(), "amg", 1e-12, fc.Criteria())
     n = analysis.model.n_dofs
     rows = csr_array((np.ones(2), ([0, 0], np.flatnonzero(analysis.system.free)[[0, 40]])), shape=(1, n))
     drag = FrictionTerms(csr_array(2.0 * rows))
     f = np.where(analysis.system.free, 1.0, 0.0)
-    with pytest.raises(ConvergenceError, match=r"conjugate residuals stall at .* times the tolerance after 1 step"):
+    with pytest.raises(fc.ConvergenceError, match=r"conjugate residuals stall at .* times the tolerance after 1 step"):
         analysis.solver.load(f).solve_nonsymmetric(rows, np.zeros(1), np.zeros(1, np.int64), np.zeros(n), 1e-12, drag)
 
 
@@ -132,11 +130,11 @@ def test_factors_that_took_over_solve_friction_on_its_compliance(monkeypatch):
 
 
 def test_nothing_is_eliminated_once_factors_have_taken_over():
-    analysis = Stepping(small_blocks(), "amg", 1e-10, Criteria())
+    analysis = Stepping(small_blocks(), "amg", 1e-10, fc.Criteria())
     n = analysis.model.n_dofs
     analysis.solver.give_up(solver.StallError("stalled"))
     none = csr_array((0, n))
-    with pytest.raises(ConvergenceError, match="the friction problem is solved with the Delassus operator"):
+    with pytest.raises(fc.ConvergenceError, match="the friction problem is solved with the Delassus operator"):
         analysis.solver.load(np.zeros(n)).solve_nonsymmetric(
             none, np.empty(0), np.empty(0, np.int64), np.zeros(n), 1e-10
         )
@@ -148,7 +146,7 @@ def test_constraints_that_repeat_each_other_are_solved_on_their_compliance(caplo
     caplog.set_level("INFO", "fastcontact")
     model = small_blocks(0.0)
     once = fc.solve(model, fc.linear_ramp(1), linear_solver="amg")[-1]
-    analysis = Stepping(model, "amg", 1e-10, Criteria())
+    analysis = Stepping(model, "amg", 1e-10, fc.Criteria())
     constraints = analysis.pairs["pair"].constraints(Configuration.undeformed(model.mesh.points))
     rows = np.flatnonzero(once.contact["pair"].active)[:2]
     n = model.n_dofs
@@ -165,7 +163,7 @@ def test_constraints_that_repeat_each_other_are_solved_on_their_compliance(caplo
 def test_a_matrix_too_large_for_factors_stays_an_error(monkeypatch):
     monkeypatch.setattr(solver, "MAX_ITERATIONS", 0)
     monkeypatch.setattr(amg, "AFFORDABLE", {3: 10})
-    with pytest.raises(ConvergenceError, match="conjugate gradients stall at"):
+    with pytest.raises(fc.ConvergenceError, match="conjugate gradients stall at"):
         fc.solve(small_blocks(0.0), fc.linear_ramp(1), linear_solver="amg", criteria=fc.Criteria(max_halvings=0))
 
 

@@ -155,11 +155,6 @@ def test_a_kept_pairing_serves_friction_through_steps():
     assert slid  # the frames of the undeformed bodies lean
 
 
-def test_keeping_a_pairing_and_renewing_it_exclude_each_other():
-    with pytest.raises(fc.ModelError, match="keep_pairing excludes geometry_updates = 2"):
-        fc.Criteria(keep_pairing=True, geometry_updates=2)
-
-
 def test_a_guess_does_not_leave_the_gap_of_a_soft_constraint_open():
     F, free = np.diag([1.0, 1e7, 1.0, 1.0]), np.array([[-1.0, -1e-3], [0.1, 0.0]])
     guess = np.array([[1.0, 1e-10 * (1.0 - 1e-7)], [-0.1, 0.0]])

@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import united
+from models import made_of, supported, united
 
 import fastcontact as fc
 from fastcontact.analysis.load_step import load_step
@@ -23,8 +23,7 @@ def clamped(name, nu, volumetric="auto", kinematics="plane_strain", n=6):
     else:
         mesh, kinematics = fc.generate.box((1.0, 1.0, 2.0), (n, n, 2 * n), name), "3d"
         below, above = "ZMIN", "ZMAX"
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=1.0, nu=nu, volumetric=volumetric))
+    model = made_of(mesh, kinematics, fc.LinearElastic(E=1.0, nu=nu, volumetric=volumetric))
     model.fix(below, "xyz"[: mesh.dim])
     model.add_traction(above, x=0.001)
     return model
@@ -56,8 +55,7 @@ def squeezed(name, n):
     """A quarter disc pressed near its pole, or a block between walls that a pressure from one side to the other bends."""
     if elements.get(name).dim == 2:
         model = fc.Model(fc.generate.quarter_disc(name, R=1.0, size=1.0 / n), "axisymmetric")
-        model.fix("A1B1", "xy")
-        model.fix("A1A2", "x")
+        supported(model, A1B1="xy", A1A2="x")
         model.add_traction("CONT1", y=lambda x: -0.001 * np.exp(-((x[:, 0] / 0.2) ** 2)))
     else:
         model = fc.Model(fc.generate.box((1.0, 1.0, 0.5), (2 * n, 2 * n, n), name), "3d")
@@ -112,10 +110,7 @@ def cantilever(element, n, law, kinematics="plane_stress", strain="finite"):
         mesh = fc.generate.renamed(mesh, {"XMIN": "LEFT", "XMAX": "RIGHT"})
     else:
         mesh = fc.generate.block((20.0, 1.0), (20 * n, n), element)
-    model = fc.Model(mesh, kinematics, strain=strain)
-    model.add_material(law)
-    model.fix("LEFT", "xyz"[: mesh.dim])
-    return model
+    return made_of(mesh, kinematics, law, strain=strain, LEFT="xyz"[: mesh.dim])
 
 
 def of_bending(step):

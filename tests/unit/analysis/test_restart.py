@@ -9,7 +9,6 @@ from models import elastic_model, united
 from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.state import State
 from fastcontact.mesh.generate import block, box
 
@@ -157,7 +156,7 @@ def test_terms_of_a_pair(name):
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_other_treatments_of_the_geometry(criteria, friction):
     relative = FRICTION if friction else FRICTIONLESS
-    check_resumed(lambda: spheres(friction=friction), fc.linear_ramp(4), relative, criteria=Criteria(**criteria))
+    check_resumed(lambda: spheres(friction=friction), fc.linear_ramp(4), relative, criteria=fc.Criteria(**criteria))
 
 
 @pytest.mark.parametrize(
@@ -168,7 +167,7 @@ def test_steps_cut_in_halves(solver, updates, friction):
 
     Iterative solvers want more updates, each of which makes the residual smaller.
     """
-    options = {"linear_solver": solver, "criteria": Criteria(max_geometry_updates=updates, max_halvings=8)}
+    options = {"linear_solver": solver, "criteria": fc.Criteria(max_geometry_updates=updates, max_halvings=8)}
     whole = check_resumed(lambda: spheres(friction=friction), fc.Ramp((0.9, 1.0)), FRICTION, after=(1,), **options)
     assert any("substeps" in step.iterations for step in whole)
 
@@ -180,7 +179,7 @@ def test_bodies_on_springs():
 def test_an_analysis_that_failed_goes_on_from_its_last_step():
     """Without enough updates for a step nor leave to cut it, and then with both."""
     ramp, steps = fc.Ramp((0.05, 0.1, 1.0)), []
-    few = Criteria(max_geometry_updates=3, max_halvings=0)
+    few = fc.Criteria(max_geometry_updates=3, max_halvings=0)
     with pytest.raises(fc.ConvergenceError):
         fc.solve(spheres(friction=0.1), ramp, criteria=few, on_step=steps.append)
     assert steps
@@ -218,7 +217,7 @@ def test_the_ramp_may_change_from_there_on():
 
 def test_solver_tolerances_and_limits_may_change():
     steps = fc.solve(spheres(), fc.Ramp((0.2, 0.4)), linear_solver="amg")
-    again = fc.solve(spheres(), fc.Ramp((0.4, 0.8)), resume=steps, linear_solver="direct", criteria=Criteria(1e-5))
+    again = fc.solve(spheres(), fc.Ramp((0.4, 0.8)), resume=steps, linear_solver="direct", criteria=fc.Criteria(1e-5))
     whole = fc.solve(spheres(), fc.Ramp((0.2, 0.4, 0.8)), linear_solver="direct")
     assert_same_to = np.abs(whole[-1].displacement).max() * 1e-8
     assert np.abs(again[-1].displacement - whole[-1].displacement).max() < assert_same_to
@@ -262,12 +261,12 @@ def test_contact_that_was_lost_is_known_from_the_last_step_alone():
 def test_a_strengthened_multigrid_cycle_is_remembered():
     """Bounds raised, precision changed, ties of the last solution: what a fresh solver would not know."""
     model, ramp = spheres("continuous"), fc.linear_ramp(3)
-    analysis = Stepping(model, "amg", 1e-10, Criteria(), ramp)
+    analysis = Stepping(model, "amg", 1e-10, fc.Criteria(), ramp)
     analysis.step(1, 0.5)
     analysis.solver._strengthen(4)
     analysis.solver.hierarchy.raise_bounds(1.3)
     memory = analysis.solver.snapshot()
-    other = Stepping(model, "amg", 1e-10, Criteria(), ramp)
+    other = Stepping(model, "amg", 1e-10, fc.Criteria(), ramp)
     other.solver.put_back(memory)
     assert other.solver.precision == "double"
     assert other.solver.hierarchy.bounds == analysis.solver.hierarchy.bounds

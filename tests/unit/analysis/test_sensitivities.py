@@ -1,14 +1,12 @@
 """Sensitivities compared with differences of solutions, in every formulation, dimension and kind of parameter."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model, supported, united
+from models import elastic_model, made_of, supported, united
 
 import fastcontact as fc
 
@@ -99,9 +97,9 @@ def test_every_formulation_between_bodies(formulation, element):
 
 
 def spheres(mesh, E=20_000.0, nu=0.3, moved=1.0, **options):
-    model = fc.Model(mesh, kinematics="axisymmetric")
-    model.add_material(fc.LinearElastic(E=E, nu=nu), "SPHHAU")
-    model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
+    model = made_of(
+        mesh, "axisymmetric", {"SPHHAU": fc.LinearElastic(E=E, nu=nu), "SPHBAS": fc.LinearElastic(E=30_000.0, nu=0.2)}
+    )
     supported(model, A1A2="x", A2B2={"y": [(0.5, -0.7 * moved), (1.0, -moved)]}, A1B1={"y": 1.0})
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
     return model
@@ -123,9 +121,7 @@ def test_in_space_with_factors_and_with_a_hierarchy(solver):
     mesh = united(L=lower, U=fc.generate.box((2.2, 2.4, 1.5), (2, 3, 1), "hex8", (0.83, 0.72, 2.0)))
 
     def make(E=1000.0, nu=0.3, moved=1.0, clearance=0.0):
-        model = fc.Model(mesh, kinematics="3d")
-        model.add_material(fc.LinearElastic(E=E, nu=nu), "LBOX")
-        model.add_material(fc.LinearElastic(E=2500.0, nu=0.22), "UBOX")
+        model = made_of(mesh, "3d", {"LBOX": fc.LinearElastic(E=E, nu=nu), "UBOX": fc.LinearElastic(E=2500.0, nu=0.22)})
         supported(model, LZMIN="xyz", UZMAX={"x": 0.01, "y": 0.004, "z": -0.05 * moved})
         model.add_contact("c", secondary="UZMIN", primary="LZMAX", clearance=clearance)
         return model
@@ -219,8 +215,8 @@ def test_sides_that_end_in_planes_of_symmetry(angle, multipliers, secondary):
         model = fc.Model(mesh, kinematics="plane_strain")
         model.add_material(fc.LinearElastic(E=E, nu=0.3), "INNER")
         model.add_material(fc.LinearElastic(E=70e3, nu=0.33), "OUTER")
-        for plane, axis in (("SYMMETRY_X", "x"), ("SYMMETRY_Y", "y")):
-            model.prescribe(plane, **{"normal" if angle else axis: 0.0})
+        model.prescribe("SYMMETRY_X", **{"normal" if angle else "x": 0.0})
+        model.prescribe("SYMMETRY_Y", **{"normal" if angle else "y": 0.0})
         model.add_pressure("BORE", 20.0 * load)
         sides = {"secondary": f"CONT_{secondary}", "primary": f"CONT_{other}"}
         options = {"clearance": clearance, "formulation": "mortar", "multipliers": multipliers}
@@ -441,9 +437,7 @@ def test_bolts_before_and_after_their_lock():
         "CUT", lambda x: np.abs(x[:, 1] - 1.0) < 1e-9, between=True
     )
     mesh = fc.generate.cut(mesh, "CUT")
-    model = elastic_model(mesh, "plane_stress", nu=0.0)
-    for end in ("BOTTOM", "TOP"):
-        model.fix(end, "xy")
+    model = elastic_model(mesh, "plane_stress", nu=0.0, BOTTOM="xy", TOP="xy")
     model.add_pretension("bolt", "CUT", force=3.0, locked_from=1.0, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)])
     point = int(np.argmax(mesh.points[:, 1] * (mesh.points[:, 1] < 0.6)))  # half a length from the bottom
     first = fc.solve(model, [1.0])[-1]

@@ -11,7 +11,6 @@ from stepping import Stepping
 
 import fastcontact as fc
 from fastcontact.analysis import step_halving
-from fastcontact.analysis.criteria import Criteria
 
 
 def spheres(formulation="node_to_segment"):
@@ -53,7 +52,7 @@ def test_no_cycle_keeps_a_finished_analysis(solver, formulation):
     model = spheres(formulation)
 
     def solved():
-        analysis = Stepping(model, solver, 1e-10, Criteria(geometry_updates=2), fc.linear_ramp(1))
+        analysis = Stepping(model, solver, 1e-10, fc.Criteria(geometry_updates=2), fc.linear_ramp(1))
         return analysis.step(1, 1.0).index
 
     solved()

@@ -12,9 +12,7 @@ from stepping import Stepping
 import fastcontact as fc
 from fastcontact.analysis import geometry_loop, step_halving
 from fastcontact.analysis.convergence_messages import geometry_moves
-from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.problem import prepare
-from fastcontact.errors import ConvergenceError
 from fastcontact.mesh.generate import block
 
 FEW = 3  # geometry updates: too few for the whole load, enough for a part of it
@@ -29,7 +27,7 @@ def spheres(friction=0.3, **options):
 
 
 def analysis_of(steps=1, friction=0.3, **criteria):
-    return Stepping(spheres(friction), "direct", 1e-10, Criteria(**criteria), fc.linear_ramp(steps))
+    return Stepping(spheres(friction), "direct", 1e-10, fc.Criteria(**criteria), fc.linear_ramp(steps))
 
 
 def close(found, expected, relative=1e-10):
@@ -40,13 +38,13 @@ def test_a_step_that_fails_whole_ends_as_if_its_parts_had_been_asked_for():
     with pytest.raises(fc.ConvergenceError, match="did not converge in 3 updates"):
         analysis_of(friction=0.1, max_geometry_updates=FEW).step(1, 1.0)
     handed, model = [], spheres(friction=0.1)
-    criteria = Criteria(max_geometry_updates=FEW)
+    criteria = fc.Criteria(max_geometry_updates=FEW)
     (step,) = fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=criteria, on_step=handed.append)
     assert [(each.index, each.load_factor) for each in handed] == [(1, 1.0)]
     ends = step.iterations["substeps"]
     assert len(ends) > 1
     assert ends[-1] == 1.0
-    parts = fc.solve(model, fc.Ramp(tuple(ends)), linear_solver="direct", criteria=Criteria())
+    parts = fc.solve(model, fc.Ramp(tuple(ends)), linear_solver="direct", criteria=fc.Criteria())
     close(step.displacement, parts[-1].displacement)
     found, expected = step.contact["hertz"], parts[-1].contact["hertz"]
     close(found.pressure, expected.pressure)
@@ -62,16 +60,16 @@ def test_without_friction_halves_end_where_a_ramp_of_the_same_instants_does():
     limits = {"max_active_set_iterations": 2, "geometry_updates": 0}
     model = spheres(friction=0.0)
     with pytest.raises(fc.ConvergenceError, match="did not converge in 2 iterations"):
-        fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=Criteria(**limits, max_halvings=0))
-    (step,) = fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=Criteria(**limits))
+        fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=fc.Criteria(**limits, max_halvings=0))
+    (step,) = fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=fc.Criteria(**limits))
     asked = fc.Ramp(tuple(step.iterations["substeps"]))
-    steps = fc.solve(model, asked, linear_solver="direct", criteria=Criteria(geometry_updates=0))
+    steps = fc.solve(model, asked, linear_solver="direct", criteria=fc.Criteria(geometry_updates=0))
     close(step.displacement, steps[-1].displacement)
 
 
 def test_a_step_that_cannot_converge_says_how_often_it_was_cut():
     handed = []
-    criteria = Criteria(max_geometry_updates=2, max_halvings=2)
+    criteria = fc.Criteria(max_geometry_updates=2, max_halvings=2)
     with pytest.raises(fc.ConvergenceError, match=r"step 1 was cut in halves 2 times, .* 0 to 0\.25 fails") as caught:
         fc.solve(spheres(), fc.linear_ramp(1), linear_solver="direct", criteria=criteria, on_step=handed.append)
     assert not handed
@@ -85,7 +83,7 @@ def test_a_step_that_cannot_converge_says_how_often_it_was_cut():
 def test_progress_tells_that_a_step_is_cut(capsys):
     limits = {"max_active_set_iterations": 2, "geometry_updates": 0}
     model = spheres(friction=0.0)
-    fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=Criteria(**limits), progress=True)
+    fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=fc.Criteria(**limits), progress=True)
     told = [text.strip() for text in capsys.readouterr().err.split("\r")]
     assert "step 1/1 does not converge, cut in halves: 0 to 1" in told
     assert not step_halving.listeners
@@ -98,7 +96,7 @@ def told_for(changes):
     options = SimpleNamespace(cohesion=None, kind="unilateral")
     pair = SimpleNamespace(secondary=side, primary=side, normals="averaged", multipliers="dual", options=options)
     still = SimpleNamespace(**vars(pair) | {"secondary": SimpleNamespace(points=np.arange(2))})
-    model, criteria = SimpleNamespace(mesh=mesh), Criteria()
+    model, criteria = SimpleNamespace(mesh=mesh), fc.Criteria()
     problem = SimpleNamespace(model=model, criteria=criteria, shape=(4, 2), pairs={"still": still, "joint": pair})
     history = [{"displacement_change": change, "active": 3} for change in changes]
     return geometry_moves(problem, history, np.arange(8.0), 60)
@@ -155,12 +153,12 @@ MODELS = {
 @pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize("name", first_of(3, list(MODELS)))
 def test_a_failed_step_leaves_no_trace(name, solver):
-    analyses = [Stepping(MODELS[name](), solver, 1e-10, Criteria(), fc.linear_ramp(4)) for _ in range(2)]
+    analyses = [Stepping(MODELS[name](), solver, 1e-10, fc.Criteria(), fc.linear_ramp(4)) for _ in range(2)]
     for analysis in analyses:
         for index in (1, 2, 3):
             analysis.step(index, index / 4)
     disturbed, undisturbed = analyses
-    generous, strict = disturbed.problem, Criteria(max_geometry_updates=0, max_halvings=1)
+    generous, strict = disturbed.problem, fc.Criteria(max_geometry_updates=0, max_halvings=1)
     disturbed.problem = replace(generous, criteria=strict)
     with pytest.raises(fc.ConvergenceError):
         disturbed.advance(4, 0.75, 1.0)
@@ -175,11 +173,11 @@ def test_a_failed_step_leaves_no_trace(name, solver):
 
 def test_parts_that_converged_before_one_failed_are_taken_back():
     model = spheres(friction=0.1)
-    analysis = Stepping(model, "direct", 1e-10, Criteria(max_geometry_updates=2, max_halvings=5), fc.linear_ramp(1))
+    analysis = Stepping(model, "direct", 1e-10, fc.Criteria(max_geometry_updates=2, max_halvings=5), fc.linear_ramp(1))
     with pytest.raises(fc.ConvergenceError, match=r"the part from 0\.59375 to 0\.625 fails"):
         analysis.advance(1, 0.0, 1.0)
     assert not analysis.u.any()
-    analysis.problem = replace(analysis.problem, criteria=Criteria())
+    analysis.problem = replace(analysis.problem, criteria=fc.Criteria())
     (expected,) = fc.solve(model, fc.linear_ramp(1), linear_solver="direct")
     step = analysis.step(1, 1.0)
     np.testing.assert_array_equal(step.displacement, expected.displacement)
@@ -187,7 +185,7 @@ def test_parts_that_converged_before_one_failed_are_taken_back():
 
 
 def test_a_step_that_fails_says_which_one_it_is():
-    criteria = Criteria(max_active_set_iterations=1, max_halvings=0)
+    criteria = fc.Criteria(max_active_set_iterations=1, max_halvings=0)
     message = (
         r"the active set did not converge in 1 iterations: 4 constraints still change, at points .* of contact 'hertz'\. Use "
         r"more iterations \(max_active_set_iterations\) \(step 1 from 0 to 0\.5; more load steps may help\)$"
@@ -232,7 +230,7 @@ def test_sizes_are_kept_and_grow(monkeypatch: pytest.MonkeyPatch) -> None:
         converges = span <= largest + 1e-12
         tried.append((span, instant if converges else (tried[-1][1] if tried else state_at), True))
         if not converges:
-            raise ConvergenceError("too far")
+            raise fc.ConvergenceError("too far")
         end, result = solved(problem, state, index, instant)
         return end, replace(result, iterations={**result.iterations, "history": [{}] * iterations})
 
@@ -271,9 +269,7 @@ def test_a_beam_that_passes_a_disc_in_one_step_does_not_stick_to_it(strain, fric
     """The equilibrium of a jammed beam exists, too, with a force of up to 1200."""
     element, n = ("quad8", (3, 34)) if strain == "small" else ("quad4", (2, 12))
     beam = block((1.5, 17.0), n, element, (0.0, -17.0)).merged_groups("SIDE", ["LEFT", "BOTTOM"])
-    model = fc.Model(beam, "plane_stress", strain=strain)
-    model.add_material(fc.LinearElastic(E=2600.0, nu=0.38))
-    model.prescribe("TOP", x=0.0, y=-9.0)
+    model = elastic_model(beam, "plane_stress", E=2600.0, nu=0.38, strain=strain, TOP={"x": 0.0, "y": -9.0})
     disc = fc.obstacles.Sphere((-0.7, -20.0), 0.5)
     model.add_obstacle("c", secondary="SIDE", obstacle=disc, friction=friction)
     with pytest.warns(fc.FastcontactWarning, match="never closed"):

@@ -2,6 +2,8 @@
 
 import warnings
 
+from models import elastic_model
+
 import fastcontact as fc
 
 
@@ -9,10 +11,7 @@ def test_a_loop_shows_the_same_warning_once():
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("default")
         for _ in range(3):
-            model = fc.Model(fc.generate.block_on_block(), kinematics="plane_strain")
-            model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-            model.fix("LOWER_BOTTOM", "xy")
-            model.fix("UPPER_TOP", "x")
+            model = elastic_model(fc.generate.block_on_block(), "plane_strain", LOWER_BOTTOM="xy", UPPER_TOP="x")
             model.prescribe("UPPER_TOP", y=-2.0)
             sides = {"secondary": "CONT_UPPER", "primary": "CONT_LOWER"}
             model.add_contact("joint", **sides, friction=0.3, formulation="node_to_segment")

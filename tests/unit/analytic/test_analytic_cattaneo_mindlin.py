@@ -8,19 +8,18 @@ import pytest
 from models import reference
 from scipy.integrate import quad
 
-from fastcontact.analytic import block_sliding, cattaneo_mindlin_line, cattaneo_mindlin_sphere
-from fastcontact.errors import FastcontactWarning, ModelError
+import fastcontact as fc
 
 REFERENCE = reference("cattaneo_mindlin")
 LIKE = {"E1": 1e5, "nu1": 0.3, "R1": 10.0, "E2": 1e5, "nu2": 0.3, "R2": 30.0, "friction": 0.4}
 
 
 def line(load, force=500.0):
-    return cattaneo_mindlin_line(**LIKE, force=force, tangential_force=load * 0.4 * force)
+    return fc.analytic.cattaneo_mindlin_line(**LIKE, force=force, tangential_force=load * 0.4 * force)
 
 
 def sphere(load, force=500.0):
-    return cattaneo_mindlin_sphere(**LIKE, force=force, tangential_force=load * 0.4 * force)
+    return fc.analytic.cattaneo_mindlin_sphere(**LIKE, force=force, tangential_force=load * 0.4 * force)
 
 
 @pytest.mark.parametrize("row", REFERENCE["line"]["rows"])
@@ -151,21 +150,21 @@ def test_loop_closes_and_its_area_is_the_dissipation():
 
 
 def test_unlike_materials_raise_a_warning_with_the_number():
-    with pytest.warns(FastcontactWarning, match=r"beta is 0\.2857"):
-        cattaneo_mindlin_line(E1=1.0, nu1=0.3, R1=1.0, friction=0.3, force=1e-3, tangential_force=0.0)
+    with pytest.warns(fc.FastcontactWarning, match=r"beta is 0\.2857"):
+        fc.analytic.cattaneo_mindlin_line(E1=1.0, nu1=0.3, R1=1.0, friction=0.3, force=1e-3, tangential_force=0.0)
 
 
 def test_block_sticks_then_slides():
     block = {"E": 2.6, "nu": 0.3, "height": 2.0, "pressure": 0.1, "friction": 0.5}  # G = 1, limit 0.05
-    stuck = block_sliding(**block, displacement=0.06)
+    stuck = fc.analytic.block_sliding(**block, displacement=0.06)
     assert (stuck.sliding, stuck.slip, stuck.dissipation) == (False, 0.0, 0.0)
     assert stuck.shear_traction == pytest.approx(0.03, rel=1e-14)
-    sliding = block_sliding(**block, displacement=0.3)
+    sliding = fc.analytic.block_sliding(**block, displacement=0.3)
     assert sliding.sliding
     assert sliding.shear_traction == pytest.approx(0.05, rel=1e-14)
     assert sliding.slip == pytest.approx(0.2, rel=1e-14)
     assert sliding.dissipation == pytest.approx(0.01, rel=1e-14)
-    limit = block_sliding(**block, displacement=0.1)
+    limit = fc.analytic.block_sliding(**block, displacement=0.1)
     assert limit.slip == pytest.approx(0.0, abs=1e-15)
-    with pytest.raises(ModelError, match="displacement is -1"):
-        block_sliding(**block, displacement=-1.0)
+    with pytest.raises(fc.ModelError, match="displacement is -1"):
+        fc.analytic.block_sliding(**block, displacement=-1.0)

@@ -11,8 +11,6 @@ import fastcontact as fc
 from fastcontact.cases.case import build_case, stored_description
 from fastcontact.cases.checks import Check, evaluated, measured, read_check
 from fastcontact.cases.summary import lines, of_step, summarise
-from fastcontact.errors import CaseError
-from fastcontact.results.step import StepResult
 
 HERTZ = fc.analytic.hertz_point(E1=1000.0, nu1=0.3, R1=10.0, force=4.0)
 SLIP = fc.analytic.cattaneo_mindlin_line(
@@ -35,7 +33,7 @@ def step():
     stress = np.tile([-1.0, -2.0, -3.0, 0.5], (m + 1, 1))
     displacement = np.tile([0.1, -0.2], (m + 1, 1))
     von_mises = np.full(m + 1, 7.0)
-    return StepResult(1, 1.0, displacement, stress, von_mises, -von_mises, np.zeros((m + 1, 2)), {"hertz": contact})
+    return fc.StepResult(1, 1.0, displacement, stress, von_mises, -von_mises, np.zeros((m + 1, 2)), {"hertz": contact})
 
 
 def check(**entry):
@@ -134,7 +132,7 @@ def test_it_says_what_is_compared():
     ],
 )
 def test_wrong_checks_are_named(entry, words):
-    with pytest.raises(CaseError, match=words):
+    with pytest.raises(fc.CaseError, match=words):
         check(**entry)
 
 
@@ -148,9 +146,9 @@ def test_no_contact_has_no_stick_zone():
 def test_the_share_of_a_contact_lies_between_nothing_and_all_of_it():
     theory = {"kind": "hertz_point", "E1": 1.0, "nu1": 0.3, "R1": 1.0, "force": 1.0}
     for share in (0.0, 1.5):
-        with pytest.raises(CaseError, match=r"theory.a.share = .* 0.25 for a quarter"):
+        with pytest.raises(fc.CaseError, match=r"theory.a.share = .* 0.25 for a quarter"):
             stored_description({"contact": {"a": {}}, "theory": {"a": {**theory, "share": share}}})
-    with pytest.raises(CaseError, match="share"):
+    with pytest.raises(fc.CaseError, match="share"):
         stored_description({"contact": {"a": {}}, "theory": {"a": {**theory, "share": "half"}}})
     assert (
         stored_description({"contact": {"a": {}}, "theory": {"a": {**theory, "share": 0.5}}})["theories"]["a"][

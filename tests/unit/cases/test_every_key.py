@@ -1,7 +1,5 @@
 """Any value of any key of a case file is read, or one line names the file and the key."""
 
-from __future__ import annotations
-
 import copy
 import functools
 import math
@@ -137,11 +135,8 @@ BLOCKS = {"generator": "block-on-block"}
     ("study", "said"),
     [
         ({"triangles": {"no_size": 1.0}}, "unknown key 'study.triangles.no_size'"),
-        ({"generator": "no-such"}, "unknown study.generator 'no-such'"),
         ({"curves": [math.nan]}, r"study.curves\[0\] must be"),
         ({"combinations": [["quad8"]]}, "study.combinations"),
-        ({"options": {"mortal": {}}}, "unknown formulation in study.options 'mortal'"),
-        ({"contact": "none"}, "unknown contact pair in study.contact 'none'"),
         ({"load_steps": 0}, "load steps must be a positive whole number, not 0"),
         ({**BLOCKS, "quadrangles": {"size_upper": [math.nan, 1.0]}}, r"study.quadrangles.size_upper\[0\] = nan must"),
         ({**BLOCKS, "quadrangles": {"size_upper": [-1.0, 1.0]}}, "quad4 mortar: .*size_upper"),

@@ -143,18 +143,34 @@ def test_a_run_that_was_killed_is_incomplete(solved, tmp_path, capsys):
     assert "  incomplete: the run was killed, or is still running" in capsys.readouterr().out.splitlines()
 
 
-@pytest.mark.parametrize("background", [False, True])
-def test_a_run_interrupted_from_the_keyboard_says_what_it_keeps(solved, tmp_path, capsys, monkeypatch, background):
-    path, write = tmp_path / "stopped.vtkhdf", fc.ResultWriter.write
-    monkeypatch.setattr("fastcontact.cli.run.LARGE", 0 if background else np.inf)
+def interrupt_before_step_3(patch):
+    write = fc.ResultWriter.write
 
     def stop(self, step):
         if step.index == 3:
             raise KeyboardInterrupt
         write(self, step)
 
+    patch.setattr(fc.ResultWriter, "write", stop)
+
+
+def fill_the_disk_at_step_2(patch):
+    real = write_arrays.append_fields
+
+    def full(file, mesh, number, *given):
+        if number == 1:
+            raise OSError(28, "No space left on device")
+        real(file, mesh, number, *given)
+
+    patch.setattr(write_arrays, "append_fields", full)
+
+
+@pytest.mark.parametrize("background", [False, True])
+def test_a_run_interrupted_from_the_keyboard_says_what_it_keeps(solved, tmp_path, capsys, monkeypatch, background):
+    path = tmp_path / "stopped.vtkhdf"
+    monkeypatch.setattr("fastcontact.cli.run.LARGE", 0 if background else np.inf)
     with monkeypatch.context() as patch:
-        patch.setattr(fc.ResultWriter, "write", stop)
+        interrupt_before_step_3(patch)
         assert main(["run", str(solved / "small.toml"), "-o", str(path)]) == 130
     told = capsys.readouterr().err.splitlines()
     assert told[-2:] == [
@@ -173,14 +189,7 @@ def test_steps_of_large_meshes_are_written_in_the_background(solved, tmp_path, c
     assert main(["run", str(solved / "small.toml"), "-q", "-o", str(path)]) == 0
     for one, other in zip(fc.open_results(path), fc.open_results(solved / "small.vtkhdf"), strict=True):
         np.testing.assert_array_equal(one.stress, other.stress)
-    real = write_arrays.append_fields
-
-    def full(file, mesh, number, *given):
-        if number == 1:
-            raise OSError(28, "No space left on device")
-        real(file, mesh, number, *given)
-
-    monkeypatch.setattr(write_arrays, "append_fields", full)
+    fill_the_disk_at_step_2(monkeypatch)
     assert main(["run", str(solved / "small.toml"), "-q", "-o", str(path)]) == 1
     told = capsys.readouterr().err.splitlines()[-1]
     assert "cannot be written at step 2 (No space left on device), 1 steps are complete" in told
@@ -188,21 +197,10 @@ def test_steps_of_large_meshes_are_written_in_the_background(solved, tmp_path, c
 
 
 def test_a_disk_that_fails_before_an_interruption_is_told(solved, tmp_path, capsys, monkeypatch):
-    path, write, real = tmp_path / "stopped.vtkhdf", fc.ResultWriter.write, write_arrays.append_fields
-
-    def stop(self, step):
-        if step.index == 3:
-            raise KeyboardInterrupt
-        write(self, step)
-
-    def full(file, mesh, number, *given):
-        if number == 1:
-            raise OSError(28, "No space left on device")
-        real(file, mesh, number, *given)
-
+    path = tmp_path / "stopped.vtkhdf"
     monkeypatch.setattr("fastcontact.cli.run.LARGE", 0)
-    monkeypatch.setattr(fc.ResultWriter, "write", stop)
-    monkeypatch.setattr(write_arrays, "append_fields", full)
+    interrupt_before_step_3(monkeypatch)
+    fill_the_disk_at_step_2(monkeypatch)
     assert main(["run", str(solved / "small.toml"), "-q", "-o", str(path)]) == 130
     told = capsys.readouterr().err.splitlines()[-3:]
     assert told[0] == "interrupted"

@@ -1,7 +1,5 @@
 """No command replaces its inputs, or one output by another; no output remains incomplete."""
 
-from __future__ import annotations
-
 import argparse
 import io
 import json

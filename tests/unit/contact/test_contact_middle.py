@@ -39,13 +39,13 @@ def pressed(x0, facing, half):
     prefix, mesh = "" if half else "ALL_", placed(x0, angle, half)
     centre = np.array([x0, -2 * x0])
     centre["xy".index(axis)] += sign * R
-    model = elastic_model(mesh, "plane_strain", E=E)
+    model = elastic_model(mesh, E=E)
     if half:
         model.fix("SYMMETRY_X", "x" if axis == "y" else "y")
     model.fix(f"{prefix}BOTTOM", "xy" if not half else axis)
     ball = fc.obstacles.Sphere(centre=tuple(centre), R=R)
     model.add_obstacle("c", secondary=f"{prefix}CONTACT", obstacle=ball, motion={axis: -sign * 0.05})
-    step = fc.solve(model, fc.linear_ramp(1))[-1]
+    step = fc.solve(model, 1)[-1]
     return step.contact["c"], step
 
 
@@ -75,7 +75,7 @@ def test_the_half_width_is_that_of_hertz_wherever_the_contact_lies(x0, facing, h
 
 @pytest.mark.parametrize("component", ["normal", "x"])
 def test_a_face_that_is_driven_is_not_a_plane_of_symmetry(component):
-    model = elastic_model(fc.generate.block((4.0, 1.0), (8, 2)), "plane_strain", E=E, TOP={"y": -0.01})
+    model = elastic_model(fc.generate.block((4.0, 1.0), (8, 2)), E=E, TOP={"y": -0.01})
     model.prescribe("RIGHT", **{component: 0.1}, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
     model.add_obstacle("c", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0)))
     for step in fc.solve(model, fc.linear_ramp(2, end=2.0)):
@@ -87,9 +87,7 @@ def test_a_face_that_is_driven_is_not_a_plane_of_symmetry(component):
 
 def test_an_end_beyond_which_the_other_body_extends_is_not_a_plane_of_symmetry():
     upper, lower = fc.generate.block((2.0, 1.0), (4, 2)), fc.generate.block((6.0, 1.0), (9, 2), origin=(-3.0, -1.0))
-    model = elastic_model(
-        united(U_=upper, L_=lower), "plane_strain", E=E, L_BOTTOM="xy", U_LEFT="x", U_TOP={"y": -0.01}
-    )
+    model = elastic_model(united(U_=upper, L_=lower), E=E, L_BOTTOM="xy", U_LEFT="x", U_TOP={"y": -0.01})
     model.add_contact("c", secondary="U_BOTTOM", primary="L_TOP")
     contact = fc.solve(model, 1)[-1].contact["c"]
     assert 0.8 < contact.middle[0] < 1.2
@@ -100,11 +98,11 @@ def test_the_middle_of_two_bodies_is_the_same_from_either_side(swapped):
     mesh = fc.generate.transformed(
         fc.generate.cylinder_on_block("quad4", size=8.0, contact_size=0.5), translate=(20.0, 0)
     )
-    model = elastic_model(mesh, "plane_strain", E=1e5, AXIS="x", BLOCK_BOTTOM="y", CYLINDER_TOP={"y": -0.5})
+    model = elastic_model(mesh, E=1e5, AXIS="x", BLOCK_BOTTOM="y", CYLINDER_TOP={"y": -0.5})
     sides = ["CONT_CYLINDER", "CONT_BLOCK"]
     secondary, primary = reversed(sides) if swapped else sides
     model.add_contact("c", secondary=secondary, primary=primary)
-    contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["c"]
+    contact = fc.solve(model, 1)[-1].contact["c"]
     both = fc.analytic.hertz_line(E1=1e5, nu1=0.3, R1=50.0, E2=1e5, nu2=0.3, force=2 * np.linalg.norm(contact.force))
     assert contact.middle[0] == pytest.approx(20.0, abs=1e-9)
     assert contact.radius[0] - 0.5 < both.radius < contact.radius[1] + 0.5
@@ -113,9 +111,9 @@ def test_the_middle_of_two_bodies_is_the_same_from_either_side(swapped):
 def rings():
     """Return contact and step of a press fit: a quarter of two rings."""
     mesh = fc.generate.rings("quad8", divisions_inner=(2, 6), divisions_outer=(2, 6))
-    model = elastic_model(mesh, "plane_strain", E=210e3, SYMMETRY_X="x", SYMMETRY_Y="y")
+    model = elastic_model(mesh, E=210e3, SYMMETRY_X="x", SYMMETRY_Y="y")
     model.add_contact("c", secondary="CONT_INNER", primary="CONT_OUTER", clearance=-0.05)
-    step = fc.solve(model, fc.linear_ramp(1))[-1]
+    step = fc.solve(model, 1)[-1]
     return step.contact["c"], step
 
 
@@ -168,14 +166,14 @@ def test_in_space_distances_are_from_the_centre_of_pressure_or_the_planes_of_sym
         x, y = mesh.points[:, 0] - at[0], mesh.points[:, 1] - at[1]
         points = np.column_stack([at[0] + 0.8 * x - 0.6 * y, at[1] + 0.6 * x + 0.8 * y, mesh.points[:, 2]])
         mesh = mesh.replace(points=points)
-    model = elastic_model(mesh, "3d", E=E)
+    model = elastic_model(mesh, E=E)
     if quarter:
         supported(model, XMIN="normal", YMIN="normal", ZMIN="z")
     else:
         model.fix("ZMIN", "xyz")
     ball = fc.obstacles.Sphere(centre=(at[0], at[1], at[2] + 3.0), R=3.0)
     model.add_obstacle("c", secondary="ZMAX", obstacle=ball, motion={"z": -0.05})
-    contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["c"]
+    contact = fc.solve(model, 1)[-1].contact["c"]
     np.testing.assert_allclose(contact.middle, at, atol=1e-6)
     flat = np.hypot(*(contact.coordinates - at)[:, :2].T)
     np.testing.assert_allclose(contact.place, flat, atol=1e-6)
@@ -187,12 +185,12 @@ def test_in_axisymmetry_places_are_radii_unless_the_surface_runs_along_the_axis(
     model = elastic_model(shaft, "axisymmetric", E=E, LEFT="x", BOTTOM="y")
     hub = fc.obstacles.HalfSpace(point=(2.0, 0.0), normal=(-1.0, 0.0))
     model.add_obstacle("c", secondary="RIGHT", obstacle=hub, motion={"x": -0.01})
-    contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["c"]
+    contact = fc.solve(model, 1)[-1].contact["c"]
     assert np.ptp(contact.place) == pytest.approx(2.0)
     ends = elastic_model(shaft, "axisymmetric", E=E, BOTTOM="y")
     plate = fc.obstacles.HalfSpace(point=(0.0, 7.0), normal=(0.0, -1.0))
     ends.add_obstacle("c", secondary="TOP", obstacle=plate, motion={"y": -0.01})
-    contact = fc.solve(ends, fc.linear_ramp(1))[-1].contact["c"]
+    contact = fc.solve(ends, 1)[-1].contact["c"]
     np.testing.assert_array_equal(contact.place, contact.coordinates[:, 0])
     assert contact.measured_from_axis
 

@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, supported, united
 
 import fastcontact as fc
 from fastcontact.contact.pairing import pair
 from fastcontact.contact.projection import smooth_normals
 from fastcontact.contact.surface import surface
-from fastcontact.mesh.generate import block, box, renamed
 
 WAYS = [
     {"formulation": "node_to_segment", "normals": "facet"}, {"formulation": "node_to_segment", "normals": "averaged"},
@@ -21,19 +20,18 @@ def punch(dim=2, shift=0.55, nu=0.0, element=None, cells=(10, 7)):
     """A punch on a block twice as wide, which its corners press into."""
     n, m = cells
     if dim == 2:
-        low = block((2.0, 1.0), (n, n // 2), element or "quad4", (0.0, -1.0))
-        up = block((1.0, 1.0), (m, m), element or "quad4", (shift, 0.0))
+        low = fc.generate.block((2.0, 1.0), (n, n // 2), element or "quad4", (0.0, -1.0))
+        up = fc.generate.block((1.0, 1.0), (m, m), element or "quad4", (shift, 0.0))
     else:
-        low = box((2.0, 2.0, 1.0), (n, n, 2), element or "hex8", (0.0, 0.0, -1.0))
-        up = box((1.0, 1.0, 1.0), (m, m, 2), element or "hex8", (shift, shift, 0.0))
-        low, up = (renamed(mesh, {"ZMIN": "BOTTOM", "ZMAX": "TOP"}) for mesh in (low, up))
+        low = fc.generate.box((2.0, 2.0, 1.0), (n, n, 2), element or "hex8", (0.0, 0.0, -1.0))
+        up = fc.generate.box((1.0, 1.0, 1.0), (m, m, 2), element or "hex8", (shift, shift, 0.0))
+        low, up = (fc.generate.renamed(mesh, {"ZMIN": "BOTTOM", "ZMAX": "TOP"}) for mesh in (low, up))
     mesh = united(L_=low, U_=up)
     if dim == 2:
         whole = np.concatenate([mesh.cell_groups[name] for name in ("U_BOTTOM", "U_LEFT", "U_RIGHT")])
         mesh = mesh.with_groups(cells={"U_WHOLE": whole})
     model = elastic_model(mesh, "plane_strain" if dim == 2 else "3d", nu=nu, L_BOTTOM="xyz"[:dim])
-    model.prescribe("U_TOP", **dict.fromkeys("xyz"[: dim - 1], 0.0), **{"xyz"[dim - 1]: -0.01})
-    return model
+    return supported(model, U_TOP={**dict.fromkeys("xyz"[: dim - 1], 0.0), **{"xyz"[dim - 1]: -0.01}})
 
 
 def pressed(model, secondary, primary, **options):

@@ -7,14 +7,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
-from fastcontact import obstacles
 from fastcontact.contact.obstacles import MeshedSurface
 from fastcontact.contact.search.facet_tables import flat_triangles
-from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import block, box, quarter_disc, sphere_octant
-from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import outer_facets
 from fastcontact.model.body_overlap import winding_numbers
 
 SOLIDS_3D = ("hex8", "hex20", "hex27", "tet4", "tet10", "wedge6", "wedge15", "pyramid5")
@@ -22,9 +18,9 @@ SOLIDS_3D = ("hex8", "hex20", "hex27", "tet4", "tet10", "wedge6", "wedge15", "py
 
 def shell(mesh):
     """The outer facets of a mesh alone, as group SHELL, normals out of the solid."""
-    facets = outer_facets(mesh)
+    facets = fc.topology.outer_facets(mesh)
     count = sum(map(len, facets.values()))
-    return Mesh(mesh.points, facets, cell_groups={"SHELL": np.arange(count)})
+    return fc.Mesh(mesh.points, facets, cell_groups={"SHELL": np.arange(count)})
 
 
 def box_distance(points):
@@ -60,7 +56,7 @@ def test_at_sharp_edges_and_tips_the_sign_is_that_of_the_winding_number(angle, s
     mesh = shell(mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t), z * (1 + 0.3 * r)])))
     # Flat facets, so that triangles and surface are the same.
     triangles = mesh.cells["quad4"][:, flat_triangles(4)].reshape(-1, 3)
-    flat = Mesh(mesh.points, {"tri3": triangles}, cell_groups={"SHELL": np.arange(len(triangles))})
+    flat = fc.Mesh(mesh.points, {"tri3": triangles}, cell_groups={"SHELL": np.arange(len(triangles))})
     points = np.random.default_rng(seed).uniform([-1.3, -1.3, -0.1], [1.3, 1.3, 1.3], (300, 3))
     distance, _ = MeshedSurface(flat, "SHELL").distance(points)
     number = winding_numbers(points, mesh.points[triangles])
@@ -74,7 +70,7 @@ def test_at_sharp_corners_in_two_dimensions_the_sign_is_right(angle):
     t = np.linspace(-half, half, n)
     corners = np.vstack([[[0.0, 0.0]], np.column_stack([np.cos(t), np.sin(t)])])
     lines = np.column_stack([np.arange(n + 1), np.roll(np.arange(n + 1), -1)])
-    pie = MeshedSurface(Mesh(corners, {"line2": lines}, cell_groups={"PIE": np.arange(n + 1)}), "PIE")
+    pie = MeshedSurface(fc.Mesh(corners, {"line2": lines}, cell_groups={"PIE": np.arange(n + 1)}), "PIE")
     points = np.random.default_rng(3).uniform(-1.2, 1.2, (2000, 2))
     radius, polar = np.linalg.norm(points, axis=1), np.abs(np.arctan2(points[:, 1], points[:, 0]))
     clear = np.abs(radius - 1) > 0.01  # the arc is a polygon
@@ -89,7 +85,7 @@ def test_a_circle_of_lines_is_as_exact_as_its_lines(element):
         t = np.linspace(0, 2 * np.pi, n * order, endpoint=False)
         k = np.arange(n) * order
         ends = [k, (k + order) % (n * order)] + ([k + 1] if order == 2 else [])
-        mesh = Mesh(2.0 * np.column_stack([np.cos(t), np.sin(t)]), {element: np.column_stack(ends)},
+        mesh = fc.Mesh(2.0 * np.column_stack([np.cos(t), np.sin(t)]), {element: np.column_stack(ends)},
                     cell_groups={"CIRCLE": np.arange(n)})  # fmt: skip
         points = np.random.default_rng(4).uniform(-3, 3, (400, 2))
         points = points[np.linalg.norm(points, axis=1) > 0.5]
@@ -136,7 +132,7 @@ def test_facets_of_solids_look_out_of_them_however_they_run():
 
 
 def test_beyond_the_border_of_an_open_surface_there_is_nothing():
-    floor = Mesh([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]], {"line2": [[2, 1], [1, 0]]}, cell_groups={"F": [0, 1]})
+    floor = fc.Mesh([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]], {"line2": [[2, 1], [1, 0]]}, cell_groups={"F": [0, 1]})
     distance, normal = MeshedSurface(floor, "F").distance(np.array([[0.9, -0.1], [1.2, -0.1], [0.0, 0.3], [1.2, 3.0]]))
     assert distance[:3].tolist() == [-0.1, np.inf, 0.3]
     assert np.isfinite(distance[3])  # seen from afar, the end of the floor is as good as its inside
@@ -144,7 +140,7 @@ def test_beyond_the_border_of_an_open_surface_there_is_nothing():
 
 
 def test_a_crease_keeps_an_edge_sharp():
-    roof = Mesh([[-1.0, -0.2], [0.0, 0.0], [1.0, -0.2]], {"line2": [[2, 1], [1, 0]]}, cell_groups={"R": [0, 1]})
+    roof = fc.Mesh([[-1.0, -0.2], [0.0, 0.0], [1.0, -0.2]], {"line2": [[2, 1], [1, 0]]}, cell_groups={"R": [0, 1]})
     own = np.array([0.2, 1.0]) / np.hypot(0.2, 1.0)
     at = np.array([[0.05, -0.01]]) + 1e-3 * own  # above the right side, near the ridge
     smooth = MeshedSurface(roof, "R", crease=30.0).distance(at)[1][0]
@@ -161,7 +157,7 @@ def test_a_crease_keeps_an_edge_sharp():
 def strip(turned=()):
     lines = [[k, k + 1] if k in turned else [k + 1, k] for k in range(6)]
     points = np.column_stack([np.arange(7.0), np.zeros(7)])
-    return Mesh(points, {"line2": lines}, cell_groups={"STRIP": np.arange(6)})
+    return fc.Mesh(points, {"line2": lines}, cell_groups={"STRIP": np.arange(6)})
 
 
 def test_an_inconsistent_orientation_names_the_facet_to_turn():
@@ -176,11 +172,11 @@ def test_an_inconsistent_orientation_names_the_facet_to_turn():
 
 def test_what_is_no_surface_is_refused():
     points = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1.0]]
-    branch = Mesh(points, {"line2": [[1, 0], [2, 1], [3, 1]]}, cell_groups={"B": [0, 1, 2]})
+    branch = fc.Mesh(points, {"line2": [[1, 0], [2, 1], [3, 1]]}, cell_groups={"B": [0, 1, 2]})
     with pytest.raises(fc.ContactError, match=r"'B' shares an edge with more than one other facet"):
         MeshedSurface(branch, "B")
     with pytest.raises(fc.ContactError, match=r"facet 0 .* has no area"):
-        MeshedSurface(Mesh([[0.0, 0.0], [0.0, 0.0]], {"line2": [[0, 1]]}, cell_groups={"N": [0]}), "N")
+        MeshedSurface(fc.Mesh([[0.0, 0.0], [0.0, 0.0]], {"line2": [[0, 1]]}, cell_groups={"N": [0]}), "N")
     with pytest.raises(fc.ContactError, match="contains no facets"):
         MeshedSurface(block((1.0, 1.0), (1, 1), "quad4", name="B").with_groups(cells={"E": []}), "E")
     with pytest.raises(fc.MeshError, match="did you mean 'STRIP'"):
@@ -199,19 +195,19 @@ def test_a_surface_of_the_model_itself_stands_apart():
 
 
 SHAPES_2D = {
-    "half_space": obstacles.HalfSpace((0.3, -0.2), (1.0, 2.0)),
-    "sphere": obstacles.Sphere((0.1, 2.0), 1.5),
-    "hollow": obstacles.Sphere((0.1, 0.2), 5.0, hollow=True),
-    "paraboloid": obstacles.paraboloid(3.0),
-    "paraboloid_below": obstacles.paraboloid(3.0, tip=-0.5, side="below"),
-    "cone": obstacles.cone(0.3),
+    "half_space": fc.obstacles.HalfSpace((0.3, -0.2), (1.0, 2.0)),
+    "sphere": fc.obstacles.Sphere((0.1, 2.0), 1.5),
+    "hollow": fc.obstacles.Sphere((0.1, 0.2), 5.0, hollow=True),
+    "paraboloid": fc.obstacles.paraboloid(3.0),
+    "paraboloid_below": fc.obstacles.paraboloid(3.0, tip=-0.5, side="below"),
+    "cone": fc.obstacles.cone(0.3),
 }
 SHAPES_3D = {
-    "half_space": obstacles.HalfSpace((0.3, -0.2, 0.1), (1.0, 2.0, -1.0)),
-    "sphere": obstacles.Sphere((0.1, 2.0, 0.4), 1.5),
-    "cylinder": obstacles.Cylinder((0.0, 0.0, 2.0), (1.0, 0.5, 0.0), 1.2),
-    "paraboloid": obstacles.paraboloid(3.0),
-    "cone": obstacles.cone(0.3),
+    "half_space": fc.obstacles.HalfSpace((0.3, -0.2, 0.1), (1.0, 2.0, -1.0)),
+    "sphere": fc.obstacles.Sphere((0.1, 2.0, 0.4), 1.5),
+    "cylinder": fc.obstacles.Cylinder((0.0, 0.0, 2.0), (1.0, 0.5, 0.0), 1.2),
+    "paraboloid": fc.obstacles.paraboloid(3.0),
+    "cone": fc.obstacles.cone(0.3),
 }
 CASES = [(2, name, shape) for name, shape in SHAPES_2D.items()] + [(3, n, s) for n, s in SHAPES_3D.items()]
 
@@ -236,30 +232,13 @@ def test_distances_vanish_on_the_surface_and_grow_along_the_normals(dim, name, s
 
 
 def test_a_flat_punch_ends_at_its_edge():
-    distance, normal = obstacles.FlatPunch(1.0, height=0.5).distance(np.array([[0.9, 0.2], [1.1, 0.2], [0.0, 0.7]]))
+    distance, normal = fc.obstacles.FlatPunch(1.0, height=0.5).distance(np.array([[0.9, 0.2], [1.1, 0.2], [0.0, 0.7]]))
     assert distance.tolist() == pytest.approx([0.3, np.inf, -0.2])
     assert normal[:, 1].tolist() == [-1.0, -1.0, -1.0]
 
 
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: obstacles.Sphere((0.0, 0.0), -1.0),
-        lambda: obstacles.paraboloid(0.0),
-        lambda: obstacles.cone(float("nan")),
-        lambda: obstacles.FlatPunch(1.0, side="left"),
-        lambda: obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0)).distance(np.zeros((1, 2))),
-        lambda: obstacles.HalfSpace((0.0, 0.0), (0.0, 0.0)).distance(np.zeros((1, 2))),
-        lambda: obstacles.Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0).distance(np.zeros((1, 2))),
-    ],
-)
-def test_wrong_arguments_are_refused(make):
-    with pytest.raises(ContactError):
-        make()
-
-
 def test_at_the_tip_of_a_cone_the_normal_is_the_axis_up_to_round_off():
     points = np.array([[1e-19, 0.0], [-1e-19, 0.0], [1.0, 0.0]])
-    normals = obstacles.cone(0.3).distance(points)[1]
+    normals = fc.obstacles.cone(0.3).distance(points)[1]
     np.testing.assert_allclose(np.abs(normals[:2]), [[0.0, 1.0]] * 2, atol=1e-15)
     assert abs(normals[2, 0]) > 0.2

@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import supported
+from models import made_of, supported
 from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
@@ -96,17 +96,14 @@ def test_only_the_curvature_that_both_sides_share_counts():
     same = Smoothing(both.secondary, both.secondary)  # convex on convex
     assert same.shared(np.array([3]), np.array([4]), (axes[0], axes[0])) == pytest.approx(np.zeros((1, 2)))
     mesh = fc.generate.sphere_on_block()
-    model = fc.Model(mesh, "3d")
-    model.add_material(STEEL)
+    model = made_of(mesh, "3d", STEEL)
     model.add_contact("ball", secondary="CONT_SPHERE", primary="CONT_BLOCK")
     assert model.bind(model.contact[0]).smoothing is None
 
 
 def fit(element="quad4", divisions=(24, 36), clearance=-0.05, **options):
     mesh = fc.generate.rings(element, divisions_inner=(6, divisions[0]), divisions_outer=(6, divisions[1]))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(STEEL)
-    supported(model, SYMMETRY_X="x", SYMMETRY_Y="y")
+    model = made_of(mesh, "plane_strain", STEEL, SYMMETRY_X="x", SYMMETRY_Y="y")
     if clearance is not None:
         options["clearance"] = clearance
     model.add_contact("fit", secondary="CONT_INNER", primary="CONT_OUTER", **options)
@@ -156,9 +153,7 @@ def test_the_error_told_of_a_press_fit_is_right_within_a_factor_of_three(divisio
     mesh = fc.generate.rings(
         "quad4", inner_radius=20.0, outer_radius=100.0, divisions_inner=(8, inner), divisions_outer=(8, outer)
     )
-    model = fc.Model(mesh, kinematics="plane_strain")
-    model.add_material(STEEL, groups=["INNER"])
-    model.add_material(fc.LinearElastic(E=70e3, nu=0.33), groups=["OUTER"])
+    model = made_of(mesh, "plane_strain", {"INNER": STEEL, "OUTER": fc.LinearElastic(E=70e3, nu=0.33)})
     supported(model, SYMMETRY_X="x", SYMMETRY_Y="y")
     primary = "CONT_OUTER" if secondary == "CONT_INNER" else "CONT_INNER"
     options = {} if formulation == "node_to_segment" else {"surface_smoothing": False}

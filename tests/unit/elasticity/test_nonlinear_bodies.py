@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import made_of
 
 import fastcontact as fc
 from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies
@@ -40,8 +41,7 @@ def single(element: str, kinematics: str, law, strain: str):
     nodes, rng = elements.get(element).nodes, np.random.default_rng(0)
     points = 1.3 * nodes + 0.04 * rng.normal(size=nodes.shape) + (3.0 if kinematics == "axisymmetric" else 0.0)
     mesh = fc.Mesh(points, {element: np.arange(len(points), dtype=np.int32)[None]})
-    model = fc.Model(mesh, kinematics, strain=strain)
-    model.add_material(law)
+    model = made_of(mesh, kinematics, law, strain=strain)
     return model, NonlinearBodies(mesh, kinematics, strain, model.material_field())
 
 
@@ -103,8 +103,7 @@ def test_threads_do_not_change_bits(law: str, monkeypatch: pytest.MonkeyPatch) -
 
     mesh = fc.generate.box((1.0, 1.0, 1.0), (5, 4, 3))
     material, strain = LAWS[law]
-    model = fc.Model(mesh, "3d", strain=strain)
-    model.add_material(material)
+    model = made_of(mesh, "3d", material, strain=strain)
     u = 0.02 * np.random.default_rng(0).normal(size=mesh.points.shape)
     found = []
     for count in (1, 2, 3):
@@ -117,33 +116,8 @@ def test_threads_do_not_change_bits(law: str, monkeypatch: pytest.MonkeyPatch) -
         assert all(np.array_equal(one, two) for one, two in zip(found[0], other, strict=True))
 
 
-@pytest.mark.parametrize(
-    ("make", "text"),
-    [
-        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=0.0), "the yield stress = 0.0 must be a positive number"),
-        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, hardening=[(0.0, 2.0)]), "hardening begins with"),
-        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, hardening=[1.0]), "must be pairs"),
-        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, hardening=[(0.2, 2.0), (0.1, 3.0)]), "ascending"),
-        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, hardening=[(0.1, 0.1)]), "falls faster"),
-        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, kinematic=-1.0), "must be zero or more"),
-        (lambda: fc.ElasticPlastic(E=lambda x: x, nu=0.3, yield_stress=1.0), "do not vary"),
-        (lambda: fc.MooneyRivlin(-1.0, 0.5, bulk=10.0), r"shear modulus 2 \(C10 \+ C01\) = -1 .* must be positive"),
-        (lambda: fc.Yeoh(1.0, 0.0, 0.0, bulk=0.0), "the bulk modulus = 0.0 must be a positive number"),
-        (lambda: fc.Ogden([1.0, 2.0], [2.0], bulk=10.0), "2 mu and 1 alpha"),
-        (lambda: fc.Ogden(1.0, 0.0, bulk=10.0), "no alpha zero"),
-        (lambda: model_with(PLASTIC, "finite"), "kinematic hardening requires small strains"),
-        (lambda: model_with(fc.LinearElastic(E=1.0, nu=0.4999), "finite"), "locks .*: use NeoHookean"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_is_refused(make, text: str) -> None:
-    with pytest.raises(fc.ModelError, match=text):
-        make()
-
-
 def model_with(law, strain: str = "small") -> fc.Model:
-    model = fc.Model(fc.generate.block(), "plane_strain", strain=strain)
-    model.add_material(law)
-    return model
+    return made_of(fc.generate.block(), "plane_strain", law, strain=strain)
 
 
 def test_initial_states_are_refused() -> None:

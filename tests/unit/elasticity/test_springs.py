@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from models import elastic_model
+from models import elastic_model, supported
 from scipy.sparse import bsr_array
 
 import fastcontact as fc
@@ -46,9 +46,7 @@ def test_a_block_on_springs_settles_by_load_over_stiffness_and_reactions_hold_th
 
 def test_a_support_beside_a_spring_bears_the_rest():
     model = block_on_springs()
-    model.fix("LEFT", "x")
-    model.prescribe("BOTTOM_LEFT", y=-0.1)
-    model.prescribe("BOTTOM_RIGHT", y=-0.1)
+    supported(model, LEFT="x", BOTTOM_LEFT={"y": -0.1}, BOTTOM_RIGHT={"y": -0.1})
     step = last(model)
     np.testing.assert_allclose(step.reaction[:, 1].sum(), PRESSURE * WIDTH, rtol=1e-12)  # of which springs bear 10
 
@@ -168,35 +166,12 @@ def test_a_spring_shares_the_load_with_a_contact():
     assert step.contact["floor"].force[1] == pytest.approx(total - 100.0 * 0.1, rel=1e-10)
 
 
-@pytest.mark.parametrize(
-    ("groups", "stiffness", "words"),
-    [
-        ([0], {"x": 1.0, "direction": [1.0, 0.0]}, "has a direction, but no axial or transverse stiffness"),
-        ([0], {"axial": 1.0, "direction": [0.0, 0.0]}, "must be 2 numbers, not all zero"),
-        ([0], {"axial": 1.0, "direction": [1.0, 0.0, 0.0]}, "must be 2 numbers, not all zero"),
-        (["NOWHERE"], {}, "NOWHERE"),
-        (["BOTTOM"], {}, "has no component"),
-        (["BOTTOM"], {"z": 1.0}, "component"),
-        (["BOTTOM"], {"y": np.nan}, r"stiffness .*(positive|finite)"),
-        (["BOTTOM"], {"y": np.inf}, r"stiffness .*(positive|finite)"),
-        (["BOTTOM"], {"y": "stiff"}, "must be a number"),
-        (["BOTTOM", "BLOCK"], {"axial": 1.0}, "have 2 and 4 nodes: they must match"),
-        (["TOP_LEFT", "TOP_LEFT"], {"axial": 1.0}, "both ends are point"),
-    ],
-)
-def test_springs_that_cannot_be(groups, stiffness, words):
-    model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (1, 1)), "plane_strain")
-    with pytest.raises(fc.ModelError, match=words):
-        model.add_spring(*groups, **stiffness)
-
-
 @pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric"])
 def test_the_stiffness_of_the_ground_has_no_limit(kinematics):
     """It adds to the diagonal alone: a spring of any stiffness is a support."""
     held, hung = block_on_springs(1e30, kinematics), block_on_springs(1.0, kinematics)
     hung.springs.clear()
-    for corner in ("BOTTOM_LEFT", "BOTTOM_RIGHT"):
-        hung.fix(corner, "y")
+    supported(hung, BOTTOM_LEFT="y", BOTTOM_RIGHT="y")
     for model in (held, hung):
         model.fix("LEFT", "x")
     np.testing.assert_allclose(last(held).displacement, last(hung).displacement, rtol=1e-10, atol=1e-15)

@@ -5,7 +5,7 @@ import dataclasses
 import mechanics
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, made_of, supported
 from pairwise import first_of
 
 import fastcontact as fc
@@ -15,10 +15,6 @@ pytestmark = pytest.mark.each_value
 
 STEEL = {"E": 200_000.0, "nu": 0.3}
 KINDS = (("tri3", 4e-3), ("tri6", 3e-5), ("quad4", 3e-3), ("quad8", 1e-5), ("quad9", 1e-5))
-
-
-def solved(model, **options):
-    return fc.solve(model, fc.linear_ramp(1), **options)[-1]
 
 
 def curved(mesh, kinematics):
@@ -37,7 +33,7 @@ def test_a_bar_whose_modulus_grows_extends_by_the_integral_of_stress_over_modulu
     model.fix("BOTTOM", "y")
     model.add_traction("RIGHT", x=3.0)
     exact = 3.0 / 1000.0 / 0.7 * (1.0 - np.exp(-1.4))
-    assert abs(solved(model).displacement[mesh.points_of("RIGHT"), 0].mean() / exact - 1.0) < tolerance
+    assert abs(fc.solve(model, 1)[-1].displacement[mesh.points_of("RIGHT"), 0].mean() / exact - 1.0) < tolerance
 
 
 def ring(element, kinematics, n, power=2.0, nu=0.3):
@@ -79,7 +75,7 @@ def ring(element, kinematics, n, power=2.0, nu=0.3):
 )
 def test_a_graded_ring_under_pressure_is_that_of_horgan_and_chan(kinematics, element, u_off, hoop_off):
     model, exact = ring(element, kinematics, 16)
-    step, bottom = solved(model), model.mesh.points_of("BOTTOM")
+    step, bottom = fc.solve(model, 1)[-1], model.mesh.points_of("BOTTOM")
     radius = model.mesh.points[bottom, 0]
     u, hoop = exact(radius)
     np.testing.assert_allclose(step.displacement[bottom, 0], u, rtol=u_off)
@@ -93,7 +89,7 @@ def test_the_error_of_a_graded_ring_falls_as_that_of_a_uniform_one():
     for n in (4, 8, 16):
         model, exact = ring("quad8", "axisymmetric", n)
         inner = model.mesh.points_of("LEFT")
-        errors.append(abs(solved(model).displacement[inner, 0].mean() / exact(np.ones(1))[0][0] - 1.0))
+        errors.append(abs(fc.solve(model, 1)[-1].displacement[inner, 0].mean() / exact(np.ones(1))[0][0] - 1.0))
     assert np.log2(errors[1] / errors[2]) > 3.5, errors
 
 
@@ -155,7 +151,7 @@ def test_two_values_over_the_cells_are_two_groups(kinematics, mesh, given):
     for model in (one, two):
         model.add_temperature(40.0)
         model.add_gravity(y=-1.0)
-    a, b = solved(one, linear_solver="direct"), solved(two, linear_solver="direct")
+    a, b = fc.solve(one, 1, linear_solver="direct")[-1], fc.solve(two, 1, linear_solver="direct")[-1]
     np.testing.assert_allclose(a.displacement, b.displacement, atol=1e-12 * np.abs(b.displacement).max())
     np.testing.assert_allclose(a.reaction, b.reaction, atol=1e-11 * np.abs(b.reaction).max())
     inside = np.ones(mesh.n_points, bool)
@@ -174,7 +170,7 @@ def test_numbers_at_points_are_a_function_that_is_linear_and_constants_one_that_
     ):
         model = held(mesh, kinematics)
         model.add_material(fc.LinearElastic(E, nu))
-        results.append(solved(model, linear_solver="direct"))
+        results.append(fc.solve(model, 1, linear_solver="direct")[-1])
     for a, b in (results[:2], results[2:]):
         np.testing.assert_allclose(a.displacement, b.displacement, atol=1e-12 * np.abs(b.displacement).max())
         np.testing.assert_allclose(a.stress, b.stress, atol=1e-11 * np.abs(b.stress).max())
@@ -199,7 +195,7 @@ def test_orthotropic_constants_vary_likewise(kinematics):
         model = held(mesh, kinematics)
         model.add_material(material)
         model.add_temperature(30.0)
-        results.append(solved(model, linear_solver="direct"))
+        results.append(fc.solve(model, 1, linear_solver="direct")[-1])
     a, b = results
     np.testing.assert_allclose(a.displacement, b.displacement, atol=1e-11 * np.abs(b.displacement).max())
     np.testing.assert_allclose(a.stress, b.stress, atol=1e-10 * np.abs(b.stress).max())
@@ -211,7 +207,7 @@ def test_nodal_forces_of_a_graded_body_balance_its_stress(options):
     mesh = fc.generate.block((2.0, 1.0), (6, 3), "quad4", distortion=0.1)
     model = held(mesh, "plane_strain")
     model.add_material(fc.LinearElastic(E=fc.Tabulated("x", [(0.0, 500.0), (2.0, 5000.0)]), nu=0.3, **options))
-    step = solved(model)
+    step = fc.solve(model, 1)[-1]
     assert mechanics.out_of_balance(model, step, 1.0)[0] < 1e-10
     assert np.allclose(step.reaction.sum(axis=0), [-2.0, -1.0], atol=1e-10)
 
@@ -230,7 +226,7 @@ def test_heat_that_expands_alike_leaves_a_graded_body_without_stress(kinematics)
     if kinematics == "3d":
         model.fix("BACK", "z")
     model.add_temperature(100.0)
-    step = solved(model)
+    step = fc.solve(model, 1)[-1]
     free = np.abs(step.stress[:, :2]).max()
     assert free < 1e-9
     np.testing.assert_allclose(
@@ -254,7 +250,7 @@ def test_graded_bodies_in_contact_shorten_by_the_integral(formulation):
     supported(model, LOWER_BOTTOM="y", LOWER_LEFT="x", UPPER_LEFT="x")
     model.add_pressure("UPPER_TOP", 5.0)
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation)
-    step = solved(model)
+    step = fc.solve(model, 1)[-1]
     exact = -5.0 * height / 1000.0 * (1.0 - np.exp(-2.0))
     np.testing.assert_allclose(step.displacement[mesh.points_of("UPPER_TOP"), 1], exact, rtol=1e-4)
     assert abs(step.contact["pair"].force[1]) == pytest.approx(50.0, rel=1e-9)
@@ -280,9 +276,9 @@ def test_all_solvers_agree_on_a_graded_hertz_contact(solver):
 
 # ----------------------------------------------------------------------------- words and mistakes
 def block_model(**constants):
-    model = fc.Model(fc.generate.block((2.0, 1.0), (4, 2), "quad4"), "plane_strain")
-    model.add_material(fc.LinearElastic(**{**STEEL, **constants}))
-    return model
+    return made_of(
+        fc.generate.block((2.0, 1.0), (4, 2), "quad4"), "plane_strain", fc.LinearElastic(**{**STEEL, **constants})
+    )
 
 
 @pytest.mark.parametrize(
@@ -325,8 +321,7 @@ def test_as_many_cells_as_points_is_no_array():
     cells = [[8, i, (i + 1) % 8] for i in range(8)]
     wheel = fc.Mesh([*ring, [0, 0]], {"tri3": cells}, {"A": [0, 1]})
     for n in (2, 8, 9):
-        model = fc.Model(wheel, "plane_strain")
-        model.add_material(fc.LinearElastic(np.ones(n), 0.3), "A")
+        model = made_of(wheel, "plane_strain", {"A": fc.LinearElastic(np.ones(n), 0.3)})
         assert model.materials[0][0].E.varies_within_cells == (n == 9)
     lone = fc.Mesh([*ring, [0, 0], [5.0, 0.0]], {"tri3": [*cells, [0, 9, 1], [0, 7, 9]]})
     model = fc.Model(lone, "plane_strain")
@@ -377,7 +372,7 @@ def test_the_error_of_a_graded_body_is_estimated_like_that_of_others(kinematics)
         model = held(mesh, kinematics)
         model.add_material(fc.LinearElastic(E, 0.3, expansion=expansion))
         model.add_temperature(lambda x: 30.0 * x[:, 0] ** 2)
-        found.append(fc.estimate_error(model, solved(model)))
+        found.append(fc.estimate_error(model, fc.solve(model, 1)[-1]))
     np.testing.assert_allclose(found[0].cells, found[1].cells, rtol=1e-8, atol=1e-12)
     assert found[0].relative > 1e-3
 
@@ -390,12 +385,10 @@ def test_density_and_expansion_of_any_material_may_vary():
         (2.0, 1e-5),
         (np.full(16, 2.0), (lambda x: np.full(len(x), 1e-5), 1e-5, np.full(16, 1e-5))),
     ):
-        model = fc.Model(space("hex8"), "3d")
-        model.add_material(fc.Anisotropic(D, density=density, expansion=expansion))
-        model.fix("BOTTOM", "xyz")
+        model = made_of(space("hex8"), "3d", fc.Anisotropic(D, density=density, expansion=expansion), BOTTOM="xyz")
         model.add_gravity(y=-1.0)
         model.add_temperature(50.0)
-        results.append(solved(model, linear_solver="direct"))
+        results.append(fc.solve(model, 1, linear_solver="direct")[-1])
         assert results[-1].reaction[:, 1].sum() == pytest.approx(4.0, rel=1e-9)
     np.testing.assert_allclose(results[0].displacement, results[1].displacement, atol=1e-14)
 
@@ -410,8 +403,7 @@ def test_the_contrast_of_materials_that_vary_is_that_of_their_cells():
     assert found[True] == pytest.approx(found[False])
     soft = {"E": (1e5, 5e4, 2e4), "nu": (0.0, 0.0, 0.0), "G": (1e4, 1e4, 1e4)}
     for axes in (None, fc.CylindricalAxes((-5.0, 0.5, 0.0), (0.0, 0.0, 1.0))):
-        model = fc.Model(fc.generate.box(divisions=(2, 2, 2)), "3d")
-        model.add_material(fc.Orthotropic(**soft, axes=axes))
+        model = made_of(fc.generate.box(divisions=(2, 2, 2)), "3d", fc.Orthotropic(**soft, axes=axes))
         assert model.material_field().contrast == pytest.approx((5.0 - 1.0) / 3.0, rel=0.01)
 
 

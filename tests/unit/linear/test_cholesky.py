@@ -46,28 +46,26 @@ def filled(A):
 
 def tree(A):
     n = A.shape[0]
-    parent, order, count = (np.empty(n, np.intc) for _ in range(3))
-    elimination_tree_kernels.parents(A.indptr, A.indices, parent)
-    elimination_tree_kernels.postordered(parent, order)
-    elimination_tree_kernels.counts(A.indptr, A.indices, parent, order, count)
-    return parent, order, count
+    parent, count, position = (np.empty(n, np.intc) for _ in range(3))
+    elimination_tree_kernels.tree_and_counts(A.indptr, A.indices, parent, count)
+    elimination_tree_kernels.postordered(parent, position)
+    return parent, position, count
 
 
 @pytest.mark.parametrize("A", MATRICES)
 def test_tree_and_counts_are_those_of_elimination(A):
     L = filled(A)
-    parent, order, count = tree(A)
+    parent, position, count = tree(A)
     below = [np.flatnonzero(L[j + 1 :, j]) + j + 1 for j in range(len(L))]
     np.testing.assert_array_equal(parent, [rows[0] if len(rows) else -1 for rows in below])
     np.testing.assert_array_equal(count, L.sum(axis=0))
-    np.testing.assert_array_equal(np.sort(order), np.arange(len(L)))
+    np.testing.assert_array_equal(np.sort(position), np.arange(len(L)))
 
 
 @pytest.mark.parametrize("A", MATRICES)
 def test_subtrees_stand_together_in_postorder(A):
-    parent, order, _ = tree(A)
-    place = np.argsort(order)
-    size = np.ones(len(order), int)
+    parent, place, _ = tree(A)
+    size = np.ones(len(place), int)
     for j in np.flatnonzero(parent >= 0):  # ascending: children before parents
         size[parent[j]] += size[j]
     for j in np.flatnonzero(parent >= 0):

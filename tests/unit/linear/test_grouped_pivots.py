@@ -10,7 +10,6 @@ from scipy.sparse import bsr_array, csr_array, diags_array
 import fastcontact as fc
 from fastcontact.analysis.problem import prepare
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
-from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import TooManyColumnsError
 from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, block_inverse, lumped
@@ -265,7 +264,7 @@ def test_columns_that_cancel_or_repeat_each_other_are_refused():
     repeated = np.eye(m)
     repeated[1] = repeated[0]
     for P in (cancel, csr_array(repeated + 0.2)):
-        with pytest.raises(ConvergenceError):
+        with pytest.raises(fc.ConvergenceError):
             CoupledPivots(P, 3 * np.arange(m), 3)
     assert "dual" in str(CoupledError())
 

@@ -14,7 +14,6 @@ import fastcontact as fc
 from fastcontact._jit import parallel
 from fastcontact._jit.decorators import set_threads, threads
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
-from fastcontact.errors import ModelError
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.krylov import krylov_kernels
 from fastcontact.linear.krylov.iterations import ConjugateGradients
@@ -439,7 +438,7 @@ def test_both_precisions_agree_and_single_takes_half_the_memory():
     assert "levels, unknowns 5148 -> " in repr(single)
     assert "operator complexity 1." in repr(single)
     assert "MB" in repr(single)
-    with pytest.raises(ModelError, match="'single' or 'double', not 'half'"):
+    with pytest.raises(fc.ModelError, match="'single' or 'double', not 'half'"):
         Amg(precision="half")
 
 

@@ -8,7 +8,6 @@ from scipy.sparse import bsr_array
 from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis.criteria import Criteria
 from fastcontact.linear import choice as linear
 from fastcontact.linear.multigrid import matrix as matrices
 from fastcontact.linear.multigrid.matrix import ALL, ScaledMatrix, symmetric_storage
@@ -152,7 +151,7 @@ def test_a_pattern_that_is_not_symmetric_is_stored_whole():
 
 def test_an_analysis_has_the_stiffness_that_its_solver_stores(forma04):
     model = forma04(fc.generate.half_spheres("tri3", size=6.0))
-    one, other = (Stepping(model, name, 1e-10, Criteria()) for name in ("direct", "amg"))
+    one, other = (Stepping(model, name, 1e-10, fc.Criteria()) for name in ("direct", "amg"))
     assert isinstance(one.system.matrix, bsr_array)
     assert isinstance(other.system.matrix, ScaledMatrix)
     u = np.random.default_rng(0).normal(size=model.n_dofs)

@@ -160,14 +160,6 @@ def test_cells_that_nobody_knows_are_named():
         fc.from_meshio(meshio.Mesh(np.eye(3), []))
 
 
-@pytest.mark.parametrize(
-    ("call", "wanted"), [("from_meshio", "meshio.Mesh"), ("from_pyvista", "pyvista.UnstructuredGrid")]
-)
-def test_what_is_no_mesh_is_refused(call, wanted):
-    with pytest.raises(fc.MeshError, match=f"{call} takes a {wanted}, not str"):
-        getattr(fc, call)("bolt.msh")
-
-
 def test_without_gmsh_the_message_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "gmsh", None)
     with pytest.raises(fc.FileError, match=r"gmsh cannot be imported .*: pip install gmsh"):

@@ -9,11 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastcontact.errors import MeshError
+import fastcontact as fc
 from fastcontact.mesh import elements
 from fastcontact.mesh import quadrature as rules
-from fastcontact.mesh.generate import block, box
-from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells, quality
 from fastcontact.mesh.quality_kernels import extremes
 
@@ -84,7 +82,7 @@ def test_points_lie_in_the_cell(rule, exact, degree):
 
 
 def one(name, points):
-    return Mesh(points, {name: [np.arange(len(points))]})
+    return fc.Mesh(points, {name: [np.arange(len(points))]})
 
 
 def test_a_right_triangle():
@@ -116,7 +114,7 @@ def test_reference_cells_have_their_measure_and_are_accepted(name):
 
 def test_facets_of_a_cube_have_right_angles():
     corners = elements.get("hex8").nodes
-    mesh = Mesh(corners, {"hex8": [range(8)], "quad4": [[0, 1, 2, 3]]})
+    mesh = fc.Mesh(corners, {"hex8": [range(8)], "quad4": [[0, 1, 2, 3]]})
     found = quality(mesh)
     assert (found.smallest_angle, found.largest_angle) == pytest.approx((90.0, 90.0))
     assert "volume 8 [length^3]" in str(found)
@@ -132,7 +130,7 @@ def test_a_curved_side_counts_in_the_area():
 @given(st.floats(0.1, 100.0), st.floats(-180.0, 180.0))
 @settings(max_examples=30, deadline=None)
 def test_angles_do_not_depend_on_size_and_direction(scale, degrees):
-    mesh = block((1.0, 1.0), (2, 2), "tri3", distortion=0.2)
+    mesh = fc.generate.block((1.0, 1.0), (2, 2), "tri3", distortion=0.2)
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     turned = mesh.replace(points=scale * mesh.points @ np.array([[c, s], [-s, c]]))
     before, after = quality(mesh), quality(turned)
@@ -143,9 +141,9 @@ def test_angles_do_not_depend_on_size_and_direction(scale, degrees):
 
 def test_the_first_inverted_cell_is_named_with_place_and_count():
     points = [[0, 0], [1, 0], [0, 1], [1, 1], [2, 0]]
-    mesh = Mesh(points, {"line2": [[0, 1]], "tri3": [[0, 1, 2], [1, 2, 3], [1, 3, 4]]})
+    mesh = fc.Mesh(points, {"line2": [[0, 1]], "tri3": [[0, 1, 2], [1, 2, 3], [1, 3, 4]]})
     assert quality(mesh).n_bad == 2
-    with pytest.raises(MeshError) as error:
+    with pytest.raises(fc.MeshError) as error:
         check_cells(mesh)
     message = str(error.value)
     assert "cell 2 (tri3 at (0.666667, 0.666667), area -0.5) is inverted (number of such cells: 2)" in message
@@ -156,7 +154,7 @@ def test_the_first_inverted_cell_is_named_with_place_and_count():
 def test_a_flat_cell_is_degenerate(height):
     mesh = one("tri3", [[0, 0], [1, 0], [0.5, height]])
     assert quality(mesh).n_bad == 1
-    with pytest.raises(MeshError, match=r"cell 0 .* is degenerate \(number of such cells: 1\)"):
+    with pytest.raises(fc.MeshError, match=r"cell 0 .* is degenerate \(number of such cells: 1\)"):
         check_cells(mesh)
 
 
@@ -176,19 +174,19 @@ def test_a_folded_quadratic_cell_is_inverted_though_its_corners_are_fine():
     nodes[3] = [0.5, 0.6]
     mesh = one("tri6", nodes)
     assert quality(mesh).n_bad == 1
-    with pytest.raises(MeshError, match="inverted"):
+    with pytest.raises(fc.MeshError, match="inverted"):
         check_cells(mesh)
 
 
 def test_a_mesh_without_solid_cells_has_no_figures():
-    found = quality(Mesh([[0, 0], [1, 0]], {"line2": [[0, 1]]}))
+    found = quality(fc.Mesh([[0, 0], [1, 0]], {"line2": [[0, 1]]}))
     assert math.isnan(found.smallest_angle)
     assert math.isnan(found.longest_edge)
     assert (found.measure, found.n_bad) == (0.0, 0)
 
 
 def test_the_report_is_a_few_lines_with_units():
-    lines = str(quality(block((2.0, 1.0), (4, 2), "tri3"))).splitlines()
+    lines = str(quality(fc.generate.block((2.0, 1.0), (4, 2), "tri3"))).splitlines()
     assert len(lines) == 4
     assert lines[0].startswith("15 points, 16 tri3, 12 line2")
     assert "45.0" in lines[1]
@@ -201,7 +199,7 @@ def test_the_report_is_a_few_lines_with_units():
 def test_jacobians_and_edges_against_plain_numpy(name):
     element = elements.get(name)
     solid = element.dim == 3
-    mesh = box((1.0, 2.0, 1.5), (2, 2, 1), name) if solid else block((1.0, 2.0), (3, 2), name)
+    mesh = fc.generate.box((1.0, 2.0, 1.5), (2, 2, 1), name) if solid else fc.generate.block((1.0, 2.0), (3, 2), name)
     points = mesh.points + np.random.default_rng(1).uniform(-0.9, 0.9, mesh.points.shape)  # some cells fold
     cells, (_, dN, weights) = mesh.cells[name], element.tables
     low, high, measure, longest = np.empty((4, len(cells)))

@@ -13,7 +13,6 @@ from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, topology
 from fastcontact.mesh.quality import check_cells
-from fastcontact.mesh.topology import bodies, cells_joined_by_facets, rigid_parts
 from fastcontact.model.rigid_motions import free_motions
 
 NAMES = ["tri3", "tri6", "quad4", "quad8", "quad9", "tet4", "tet10", "hex8", "hex20", "wedge6", "pyramid5"]
@@ -112,7 +111,7 @@ CASES = [
 )
 def test_motions_at_hinges_are_those_that_cost_no_energy(element, origins, parts):
     mesh = joined(element, *origins)
-    assert rigid_parts(mesh).count == parts
+    assert fc.topology.rigid_parts(mesh).count == parts
     kinematics = "3d" if mesh.dim == 3 else "plane_strain"
     motions = free_motions(mesh, kinematics, np.zeros(mesh.points.shape, bool))
     assert len(motions) == zero_energy(mesh)
@@ -125,13 +124,13 @@ def test_motions_at_hinges_are_those_that_cost_no_energy(element, origins, parts
 def test_three_bodies_in_a_triangle_hold_each_other():
     corners = np.array([[0, 0], [1, 0], [0.5, 0.5], [1, 0], [2, 0], [1.5, 0.5], [0.5, 0.5], [1.5, 0.5], [1, 1]], float)
     mesh = fc.generate.merge_points(fc.Mesh(corners, {"tri3": np.arange(9).reshape(3, 3)}), 1e-9)
-    assert rigid_parts(mesh).count == 3
+    assert fc.topology.rigid_parts(mesh).count == 3
     assert len(free_motions(mesh, "plane_strain", np.zeros(mesh.points.shape, bool))) == zero_energy(mesh) == 3
 
 
 def test_hinges_name_their_nodes_and_parts():
     mesh = joined("hex8", (0.0, 0.0, 0.0), (1.0, 1.0, 0.0))
-    parts = rigid_parts(mesh)
+    parts = fc.topology.rigid_parts(mesh)
     on_edge = np.flatnonzero((mesh.points[:, :2] == 1.0).all(axis=1))
     assert parts.hinge_node.tolist() == np.repeat(on_edge, 2).tolist()
     assert parts.hinge_part.tolist() == [0, 1, 0, 1]
@@ -143,7 +142,7 @@ def test_hinges_name_their_nodes_and_parts():
 def test_bodies_apart_and_points_of_none_have_no_hinges():
     mesh = joined("quad4", (0.0, 0.0), (1.0, 1.0), merged=False)
     lone = mesh.replace(points=np.vstack([mesh.points, [[9.0, 9.0]]]))
-    parts = rigid_parts(lone)
+    parts = fc.topology.rigid_parts(lone)
     assert parts.count == 2
     assert parts.part.tolist() == [0] * 4 + [1] * 4 + [-1]
     assert not len(parts.hinge_node)
@@ -152,10 +151,10 @@ def test_bodies_apart_and_points_of_none_have_no_hinges():
 def test_a_facet_between_elements_of_two_kinds_or_orders_joins():
     points = [[0, 0], [1, 0], [1, 1], [0, 1], [2, 0.5], [0.5, 0.0], [1, 0.5], [0.5, 1], [0, 0.5]]
     mixed = fc.Mesh(points[:5], {"quad4": [[0, 1, 2, 3]], "tri3": [[1, 4, 2]]})
-    assert rigid_parts(mixed).count == 1
+    assert fc.topology.rigid_parts(mixed).count == 1
     orders = fc.Mesh(points, {"quad8": [[0, 1, 2, 3, 5, 6, 7, 8]], "tri3": [[1, 4, 2]]})
-    assert len(np.unique(cells_joined_by_facets(orders))) == 2
-    assert rigid_parts(orders).count == 1  # two common nodes hold as well
+    assert len(np.unique(fc.topology.cells_joined_by_facets(orders))) == 2
+    assert fc.topology.rigid_parts(orders).count == 1  # two common nodes hold as well
 
 
 def test_parts_do_not_depend_on_the_order_of_cells():
@@ -165,9 +164,9 @@ def test_parts_do_not_depend_on_the_order_of_cells():
         cells={name: rng.permutation(block) if name == "tet4" else block for name, block in mesh.cells.items()},
         cell_groups={},
     )
-    ours, theirs = rigid_parts(mesh), rigid_parts(shuffled)
+    ours, theirs = fc.topology.rigid_parts(mesh), fc.topology.rigid_parts(shuffled)
     assert ours.hinge_node.tolist() == theirs.hinge_node.tolist()
     pairs = np.unique(np.stack([ours.part, theirs.part]), axis=1)
     assert ours.count == theirs.count == 3
     assert pairs.shape[1] <= ours.count + len(np.unique(ours.hinge_node))
-    assert bodies(mesh)[0] == 1
+    assert fc.topology.bodies(mesh)[0] == 1

@@ -7,7 +7,6 @@ import pytest
 from models import elastic_model, supported
 
 import fastcontact as fc
-from fastcontact.mesh.generate import block, half_spheres
 from fastcontact.model.fingerprint import different, fingerprint
 from fastcontact.model.ramp import ramp_of
 
@@ -135,7 +134,7 @@ def spheres(mesh, held, **contact):
 @pytest.mark.parametrize("element", ["tri3", "quad4", "tri6"])
 def test_results_are_those_of_the_model_whose_axis_is_held(element, formulation):
     sizes = {"size": 16.0} if element.startswith("tri") else {"arc_sizes": (8.0, 16.0), "radial_sizes": (8.0, 16.0)}
-    mesh = half_spheres(element, **sizes)
+    mesh = fc.generate.half_spheres(element, **sizes)
     if element == "tri6" and formulation == "node_to_segment":
         pytest.skip("node-to-segment refuses facets whose corner nodes carry no pressure")
     free, held = (spheres(mesh, held, formulation=formulation) for held in (False, True))
@@ -146,7 +145,7 @@ def test_results_are_those_of_the_model_whose_axis_is_held(element, formulation)
 
 
 def cylinder(inner=0.0):
-    return elastic_model(block((1.0, 1.0), (2, 2), origin=(inner, 0.0)), "axisymmetric", BOTTOM="y")
+    return elastic_model(fc.generate.block((1.0, 1.0), (2, 2), origin=(inner, 0.0)), "axisymmetric", BOTTOM="y")
 
 
 def test_one_line_says_which_nodes_are_held(caplog):
@@ -228,7 +227,7 @@ def test_a_free_block_expands_by_the_rise_over_the_reference(options, rise):
 
 
 def model(pressure=lambda points: 1.0 + points[:, 0], height=3.0, order=1, stiffness=2.0, mass=1.0):
-    found = elastic_model(block((2.0, 1.0), (6, 3), "quad4", origin=(-1.0, -1.0)), "plane_strain")
+    found = elastic_model(fc.generate.block((2.0, 1.0), (6, 3), "quad4", origin=(-1.0, -1.0)), "plane_strain")
     supports = [("BOTTOM", {"y": 0.0}), ("LEFT", {"x": 0.0})][::order]
     for group, values in supports:
         found.prescribe(group, **values)
@@ -267,7 +266,7 @@ def test_what_changed_is_named(change, part):
 
 @pytest.mark.parametrize(("values", "digest"), [(100.0, "3ac392ebd97a4d4c"), (np.ones((2, 9)), "6895e0e40b806985")])
 def test_digests_of_temperatures_are_those_in_files_of_earlier_versions(values, digest):
-    model = elastic_model(block((1.0, 1.0), (2, 2)), "plane_strain")
+    model = elastic_model(fc.generate.block((1.0, 1.0), (2, 2)), "plane_strain")
     model.add_temperature(values, **({"times": [0.0, 1.0]} if np.ndim(values) else {}))
     assert fingerprint(model)["the temperatures"] == digest
 

@@ -7,7 +7,6 @@ import pytest
 from models import elastic_model, united
 
 import fastcontact as fc
-from fastcontact.mesh import generate
 from fastcontact.mesh.generate import block, box
 from fastcontact.model.hanging_nodes import hanging_nodes, hanging_nodes_warning
 
@@ -15,7 +14,7 @@ pytestmark = pytest.mark.pairwise
 
 
 def joined(lower, upper):
-    return generate.merge_points(united(L_=lower, U_=upper), 1e-9)
+    return fc.generate.merge_points(united(L_=lower, U_=upper), 1e-9)
 
 
 def plates(element, coarse, fine):
@@ -80,12 +79,12 @@ def test_a_quadratic_facet_on_a_linear_one():
 @pytest.mark.parametrize(
     "mesh",
     [
-        generate.half_spheres("tri6", size=10.0),
-        generate.block_on_block(),
-        generate.cylinder_on_block(),
-        generate.rings(),
-        generate.sphere_on_block(),
-        generate.refined(generate.half_spheres(size=20.0)),
+        fc.generate.half_spheres("tri6", size=10.0),
+        fc.generate.block_on_block(),
+        fc.generate.cylinder_on_block(),
+        fc.generate.rings(),
+        fc.generate.sphere_on_block(),
+        fc.generate.refined(fc.generate.half_spheres(size=20.0)),
     ],
     ids=["half-spheres", "block-on-block", "cylinder-on-block", "rings", "sphere-on-block", "refined"],
 )
@@ -160,5 +159,5 @@ def test_nodes_across_a_thin_curved_sheet_do_not_hang(element, thickness):
 
 
 def test_bodies_in_contact_hang_on_nothing():
-    mesh = generate.block_on_block(divisions_lower=(3, 2), divisions_upper=(7, 2))
+    mesh = fc.generate.block_on_block(divisions_lower=(3, 2), divisions_upper=(7, 2))
     assert not hanging(mesh)

@@ -127,10 +127,9 @@ def test_the_rotation_of_a_round_pin_in_its_hole_is_named():
 def test_the_rotation_of_a_ring_of_sectors_is_about_its_centre():
     part = fc.generate.block((1.0, 1.0), (4, 2), "quad8")
     radius, angle = 50.0 + 50.0 * part.points[:, 1], -2.0 * np.pi / 6.0 * part.points[:, 0]
-    model = fc.Model(
-        part.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])), "plane_stress"
+    model = elastic_model(
+        part.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])), "plane_stress", E=210e3
     )
-    model.add_material(fc.LinearElastic(E=210e3, nu=0.3))
     model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=6)
     model.add_pressure("BOTTOM", 1.0)
     with pytest.raises(fc.ModelError, match=r"1 rigid-body motion is not .*'BLOCK': rotation about \(0, 0\)\. "):

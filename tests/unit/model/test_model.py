@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, supported
+from models import elastic_model, made_of, supported
 from test_result_files import MESH, step_result
 
 import fastcontact as fc
@@ -51,9 +51,7 @@ def bolt(**options):
 
 
 def plate(kinematics="plane_stress"):
-    model = fc.Model(fc.generate.block((1.0, 1.0), (2, 2)), kinematics)
-    model.add_material(fc.LinearElastic(E=1e3, nu=0.3, expansion=1e-5))
-    return model
+    return made_of(fc.generate.block((1.0, 1.0), (2, 2)), kinematics, fc.LinearElastic(E=1e3, nu=0.3, expansion=1e-5))
 
 
 @pytest.mark.parametrize("normal", [None, (0.0, 0.0, 2.0), (0.0, 0.0, -1.0), (0.0, 0.3, -1.0)])
@@ -124,8 +122,7 @@ SIZES = [1e61, 1e160, 1e308, 10**400, -1e300]
 
 def half_spheres(y=-0.1, E=20_000.0):
     model = elastic_model(fc.generate.half_spheres("tri3", size=12.0), "axisymmetric", E=E, A1A2="x", A1B1="y")
-    model.prescribe("A2B2", y=y)
-    return model
+    return supported(model, A2B2={"y": y})
 
 
 def pair(**options):
@@ -161,12 +158,6 @@ def test_a_number_out_of_range_is_refused_by_its_name(way, size):
     assert "not finite" not in str(caught.value)
 
 
-@pytest.mark.parametrize("E", [1e61, 1e308, 10**400, 1e-61, 1e-320])
-def test_a_modulus_out_of_range(E):
-    with pytest.raises(fc.ModelError, match=r"out of range: it must lie between 1e-60 and 1e\+60|must be a number"):
-        fc.LinearElastic(E=E, nu=0.3)
-
-
 @pytest.mark.parametrize(("y", "E"), [(-1e-60, 1.0), (-1e50, 1e-40), (-0.1, 1e50), (-1e55, 1e55)])
 def test_within_the_range_results_are_those_of_other_units(y, E):
     with warnings.catch_warnings():
@@ -189,9 +180,7 @@ def cube():
 
 def ring():
     """An axisymmetric block."""
-    model = fc.Model(block((1.0, 1.0), (2, 2), "quad4"), "axisymmetric")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, density=1.0))
-    return model
+    return made_of(block((1.0, 1.0), (2, 2), "quad4"), "axisymmetric", fc.LinearElastic(E=1.0, nu=0.3, density=1.0))
 
 
 def thin_plate():

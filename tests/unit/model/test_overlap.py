@@ -11,16 +11,14 @@ from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, block_on_block, box, sphere_octant, union
-from fastcontact.mesh.topology import outer_facets
 from fastcontact.model.body_overlap import _depths, penetration, winding_numbers
 from fastcontact.model.model_warnings import model_warnings
-from fastcontact.model.ramp import Ramp
 
 SOLIDS = ("hex8", "hex20", "hex27", "tet4", "tet10", "wedge6", "wedge15", "pyramid5", "pyramid13")
 
 
 def shell(mesh):
-    return [mesh.points[facets] for facets in outer_facets(mesh).values()]
+    return [mesh.points[facets] for facets in fc.topology.outer_facets(mesh).values()]
 
 
 @pytest.mark.parametrize("element", SOLIDS)
@@ -58,7 +56,7 @@ def test_near_sharp_edges_the_winding_number_decides(angle, seed):
     mesh = slab_with_a_sharp_edge(angle)
     points = np.random.default_rng(seed).uniform([-1.2, -1.2, -0.1], [1.2, 1.2, 1.1], (200, 3))
     depth, _ = _depths(points, shell(mesh))
-    triangles = mesh.points[outer_facets(mesh)["quad4"]][:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
+    triangles = mesh.points[fc.topology.outer_facets(mesh)["quad4"]][:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
     number = winding_numbers(points, triangles)
     assert np.abs(number - np.round(number)).max() < 1e-9
     # Bilinear facets bulge a little beyond their triangles.
@@ -216,10 +214,10 @@ def test_the_worst_instant_counts():
     model.supports.clear()
     model.fix("TOP", "y")
     model.prescribe("TOP", x=-0.01, ramp=[(0.0, 0.0), (0.5, 1.0), (1.0, 0.0)])
-    (text,) = told(model, Ramp((0.25, 0.5, 1.0)))
+    (text,) = told(model, fc.Ramp((0.25, 0.5, 1.0)))
     assert "by up to 0.01" in text
     assert "instant 0.5" in text
-    assert not told(model, Ramp((1.0,)))
+    assert not told(model, fc.Ramp((1.0,)))
 
 
 def test_an_obstacle_that_moves_into_held_nodes():
@@ -232,9 +230,7 @@ def test_an_obstacle_that_moves_into_held_nodes():
 
 
 def test_an_interference_between_nodes_that_are_held_on_both_sides():
-    model = elastic_model(block_on_block())
-    for group in ("LOWER_BOTTOM", "UPPER_TOP", "LOWER_LEFT", "UPPER_LEFT"):
-        model.fix(group, "xy")
+    model = elastic_model(block_on_block(), LOWER_BOTTOM="xy", UPPER_TOP="xy", LOWER_LEFT="xy", UPPER_LEFT="xy")
     model.add_contact("pair", secondary="CONT_LOWER", primary="CONT_UPPER", clearance=-0.02)
     (text,) = told(model)
     assert "supports push 1 of the 9 nodes of 'CONT_LOWER' into 'CONT_UPPER', contact 'pair', by up to 0.02" in text

@@ -174,18 +174,6 @@ def test_groups_are_related_along_their_normals():
     assert step.displacement[top[0], 1] < 0
 
 
-@pytest.mark.parametrize(("call", "words"), [
-    (lambda m: m.relate_groups("LEFT", "RIGHT", "x", translation=(1.0,)), "must be 2 numbers"),
-    (lambda m: m.relate_groups("LEFT", "RIGHT", "q"), "unknown component 'q'"),
-    (lambda m: m.relate_groups("LEFT", "RIGHT", "x", coefficients=(1.0,)), "needs two coefficients"),
-    (lambda m: m.relate_groups("LEFT", "RIGHT", "x", value=np.nan), "must be|finite|number"),
-    (lambda m: m.prescribe("TOP", normal=np.nan), "must be|finite|number"),
-])  # fmt: skip
-def test_what_cannot_be_related_is_refused(call, words):
-    with pytest.raises(fc.ModelError, match=words):
-        call(model_of(block(2)))
-
-
 def test_a_support_that_contradicts_a_normal_one_is_told():
     model = model_of(block(2))
     supported(model, LEFT="x", BOTTOM="y")
@@ -209,8 +197,8 @@ def test_a_ring_held_round_about_is_lames():
     radius, angle = 1.0 + mesh.points[:, 0], 0.3 + 0.9 * mesh.points[:, 1]
     mesh = mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
     model, round_about = model_of(mesh), fc.CylindricalAxes()
-    for end in ("BOTTOM", "TOP"):
-        model.fix(end, "y", axes=round_about)
+    model.fix("BOTTOM", "y", axes=round_about)
+    model.fix("TOP", "y", axes=round_about)
     model.prescribe("LEFT", x=0.01, axes=round_about)
     step = last(model)
     # u = A r + B / r without stress outside: A / (1 - 2 nu) = B / 4.
@@ -224,28 +212,10 @@ def test_a_ring_held_round_about_is_lames():
     assert found.derivatives["prescribed", "LEFT"] == pytest.approx(found.value, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda m: m.fix("LEFT", "x", axes=(0.0, 0.0)), "the axes of the support of 'LEFT'"),
-        (lambda m: m.prescribe("LEFT", normal=0.0, axes=(1.0, 1.0)), "along its normals or along axes"),
-        (lambda m: m.fix("LEFT", "x", axes=((0.0, 1.0, 1.0), (1.0, 0.0, 0.0))), "components out of the plane"),
-        (lambda m: m.fix("BOTTOM", "x", axes=fc.CylindricalAxes()), "a node at .* lies on the line"),
-        (lambda m: m.fix("NOWHERE", "x", axes=(1.0, 1.0)), "unknown group 'NOWHERE'"),
-    ],
-)
-def test_axes_that_cannot_be(call, said):
-    with pytest.raises(fc.FastcontactError, match=said):
-        call(model_of(block(2)))
-
-
 def bar(cut=True):
     mesh = fc.generate.block((1.0, 2.0), (2, 4))
     mesh = mesh.with_facet_group("CUT", lambda x: np.abs(x[:, 1] - 1.0) < 1e-9, between=True)
-    model = elastic_model(fc.generate.cut(mesh, "CUT") if cut else mesh, "plane_stress")
-    for end in ("TOP", "BOTTOM"):
-        model.fix(end, "xy")
-    return model
+    return elastic_model(fc.generate.cut(mesh, "CUT") if cut else mesh, "plane_stress", TOP="xy", BOTTOM="xy")
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Failures below a result file, and forged, truncated or dismantled files: one line."""
 
-from __future__ import annotations
-
 import dataclasses
 import errno
 import gc
@@ -105,9 +103,9 @@ READS = """
     import errno, sys
     from pathlib import Path
     import pytest
-    sys.path.insert(0, sys.argv[1])
+    sys.path[:0] = sys.argv[2:]
     import test_accidents as t
-    path = Path(sys.argv[2])
+    path = Path(sys.argv[1])
     with t.ResultWriter(path, t.MESH) as out:
         out.write(t.step_result(0))
     before = path.read_bytes()
@@ -124,7 +122,8 @@ READS = """
 
 def test_failing_reads_are_told_and_nothing_is_written_any_more(path: Path) -> None:
     """In a process of its own: HDF5 must not crash at its end over what it could not close."""
-    command = [sys.executable, "-c", textwrap.dedent(READS), str(Path(__file__).parent), str(path)]
+    folder = Path(__file__).parent
+    command = [sys.executable, "-c", textwrap.dedent(READS), path, folder, folder.parents[1]]
     done = subprocess.run(command, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert_holds(path, 1)

@@ -7,6 +7,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
+from models import supported
 
 import fastcontact as fc
 from fastcontact.cli import main
@@ -22,15 +23,12 @@ def results(request, tmp_path_factory):
     path = tmp_path_factory.mktemp("conversions") / "result.vtkhdf"
     if request.param == "2d":
         model = fc.Model(fc.generate.half_spheres(size=25.0), kinematics="axisymmetric", case_text=CASE)
-        model.prescribe("A2B2", y=-2.0)
-        model.prescribe("A1B1", y=2.0)
+        supported(model, A2B2={"y": -2.0}, A1B1={"y": 2.0})
         pair = {"secondary": "CONT1", "primary": "CONT2"}
     else:
         mesh = fc.generate.sphere_on_block(R=1.0, size=0.5, contact_size=0.3, contact_radius=0.3)
         model = fc.Model(mesh, kinematics="3d", case_text=CASE)
-        for group, axis in (("SYMMETRY_X", "x"), ("SYMMETRY_Z", "z"), ("BLOCK_BOTTOM", "y")):
-            model.fix(group, axis)
-        model.prescribe("SPHERE_TOP", y=-0.02)
+        supported(model, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -0.02})
         pair = {"secondary": "CONT_SPHERE", "primary": "CONT_BLOCK"}
     model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
     model.add_contact("hertz", **pair)

@@ -1,7 +1,5 @@
 """Result files of every schema version, the current one included, remain readable (resources/make.py)."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import math

@@ -7,9 +7,7 @@ from models import elastic_model
 from pairwise import first_of
 
 import fastcontact as fc
-from fastcontact import normal_stress
 from fastcontact.cli import main
-from fastcontact.errors import FastcontactError
 from fastcontact.mesh.generate import block, box, union
 from fastcontact.results.plot.curves import stresses_on_axis
 
@@ -100,7 +98,7 @@ def test_the_stress_along_normals_in_space_is_that_of_the_tensor():
     stress[points] = tensor[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
     contact, moved = contact_of(points, np.zeros((6, 3)), normal=normal), np.zeros((9, 3))
     step = fc.StepResult(1, 1.0, moved, stress, np.zeros(9), np.zeros(9), moved)
-    np.testing.assert_allclose(normal_stress(contact, step), -np.arange(6.0), atol=1e-14)
+    np.testing.assert_allclose(fc.normal_stress(contact, step), -np.arange(6.0), atol=1e-14)
 
 
 @pytest.mark.parametrize(("iterations", "reach"), [({"parameter": "frequency"}, 1.1), ({}, 51.0)], ids=["mode", "load"])
@@ -170,7 +168,7 @@ def test_no_axis_no_picture(root):
         "floor", secondary="TOP", obstacle=fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0)), motion={"y": -0.01}
     )
     step = fc.solve(model, fc.linear_ramp(1))[-1]
-    with pytest.raises(FastcontactError, match="no nodes on the axis of contact 'floor'"):
+    with pytest.raises(fc.FastcontactError, match="no nodes on the axis of contact 'floor'"):
         fc.plot.axis_stress(mesh, step, "floor")
 
 

@@ -4,8 +4,6 @@ The disk is simulated: what was written before the last synchronisation is there
 file has any of the sizes that it has had since.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import shutil

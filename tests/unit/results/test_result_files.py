@@ -1,7 +1,5 @@
 """Result files: bitwise round trip, readable by other programs, and no step lost by failures."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import importlib.util
@@ -20,10 +18,7 @@ import pytest
 import fastcontact as fc
 from fastcontact.errors import FileError, ModelError
 from fastcontact.mesh import elements
-from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import layout, write_arrays
-from fastcontact.results.reader import open_results
-from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.writer import ResultWriter
 
 # Corners of the cells, body by body: two blocks, 0.1 apart, of four kinds of cells.
@@ -40,7 +35,7 @@ CORNERS = [
 ]
 
 
-def two_blocks() -> Mesh:
+def two_blocks() -> fc.Mesh:
     nodes, cells = [], {}
     for name, corners in CORNERS:
         element = elements.get(name)
@@ -49,7 +44,7 @@ def two_blocks() -> Mesh:
         nodes.extend(map(tuple, place.round(12).tolist()))
     points, number = np.unique(np.array(nodes), axis=0, return_inverse=True)
     blocks = {name: number.ravel()[np.array(rows, int)] for name, rows in cells.items()}
-    return Mesh(
+    return fc.Mesh(
         points,
         blocks,
         # numbered by element: 0 quad8, 1-2 tri6, 3 quad9, 4 quad4, 5-7 line3, 8 line2
@@ -69,10 +64,10 @@ def vectors(random: np.random.Generator, *shape: int) -> np.ndarray:
     return values
 
 
-def contact_result(number: int, name: str, formulation: str, mesh: Mesh = MESH) -> ContactResult:
+def contact_result(number: int, name: str, formulation: str, mesh: fc.Mesh = MESH) -> fc.ContactResult:
     random = np.random.default_rng(number + 100 * len(name))
     m, dim = min((number * 3 + len(name)) % 7, mesh.n_points), mesh.dim
-    return ContactResult(
+    return fc.ContactResult(
         name=name,
         formulation=formulation,
         points=random.permutation(mesh.n_points)[:m].astype(np.int32),
@@ -91,15 +86,15 @@ def contact_result(number: int, name: str, formulation: str, mesh: Mesh = MESH) 
     )
 
 
-def nth_step(number: int) -> StepResult:
+def nth_step(number: int) -> fc.StepResult:
     """One of many steps, whose history stays short."""
     return dataclasses.replace(step_result(number % 5), index=number + 1, load_factor=(number + 1) / 7.0)
 
 
-def step_result(number: int, mesh: Mesh = MESH, pairs: dict[str, str] = PAIRS) -> StepResult:
+def step_result(number: int, mesh: fc.Mesh = MESH, pairs: dict[str, str] = PAIRS) -> fc.StepResult:
     random, n, dim = np.random.default_rng(number), mesh.n_points, mesh.dim
     history = [{"residual": 10.0**-i / 3.0, "active": i, "closed": bool(i % 2)} for i in range(number)]
-    return StepResult(
+    return fc.StepResult(
         index=number + 1,
         load_factor=(number + 1) / 7.0,
         displacement=random.normal(size=(n, dim)),
@@ -131,15 +126,15 @@ def assert_same(found: object, expected: object, where: str = "") -> None:
             assert (type(a), a) == (type(b), b), name
 
 
-def assert_holds(path: Path, n_steps: int, nth: Callable[[int], StepResult] = step_result) -> None:
+def assert_holds(path: Path, n_steps: int, nth: Callable[[int], fc.StepResult] = step_result) -> None:
     """The file has so many steps, each as it was written."""
-    with open_results(path) as results:
+    with fc.open_results(path) as results:
         assert len(results) == n_steps
         for number, step in enumerate(results):
             assert_same(step, nth(number), f"step {number}")
 
 
-def write(path: Path, n_steps: int = 3, mesh: Mesh = MESH) -> Path:
+def write(path: Path, n_steps: int = 3, mesh: fc.Mesh = MESH) -> Path:
     with ResultWriter(path, mesh) as out:
         for number in range(n_steps):
             out.write(step_result(number, mesh))
@@ -176,11 +171,11 @@ def test_any_bit_pattern_survives(path: Path) -> None:
         )
         with ResultWriter(path, MESH) as out:
             out.write(step)
-    assert_same(open_results(path)[0], step)
+    assert_same(fc.open_results(path)[0], step)
 
 
 def test_the_mesh_comes_back_with_its_groups_and_their_order(path: Path) -> None:
-    mesh = open_results(write(path)).mesh
+    mesh = fc.open_results(write(path)).mesh
     assert mesh.points.tobytes() == MESH.points.tobytes()
     assert mesh.points.shape == MESH.points.shape
     for found, expected in (
@@ -196,9 +191,9 @@ def test_the_mesh_comes_back_with_its_groups_and_their_order(path: Path) -> None
 
 def test_three_components_in_space(path: Path) -> None:
     # There may be no solid element for space yet: the points alone must come back with all components.
-    mesh = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0.5]], {"tri3": [[0, 1, 2]]}, {"skin": [0]})
+    mesh = fc.Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0.5]], {"tri3": [[0, 1, 2]]}, {"skin": [0]})
     write(path, 2, mesh)
-    with open_results(path) as results:
+    with fc.open_results(path) as results:
         assert results.mesh.dim == 3
         assert_same(results[1], step_result(1, mesh))
         assert results[1].stress.shape == (3, 6)
@@ -210,7 +205,7 @@ def test_what_the_file_says_beside_the_steps(path: Path) -> None:
         out.write(step_result(0))
         out.write(step_result(1))
         out.close(log=["20 steps", {"seconds": np.float64(1.5)}], warnings=["the ramp has one step"])
-    results = open_results(path)
+    results = fc.open_results(path)
     assert results.kinematics == "plane_strain"
     assert results.case_text == model.case_text
     assert results.versions["numpy"] == np.__version__
@@ -225,14 +220,14 @@ def test_what_the_file_says_beside_the_steps(path: Path) -> None:
 
 def test_a_bare_mesh_takes_its_kinematics_and_case_from_the_call(path: Path) -> None:
     ResultWriter(path, MESH, kinematics="plane_stress", case_text="x = 1").close()
-    results = open_results(path)
+    results = fc.open_results(path)
     assert (results.kinematics, results.case_text, len(results)) == ("plane_stress", "x = 1", 0)
     assert results.load_factors.shape == (0,)
     assert list(results) == []
 
 
 def test_results_are_a_sequence(path: Path) -> None:
-    results = open_results(write(path, 4))
+    results = fc.open_results(write(path, 4))
     assert results[-1].index == results[3].index == 4
     assert results[np.int64(2)].index == 3
     assert [step.index for step in results[1:3]] == [2, 3]
@@ -244,7 +239,7 @@ def test_results_are_a_sequence(path: Path) -> None:
 
 
 def test_steps_outlive_the_file(path: Path) -> None:
-    with open_results(write(path)) as results:
+    with fc.open_results(write(path)) as results:
         step = results[1]
     path.unlink()
     assert_same(step, step_result(1))
@@ -258,7 +253,7 @@ def test_a_pair_may_come_late_and_go(path: Path) -> None:
     with ResultWriter(path, MESH) as out:
         for step in steps:
             out.write(step)
-    for found, expected in zip(open_results(path), steps, strict=True):
+    for found, expected in zip(fc.open_results(path), steps, strict=True):
         assert_same(found, expected)
 
 
@@ -277,22 +272,22 @@ def test_steps_can_be_followed_while_they_are_written(path: Path) -> None:
     code = "import sys; from fastcontact.results.reader import open_results as read; "
     code += "print(read(sys.argv[1])[-1].index)"
     with ResultWriter(path, MESH) as out:
-        assert len(open_results(path)) == 0
+        assert len(fc.open_results(path)) == 0
         out.write(step_result(0))
         out.write(step_result(1))
-        results = open_results(path)
+        results = fc.open_results(path)
         assert not results.complete
         assert_same(results[1], step_result(1))
         other = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
         assert other.stdout.strip() == "2"
         out.write(step_result(2))
-    assert_same(open_results(path)[2], step_result(2))
+    assert_same(fc.open_results(path)[2], step_result(2))
 
 
 # ------------------------------------------------------------------------------------------ other programs
 
 
-def expected_point_data(step: StepResult) -> dict[str, np.ndarray]:
+def expected_point_data(step: fc.StepResult) -> dict[str, np.ndarray]:
     n = MESH.n_points
     pressure = np.zeros(n)
     for contact in step.contact.values():
@@ -328,7 +323,7 @@ CELL_DATA = {
 }
 
 
-def assert_grid_shows(grid: object, step: StepResult) -> None:
+def assert_grid_shows(grid: object, step: fc.StepResult) -> None:
     """A VTK grid has the cells of the sample and all data of a step."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
@@ -389,7 +384,7 @@ def test_pyvista_shows_what_vtk_shows(path: Path) -> None:
     import pyvista
 
     write(path, 3)
-    results = open_results(path)
+    results = fc.open_results(path)
     assert_grid_shows(results.to_pyvista(1), step_result(1))
     assert_grid_shows(results.to_pyvista(results[-1]), step_result(2))
     assert pyvista.read(path).n_cells == 5
@@ -409,7 +404,7 @@ def test_an_exception_leaves_all_steps_and_its_message(path: Path) -> None:
 
     with pytest.raises(ZeroDivisionError):
         analysis()
-    results = open_results(path)
+    results = fc.open_results(path)
     assert [step.index for step in results] == [1, 2]
     assert_same(results[1], step_result(1))
     assert not results.complete
@@ -424,7 +419,7 @@ def test_a_step_interrupted_half_way_can_be_written_again(path: Path, monkeypatc
             patch.setattr(write_arrays, "append_offsets", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
             with pytest.raises(KeyboardInterrupt):
                 out.write(step_result(4))
-        assert len(open_results(path)) == 1
+        assert len(fc.open_results(path)) == 1
         out.write(step_result(1))
     assert_holds(path, 2)
 
@@ -444,11 +439,11 @@ def test_an_old_file_stays_until_the_new_one_is_begun(path: Path, monkeypatch: p
 
 
 def test_an_open_old_file_can_still_be_read_when_a_new_one_takes_its_place(path: Path) -> None:
-    with open_results(write(path, 3)) as old:
+    with fc.open_results(write(path, 3)) as old:
         write(path, 1)
         assert len(old) == 3
         assert_same(old[2], step_result(2))
-    assert len(open_results(path)) == 1
+    assert len(fc.open_results(path)) == 1
 
 
 def test_a_second_writer_is_refused_and_damages_nothing(path: Path) -> None:
@@ -467,7 +462,7 @@ def test_a_second_writer_is_refused_and_damages_nothing(path: Path) -> None:
         out.write(step_result(1))
     assert_holds(path, 2)
     write(link, 1)  # now the path is free, and the link still names the same file
-    assert len(open_results(path)) == 1
+    assert len(fc.open_results(path)) == 1
     assert link.is_symlink()
 
 
@@ -500,7 +495,7 @@ def test_a_writer_that_is_forgotten_frees_the_path(path: Path) -> None:
     out.write(step_result(0))
     del out
     write(path, 2)
-    assert len(open_results(path)) == 2
+    assert len(fc.open_results(path)) == 2
 
 
 # -------------------------------------------------------------------------------------- messages on writing
@@ -534,7 +529,7 @@ def test_protected_folders_and_files() -> None:
             ResultWriter(path, MESH)
         os.chmod(path, 0)
         with no_rights_of_root(), pytest.raises(FileError, match="is not readable"):
-            open_results(path)
+            fc.open_results(path)
         os.chmod(path, 0o644)
         assert path.read_bytes() == before
         os.chmod(folder, 0o755)
@@ -555,14 +550,14 @@ def test_files_that_must_not_be_replaced(tmp_path: Path, path: Path) -> None:
             ResultWriter(foreign, MESH)
         assert foreign.read_bytes() == before
     path.write_bytes(b"")  # a name that tempfile has made
-    assert len(open_results(write(path, 1))) == 1
+    assert len(fc.open_results(write(path, 1))) == 1
 
 
 def test_steps_that_do_not_fit(path: Path) -> None:
     good, n = step_result(1), MESH.n_points
     contact = good.contact["right / 2"]
 
-    def contact_with(**change: np.ndarray) -> dict[str, ContactResult]:
+    def contact_with(**change: np.ndarray) -> dict[str, fc.ContactResult]:
         return {"c": dataclasses.replace(contact, **change)}
 
     bad = {
@@ -576,7 +571,7 @@ def test_steps_that_do_not_fit(path: Path) -> None:
             with pytest.raises(FileError, match=message):
                 out.write(dataclasses.replace(good, **change))
         out.write(good)
-    assert_same(open_results(path)[0], good)
+    assert_same(fc.open_results(path)[0], good)
     with pytest.raises(FileError, match="is closed"):
         out.write(good)
     out.close()  # a second close does nothing
@@ -592,7 +587,7 @@ def test_a_file_from_the_future(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["fastcontact"].attrs.modify("schema", 7)
     with pytest.raises(FileError, match="has schema 7, this fastcontact reads up to 4: update fastcontact"):
-        open_results(path)
+        fc.open_results(path)
 
 
 def test_truncated_files_say_so(path: Path) -> None:
@@ -600,7 +595,7 @@ def test_truncated_files_say_so(path: Path) -> None:
     for part in (0.02, 0.3, 0.6, 0.9, 0.999):
         path.write_bytes(whole[: int(part * len(whole))])
         with pytest.raises(FileError, match=r"truncated or damaged|is not an HDF5 file"):
-            open_results(path)
+            fc.open_results(path)
 
 
 def test_damage_inside_is_told_and_never_read_as_data(path: Path) -> None:
@@ -611,11 +606,11 @@ def test_damage_inside_is_told_and_never_read_as_data(path: Path) -> None:
         with h5py.File(damaged, "r+") as file:
             file[name].resize(1, axis=0)
         with pytest.raises(FileError, match=r"truncated or damaged .*: repeat the run"):
-            open_results(damaged)[2]
+            fc.open_results(damaged)[2]
     with h5py.File(path, "r+") as file:
         del file["fastcontact/mesh/cells"]
     with pytest.raises(FileError, match="truncated or damaged"):
-        open_results(path)
+        fc.open_results(path)
 
 
 def test_forces_on_the_primary_side_that_are_cut_off(path: Path) -> None:
@@ -627,7 +622,7 @@ def test_forces_on_the_primary_side_that_are_cut_off(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["fastcontact/contact/0/primary"].resize(2, axis=0)
     with pytest.raises(FileError, match="the table of primary forces of 'left' is truncated"):
-        open_results(path)[0]
+        fc.open_results(path)[0]
 
 
 def test_the_file_is_what_the_standard_says(path: Path) -> None:
@@ -672,4 +667,4 @@ def test_a_step_that_is_no_number_is_told(number, path):
         else "is selected by an integer or a slice"
     )
     with pytest.raises(fc.FileError, match=said):
-        open_results(write(path, 1))[number]
+        fc.open_results(write(path, 1))[number]

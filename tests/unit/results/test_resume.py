@@ -1,7 +1,5 @@
 """Result files survive any end of their writer, can be continued, and hold many steps."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import os
@@ -10,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from models import supported
 from test_result_files import MESH, assert_holds, assert_same, nth_step, step_result
 
 import fastcontact as fc
@@ -28,9 +27,7 @@ def spheres(E: float = 20_000.0, friction: float = 0.0, arc: float = 3.0) -> fc.
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(arc, 6.0), segments=3)
     model = fc.Model(mesh, "axisymmetric", case_text="first")
     model.add_material(fc.LinearElastic(E=E, nu=0.3))
-    model.fix("A1A2", "x")
-    model.prescribe("A2B2", y=-2.0)
-    model.prescribe("A1B1", y=+2.0)
+    supported(model, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": +2.0})
     options = {"formulation": "node_to_segment", "friction": friction}
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
     return model

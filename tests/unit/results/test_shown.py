@@ -1,7 +1,5 @@
 """Tables and short displays of results, meshes, models, studies and pictures."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import io
@@ -27,7 +25,6 @@ from fastcontact._jit import compiling
 from fastcontact._tools.html_table import html_table
 from fastcontact.analysis.progress import Progress, StatusLine
 from fastcontact.errors import CaseError, FileError, MeshError
-from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import HEAD, MAX_SHOWN, ContactResult, MaterialStress, StepResult, Steps, phases
 from fastcontact.results.tables import contact_table, line_table, with_column, write_csv
 
@@ -295,7 +292,7 @@ def test_compiling_is_told_once(tmp_path):
 
 # A quadratic triangle whose numbers run wild, with its inclined edge of length 5 as a line of two pieces.
 POINTS = [[-3.0, 0.0], [0.0, 4.0], [0.0, 0.0], [-1.5, 0.0], [-1.5, 2.0], [0.0, 2.0]]
-MESH = Mesh(
+MESH = fc.Mesh(
     POINTS,
     {"tri6": [[0, 2, 1, 3, 5, 4]], "line3": [[0, 1, 4]]},
     {"SOLID": [0], "EDGE": [1]},
@@ -304,7 +301,7 @@ MESH = Mesh(
 RANDOM = np.random.default_rng(3)
 
 
-def step_result(number: int, names: tuple[str, ...] = ("c",), mesh: Mesh = MESH) -> StepResult:
+def step_result(number: int, names: tuple[str, ...] = ("c",), mesh: fc.Mesh = MESH) -> StepResult:
     n, dim = mesh.n_points, mesh.dim
     stress = RANDOM.normal(size=(n, 4 if dim == 2 else 6))
     contact = {name: contact_result(name, number + 1, mesh) for name in names}
@@ -312,7 +309,7 @@ def step_result(number: int, names: tuple[str, ...] = ("c",), mesh: Mesh = MESH)
     return StepResult(number + 1, (number + 1) / 4, *found)
 
 
-def contact_result(name: str, m: int, mesh: Mesh = MESH) -> ContactResult:
+def contact_result(name: str, m: int, mesh: fc.Mesh = MESH) -> ContactResult:
     points = np.array([0, 4, 1, 2], np.int32)[:m]
     return contact_of(
         points, mesh.points[points], name=name, formulation="node_to_segment", abscissa=2.5 * np.arange(m),
@@ -357,7 +354,7 @@ def test_contact_table_without_rows() -> None:
 
 def test_tables_in_space_measure_the_radius_from_the_y_axis() -> None:
     points, cells = [[3, 7, 4], [0, 1, 0], [-6, 0, 8.0]], {"tri3": [[0, 1, 2]], "line2": [[0, 1], [1, 2]]}
-    mesh = Mesh(points, cells, {"P": [1, 2]})
+    mesh = fc.Mesh(points, cells, {"P": [1, 2]})
     step = step_result(0, (), mesh)
     table = line_table(mesh, step, "P", 0)
     np.testing.assert_allclose(table["radius"], [5.0, 0.0, 10.0], rtol=1e-15)

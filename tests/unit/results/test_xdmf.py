@@ -1,7 +1,5 @@
 """XDMF sidecars and Grace project files: other programs read the same numbers."""
 
-from __future__ import annotations
-
 import math
 import os
 import re
@@ -18,11 +16,10 @@ from hypothesis import strategies as st
 from test_node_order import SOLIDS, row_of
 from test_result_files import CELL_DATA, MESH, ResultWriter, expected_point_data, step_result, write
 
+import fastcontact as fc
 from fastcontact.errors import CaseError, FileError
 from fastcontact.mesh import elements
-from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import layout
-from fastcontact.results.step import StepResult
 from fastcontact.results.xdmf import write_xdmf
 from fastcontact.results.xmgrace import STYLES, Curve, escape, round_axis, write_agr
 
@@ -144,17 +141,17 @@ def test_what_cannot_be_exported(tmp_path: Path) -> None:
         path = path.rename(tmp_path / name)
         with pytest.raises(FileError, match=rf"XDMF readers cannot open '{name}': use a name in ASCII without colons"):
             write_xdmf(path, tmp_path / "a.xdmf")
-    lines = Mesh(MESH.points, {"line2": MESH.cells["line2"]})
+    lines = fc.Mesh(MESH.points, {"line2": MESH.cells["line2"]})
     write(tmp_path / "lines.vtkhdf", 1, lines)
     with pytest.raises(FileError, match=r"with no solid cells: open the .vtkhdf file itself"):
         write_xdmf(tmp_path / "lines.vtkhdf", tmp_path / "a.xdmf")
     assert not (tmp_path / "a.xdmf").exists()
 
 
-def solid_step(mesh: Mesh) -> StepResult:
+def solid_step(mesh: fc.Mesh) -> fc.StepResult:
     """Displacements that tell the points apart."""
     u, zero = np.arange(mesh.points.size, dtype=float).reshape(-1, 3), np.zeros(mesh.n_points)
-    return StepResult(1, 1.0, u, np.zeros((mesh.n_points, 6)), zero, zero, np.zeros_like(u))
+    return fc.StepResult(1, 1.0, u, np.zeros((mesh.n_points, 6)), zero, zero, np.zeros_like(u))
 
 
 def test_vtk_reads_every_solid_through_it(tmp_path: Path) -> None:

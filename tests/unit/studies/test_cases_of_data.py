@@ -7,8 +7,6 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
-from fastcontact.errors import CaseError
-from fastcontact.mesh.generate import block
 from fastcontact.studies.case_parameters import substitute
 from fastcontact.studies.quantities import contact_radius, peak
 
@@ -80,13 +78,13 @@ def read_again(text):
 def test_what_is_no_case_file_is_refused(study, tmp_path):
     (tmp_path / "plate.inp").write_text(DECK)
     with pytest.raises(
-        CaseError, match="'plate' is an input deck: studies change the mesh and the values of a case file"
+        fc.CaseError, match="'plate' is an input deck: studies change the mesh and the values of a case file"
     ):
         study(read_case(tmp_path / "plate.inp"))
 
 
 def test_a_maximum_on_the_axis_is_that_of_a_quartic_along_it():
-    mesh = block((1.0, 2.0), (4, 60))
+    mesh = fc.generate.block((1.0, 2.0), (4, 60))
     x, y = mesh.points.T
     value, where = peak(mesh, 3.0 - 2.0 * (y - 0.917) ** 2 + (y - 0.917) ** 4 - x**2, axisymmetric=True)
     assert value == pytest.approx(3.0, rel=1e-12)
@@ -95,7 +93,7 @@ def test_a_maximum_on_the_axis_is_that_of_a_quartic_along_it():
 
 @pytest.mark.parametrize("axisymmetric", [True, False])
 def test_with_few_nodes_a_parabola_through_the_neighbours_does(axisymmetric):
-    mesh = block((1.0, 2.0), (4, 8))
+    mesh = fc.generate.block((1.0, 2.0), (4, 8))
     x, y = mesh.points.T
     x0 = 0.0 if axisymmetric else 0.55
     value, where = peak(mesh, 3.0 - (y - 0.9) ** 2 - (x - x0) ** 2, axisymmetric)
@@ -104,7 +102,7 @@ def test_with_few_nodes_a_parabola_through_the_neighbours_does(axisymmetric):
 
 
 def test_where_no_vertex_is_near_the_node_itself_is_taken():
-    mesh = block((1.0, 2.0), (4, 8))
+    mesh = fc.generate.block((1.0, 2.0), (4, 8))
     values = mesh.points @ [1.0, 2.0]  # largest in a corner
     value, where = peak(mesh, values, axisymmetric=False)
     assert value == 5.0
@@ -187,16 +185,16 @@ def test_a_name_sets_several_paths_by_their_laws():
     ],
 )
 def test_a_wrong_path_is_told(path, words):
-    with pytest.raises(CaseError, match=words):
+    with pytest.raises(fc.CaseError, match=words):
         substitute(linked(LINKED), {path: 1.0})
 
 
 @pytest.mark.parametrize("law", ["2*valve", "value+1", "__import__('os')", 3.0, "value^x"])
 def test_a_law_is_a_power_of_the_value_and_nothing_else(law):
-    with pytest.raises(CaseError, match=r"a\*value\^p"):
+    with pytest.raises(fc.CaseError, match=r"a\*value\^p"):
         substitute(linked({"n": {"contact.pair.friction": law}}), {"n": 2.0})
 
 
 def test_a_power_of_a_negative_number_is_refused():
-    with pytest.raises(CaseError, match=r"cannot be evaluated for -2\.0"):
+    with pytest.raises(fc.CaseError, match=r"cannot be evaluated for -2\.0"):
         substitute(linked({"n": {"contact.pair.friction": "value^0.5"}}), {"n": -2.0})

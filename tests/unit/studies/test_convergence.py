@@ -9,10 +9,8 @@ import pytest
 import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.cli import main
-from fastcontact.errors import CaseError
 from fastcontact.studies import runs as convergence
 from fastcontact.studies import settings as levels
-from fastcontact.studies.runs import convergence_study
 from fastcontact.studies.settings import combinations, settings
 
 FORCE, PRESSURE = 600_000.0, 2900.0  # of theory
@@ -114,7 +112,7 @@ def test_what_failed_is_told_and_the_rest_shown(case):
 
 
 def test_a_quantity_that_nothing_gives_is_named(case):
-    with pytest.raises(CaseError, match=r"'C1.stres.yy'.*C1.stress.yy"):
+    with pytest.raises(fc.CaseError, match=r"'C1.stres.yy'.*C1.stress.yy"):
         gathered(case, [[made_up(k) for k in range(3)]], wanted=("C1.stres.yy",))
 
 
@@ -177,7 +175,7 @@ def test_corners_of_a_quadratic_mesh_file_make_a_linear_study(on_a_mesh_file):
 
 
 def test_the_report_stands_alone_and_says_everything(root):
-    study = convergence_study(root / "data/cases/forma04c.toml", levels=3, workers=1)
+    study = fc.convergence_study(root / "data/cases/forma04c.toml", levels=3, workers=1)
     names = [str(series.combination) for series in study.series]
     captions = [caption for caption, _ in study.tables()]
     assert captions[:-1] == [caption for name in names for caption in (name, f"{name}: limits")]

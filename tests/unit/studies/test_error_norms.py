@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from models import body_of, elastic_model
+from models import body_of, elastic_model, made_of
 
 import fastcontact as fc
 from fastcontact.elasticity.stiffness import stiffness
@@ -132,8 +132,7 @@ def test_materials_are_those_of_the_cells_and_groups_add_up():
     both, lower, upper = (fc.error_against(shifted, model, rest, groups=g) for g in (None, "LOWER", ["UPPER"]))
     for name in ("energy", "displacement", "energy_of_theory", "displacement_of_theory"):
         assert getattr(both, name) == pytest.approx(np.hypot(getattr(lower, name), getattr(upper, name)), rel=1e-12)
-    alone = fc.Model(mesh, "plane_strain")
-    alone.add_material(stiff)
+    alone = made_of(mesh, "plane_strain", stiff)
     assert fc.error_against(shifted, alone, rest, groups="UPPER") == upper
     assert fc.error_against(shifted, alone, rest, groups="LOWER").energy < lower.energy
 

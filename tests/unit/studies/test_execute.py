@@ -21,7 +21,6 @@ from fastcontact.cli import main
 from fastcontact.studies import execute, job
 from fastcontact.studies.fit import fit_limit
 from fastcontact.studies.report import percent
-from fastcontact.studies.runs import parameter_sweep
 from fastcontact.studies.settings import Combination, combinations, recipe, settings
 
 
@@ -227,7 +226,7 @@ def test_a_dask_scheduler_by_its_address(case, tmp_path):
         options = ["--json", str(tmp_path / "sweep.json"), "-q", "--executor", cluster.scheduler_address]
         assert main(["sweep", str(case), "--set", "approach=0.4", "--level", "0", *options]) == 0
     (point,) = json.loads((tmp_path / "sweep.json").read_text())["points"]
-    (expected,) = parameter_sweep(case, {"approach": [0.4]}, level=0, workers=1).points
+    (expected,) = fc.parameter_sweep(case, {"approach": [0.4]}, level=0, workers=1).points
     assert point["force"] == pytest.approx(expected.values["force"], rel=1e-13)
 
 

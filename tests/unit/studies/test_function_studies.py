@@ -11,7 +11,6 @@ from pairwise import first_of
 
 import fastcontact as fc
 from fastcontact.cli import main
-from fastcontact.errors import CaseError
 
 A, B, E, NU = 1.0, 2.0, 1000.0, 0.3  # a tube of Lame's under unit pressure inside, held between two planes
 SIZES = [0.5, 0.25, 0.125, 0.0625]
@@ -253,5 +252,5 @@ def test_not_reached_is_said_and_is_exit_code_two(case, capsys):
     ],
 )
 def test_what_is_wrong_is_told(case, options, words):
-    with pytest.raises(CaseError, match=words):
+    with pytest.raises(fc.CaseError, match=words):
         fc.adaptive_study(case, **options)

@@ -8,12 +8,10 @@ import pytest
 import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.cli import main
-from fastcontact.mesh.generate import GENERATORS
 from fastcontact.studies import quantities
 from fastcontact.studies.convergence_report import sentences
 from fastcontact.studies.fit import fit_limit
 from fastcontact.studies.job import job_of
-from fastcontact.studies.runs import convergence_study
 from fastcontact.studies.settings import RULES, combinations, make_mesh, one_combination, recipe, settings
 
 BALL = """kinematics = "axisymmetric"
@@ -56,7 +54,7 @@ def case_of(tmp_path, generator):
     return read_case(path)
 
 
-@pytest.mark.parametrize("generator", GENERATORS)
+@pytest.mark.parametrize("generator", fc.generate.GENERATORS)
 def test_every_generator_makes_meshes_half_as_fine(tmp_path, generator):
     case = case_of(tmp_path, generator)
     chosen = settings(case)
@@ -112,7 +110,7 @@ def test_a_rigid_surface_from_a_file_is_found_beside_the_case(tmp_path):
         'shape = { kind = "sphere", centre = [0.0, 10.0], R = 10.0 }\n', shape
     )
     case.write_text(text)
-    study = convergence_study(case, 1, workers=1)
+    study = fc.convergence_study(case, 1, workers=1)
     assert study.series[0].values("force")[0] > 0
 
 
@@ -126,7 +124,7 @@ def test_the_theory_counts_for_the_share_that_the_model_holds(root):
 def test_a_formulation_that_misses_an_exact_theory_is_told_so(root, tmp_path):
     case = tmp_path / "fit.toml"
     case.write_text((root / "data/cases/press-fit.toml").read_text() + FIT)
-    study = convergence_study(case, 3, ["quad8"], ["continuous", "mortar"], workers=1)
+    study = fc.convergence_study(case, 3, ["quad8"], ["continuous", "mortar"], workers=1)
     off, right = study.series
     lame = fc.analytic.press_fit_cylinders(
         E_inner=210e3, nu_inner=0.3, E_outer=70e3, nu_outer=0.33, inner_radius=20.0, interface_radius=50.0,

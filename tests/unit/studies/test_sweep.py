@@ -8,9 +8,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.cli import main
-from fastcontact.errors import CaseError
 from fastcontact.studies.report import Report
-from fastcontact.studies.runs import convergence_study, parameter_sweep
 from fastcontact.studies.sweep_report import parameter_label
 
 
@@ -21,7 +19,7 @@ def case(root):
 
 @pytest.fixture(scope="module")
 def sweep(case):
-    return parameter_sweep(case, {"approach": (0.004, 0.04, 0.4, 4.0)}, level=2, workers=1)
+    return fc.parameter_sweep(case, {"approach": (0.004, 0.04, 0.4, 4.0)}, level=2, workers=1)
 
 
 def test_hertz_is_the_limit_of_a_small_approach(sweep):
@@ -37,7 +35,7 @@ def test_hertz_is_the_limit_of_a_small_approach(sweep):
 
 
 def test_two_parameters_are_combined_the_last_one_fastest(case):
-    found = parameter_sweep(case, {"material[0].E": (1e4, 2e4), "approach": (0.4, 4.0)}, level=0, workers=1)
+    found = fc.parameter_sweep(case, {"material[0].E": (1e4, 2e4), "approach": (0.4, 4.0)}, level=0, workers=1)
     assert [tuple(point.parameters.values()) for point in found.points] == [(1e4, 0.4), (1e4, 4), (2e4, 0.4), (2e4, 4)]
     soft, stiff = found.points[1], found.points[3]
     # Both materials of the case are one entry: the force is proportional to the modulus.
@@ -106,12 +104,12 @@ def test_theory_is_a_curve_between_the_points_and_axes_are_of_one_kind(sweep):
 @pytest.mark.slow
 def test_a_theory_that_the_parameter_does_not_change_is_told(case):
     pytest.importorskip("matplotlib", reason="pictures need matplotlib")
-    found = parameter_sweep(case, {"material[0].E": (1e4, 2e4), "approach": (0.4, 4.0)}, level=0, workers=1)
+    found = fc.parameter_sweep(case, {"material[0].E": (1e4, 2e4), "approach": (0.4, 4.0)}, level=0, workers=1)
     ax = drawn(found)["contact force"]
     assert ax.get_xlabel() == "Young's modulus of material 1 [MPa]"
     assert "theory at equal approach\n(the same for every material[0].E)" in curves(ax)
     assert (ax.get_xscale(), ax.get_yscale()) == ("linear", "linear")
-    turned = parameter_sweep(case, {"approach": (0.4, 0.8), "material[0].E": (1e4, 2e4)}, level=0, workers=1)
+    turned = fc.parameter_sweep(case, {"approach": (0.4, 0.8), "material[0].E": (1e4, 2e4)}, level=0, workers=1)
     labels = curves(drawn(turned)["contact force"])
     assert {"material[0].E = 10000", "material[0].E = 20000", "theory at equal approach"} <= set(labels)
     assert len(turned.theories) == 2
@@ -119,7 +117,7 @@ def test_a_theory_that_the_parameter_does_not_change_is_told(case):
 
 def test_where_a_theory_is_not_defined_there_is_no_curve(case):
     pytest.importorskip("matplotlib", reason="pictures need matplotlib")
-    found = parameter_sweep(case, {"theory.hertz.nu1": (0.3, 0.6)}, level=0, workers=1)
+    found = fc.parameter_sweep(case, {"theory.hertz.nu1": (0.3, 0.6)}, level=0, workers=1)
     assert len(found.points) == len(found.failed) == 1
     assert [curve.values for curve in found.theories] == [{}]
     line = curves(drawn(found)["contact force"])["theory at equal approach"]
@@ -128,7 +126,7 @@ def test_where_a_theory_is_not_defined_there_is_no_curve(case):
 
 def test_a_quantity_without_theory_has_no_ratio(root):
     pytest.importorskip("matplotlib", reason="pictures need matplotlib")
-    found = parameter_sweep(
+    found = fc.parameter_sweep(
         root / "data/cases/cattaneo-mindlin.toml", {"material[0].E": (1e3, 2e3)}, level=0, workers=1
     )
     assert found.units["force"] == "N/mm"
@@ -156,7 +154,7 @@ def test_parameters_in_words():
 
 def test_values_that_are_no_numbers_have_no_curve(case):
     pytest.importorskip("matplotlib", reason="pictures need matplotlib")
-    found = parameter_sweep(case, {"contact.hertz.formulation": ("continuous", "mortar")}, level=0, workers=1)
+    found = fc.parameter_sweep(case, {"contact.hertz.formulation": ("continuous", "mortar")}, level=0, workers=1)
     assert found.theories == ()
     ax = drawn(found)["contact force"]
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["continuous", "mortar"]
@@ -171,8 +169,8 @@ def test_values_that_are_no_numbers_have_no_curve(case):
     ],
 )
 def test_what_is_wrong_is_told_before_anything_runs(case, parameters, words):
-    with pytest.raises(CaseError, match=words):
-        parameter_sweep(case, parameters, workers=1)
+    with pytest.raises(fc.CaseError, match=words):
+        fc.parameter_sweep(case, parameters, workers=1)
 
 
 @pytest.mark.parametrize(
@@ -190,10 +188,10 @@ def test_what_is_wrong_in_the_study_is_told_by_every_command(case, entry, words,
         "[study]", f"[study]\n{entry}"
     )
     (tmp_path / "case.toml").write_text(re.sub(r"(?ms)^\[study\.(?=parameters|options).*?(?=^\[|\Z)", "", text))
-    with pytest.raises(CaseError, match=words):
-        parameter_sweep(tmp_path / "case.toml", {"approach": (0.4,)}, level=0, workers=1)
-    with pytest.raises(CaseError, match=words):
-        convergence_study(tmp_path / "case.toml", 1, workers=1)
+    with pytest.raises(fc.CaseError, match=words):
+        fc.parameter_sweep(tmp_path / "case.toml", {"approach": (0.4,)}, level=0, workers=1)
+    with pytest.raises(fc.CaseError, match=words):
+        fc.convergence_study(tmp_path / "case.toml", 1, workers=1)
 
 
 def test_quantities_of_the_study_are_in_the_table(case, tmp_path):
@@ -201,7 +199,7 @@ def test_quantities_of_the_study_are_in_the_table(case, tmp_path):
     (tmp_path / "case.toml").write_text(
         text.replace("[study]", '[study]\nquantities = ["C1.stress.yy", "von_mises_max"]')
     )
-    found = parameter_sweep(tmp_path / "case.toml", {"approach": (0.4,)}, level=0, workers=1)
+    found = fc.parameter_sweep(tmp_path / "case.toml", {"approach": (0.4,)}, level=0, workers=1)
     header, row = found.tables()[0][1]
     assert f"{found.points[0].values['C1.stress.yy']:.7g}" == row[header.index("C1.stress.yy [MPa]")]
     assert "von_mises_max [MPa]" in header

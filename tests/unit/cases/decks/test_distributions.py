@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from deck_text import CONTACT, SUPPORTS, WHOLE, deck_of
+from models import made_of
 
 import fastcontact as fc
 
@@ -83,11 +84,9 @@ def test_what_is_refused(tmp_path, old, new, said):
 def test_axes_of_cells_from_python():
     mesh = fc.generate.box((2.0, 1.0, 1.0), (2, 1, 1), "hex8")
     turned = np.array([np.eye(3), [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.Orthotropic((8.0, 1.0, 1.0), (0.0,) * 3, (1.0,) * 3, axes=turned))
-    model.fix("XMIN", "x")
-    model.fix("YMIN", "y")
-    model.fix("ZMIN", "z")
+    model = made_of(
+        mesh, "3d", fc.Orthotropic((8.0, 1.0, 1.0), (0.0,) * 3, (1.0,) * 3, axes=turned), XMIN="x", YMIN="y", ZMIN="z"
+    )
     model.add_pressure("XMAX", -0.01)
     (step,) = fc.solve(model, 1)
     assert step.displacement[mesh.points_of("XMAX"), 0] == pytest.approx(0.01 / 8.0 + 0.01)

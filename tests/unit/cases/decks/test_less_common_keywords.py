@@ -98,9 +98,6 @@ def test_supports_along_skew_axes(tmp_path):
     )  # forces of the equation are no reactions
 
 
-RIGID = "*Node, nset=ref\n90, 0.5, 0.5, 2.5\n*Rigid Body, elset=up, ref node=90\n"
-
-
 def test_two_couplings_share_the_rotation_of_a_node(tmp_path):
     """Both sides of a plane strip follow one node: a moment turns the strip as a whole."""
     links = (

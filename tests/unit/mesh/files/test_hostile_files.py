@@ -25,7 +25,6 @@ from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh.files import meshio_process
 from fastcontact.mesh.files.med import add_field, write_med_mesh
 from fastcontact.mesh.files.meshio_content import Block, build_mesh
-from fastcontact.results.med import write_med_results
 
 HEAP = b"GCOL\x01\0\0\0"
 
@@ -118,7 +117,7 @@ def test_texts_in_a_mesh_file_are_not_read(tmp_path):
             {"shape": (4,), "maxshape": (None,), "dtype": "u1", "chunks": (2**30,)},
             r"1.07e\+09 bytes",
         ),
-        ("fastcontact/mesh/elements", {"shape": (10**6,), "dtype": h5py.string_dtype()}, "1000000 texts or references"),
+        ("fastcontact/mesh/elements", {"shape": (10**6,), "dtype": h5py.string_dtype()}, "1000000 strings or"),
         ("fastcontact/versions", {"data": ["{}"], "dtype": h5py.string_dtype()}, "is not a string"),
         ("fastcontact/case", {"data": "x", "dtype": h5py.string_dtype(), "chunks": None}, "Expecting value"),
         ("fastcontact/mesh/cell_groups/sizes", {"data": np.zeros(10**6, np.int64)}, r"6 names for sizes of shape"),
@@ -350,7 +349,7 @@ def test_data_sets_that_are_too_large_together(tmp_path, results):
     """A few kilobytes can hold any number of names of one data set of zeros."""
     mesh = tmp_path / "mesh.med"
     write_med_mesh(mesh, MESH)
-    write_med_results(tmp_path / "fields.rmed", MESH, [step_result(1)])
+    fc.write_med_results(tmp_path / "fields.rmed", MESH, [step_result(1)])
     for path in (mesh, tmp_path / "fields.rmed", results):
         with h5py.File(path, "r+") as file:
             file.create_dataset("zeros", (1 << 24,), "f8", chunks=(1 << 20,), compression="gzip")

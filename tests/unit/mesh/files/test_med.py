@@ -1,5 +1,6 @@
 """MED files: compared with the MED library and medcoupling, files of code_aster, and round trips."""
 
+import contextlib
 import dataclasses
 import json
 import shutil
@@ -14,13 +15,11 @@ from hypothesis import strategies as st
 from matplotlib_pictures import contact_of
 from models import assert_same_mesh, members, row_of
 
+import fastcontact as fc
 from fastcontact.errors import FastcontactWarning, FileError, MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.files.med import read_med, read_med_field, write_med_mesh
 from fastcontact.mesh.files.mesh_files import read_mesh_report
-from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.med import write_med_results
-from fastcontact.results.step import StepResult
 
 CASES = Path(__file__).resolve().parents[5] / "shared" / "cases"
 FLAT = [name for name, element in elements.ELEMENTS.items() if element.dim <= 2]
@@ -35,13 +34,22 @@ def all_elements():
     )
 
 
+@contextlib.contextmanager
+def changed(path):
+    """Write a mesh of all elements; give its group in the file, and that of its only step, to be changed."""
+    write_med_mesh(path, all_elements())
+    with h5py.File(path, "a") as file:
+        mesh = file["ENS_MAA/mesh"]
+        yield mesh, next(iter(mesh.values()))
+
+
 def some_steps(mesh, count=3):
     random = np.random.default_rng(4)
     n, m = mesh.n_points, 4 if mesh.dim == 2 else 6
     for index in range(1, count + 1):
         displacement, reaction = random.normal(size=(2, n, mesh.dim))
         von_mises, signed = random.normal(size=(2, n))
-        yield StepResult(
+        yield fc.StepResult(
             index, index / count, displacement, random.normal(size=(n, m)), von_mises, signed, reaction,
             {"contact": contact(np.array([1, 4]), np.array([2.5, 0.5]) * index)},
         )  # fmt: skip
@@ -63,7 +71,7 @@ def run(*command):
 
 def test_med_library_accepts_what_we_write(tmp_path):
     path = tmp_path / "results.med"
-    write_med_results(path, all_elements(), some_steps(all_elements()))
+    fc.write_med_results(path, all_elements(), some_steps(all_elements()))
     code, said = run("medconforme", path)
     assert code == 0
     assert said.count("conforme a") + said.count("conforme au") >= 2
@@ -98,7 +106,7 @@ def test_medcoupling_reads_our_fields_at_all_instants(tmp_path):
     mc = pytest.importorskip("medcoupling", reason="medcoupling is not installed")
     mesh, path = all_elements(), tmp_path / "results.med"
     steps = list(some_steps(mesh))
-    write_med_results(path, mesh, iter(steps))
+    fc.write_med_results(path, mesh, iter(steps))
     assert set(mc.MEDFileFields(str(path)).getFieldsNames()) == {
         "DEPL", "SIEF_NOEU", "SIEQ_NOEU", "REAC_NODA", "PRES_CONT",
     }  # fmt: skip
@@ -266,7 +274,7 @@ def meshes(draw):
         size, count = elements.get(name).n_nodes, draw(st.integers(1, 3))
         cells[name] = np.reshape(draw(st.lists(node, min_size=size * count, max_size=size * count)), (count, size))
     n_cells = sum(map(len, cells.values()))
-    return Mesh(
+    return fc.Mesh(
         points,
         cells,
         draw(st.dictionaries(NAMES, st.lists(st.integers(0, n_cells - 1)), max_size=5)),
@@ -283,9 +291,9 @@ def test_any_mesh_comes_back_the_same(tmp_path, mesh):
 
 def test_fields_come_back_in_code_aster_component_order(tmp_path):
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0], [2.0, 2.0, 2.0]])
-    mesh, path = Mesh(points, {"quad4": [[0, 1, 2, 3]]}), tmp_path / "solid.med"
+    mesh, path = fc.Mesh(points, {"quad4": [[0, 1, 2, 3]]}), tmp_path / "solid.med"
     steps = list(some_steps(mesh))
-    write_med_results(path, mesh, steps)
+    fc.write_med_results(path, mesh, steps)
     times, values = read_med_field(path, "SIEF_NOEU")
     np.testing.assert_array_equal(times, [1 / 3, 2 / 3, 1.0])
     xx, yy, zz, xy, yz, xz = np.moveaxis([step.stress for step in steps], 2, 0)
@@ -299,7 +307,7 @@ def test_fields_come_back_in_code_aster_component_order(tmp_path):
 
 def test_contact_pressure_is_zero_off_the_contact(tmp_path):
     mesh, path = all_elements(), tmp_path / "results.med"
-    write_med_results(path, mesh, some_steps(mesh))
+    fc.write_med_results(path, mesh, some_steps(mesh))
     expected = np.zeros((3, mesh.n_points, 1))
     expected[:, [1, 4], 0] = np.outer([1, 2, 3], [2.5, 0.5])
     np.testing.assert_array_equal(read_med_field(path, "PRES_CONT")[1], expected)
@@ -308,7 +316,7 @@ def test_contact_pressure_is_zero_off_the_contact(tmp_path):
 def test_temperatures_are_written_where_heat_is_conducted(tmp_path):
     mesh, path = all_elements(), tmp_path / "hot.med"
     hot = np.linspace(20.0, 80.0, mesh.n_points)
-    write_med_results(path, mesh, [dataclasses.replace(step, temperature=hot) for step in some_steps(mesh)])
+    fc.write_med_results(path, mesh, [dataclasses.replace(step, temperature=hot) for step in some_steps(mesh)])
     np.testing.assert_array_equal(read_med_field(path, "TEMP")[1], np.tile(hot[:, None], (3, 1, 1)))
 
 
@@ -351,7 +359,7 @@ def test_reads_med_2(tmp_path):
     write_med_2(tmp_path / "old.med")
     mesh, report = read_mesh_report(tmp_path / "old.med")
     assert (report.format, report.mesh_name) == ("MED 2.3.6", "old")
-    expected = Mesh(
+    expected = fc.Mesh(
         [[0, 0], [1, 0], [1, 1], [0, 1]],
         {"tri3": [[0, 1, 2], [0, 2, 3]], "line2": [[0, 1]]},
         {"one": [0, 1], "two": [1]},
@@ -379,10 +387,7 @@ def test_reads_med_2_as_the_med_library_converts_it(tmp_path):
 
 def test_first_of_several_time_steps_is_read(tmp_path):
     path = tmp_path / "moving.med"
-    write_med_mesh(path, all_elements())
-    with h5py.File(path, "a") as file:
-        mesh = file["ENS_MAA/mesh"]
-        first = next(iter(mesh))
+    with changed(path) as (mesh, first):
         mesh.copy(first, f"{1:020d}{-1:020d}")
         later = mesh[f"{1:020d}{-1:020d}"]
         later.attrs["NDT"] = 1
@@ -392,10 +397,8 @@ def test_first_of_several_time_steps_is_read(tmp_path):
 
 def test_numbers_and_families_may_be_absent(tmp_path):
     path = tmp_path / "bare.med"
-    write_med_mesh(path, all_elements())
-    with h5py.File(path, "a") as file:
-        del file["FAS"]
-        step = next(iter(file["ENS_MAA/mesh"].values()))
+    with changed(path) as (mesh, step):
+        del mesh.file["FAS"]
         for entry in [step["NOE"], *step["MAI"].values()]:
             del entry["FAM"]
     mesh = read_med(path).mesh
@@ -413,7 +416,7 @@ def add_vertices(path, points, family):
 
 def test_groups_of_vertex_cells_become_groups_of_points(tmp_path):
     path = tmp_path / "vertices.med"
-    write_med_mesh(path, Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2]]}, {"corners": []}, {"P": [1]}))
+    write_med_mesh(path, fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2]]}, {"corners": []}, {"P": [1]}))
     add_vertices(path, [0, 2], family=-1)
     mesh, report = read_mesh_report(path)
     assert mesh.point_groups["corners"].tolist() == [0, 2]
@@ -423,7 +426,7 @@ def test_groups_of_vertex_cells_become_groups_of_points(tmp_path):
 
 def test_points_lost_from_a_mixed_group_are_counted(tmp_path):
     path = tmp_path / "mixed.med"
-    write_med_mesh(path, Mesh([[0, 0], [1, 0], [0, 1], [5, 5]], {"tri3": [[0, 1, 2]]}, {"mixed": [0]}))
+    write_med_mesh(path, fc.Mesh([[0, 0], [1, 0], [0, 1], [5, 5]], {"tri3": [[0, 1, 2]]}, {"mixed": [0]}))
     add_vertices(path, [0, 3], family=-1)
     with pytest.warns(FastcontactWarning, match="'mixed'.* 1 points"):
         assert read_med(path).mesh.cell_groups["mixed"].tolist() == [0]
@@ -450,11 +453,9 @@ def test_no_mesh_and_two_meshes(tmp_path):
 
 def test_unknown_kinds_are_named_and_counted(tmp_path):
     path = tmp_path / "foreign.med"
-    write_med_mesh(path, all_elements())
-    with h5py.File(path, "a") as file:
-        cells = next(iter(file["ENS_MAA/mesh"].values()))["MAI"]
-        cells.move("TR6", "TR7")
-        cells.create_dataset("POG/INN", data=[1, 4, 8, 13])
+    with changed(path) as (_, step):
+        step["MAI"].move("TR6", "TR7")
+        step["MAI"].create_dataset("POG/INN", data=[1, 4, 8, 13])
     with pytest.raises(MeshError, match=r"3 cells of kind POG, 2 cells of kind TR7.*use only.* SE2"):
         read_med(path)
 
@@ -462,9 +463,8 @@ def test_unknown_kinds_are_named_and_counted(tmp_path):
 @pytest.mark.parametrize(("attribute", "value", "message"), [("TYP", 1, "structured grid"), ("REP", 1, "cylindrical")])
 def test_meshes_of_another_kind(tmp_path, attribute, value, message):
     path = tmp_path / "other.med"
-    write_med_mesh(path, all_elements())
-    with h5py.File(path, "a") as file:
-        file["ENS_MAA/mesh"].attrs[attribute] = value
+    with changed(path) as (mesh, _):
+        mesh.attrs[attribute] = value
     with pytest.raises(MeshError, match=f"mesh 'mesh' of .*{message}"):
         read_med(path)
 
@@ -485,9 +485,7 @@ def test_meshes_of_another_kind(tmp_path, attribute, value, message):
 )
 def test_damage_is_named(tmp_path, where, values, message):
     path = tmp_path / "damaged.med"
-    write_med_mesh(path, all_elements())
-    with h5py.File(path, "a") as file:
-        step = next(iter(file["ENS_MAA/mesh"].values()))
+    with changed(path) as (_, step):
         attributes = dict(step[where].attrs)
         del step[where]
         if values is not None:
@@ -499,9 +497,8 @@ def test_damage_is_named(tmp_path, where, values, message):
 
 def test_family_that_is_not_described_is_counted(tmp_path):
     path = tmp_path / "family.med"
-    write_med_mesh(path, all_elements())
-    with h5py.File(path, "a") as file:
-        next(iter(file["ENS_MAA/mesh"].values()))["NOE/FAM"][:3] = 77
+    with changed(path) as (_, step):
+        step["NOE/FAM"][:3] = 77
     with pytest.warns(FastcontactWarning, match="3 cells or points belong to family 77"):
         read_med(path)
 
@@ -518,10 +515,9 @@ def test_links_out_of_the_file_are_refused(tmp_path):
 def test_values_in_another_file_are_refused(tmp_path):
     path = tmp_path / "outside.med"
     for make in ("external", "virtual"):
-        write_med_mesh(path, all_elements())
         np.zeros(140).tofile(tmp_path / "numbers.bin")
-        with h5py.File(path, "a") as file:
-            points = next(iter(file["ENS_MAA/mesh"].values()))["NOE"]
+        with changed(path) as (_, step):
+            points = step["NOE"]
             del points["COO"]
             if make == "external":
                 points.create_dataset("COO", 140, float, external=[(str(tmp_path / "numbers.bin"), 0, 140 * 8)])
@@ -535,10 +531,9 @@ def test_values_in_another_file_are_refused(tmp_path):
 
 def test_soft_links_inside_the_file_are_followed(tmp_path):
     path = tmp_path / "soft.med"
-    write_med_mesh(path, all_elements())
-    with h5py.File(path, "a") as file:
-        file.move("ENS_MAA/mesh", "elsewhere")
-        file["ENS_MAA/mesh"] = h5py.SoftLink("/elsewhere")
+    with changed(path) as (mesh, _):
+        mesh.file.move("ENS_MAA/mesh", "elsewhere")
+        mesh.file["ENS_MAA/mesh"] = h5py.SoftLink("/elsewhere")
     assert read_med(path).mesh.n_points == 70
 
 
@@ -570,21 +565,21 @@ def test_failed_results_leave_the_old_file(tmp_path):
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        write_med_results(path, mesh, breaks_off())
+        fc.write_med_results(path, mesh, breaks_off())
     with pytest.raises(FileError, match="no step to write"):
-        write_med_results(path, mesh, [])
+        fc.write_med_results(path, mesh, [])
     with pytest.raises(FileError, match="two steps have the index 1"):
-        write_med_results(path, mesh, [*some_steps(mesh, 1), *some_steps(mesh, 1)])
-    smaller = Mesh(mesh.points[:5], {"line2": [[0, 1]]})
+        fc.write_med_results(path, mesh, [*some_steps(mesh, 1), *some_steps(mesh, 1)])
+    smaller = fc.Mesh(mesh.points[:5], {"line2": [[0, 1]]})
     with pytest.raises(MeshError, match=r"stress of step 1 has shape \(70, 4\) where the mesh needs \(5, 4\)"):
-        write_med_results(path, smaller, some_steps(mesh))
+        fc.write_med_results(path, smaller, some_steps(mesh))
     assert path.read_text() == "precious"
     assert [entry.name for entry in tmp_path.iterdir()] == ["results.med"]
 
 
 def test_unknown_field_offers_near_names(tmp_path):
     path = tmp_path / "results.med"
-    write_med_results(path, all_elements(), some_steps(all_elements()))
+    fc.write_med_results(path, all_elements(), some_steps(all_elements()))
     with pytest.raises(FileError, match="unknown field 'SIEF_NOUE': did you mean 'SIEF_NOEU'"):
         read_med_field(path, "SIEF_NOUE")
     with h5py.File(path, "a") as file:

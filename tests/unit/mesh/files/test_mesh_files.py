@@ -13,12 +13,10 @@ from hypothesis import strategies as st
 from models import assert_same_mesh, members, row_of
 from pairwise import first_of
 
-from fastcontact import topology
+import fastcontact as fc
 from fastcontact.errors import FastcontactWarning, FileError, MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.files.mesh_files import read_mesh, read_mesh_report, write_mesh
-from fastcontact.mesh.generate import half_spheres
-from fastcontact.mesh.mesh import Mesh
 
 FLAT = [name for name, element in elements.ELEMENTS.items() if element.dim <= 2]
 SOLIDS = [name for name in elements.ELEMENTS if name not in FLAT]
@@ -34,7 +32,7 @@ def reading(request):
 def patch():
     """Four triangles on a line, with a group for each body, the line, its parts and two points."""
     points = [[0, 0], [1, 0], [2, 0], [0.5, 1], [1.5, 1], [9, 9]]
-    return Mesh(
+    return fc.Mesh(
         points,
         {"tri3": [[0, 1, 3], [1, 2, 4], [1, 4, 3]], "line2": [[0, 1], [1, 2]]},
         {"left": [0, 2], "right": [1], "bottom": [3, 4]},
@@ -51,13 +49,13 @@ def test_clockwise_cells_are_turned_and_counted(tmp_path, name, caplog):
     block = mesh.cells[name].copy()
     mirrored = mesh.points * [1.0, -1.0]
     block[1] += 2 * block.shape[1]  # the second cell stands in the mirror
-    both = Mesh(np.concatenate([mesh.points, mirrored]), {name: block}, {"second": [1]})
+    both = fc.Mesh(np.concatenate([mesh.points, mirrored]), {name: block}, {"second": [1]})
     write_mesh(tmp_path / "turned.med", both)
     with caplog.at_level(logging.INFO, logger="fastcontact"):
         found, report = read_mesh_report(tmp_path / "turned.med")
     assert report.n_turned == 1
     assert "1 cells turned" in caplog.text
-    assert (topology.corner_measures(found, name) > 0).all()
+    assert (fc.topology.corner_measures(found, name) > 0).all()
     assert set(found.cells[name][1]) == set(block[1])
     np.testing.assert_array_equal(found.cells[name][0], block[0])
     assert read_mesh_report(tmp_path / "turned.med", orient=False)[1].n_turned == 0
@@ -77,7 +75,7 @@ def test_number_turned_is_the_number_that_was_clockwise(tmp_path, turned, suffix
     write_mesh(path, mesh.replace(cells=cells))
     found, report = read_mesh_report(path)
     assert report.n_turned == sum(turned[:4])
-    assert all((topology.corner_measures(found, name) > 0).all() for name in found.cells)
+    assert all((fc.topology.corner_measures(found, name) > 0).all() for name in found.cells)
 
 
 # There and back -------------------------------------------------------------------------------------
@@ -298,7 +296,7 @@ def test_flat_mesh_becomes_a_plane_one_and_keeps_unused_points(tmp_path, height)
 @pytest.mark.parametrize("suffix", ["med", "vtu", "msh", "inp"])
 def test_shell_stays_in_space(tmp_path, suffix):
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 1e-6], [0.0, 1.0, 0.0]])
-    mesh = Mesh(points, {"quad4": [[0, 1, 2, 3]]}, {"shell": [0]})
+    mesh = fc.Mesh(points, {"quad4": [[0, 1, 2, 3]]}, {"shell": [0]})
     write_mesh(tmp_path / f"shell.{suffix}", mesh)
     assert_same_mesh(read_mesh(tmp_path / f"shell.{suffix}"), mesh)
 
@@ -414,7 +412,7 @@ def test_threads_get_their_streams_back(tmp_path, capfd):
 def test_groups_survive_a_round_trip_through_pyvista(tmp_path):
     """Also where another program reads the file and writes it again."""
     pyvista = pytest.importorskip("pyvista", reason="needs PyVista: pip install 'fastcontact[view]'")
-    mesh = half_spheres(size=10.0)
+    mesh = fc.generate.half_spheres(size=10.0)
     write_mesh(tmp_path / "ours.vtu", mesh)
     pyvista.read(tmp_path / "ours.vtu").save(tmp_path / "theirs.vtu")
     found = read_mesh(tmp_path / "theirs.vtu")

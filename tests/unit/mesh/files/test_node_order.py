@@ -12,8 +12,6 @@ import fastcontact as fc
 from fastcontact.mesh import elements
 from fastcontact.mesh.files.med import write_med_mesh
 from fastcontact.mesh.files.mesh_files import read_mesh, read_mesh_report, write_mesh
-from fastcontact.mesh.generate.box import box
-from fastcontact.mesh.topology import corner_measures
 
 pytestmark = pytest.mark.usefixtures("meshio_here")
 
@@ -22,7 +20,7 @@ SOLIDS = {name: element for name, element in elements.ELEMENTS.items() if elemen
 
 
 def volumes(names):
-    return {name: corner_measures(row_of([name]), name)[0] for name in names}
+    return {name: fc.topology.corner_measures(row_of([name]), name)[0] for name in names}
 
 
 def outward_with_mid_nodes(points, faces):
@@ -63,7 +61,7 @@ def test_medcoupling_sees_our_solids_as_they_are(tmp_path, name):
     # What medcoupling calls the volume of linear cells.
     found.convertQuadraticCellsToLinear()
     measured = found.getMeasureField(False).getArray().toNumPyArray()
-    np.testing.assert_allclose(measured, corner_measures(mesh, name), rtol=1e-12)
+    np.testing.assert_allclose(measured, fc.topology.corner_measures(mesh, name), rtol=1e-12)
     assert (measured > 0).all()
 
 
@@ -78,13 +76,13 @@ def test_solids_of_medcoupling_are_read_the_right_way_round(tmp_path):
     mc.WriteUMesh(str(tmp_path / "cubes.med"), cubes, True)
     mesh, report = read_mesh_report(tmp_path / "cubes.med")
     assert (list(mesh.cells), report.n_turned) == (["hex8"], 0)
-    assert corner_measures(mesh, "hex8").sum() == pytest.approx(2.5**3)
+    assert fc.topology.corner_measures(mesh, "hex8").sum() == pytest.approx(2.5**3)
     cubes.simplexize(mc.PLANAR_FACE_6)
     cubes.findAndCorrectBadOriented3DCells()
     mc.WriteUMesh(str(tmp_path / "tetrahedra.med"), cubes, True)
     mesh, report = read_mesh_report(tmp_path / "tetrahedra.med")
     assert (list(mesh.cells), report.n_turned) == (["tet4"], 0)
-    assert corner_measures(mesh, "tet4").sum() == pytest.approx(2.5**3)
+    assert fc.topology.corner_measures(mesh, "tet4").sum() == pytest.approx(2.5**3)
 
 
 @pytest.mark.skipif(not CASES.is_dir(), reason="code_aster's cases are not beside the checkout")
@@ -176,7 +174,7 @@ def assert_vtk_cells(grid, mesh, vtk):
     size.SetInputData(grid)
     size.Update()
     measured = size.GetOutput().GetCellData().GetArray("Volume")
-    expected = np.concatenate([corner_measures(mesh, name) for name in mesh.solids])
+    expected = np.concatenate([fc.topology.corner_measures(mesh, name) for name in mesh.solids])
     assert grid.GetNumberOfCells() == len(expected)
     for number, volume in enumerate(expected):
         cell = grid.GetCell(number)
@@ -205,7 +203,7 @@ def test_vtk_sees_our_solids_as_they_are(tmp_path, name, suffix):
 @pytest.mark.parametrize("element", SOLIDS)
 def test_vtk_reads_results_of_a_solid(tmp_path, element):
     vtk = pytest.importorskip("vtk", reason="vtk is not installed")
-    model = elastic_model(box((2.0, 1.0, 1.0), (2, 1, 1), element), "3d", E=200.0, XMIN="xyz")
+    model = elastic_model(fc.generate.box((2.0, 1.0, 1.0), (2, 1, 1), element), "3d", E=200.0, XMIN="xyz")
     model.prescribe("XMAX", x=1e-3, y=2e-3, z=-1e-3)
     path = tmp_path / "solid.vtkhdf"
     with fc.ResultWriter(path, model) as out:

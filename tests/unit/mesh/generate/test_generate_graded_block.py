@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.generate import graded_block
 
 FACES = [e.name for e in elements.ELEMENTS.values() if e.dim == 2]
 SOLIDS = [e.name for e in elements.ELEMENTS.values() if e.dim == 3]
@@ -15,7 +13,7 @@ GROUPS = {"BLOCK", "TOP", "CONTACT", "BOTTOM", "SIDE", "SYMMETRY_X", "POLE"}
 
 @pytest.mark.parametrize("element", FACES + SOLIDS)
 def test_it_fills_the_block_and_names_its_sides(element):
-    mesh = graded_block(element, width=4.0, depth=3.0, contact_radius=0.8, contact_size=0.4)
+    mesh = fc.generate.graded_block(element, width=4.0, depth=3.0, contact_radius=0.8, contact_size=0.4)
     dim = mesh.dim
     assert dim == elements.get(element).dim
     assert fc.quality(mesh).n_bad == 0
@@ -34,7 +32,7 @@ def test_it_fills_the_block_and_names_its_sides(element):
 
 @pytest.mark.parametrize("element", ["quad4", "tri6", "hex8", "tet10"])
 def test_edges_are_as_asked_at_the_contact_and_far_from_it(element):
-    mesh = graded_block(element, width=10.0, contact_radius=1.0, contact_size=0.2, size=2.0, growth=0.5)
+    mesh = fc.generate.graded_block(element, width=10.0, contact_radius=1.0, contact_size=0.2, size=2.0, growth=0.5)
     for axis in range(mesh.dim):
         on_axis = (np.delete(mesh.points, axis, axis=1) == 0.0).all(axis=1)
         places = np.sort(np.abs(mesh.points[on_axis, axis]))[:: elements.get(element).order]
@@ -48,29 +46,10 @@ def test_edges_are_as_asked_at_the_contact_and_far_from_it(element):
 
 
 def test_the_contact_is_the_finely_meshed_part_of_the_top():
-    mesh = graded_block("hex8", width=10.0, contact_radius=1.0, contact_radius_y=2.0, contact_size=0.3)
+    mesh = fc.generate.graded_block("hex8", width=10.0, contact_radius=1.0, contact_radius_y=2.0, contact_size=0.3)
     reach = mesh.points[mesh.points_of("CONTACT")].max(axis=0)
     assert (reach[:2] >= [1.0, 2.0]).all()
     assert (reach[:2] <= [1.3, 2.3]).all()
     assert reach[2] == 0.0
-    whole = graded_block("quad4", width=1.0, contact_radius=1.0)
+    whole = fc.generate.graded_block("quad4", width=1.0, contact_radius=1.0)
     assert whole.cell_groups["CONTACT"].tolist() == whole.cell_groups["TOP"].tolist()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"element": "line2"}, "element"),
-        ({"width": 0.0}, "width = 0"),
-        ({"depth": -1.0}, "depth = -1"),
-        ({"contact_radius": 11.0}, "contact_radius = 11 .* at most width = 10"),
-        ({"contact_size": 3.0}, "contact_size = 3 .* at most size = 2.5"),
-        ({"size": 11.0}, "size = 11"),
-        ({"growth": 2.0}, "growth = 2"),
-        ({"contact_radius_y": 1.0}, "contact_radius_y = 1.0 has no effect on quad4"),
-        ({"element": "hex8", "contact_radius_y": 20.0}, "contact_radius_y = 20"),
-    ],
-)
-def test_bad_arguments_are_named(arguments, words):
-    with pytest.raises(MeshError, match=words):
-        graded_block(**arguments)
