@@ -143,17 +143,17 @@ def not_makeable():
     recipe(replace(chosen, generator=None, arguments={}, case_combination=Combination("quad4", None)), "tri3", 1)
 
 
-def failing(jobs, **_):
-    return [{"error": "the mesh is folded", "kind": "MeshError"} for _ in jobs]
+def failing(jobs, rows, *_):
+    return [(row, {"error": "the mesh is folded", "kind": "MeshError"}) for row in rows]
 
 
 def no_level(patch):
-    patch.setattr(execute, "run_all", failing)
+    patch.setattr(execute, "_run_jobs", failing)
     fc.convergence_study("forma04a", 1, ["tri3"], ["node_to_segment"])
 
 
 def no_point(patch):
-    patch.setattr(execute, "run_all", failing)
+    patch.setattr(execute, "_run_jobs", failing)
     fc.parameter_sweep("forma04a", {"approach": [1.0]})
 
 
