@@ -145,13 +145,16 @@ class Bodies:
 
 
 def effective_radius(R1: float, R2: float, names: tuple[str, str] = ("R1", "R2")) -> float:
-    """Return the relative radius R [length], with 1/R = 1/R1 + 1/R2; ModelError if both radii are infinite."""
-    R1 = positive(names[0], R1, infinite=True)
-    R2 = positive(names[1], R2, infinite=True)
+    """Return the relative radius R [length], with 1/R = 1/R1 + 1/R2, where radii of concave surfaces are negative.
+
+    Raises ModelError if R is not positive or both radii are infinite.
+    """
+    for name, R in zip(names, (R1, R2), strict=True):
+        positive(f"the size of {name}", abs(R) if isinstance(R, (int, float)) and R is not True else R, infinite=True)
     if math.isinf(R1) and math.isinf(R2):
         reason = "two planes have no Hertz contact" if names == ("R1", "R2") else "use hertz_line for line contact"
         raise ModelError(f"{names[0]} and {names[1]} are both infinite: {reason}")
-    return 1.0 / (1.0 / R1 + 1.0 / R2)
+    return positive(f"the relative curvature 1/{names[0]} + 1/{names[1]}", 1.0 / R1 + 1.0 / R2) ** -1
 
 
 def in_plane(kinematics: str) -> str:

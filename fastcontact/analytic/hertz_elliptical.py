@@ -132,7 +132,7 @@ def hertz_elliptical(
         See `hertz_point`.
     R1x, R1y, R2x, R2y : float
         Principal radii of curvature [length] of bodies 1 and 2 in the planes through the normal and x or y; infinity for a
-        straight section.
+        straight section, and negative for a concave one, such as a groove.
     force, approach, pressure_max : float
         Normal force [force], approach [length] or largest pressure [pressure]; give exactly one of them.
 

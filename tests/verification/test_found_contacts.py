@@ -202,7 +202,8 @@ def test_softer_bodies_are_secondary_even_with_coarser_meshes(element):
     assert (np.diff(pressures[0]) < 0.0).all()
     assert (np.diff(pressures[1]) > 0.0).sum() >= 5
     assert not warnings[0]
-    assert "or exchange the sides, since the body of 'BASE TOP' is softer" in warnings[1][0]
+    if element == "quad4":  # those of quad8, by up to 17 % of their mean, are below the limit
+        assert "or exchange the sides, since the body of 'BASE TOP' is softer" in warnings[1][0]
 
 
 @pytest.mark.parametrize("element", ["quad8", "hex8"])

@@ -85,12 +85,12 @@ BAD_INPUT = [
     ("hertz_box", {"kinematics": "axisymetric"}, "axisymmetric"),
     ("hertz_elliptical", {"R1y": math.inf}, "R1y and R2y are both infinite: use hertz_line for line contact"),
     ("hertz_elliptical", {"R1y": 1e14}, "use hertz_line"),
-    ("hertz_elliptical", {"R1x": -1.0}, "R1x is -1"),
+    ("hertz_elliptical", {"R1x": -1.0}, "the relative curvature 1/R1x [+] 1/R2x is -1"),
     ("hertz_elliptical", {"force": None}, "exactly one of force, approach, pressure_max"),
     ("hertz_line", {"kinematics": "plain_strain"}, "did you mean 'plane_strain'"),
     ("hertz_line", {"force": None}, "exactly one of force, radius, pressure_max"),
-    ("hertz_line", {"R1": -1.0}, "R1 is -1"),
-    ("hertz_point", {"R1": -1.0}, "R1 is -1"),
+    ("hertz_line", {"R1": 3.0, "R2": -2.0}, "the relative curvature 1/R1 [+] 1/R2 is -0.1"),
+    ("hertz_point", {"R1": True}, "R1 is True"),
     ("hertz_point", {"R2": 0.0}, "R2 is 0"),
     ("hertz_point", {"R1": math.inf}, "both infinite"),
     ("hertz_point", {"nu1": 0.6}, r"nu1 is 0\.6"),
@@ -155,3 +155,10 @@ def test_bad_requests_are_named(request_, words):
 def test_import_needs_numpy_only():
     heavy = {"scipy", "numba", "matplotlib", "meshio", "h5py", "pyamg"}
     assert printed(f"import sys, fastcontact.analytic; print({heavy} & set(sys.modules))") == "set()\n"
+
+
+def test_a_concave_radius_is_negative():
+    load = {"E1": 1e5, "nu1": 0.3, "force": 10.0}
+    assert analytic.hertz_line(R1=10.0, R2=-11.0, **load).R_effective == pytest.approx(110.0)
+    groove = analytic.hertz_elliptical(R1x=10.0, R1y=10.0, R2y=-11.0, **load)
+    assert groove.pressure_max == pytest.approx(analytic.hertz_elliptical(R1x=10.0, R1y=110.0, **load).pressure_max)
