@@ -145,7 +145,7 @@ def hertz_point(
     E2, nu2 : float, optional
         Young's modulus [pressure] and Poisson's ratio [-], -1 < nu2 <= 0.5, of body 2, which is rigid without `E2`.
     R2 : float
-        Radius of body 2 [length]; by default infinity, a plane. The radius of a concave surface, such as a socket, is negative.
+        Radius of body 2 [length]; by default infinity, a plane. It is negative for a concave surface, such as a socket.
     force, approach, radius, pressure_max : float
         Normal force [force], approach [length], contact radius [length] or largest pressure [pressure]; give exactly one of
         them.
