@@ -2,6 +2,7 @@
 
 import warnings
 
+import numpy as np
 import pytest
 from models import made_of
 
@@ -107,3 +108,51 @@ def test_sides_that_overlap_at_the_start_are_told_where_the_motion_is_along_them
         fc.solve(model, 1)
     told = [text for text in map(str, (w.message for w in raised)) if "begins with a penetration of 0.05 at" in text]
     assert len(told) == (distance < 0.0)
+
+
+def quadrilateral(divisions, corners, group):
+    """A quad8 mesh of a quadrilateral with the corners (4, 2); the names of its sides begin with that of the cell group."""
+    mesh = fc.generate.block((1.0, 1.0), divisions, "quad8", name=group)
+    x, y = mesh.points.T[:, :, None]
+    a, b, c, d = np.array(corners, float)
+    mesh = mesh.replace(points=(1 - x) * (1 - y) * a + x * (1 - y) * b + x * y * c + (1 - x) * y * d)
+    return fc.generate.renamed(mesh, lambda name: name if len(name) == 1 else f"{group} {name}")
+
+
+@pytest.mark.parametrize("turn", [0.0, 18.0])
+def test_a_blade_at_both_ends_of_a_sector_is_held_by_friction(turn):
+    """Its halves slide in the dovetail until both flanks close; sliding that overshoots must not grow."""
+    t, join = np.tan(np.pi / 20), fc.generate.merge_points
+    inner = [(0, 100), (14 / 1.42, 100), (14, 142), (0, 140)]
+    outer = [inner[1], (100 * t, 100), (142 * t, 142), inner[2]]
+    disc = [
+        ("A", (16, 12), inner),
+        ("B", (8, 12), outer),
+        ("C", (8, 10), [(14, 142), (142 * t, 142), (150 * t, 150), (6, 150)]),
+    ]
+    blade = [("D", (12, 16), [(0, 142), (14, 142), (6, 150), (0, 150)])]
+    blade.append(("E", (12, 24), [(0, 150), (6, 150), (5, 180), (0, 180)]))
+    right = [fc.generate.union(*[quadrilateral(n, x, g) for g, n, x in parts]) for parts in (disc, blade)]
+    halves = [[join(mesh, 1e-7) for mesh in right], []]
+    halves[1] = [fc.generate.transformed(fc.generate.mirrored(mesh, "x"), rotate=-18.0) for mesh in halves[0]]
+    mesh = fc.generate.union(join(fc.generate.union(halves[0][0], halves[1][0]), 1e-7), halves[0][1], halves[1][1])
+
+    def at(angle):
+        return lambda x: np.abs(np.arctan2(x[:, 0], x[:, 1]) - angle) < 1e-7
+
+    polar = np.arctan2(mesh.points[:, 0], mesh.points[:, 1])
+    mesh = mesh.with_facet_group("FIRST", at(0.0)).with_facet_group("LAST", at(np.pi / 10))
+    pin = int(np.argmin(np.hypot(mesh.points[:, 0], mesh.points[:, 1] - 100)))
+    mesh = fc.generate.transformed(mesh.with_groups(points={"PIN": [pin]}), rotate=turn)
+    materials = {("A", "B", "C"): (210e3, 7.85e-9), ("D", "E"): (115e3, 4.5e-9)}
+    model = fc.Model(mesh, "plane_strain")
+    for groups, (E, density) in materials.items():
+        model.add_material(fc.LinearElastic(E=E, nu=0.3, density=density), groups)
+    model.add_cyclic_symmetry("FIRST", "LAST", sectors=20)
+    model.fix("PIN", "y", axes=fc.CylindricalAxes())
+    model.add_contact("flank", secondary="D RIGHT", primary="C LEFT", friction=0.2)
+    model.add_centrifugal(1000.0)
+    contact = fc.solve(model, 2)[-1].contact["flank"]
+    axes = np.radians(np.where(polar[contact.points] < np.pi / 20, turn, turn - 18.0))
+    held = -(contact.force_vectors * np.column_stack([-np.sin(axes), np.cos(axes)])).sum()
+    assert held == pytest.approx(2.0 * 4.5e-9 * 1000.0**2 * 38787.3333, rel=1e-6)
