@@ -122,7 +122,7 @@ def test_no_help(started, monkeypatch, spoilt):
     monkeypatch.setattr(compiling, "count", 100)
     ahead.expect(["2d"])
     assert started == []
-    assert compiling.helpers == []
+    assert compiling.helper_requests == []
 
 
 class Process:
