@@ -214,15 +214,15 @@ def expect(runs: Sequence[str]) -> None:
         return
 
     def begin() -> None:
-        if compiling.count > MAX_UNHELPED and begin in compiling.helpers:
-            compiling.helpers.remove(begin)
+        if compiling.count > MAX_UNHELPED and begin in compiling.helper_requests:
+            compiling.helper_requests.remove(begin)
             _runs_with_helpers.update(new)
             if all(map(_is_cached, required_kernels(new))):  # the other kernels may run in Python
                 return
             with contextlib.suppress(OSError):  # without helpers, the run compiles all kernels
                 compiling.waiters.append(Helpers(new, start(new, helpers)).wait)
 
-    compiling.helpers[:] = [begin]
+    compiling.helper_requests[:] = [begin]
     begin()
 
 

@@ -32,12 +32,12 @@ def count_uncompiled() -> None:
     """Count a kernel that has no compiled version, and request helpers."""
     global count
     count += 1
-    for helper in list(helpers):
-        helper()
+    for request in list(helper_requests):
+        request()
 
 
 def wait(name: str) -> bool:
-    """Wait for helpers that compile a kernel of this name. Returns whether there were any, so that its file may now exist."""
+    """Wait for helpers that compile a kernel called `name`; return whether there were any, so its file may now exist."""
     return any(waiter(name) for waiter in waiters)
 
 
@@ -51,13 +51,13 @@ def print_announcement() -> None:
 
 def in_worker() -> bool:
     """Return whether this is a worker process, in which `multiprocessing` is already imported."""
-    processes = sys.modules.get("multiprocessing")
-    return processes is not None and processes.parent_process() is not None
+    multiprocessing = sys.modules.get("multiprocessing")
+    return multiprocessing is not None and multiprocessing.parent_process() is not None
 
 
 # Functions that are called when a kernel is compiled or waited for, but not when it is read from the disk cache.
 listeners: list[Callable[[], None]] = [print_announcement]
-# Functions of `ahead` that are called when a kernel has no compiled version, and to wait for a helper that compiles a kernel.
-helpers: list[Callable[[], None]] = []
+# Functions of `ahead` that are called when a kernel has no compiled version, to start helpers.
+helper_requests: list[Callable[[], None]] = []
 # Functions of `ahead` that wait for a helper that compiles a kernel.
 waiters: list[Callable[[str], bool]] = []

@@ -19,7 +19,7 @@ def versions() -> dict[str, str]:
     for name in LIBRARIES:
         with contextlib.suppress(metadata.PackageNotFoundError):
             library = metadata.distribution(name)
-            # `metadata.version` would import `email`.
+            # `metadata.version` would import `email`, which takes time.
             text = library.read_text("METADATA") or library.read_text("PKG-INFO") or ""
             if version := text.partition("\nVersion: ")[2].partition("\n")[0]:
                 by_name[name] = version

@@ -290,7 +290,7 @@ def balance(
         # In stiff parts with large displacements, the round-off of internal forces may exceed the forces in soft parts. If
         # there are no forces, the relative residual is not defined, and the round-off of internal forces is the bound. Both
         # cases need abs(K) @ lengths, which costs as much as a product with K.
-        product = problem.system.K.absolute_product(problem.accurate_to(u))
+        product = problem.system.K.absolute_product(problem.round_off_lengths(u))
         residual = problem.system.balance(unbalanced, SUM_ROUND_OFF * product)[1]
         round_off, noise = _round_off(problem, product, forces, largest_so_far)
     reaction = reaction[: problem.model.mesh.points.size]
@@ -311,7 +311,7 @@ def _round_off(problem: Problem, product: Array, forces: tuple[Array, ...], scal
     ----------
     problem : Problem
     product : ndarray (n_dofs,)
-        ``abs(K) @ lengths`` with the lengths of `Problem.accurate_to` [force].
+        ``abs(K) @ lengths`` with the lengths of `Problem.round_off_lengths` [force].
     forces : tuple of ndarray
         Reactions, contact forces and external forces [force].
     scale : float

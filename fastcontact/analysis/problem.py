@@ -69,13 +69,13 @@ class StepLoad:
     angles : dict of str to float
         Rotation angle of each rigid obstacle that rotates, by the name of its contact pair [radian].
     following : tuple of float
-        Factor of each pressure that follows the deformed surface [-].
+        Factor of each follower pressure [-].
     friction_factors : dict of str to float
         Factor of the coefficient of friction of each contact pair whose coefficient varies [-].
     fluids : dict of str to float
         Fluid pressure at the source of each contact pair that fluid may enter [pressure].
     rise : ndarray (n_points,), optional
-        Temperature rise, which expands nonlinear bodies [temperature]. For linear bodies, `force` includes its nodal forces.
+        Temperature rise, which strains nonlinear bodies [temperature]. For linear bodies, `force` includes its nodal forces.
     """
 
     lift: Array
@@ -107,7 +107,7 @@ class Problem:
     system : System
         Stiffness matrix, supports and multi-point constraints.
     floating_bodies : FloatingBodies, optional
-        Springs of bodies that contact alone restrains, if there are such bodies.
+        Bodies that are restrained by contact alone, with their springs, if there are such bodies.
     dofs : ActiveDofs
         Degrees of freedom of the contact problem.
     contact_dofs : ndarray of int
@@ -118,7 +118,7 @@ class Problem:
         Rigid obstacles that are driven by forces.
     prescribed, forces : dict of ramp table to ndarray (n_points + n_driven, dim)
         For each ramp, the prescribed displacements [length] and the nodal forces [force] at multiplier 1.
-    solver_at_rest : dict
+    initial_snapshot : dict
         Snapshot of the solver before the first step.
     warnings : tuple of str
         Warnings about the stiffness of springs.
@@ -126,11 +126,11 @@ class Problem:
         The solid cells, if they are nonlinear. `system` and `solver` then hold the tangent at zero displacements, or at
         `linearised_at`.
     following : sequence of (FollowingPressure, ramp table)
-        Pressures that follow the deformed surface. `forces` include their forces on the undeformed surface.
+        Follower pressures. `forces` include their forces on the undeformed surface.
     heat : Heat, optional
         Heat conduction, if the model has any.
     linearised_at : ndarray (n_dofs,), optional
-        Displacements at which `system` is the tangent, for bodies in finite strain [length].
+        Displacements at which `system` contains the tangent, for bodies in finite strain [length].
     """
 
     model: Model
@@ -147,7 +147,7 @@ class Problem:
     force_driven: ForceDrivenObstacles
     prescribed: ByRamp
     forces: ByRamp
-    solver_at_rest: Mapping[str, Any]
+    initial_snapshot: Mapping[str, Any]
     warnings: tuple[str, ...] = ()
     bodies: NonlinearBodies | None = None
     following: Sequence[tuple[FollowingPressure, Table | None]] = ()
@@ -175,7 +175,7 @@ class Problem:
         prescribed = combined(self.prescribed, self.ramp, instant, self.shape)
         factors = [multiplier(relation.ramp, self.ramp, instant) for relation in self.model.relations]
         lift = self.system.lift(prescribed.ravel(), factors)
-        obstacles, clearances, angles, frictions, fluids = {}, {}, {}, {}, {}
+        obstacles, clearance_factors, angles, friction_factors, fluids = {}, {}, {}, {}, {}
         for pair in self.model.contact:
             side = self.pairs[pair.name].primary
             if isinstance(side, RigidSide):
@@ -183,21 +183,21 @@ class Problem:
             if pair.rotation is not None:
                 angles[pair.name] = angle_at(pair, self.ramp, instant)
             if pair.clearance_ramp is not None:
-                clearances[pair.name] = multiplier(pair.clearance_ramp, self.ramp, instant)
+                clearance_factors[pair.name] = multiplier(pair.clearance_ramp, self.ramp, instant)
             if pair.friction_ramp is not None:
-                frictions[pair.name] = multiplier(pair.friction_ramp, self.ramp, instant)
+                friction_factors[pair.name] = multiplier(pair.friction_ramp, self.ramp, instant)
             if pair.fluid is not None:
                 fluids[pair.name] = pair.fluid.pressure * multiplier(pair.fluid.ramp, self.ramp, instant)
         force = combined(self.forces, self.ramp, instant, self.shape).ravel()
         following = tuple(multiplier(table, self.ramp, instant) for _, table in self.following)
         temperatures = self.factors(self.model.temperatures, instant)
         rise = None if self.bodies is None else self.model.temperature_rise(temperatures)
-        return StepLoad(lift, force, obstacles, clearances, angles, following, frictions, fluids, rise)
+        return StepLoad(lift, force, obstacles, clearance_factors, angles, following, friction_factors, fluids, rise)
 
     def factors(
         self, histories: Iterable[Temperature | InitialState | Pretension | Load], instant: float
     ) -> list[float]:
-        """Return the load factors of temperatures, initial states, pretension sections or loads at an instant [-]."""
+        """Return the multipliers of temperatures, initial states, pretension sections or loads at an instant [-]."""
         return [multiplier(history.ramp, self.ramp, instant) for history in histories]
 
     def displacement(self, u: Array) -> Array:
@@ -205,7 +205,7 @@ class Problem:
         points = self.model.mesh.points
         return u[: points.size].reshape(points.shape)
 
-    def accurate_to(self, u: Array) -> Array:
+    def round_off_lengths(self, u: Array) -> Array:
         """Return the lengths (n_dofs,) whose round-off limits the accuracy of displacements u (n_dofs,) [length].
 
         These are the displacements. In finite strain the distances from the centre of the mesh are added, because
@@ -273,10 +273,10 @@ class Problem:
         # Gaps are differences of coordinates, whose round-off limits their accuracy.
         round_off = 8 * np.finfo(float).eps * float(np.abs(self.model.mesh.points).max())
         zero, instant = np.zeros(self.force_driven.n_dofs), self.ramp.table[0][0]
-        return State(zero, round_off, solver=self.solver_at_rest, work=Work(), instant=instant)
+        return State(zero, round_off, solver=self.initial_snapshot, work=Work(), instant=instant)
 
 
-def quadratic_and_linear(model: Model) -> bool:
+def linear_with_quadratic_cells(model: Model) -> bool:
     """Return whether a model of linear bodies has quadratic cells; see `linear.choice.make`."""
     return not model.nonlinear and any(elements.get(name).order == 2 for name in model.mesh.solids)
 
@@ -307,7 +307,7 @@ def prepare(
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,
         tolerance=choice.tight_enough(linear_tolerance, criteria.relative),
-        columns=not all(pair.eliminable for pair in pairs.values()), quadratic=quadratic_and_linear(model),
+        columns=not all(pair.eliminable for pair in pairs.values()), quadratic=linear_with_quadratic_cells(model),
     )  # fmt: skip
     field = model.material_field()
     solver.contrast = field.contrast
@@ -337,7 +337,7 @@ def prepare(
 
 
 def linearised(
-    problem: Problem, K: bsr_array, u: Array, contact: csr_array | None, stiff: bool, replaces: bool
+    problem: Problem, K: bsr_array, u: Array, contact: csr_array | None, stiff_springs: bool, replaces_springs: bool
 ) -> Problem:
     """Return a problem whose system and linear solver use the tangent of the terms at displacements u.
 
@@ -352,9 +352,9 @@ def linearised(
         Displacements about which the terms are linearised [length].
     contact : csr_array (n_dofs, n_dofs), optional
         Stiffness due to contact, which is added to K [force / length].
-    stiff : bool
+    stiff_springs : bool
         Whether the springs of floating bodies are as stiff as the bodies.
-    replaces : bool
+    replaces_springs : bool
         Whether the springs of floating bodies are omitted if `contact` resists all their motions. The iteration of positions
         may not converge for a tangent that is nearly singular.
     """
@@ -367,8 +367,8 @@ def linearised(
         if model.kinematics != "axisymmetric":
             rotated = _floating_motions(model, model.prescribed_by_ramp()[0], displacement)
             motions = rotated if len(rotated) == len(motions) else motions
-        floating = FloatingBodies(motions, system, problem.solver.iterative and not stiff, model.springs)
-    if replaces and floating is not None and contact is not None:
+        floating = FloatingBodies(motions, system, problem.solver.iterative and not stiff_springs, model.springs)
+    if replaces_springs and floating is not None and contact is not None:
         modes = floating.motions.displacement
         values = np.linalg.eigvalsh(modes.T @ (contact @ modes))
         floating = None if values[0] > SINGLE_PRECISION * values[-1] else floating
@@ -382,8 +382,8 @@ def linearised(
 def _floating_motions(model: Model, supported: Mask, displacement: Array | float = 0.0) -> FreeMotions:
     """Return the rigid-body modes that supports and multi-point constraints leave free.
 
-    Rotations are those of the configuration with the displacements `displacement` (n_points, dim) [length]; `supported`
-    (n_points, dim) are the components that supports hold.
+    Rotations refer to the configuration displaced by `displacement` (n_points, dim) [length]; `supported` (n_points, dim)
+    are the components that supports hold.
     """
     deformed = model.mesh.replace(points=model.mesh.points + displacement)
     motions = free_motions(deformed, model.kinematics, supported, model.holding_rows())
@@ -437,8 +437,8 @@ def _prepared_dofs(
 def near_nullspace(model: Model, displacement: Array | float = 0.0) -> Array:
     """Return the near null space (n_dofs, k) for multigrid: the rigid-body modes of the mesh [-].
 
-    Rotations are those of the configuration with the displacements `displacement` (n_points, dim) [length]. One set of
-    modes suffices for all bodies, because aggregates do not extend over several bodies. In axisymmetric models, motions in
-    the plane are not rigid-body modes of the ring, but their energy is small away from the axis, and aggregates need them.
+    Rotations refer to the configuration displaced by `displacement` (n_points, dim) [length]. One set of modes suffices for
+    all bodies, because aggregates do not extend over several bodies. In axisymmetric models, motions in the plane are not
+    rigid-body modes of the ring, but their energy is small away from the axis, so coarse spaces must contain them.
     """
     return rigid_modes(model.mesh.points + displacement, "plane_strain" if model.mesh.dim == 2 else model.kinematics)

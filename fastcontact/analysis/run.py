@@ -12,7 +12,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.analysis import restart, step_halving
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.interpenetration import Peak
-from fastcontact.analysis.problem import Problem, prepare, quadratic_and_linear
+from fastcontact.analysis.problem import Problem, linear_with_quadratic_cells, prepare
 from fastcontact.analysis.progress import Progress
 from fastcontact.analysis.result_warnings import result_warnings
 from fastcontact.analysis.stages import next_stage, stage_of
@@ -161,7 +161,7 @@ def solve_steps(
 def _kernel_sets(model: Model, linear_solver: str) -> list[str]:
     """Return the keys of the table in `_jit.ahead` that lists the kernels to compile in advance for a model."""
     dim = model.mesh.dim
-    default = chosen(dim, model.mesh.n_points * dim, quadratic=quadratic_and_linear(model))[0]
+    default = chosen(dim, model.mesh.n_points * dim, quadratic=linear_with_quadratic_cells(model))[0]
     multigrid = "amg" in (linear_solver, default if linear_solver == "auto" else "")
     return [f"{dim}d", *([f"{dim}d amg"] if multigrid else [])]
 

@@ -25,7 +25,7 @@ def run(options: Namespace) -> int:
         say(f"{name:<12} {version}")
     say(f"{'threads':<12} {decorators.threads()} of {os.cpu_count()}")
     files = cache.files.get(getattr(element_2d_kernels.add_stiffness, "py_func", None))
-    say(f"{'cache':<12} {getattr(files, 'folder', 'none: kernels compile in every process')}")
+    say(f"{'cache':<12} {getattr(files, 'folder', 'none: kernels are compiled in every process')}")
     if options.warmup:
         started = time.perf_counter()
         done = _warm_up(show=stderr_is_terminal() and not options.quiet)
@@ -52,9 +52,9 @@ def _warm_up(show: bool) -> int:
         errors.seek(0)
         error_lines = errors.read().split("\n")
     if failed:
-        manner = f"by {signal.Signals(-failed[0]).name}" if failed[0] < 0 else f"with exit code {failed[0]}"
-        reason = next(filter(None, reversed(error_lines)), "the memory may have been full")
+        manner = f"on {signal.Signals(-failed[0]).name}" if failed[0] < 0 else f"with exit code {failed[0]}"
+        reason = next(filter(None, reversed(error_lines)), "perhaps out of memory")
         raise FastcontactError(
-            f"a process that compiles kernels ended {manner}, {done} of {total} kernels begun: {reason}"
+            f"a process that compiles kernels ended {manner} after starting {done} of {total} kernels: {reason}"
         )
     return done

@@ -13,7 +13,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.mesh.mesh import Mesh
 
-# Approximate number of sampled facets of each kind.
+# Approximate number of sampled facets of each element type.
 SAMPLE = 200
 
 
@@ -38,14 +38,14 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
         )
     for side in (secondary, primary):
         _check_normals(mesh, name, side)
-    (centres, normals, sizes), opposite = _facet_frames(mesh, secondary), _facet_frames(mesh, primary)
-    difference = opposite[0][None] - centres[:, None]
+    (x, normals, sizes), (y, other_normals, other_sizes) = (_facet_geometry(mesh, s) for s in (secondary, primary))
+    difference = y[None] - x[:, None]
     height, distance = np.einsum("ijd,id->ij", difference, normals), np.linalg.norm(difference, axis=2)
-    facing = normals @ opposite[1].T < 0
-    ahead = (height > -0.1 * distance) | (distance < np.minimum.outer(sizes, opposite[2]))
+    facing = normals @ other_normals.T < 0
+    ahead = (height > -0.1 * distance) | (distance < np.minimum.outer(sizes, other_sizes))
     if not (facing & ahead).any():
         depth = -height[facing]
-        hint = f", or do the bodies lie inside each other, by {depth.min():.4g} or more" if len(depth) else ""
+        hint = f", or do the bodies overlap, by {depth.min():.4g} or more" if len(depth) else ""
         raise ContactError(
             f"no facet of '{secondary.group}' faces '{primary.group}': the outer sides of the two groups face away from "
             f"each other; is one of them the wrong face of its body{hint}?"
@@ -55,7 +55,7 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
 def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSide) -> None:
     """Raise ContactError if no facet of the secondary side of contact `name` faces the obstacle."""
     _check_normals(mesh, name, secondary)
-    centres, outward, _ = _facet_frames(mesh, secondary)
+    centres, outward, _ = _facet_geometry(mesh, secondary)
     _, normal, paired, _ = obstacle.facing(centres, Pose(np.zeros(mesh.dim)))
     cosine = np.einsum("id,id->i", outward, normal)[paired]
     if len(cosine) and (cosine >= 0).all():
@@ -77,7 +77,7 @@ def _check_normals(mesh: Mesh, name: str, side: Surface) -> None:
 
 
 def shared_facets(mesh: Mesh, group: str, other: str) -> Numbers:
-    """Return the nodes of the facets that two groups share, ascending; a mesh may contain a facet more than once."""
+    """Return the sorted nodes of the facets that two groups share; a mesh may contain a facet more than once."""
     facets_of_group, facets_of_other = mesh.cells_of(group, dim=mesh.dim - 1), mesh.cells_of(other, dim=mesh.dim - 1)
     nodes = [np.empty(0, np.int32)]
     for name in facets_of_group.keys() & facets_of_other.keys():
@@ -89,11 +89,11 @@ def shared_facets(mesh: Mesh, group: str, other: str) -> Numbers:
     return np.unique(np.concatenate(nodes))
 
 
-def _facet_frames(mesh: Mesh, side: Surface) -> tuple[Array, Array, Array]:
-    """Return centres, unit normals and sizes of about SAMPLE facets of each kind, given by their corners."""
+def _facet_geometry(mesh: Mesh, side: Surface) -> tuple[Array, Array, Array]:
+    """Return centres, unit normals and sizes of about SAMPLE facets of each element type, computed from their corners."""
     blocks = [(block.facets, elements.get(block.element).n_corners) for block in side.blocks]
     corners = [mesh.points[facets[:: max(1, len(facets) // SAMPLE), :n]] for facets, n in blocks]
-    centres = np.concatenate([of_block.mean(axis=1) for of_block in corners])
-    normals = np.concatenate([flat_area_vectors(of_block) for of_block in corners])
+    centres = np.concatenate([block_corners.mean(axis=1) for block_corners in corners])
+    normals = np.concatenate([flat_area_vectors(block_corners) for block_corners in corners])
     areas = np.linalg.norm(normals, axis=1)
     return centres, normals / areas[:, None], areas ** (1 / (mesh.dim - 1))

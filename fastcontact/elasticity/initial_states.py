@@ -22,7 +22,7 @@ ALWAYS: Table = ((-LARGEST, 1.0), (LARGEST, 1.0))
 
 @dataclass(frozen=True, eq=False)
 class InitialState:
-    """An initial stress or strain of groups of solid cells, or of all of them.
+    """An initial stress or strain of groups of solid cells, or of all solid cells.
 
     Attributes
     ----------
@@ -54,28 +54,28 @@ class InitialState:
         """Kind and groups, for messages."""
         return f"the initial {self.kind} of {listed(self.groups)}"
 
-    def values(self, name: str, rows: Indices, N: Array) -> Array:
-        """Return the components (n_rows, n, n_components) in the axes x, y and z, in cells of the element type `name`.
+    def values(self, element: str, rows: Indices, N: Array) -> Array:
+        """Return the components (n_rows, n, n_components) in the axes x, y and z, in cells of the type `element`.
 
         The components are stresses [pressure] or strains [-], and zero in cells of other groups. `rows` (n_rows,) of int
         contains the numbers of the cells, and `N` (n, n_nodes) [-] the shape functions at n points of a cell. ModelError if a
         component does not exist in the kinematics.
         """
         size = 6 if self.kinematics == "3d" else 4
-        is_member = np.isin(rows, self.cells.rows.get(name, ()))
+        is_member = np.isin(rows, self.cells.rows.get(element, ()))
         members = rows[is_member]
         values = np.zeros((len(members) * len(N), 6))
         for component, value in self.components.items():
-            values[:, component] = value.at(name, members, N) if isinstance(value, Varying) else value
+            values[:, component] = value.at(element, members, N) if isinstance(value, Varying) else value
         if self.axes is not None:
-            points = positions(self.cells.mesh, self.cells.mesh.cells[name][members], N)
+            points = positions(self.cells.mesh, self.cells.mesh.cells[element][members], N)
             rotation = rotations(frames(self.axes, points, self.kinematics))
             if self.kind == "strain":  # engineering strains transform by the inverse transpose
                 rotation = np.asarray(np.linalg.inv(rotation).transpose(0, 2, 1))
             values = np.einsum("nij,nj->ni", rotation, values)
-        # In plane stress the component zz is also out of plane: an initial strain zz is admissible, but a stress zz is not.
-        out_of_plane = [*range(size, 6), *([2] if (self.kind, self.kinematics) == ("stress", "plane_stress") else [])]
-        if np.abs(values[:, out_of_plane]).max(initial=0.0) > ROUND_OFF * np.abs(values).max(initial=0.0):
+        # In plane stress, an initial strain zz is admissible, but an initial stress zz is not.
+        inadmissible = [*range(size, 6), *([2] if (self.kind, self.kinematics) == ("stress", "plane_stress") else [])]
+        if np.abs(values[:, inadmissible]).max(initial=0.0) > ROUND_OFF * np.abs(values).max(initial=0.0):
             raise ModelError(
                 f"{self.name} has out-of-plane components, which {self.kinematics} does not have: change its axes"
             )
@@ -90,19 +90,19 @@ class InitialState:
 
 
 def initial_state(
-    kind: str, groups: tuple[str, ...] | None, cells: Cells, by_name: Mapping[str, Any], axes: Axes, kinematics: str,
+    kind: str, groups: tuple[str, ...] | None, cells: Cells, values: Mapping[str, Any], axes: Axes, kinematics: str,
     ramp: Table | None,
 ) -> InitialState:  # fmt: skip
-    """Return the initial state of a `kind` with components given by their names; ModelError if it is not admissible.
+    """Return the initial state of a `kind` with the `values` of its components by name; ModelError if it is not admissible.
 
     The other arguments are attributes of `InitialState`.
     """
     label = f"the initial {kind} of {listed(groups)}"
     components: dict[int, Any] = {}
-    for component in by_name:
+    for component in values:
         check_known(f"component of {label}", component, COMPONENTS, ModelError)
     for number, component in enumerate(COMPONENTS):
-        value = wrapped(by_name.get(component))
+        value = wrapped(values.get(component))
         if value is None:
             continue
         if number > 3 and kinematics != "3d":
@@ -121,14 +121,14 @@ def initial_state(
 
 @dataclass(frozen=True, eq=False)
 class StressOffset:
-    """Stress in cells in addition to that of the displacements: due to temperature, initial strains and initial stresses.
+    """Stress in addition to that caused by displacements, due to temperature, initial strains and initial stresses.
 
     Attributes
     ----------
     rise : ndarray (n_points,)
-        Temperature rise over the reference temperature [temperature].
+        Temperature rise above the reference temperature [temperature].
     expansion : ndarray (n_moduli, n_components)
-        Thermal strains per unit of temperature [1 / temperature].
+        Thermal strains per unit temperature rise, for each row of elastic moduli [1 / temperature].
     states : sequence of (float, InitialState)
         Initial stresses and strains, each with its multiplier.
     """
@@ -137,10 +137,10 @@ class StressOffset:
     expansion: Array
     states: Sequence[tuple[float, InitialState]] = ()
 
-    def initial(self, kind: str, name: str, rows: Indices, N: Array) -> Array | None:
+    def initial(self, kind: str, element: str, rows: Indices, N: Array) -> Array | None:
         """Return the sum of initial stresses [pressure] or strains [-], (n_rows, n, n_components); None if there are none.
 
         The `kind` is ``"stress"`` or ``"strain"``, and the other arguments are those of `InitialState.values`.
         """
-        values = [factor * state.values(name, rows, N) for factor, state in self.states if state.kind == kind]
+        values = [factor * state.values(element, rows, N) for factor, state in self.states if state.kind == kind]
         return np.asarray(np.sum(values, axis=0)) if values else None

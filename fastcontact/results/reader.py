@@ -30,8 +30,8 @@ from fastcontact.results.units import units_of_results
 # collection consists of a header of 16 bytes with its size and a sequence of objects, each of which has a header of 16 bytes.
 # Strings are read without the HDF5 library, which does not terminate for some damaged files.
 SIGNATURE = b"GCOL\x01\0\0\0"  # with version and reserved bytes
-HEAD = struct.Struct("<8sQ")  # header of a collection: signature, size
-OBJECT = struct.Struct("<H6xQ")  # header of an object: number, size; free space at the end has the number 0
+COLLECTION_HEADER = struct.Struct("<8sQ")  # header of a collection: signature, size
+OBJECT_HEADER = struct.Struct("<H6xQ")  # header of an object: number, size; free space at the end has the number 0
 REFERENCE = struct.Struct("<IQI")  # entry of a data set: length of the string, address of the collection, object number
 
 
@@ -48,11 +48,11 @@ def read_text(dataset: Any, raw: Any) -> str:
         raise ValueError(f"'{dataset.name}' is not a string")
     file_size = raw.seek(0, os.SEEK_END)
     length, offset, object_number = _unpack(REFERENCE, raw, start, file_size)
-    signature, size = _unpack(HEAD, raw, offset, file_size)
-    position, end = offset + HEAD.size, min(offset + size, file_size)
-    while signature == SIGNATURE and position + OBJECT.size <= end:
-        number, size = _unpack(OBJECT, raw, position, end)
-        position += OBJECT.size
+    signature, size = _unpack(COLLECTION_HEADER, raw, offset, file_size)
+    position, end = offset + COLLECTION_HEADER.size, min(offset + size, file_size)
+    while signature == SIGNATURE and position + OBJECT_HEADER.size <= end:
+        number, size = _unpack(OBJECT_HEADER, raw, position, end)
+        position += OBJECT_HEADER.size
         if number == object_number and length <= size and position + length <= end:
             return raw.read(length).decode("utf-8")
         if number in (0, object_number):
@@ -71,7 +71,7 @@ def _unpack(kind: struct.Struct, raw: Any, offset: int, end: int) -> tuple[Any, 
 if TYPE_CHECKING:
     import pandas
 
-# Columns of the row of a contact pair in which NaN stands for None.
+# In these columns of the table of steps of a contact pair, NaN stands for None.
 NAN_FOR_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent")
 
 
@@ -134,7 +134,7 @@ class Results(StepSequence):
     load_factors : ndarray (n_steps,)
         Load factor at the end of each step [-].
     units : dict of str to str
-        Names of units from the model or the case file, as described for `ContactResult`; empty without names.
+        Names of units from the model or the case file, as described for `ContactResult`; empty if none were given.
     warnings : tuple of str
         All distinct warnings of the run and of its steps.
     log : object
@@ -150,8 +150,8 @@ class Results(StepSequence):
         """Open the file.
 
         Changes in the journal, which a power loss may have interrupted, are applied to the data that are read, but not to the
-        file. They are ignored while another program writes to the file, unless `repeat` is true, which states that no other
-        program does.
+        file. They are ignored while another program writes to the file. With `repeat`, the caller states that no other
+        program does, and they are always applied.
         """
         import h5py
 
@@ -160,14 +160,14 @@ class Results(StepSequence):
             raise FileError(f"'{path}' is not readable: ask its owner for read permission")
         if not h5py.is_hdf5(self.path):
             raise FileError(f"'{path}' is not an HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
-        # The file is opened by a separate file object. By name, HDF5 would reuse an open file with its cached state.
+        # The file is opened by a separate file object. Given its name, HDF5 would reuse an open file with its cached state.
         self._raw: Any = open(path, "rb")  # noqa: SIM115
         self._file: Any = None
         try:
             writes = journal.pending(self._raw) if not is_being_written(self.path) or repeat else []
             if writes:
                 self._raw = journal.JournalView(self._raw, writes)
-            with self._readable_errors():
+            with self._as_file_errors():
                 self._file = h5py.File(self._raw, "r")
                 self._read_header(self._checked_group())
         except BaseException:
@@ -204,7 +204,7 @@ class Results(StepSequence):
         self.log: Any = (run or {}).get("log")
         self.error: str = (run or {}).get("error", "")
         self.complete = run is not None and not self.error
-        notes = [self._notes(number) for number in range(self._n_steps)]
+        notes = [self._notes_of_step(number) for number in range(self._n_steps)]
         self.case_text = next((note["case"] for note in reversed(notes) if "case" in note), self.case_text)
         step_warnings = [text for note in notes for text in note["warnings"]]
         unit_names = _read_json(group["units"], self._raw) if "units" in group else self._units_of_case()
@@ -220,7 +220,7 @@ class Results(StepSequence):
         rows = group["runs"][-1:]
         if not len(rows) or rows["n_steps"][0] != self._n_steps or not rows["count"][0]:
             return None
-        return self._note(int(rows["first"][0]), int(rows["count"][0]))
+        return self._record(int(rows["first"][0]), int(rows["count"][0]))
 
     def __len__(self) -> int:
         return self._n_steps
@@ -333,18 +333,18 @@ class Results(StepSequence):
             return {}
         return {key: str(value) for key, value in unit_names.items()} if isinstance(unit_names, dict) else {}
 
-    def _notes(self, number: int) -> dict[str, Any]:
+    def _notes_of_step(self, number: int) -> dict[str, Any]:
         row = self._rows[number]
-        return self._note(int(row["notes_first"]), int(row["notes_count"]))
+        return self._record(int(row["notes_first"]), int(row["notes_count"]))
 
-    def _note(self, first: int, count: int) -> dict[str, Any]:
+    def _record(self, first: int, count: int) -> dict[str, Any]:
         return json.loads(self._file["fastcontact/notes"][first : first + count].tobytes())
 
     def _step(self, number: int) -> StepResult:
         if not self._file:
             raise FileError(f"'{self.path}' is closed: open it again to read more steps")
-        with self._readable_errors():
-            notes, stored = self._notes(number), self.point_field_names
+        with self._as_file_errors():
+            notes, stored = self._notes_of_step(number), self.point_field_names
             return StepResult(
                 index=int(self._rows["index"][number]),
                 load_factor=float(self._rows["load_factor"][number]),
@@ -424,7 +424,7 @@ class Results(StepSequence):
         return contacts
 
     @contextlib.contextmanager
-    def _readable_errors(self) -> Iterator[None]:
+    def _as_file_errors(self) -> Iterator[None]:
         """Convert errors of HDF5, and errors due to damaged data, to a FileError."""
         try:
             yield
@@ -495,7 +495,7 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     primary_forces: dict[str, Any] = {}
     if "primary_first" in step.dtype.names:
         table = _rows(pair["primary"], step, "primary_", f"the table of primary forces of '{name}'")
-        primary_forces = {f"primary_{name}": np.ascontiguousarray(table[name]) for name in ("points", "force_vectors")}
+        primary_forces = {f"primary_{key}": np.ascontiguousarray(table[key]) for key in ("points", "force_vectors")}
     return ContactResult(name=name, formulation=formulation, **resultants, **primary_forces, **columns)
 
 

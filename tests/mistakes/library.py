@@ -389,7 +389,7 @@ CONTACT = [
     Mistake("a support that pushes a corner into an obstacle", lambda: solved(corner_pushed()), fc.FastcontactWarning,
             r"supports push 1 of the 3 nodes of 'TOP' into the rigid obstacle, contact 'plane', by up to 0\.01 \(point \d+ at \(0, 1\), instant 1\): contact forces cannot change what supports prescribe; leave these nodes out of the support, or out of the contact \('excluded'\)"),
     Mistake("a penetration larger than an element", lambda: solved(blocks(changed(shift=-2.0))), fc.ContactError,
-            r"no facet of 'CONT_UPPER' faces 'CONT_LOWER': the outer sides of the two groups face away from each other; is one of them the wrong face of its body, or do the bodies lie inside each other, by 2 or more\?"),
+            r"no facet of 'CONT_UPPER' faces 'CONT_LOWER': the outer sides of the two groups face away from each other; is one of them the wrong face of its body, or do the bodies overlap, by 2 or more\?"),
     Mistake("an obstacle with reversed orientation", lambda: solved(with_obstacle(1.0, (0.0, 1.0))), fc.ContactError,
             r"the rigid obstacle of contact 'plane' faces in the same direction as 'TOP', so that they cannot touch: reverse its normal or its facets, or name another face of the body"),
     Mistake("an obstacle deep in the body", lambda: solved(with_obstacle(0.2)), fc.ContactError,

@@ -89,7 +89,7 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
         raise axes.refuse(f"distribution '{axes.distribution[:80]}' is not defined")
     scopes = [scope for scope in assembly.scopes if assembly.part(scope) is axes.part]
     default, frame_of = None, {}  # type: Array | None, dict[int, Array]
-    for row in block.each():
+    for row in block.iter_rows():
         points = tuple(row.number(index) for index in range(1, 7))
         frame = local_axes(Axes(row.location, "", False, points), np.zeros(3))
         if not row.text(0):

@@ -12,13 +12,13 @@ from typing import Any, NamedTuple, TypeVar
 from fastcontact.errors import CaseError, FastcontactError, FileError
 
 # Largest size [byte] and largest number of files of a deck with all included files. A larger deck is treated as an error.
-LARGEST = 1 << 28
-MOST_FILES = 200
+MAX_SIZE = 1 << 28
+MAX_FILES = 200
 # Largest number of characters of a line, or of a keyword with its continuation lines. Abaqus and CalculiX allow far fewer.
 LONGEST_LINE = 1 << 16
 _TOO_LONG = f"the line has more than {LONGEST_LINE} characters: break it between two entries"
 LONGEST_QUOTED = 80  # length to which messages cut names and entries
-LARGEST_WHOLE = 1 << 53  # every integer up to this one is exact in double precision
+LARGEST_INTEGER = 1 << 53  # every integer up to this one is exact in double precision
 Entry = TypeVar("Entry")
 
 
@@ -73,7 +73,7 @@ class Row(Item):
     def number(self, index: int, default: float | None = None) -> float:
         """Return an entry as a number, or `default` if it is empty.
 
-        Raises CaseError if it is not a number or has no default.
+        Raises CaseError if the entry is not a number, or is empty without a default.
         """
         text = self.text(index)
         if not text:
@@ -82,10 +82,10 @@ class Row(Item):
             return default
         return as_number(self.location, text)
 
-    def whole(self, index: int, default: int | None = None) -> int:
+    def integer(self, index: int, default: int | None = None) -> int:
         """Return an entry as an integer. Raises CaseError as for `number`, and if the entry is not an integer."""
         value = self.number(index, default)
-        if value != int(value) or abs(value) > LARGEST_WHOLE:
+        if value != int(value) or abs(value) > LARGEST_INTEGER:
             raise self.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is not a whole number")
         return int(value)
 
@@ -131,15 +131,15 @@ class Block(Item):
     @property
     def rows(self) -> list[Row]:
         """The data lines that are not empty."""
-        return list(self.each())
+        return list(self.iter_rows())
 
-    def each(self) -> Iterator[Row]:
+    def iter_rows(self) -> Iterator[Row]:
         """Return an iterator over the data lines that are not empty."""
         return (row for row in self.lines if any(row.entries))
 
     def numbers(self) -> list[float]:
         """Return the numbers in all data lines. Raises CaseError if an entry is not a number."""
-        return [row.number(i) for row in self.each() for i, text in enumerate(row.entries) if text]
+        return [row.number(i) for row in self.iter_rows() for i, text in enumerate(row.entries) if text]
 
     def only(self, variable: str = "") -> Row:
         """Return the only data line. Raises CaseError unless there is exactly one.
@@ -174,7 +174,7 @@ class Block(Item):
 
 @dataclass
 class Source:
-    """State of reading a deck: its folder, the size [byte] and the paths of the files read so far, and the open files."""
+    """State of the reader: folder of the deck, size [byte] and paths of the files read so far, and files that are open."""
 
     folder: Path
     size: int = 0
@@ -207,12 +207,12 @@ def key_of(name: str) -> str:
 
 
 def read_blocks(path: Path) -> Iterator[Block]:
-    """Return an iterator over the blocks of a deck, in which the blocks of a file replace its *INCLUDE.
+    """Return an iterator over the blocks of a deck, with each *INCLUDE replaced by the blocks of its file.
 
     Raises
     ------
     FileError
-        If a file cannot be read, or if the files are too many or too large.
+        If a file cannot be read, or if there are too many files or they are too large.
     CaseError
         If a line is invalid or the file of an *INCLUDE is not accepted; the message names file and line.
     """
@@ -237,15 +237,15 @@ class _Line(NamedTuple):
 
 
 def _contents(path: Path, source: Source) -> bytes:
-    """Return the contents of a file with Unix line ends.
+    """Return the contents of a file with Unix line endings.
 
     Raises FileError if it cannot be read or the deck becomes too large.
     """
     source.files.append(path)
     try:
         source.size += path.stat().st_size
-        if source.size > LARGEST or len(source.files) > MOST_FILES:
-            raise FileError(f"'{path}' and its included files have more than {LARGEST >> 20} MiB or {MOST_FILES} files")
+        if source.size > MAX_SIZE or len(source.files) > MAX_FILES:
+            raise FileError(f"'{path}' and its included files have more than {MAX_SIZE >> 20} MiB or {MAX_FILES} files")
         contents = path.read_bytes().removeprefix(BOM_UTF8)
     except OSError as error:
         raise FileError(f"cannot read '{path}': {error.strerror or error}") from error
@@ -319,7 +319,7 @@ def _keyword(line: str) -> str:
 
 
 def _entries(line: str) -> list[str]:
-    """Return the entries of a line without surrounding blanks, which commas outside quotation marks separate."""
+    """Return the entries of a line, which are separated by commas outside quotation marks, without surrounding blanks."""
     if '"' not in line:
         return [entry.strip() for entry in line.split(",")]
     entries = [""]
@@ -347,7 +347,7 @@ def _parameters(location: Location, line: str) -> dict[str, str | None]:
 
 
 def _read_include(block: Block, name: str, source: Source) -> Iterator[Block]:
-    """Yield the blocks of the file of an *INCLUDE.
+    """Yield the blocks of an included file.
 
     Raises CaseError unless the file exists in the folder of the deck or below.
     """
@@ -394,7 +394,7 @@ def register(kind: str, name: str, table: dict[str, Entry], entry: Entry, at: Lo
 
 
 def look_up(kind: str, name: str, table: Mapping[str, Any], at: Location | Located) -> Any:
-    """Return the entry of a table with a name. Raises CaseError, with the names of all entries, if there is none."""
+    """Return an entry of a table by its name. Raises CaseError, with the names of all entries, if there is none."""
     if key_of(name) not in table:
         names = ", ".join(entry.name for entry in table.values()) or "none"
         raise at.refuse(f"{kind} '{name}' is not defined; {kind.rpartition(' ')[2]}s: {names}")

@@ -100,7 +100,7 @@ class Conditions:
         elif keyword == "CLOAD":
             self.forces.record(condition, self._forces(block))
         else:
-            entries = ((targets(self.assembly, row), row.number(2), row.location) for row in block.each())
+            entries = ((targets(self.assembly, row), row.number(2), row.location) for row in block.iter_rows())
             self.loads.record(condition, entries)
 
     def _update_periods(self, number: int) -> None:
@@ -144,7 +144,7 @@ class Conditions:
             self.supports.remove_earlier()
             self.heat.temperatures.remove_earlier()
         driven = False
-        for row in block.each():
+        for row in block.iter_rows():
             if row.text(1) == "11":
                 self.heat.prescribe(condition, row)
                 continue
@@ -153,8 +153,8 @@ class Conditions:
             if row.text(1).upper() in ("XASYMM", "YASYMM", "ZASYMM"):
                 raise row.refuse(f"{row.text(1)} is not supported: give the components")
             if components is None:
-                first = row.whole(1)
-                last, value = row.whole(2, first), row.number(3, 0.0)
+                first = row.integer(1)
+                last, value = row.integer(2, first), row.number(3, 0.0)
                 if not 1 <= first <= last <= 6:
                     raise row.refuse(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
                 components = tuple(range(first, last + 1))
@@ -208,8 +208,8 @@ class Conditions:
 
     def _forces(self, block: Block) -> Iterator[tuple[list[Component], float, Location]]:
         """Yield the components, the value [force] and the location of each line of a *CLOAD block."""
-        for row in block.each():
-            component, value = row.whole(1), row.number(2)
+        for row in block.iter_rows():
+            component, value = row.integer(1), row.number(2)
             points = self.assembly.nodes(row.text(0), row.location)
             names = [self._component(point, component) if 1 <= component <= 6 else None for point in points]
             if None in names:

@@ -226,7 +226,7 @@ def contact_pair(content: Content, block: Block) -> None:
 
 def _sides(block: Block, kind: str) -> Iterator[tuple[Location, str, str]]:
     """Yield the location of each data line with the names of its secondary and its primary surface."""
-    for row in block.each():
+    for row in block.iter_rows():
         if len([entry for entry in row.entries if entry]) != 2:
             raise row.refuse(f"{kind} needs two surfaces, the secondary and the primary one")
         yield row.location, unquoted(row.text(0)), unquoted(row.text(1))
@@ -265,9 +265,9 @@ def tie(content: Content, block: Block) -> None:
 
 def equation(content: Content, block: Block) -> None:
     """Read *EQUATION: the number of terms, then the node, component and coefficient of each term."""
-    rows = block.each()
+    rows = block.iter_rows()
     for first in rows:
-        count = first.whole(0)
+        count = first.integer(0)
         terms: list[tuple[str, int, float]] = []
         if not 1 <= count <= MOST_TERMS:
             raise first.refuse(f"an equation cannot have {count} terms")
@@ -276,7 +276,7 @@ def equation(content: Content, block: Block) -> None:
             if row is None:
                 break
             starts = (start for start in range(0, len(row.entries), 3) if row.text(start))
-            terms += [(row.text(start), row.whole(start + 1), row.number(start + 2)) for start in starts]
+            terms += [(row.text(start), row.integer(start + 1), row.number(start + 2)) for start in starts]
         if len(terms) != count:
             raise first.refuse(f"the equation has {len(terms)} terms, {count} are announced")
         content.equations.append(Equation(first.location, tuple(terms)))
@@ -289,7 +289,7 @@ def multi_point(content: Content, block: Block) -> None:
     PLANE, STRAIGHT and MEANROT continue on lines that begin with a number.
     """
     started: list[tuple[Row, str, list[str]]] = []
-    for row in block.each():
+    for row in block.iter_rows():
         kind, nodes = row.text(0).upper(), [unquoted(entry) for entry in row.entries[1:] if entry]
         if kind.isdecimal() and started:
             started[-1][2].extend([*([row.text(0)] if int(kind) else []), *nodes])
@@ -317,8 +317,8 @@ def rigid_body(content: Content, block: Block) -> None:
 def coupling(content: Content, block: Block, inner: Block) -> None:
     """Read *COUPLING (`block`) with its *KINEMATIC or *DISTRIBUTING (`inner`)."""
     components: set[int] = set()
-    for row in inner.each():
-        first, last = row.whole(0), row.whole(1, row.whole(0))
+    for row in inner.iter_rows():
+        first, last = row.integer(0), row.integer(1, row.integer(0))
         if not 1 <= first <= last <= 6:
             raise row.refuse(f"the components {first} to {last} are not within 1 to 6")
         components.update(range(first, last + 1))

@@ -35,7 +35,7 @@ def initial_temperatures(assembly: Assembly, blocks: Iterable[Block]) -> dict[in
 
 def temperatures_of_block(assembly: Assembly, block: Block) -> Iterator[tuple[list[int], float, Location]]:
     """Yield each point of a block with its temperature and the location of the data line."""
-    for row in block.each():
+    for row in block.iter_rows():
         if any(row.entries[2:]):
             raise row.refuse("temperature gradients exist in beams and shells only: give a single temperature")
         value = row.number(1)
@@ -90,7 +90,7 @@ def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
     starts = starts_of(model.mesh.solids)
     values = np.zeros((sum(map(len, model.mesh.solids.values())), len(names)))
     for block in content.initial_stresses:
-        for row in block.each():
+        for row in block.iter_rows():
             if len(row.entries) != 1 + len(names):
                 raise row.refuse(
                     f"{len(row.entries)} entries, but {1 + len(names)} are needed: an element or a set, and the components "
@@ -208,14 +208,14 @@ class HeatConditions:
         """Record a block of heat loads of the current step."""
         keyword = condition.block.keyword
         histories: dict[str, Histories[Any]] = {"CFLUX": self.powers, "FILM": self.films, "SFILM": self.films}
-        entries = ((list(self._names(row)), row.number(2), row.location) for row in condition.block.each())
+        entries = ((list(self._names(row)), row.number(2), row.location) for row in condition.block.iter_rows())
         histories.get(keyword, self.fluxes).record(condition, entries)
 
     def _names(self, row: Row) -> Iterator[int | Target]:
         """Yield the points or the targets of a line of a heat load, and remove the films that it replaces."""
         keyword = row.location.keyword
         if keyword == "CFLUX":
-            if row.whole(1, TEMPERATURE) not in (0, TEMPERATURE):
+            if row.integer(1, TEMPERATURE) not in (0, TEMPERATURE):
                 raise row.refuse(f"degree of freedom {row.text(1)} is not 11, the temperature")
             yield from self._points_of_solids(row)
             return

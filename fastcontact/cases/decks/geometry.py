@@ -22,8 +22,8 @@ def nodes(content: Content, part: Part, block: Block) -> None:
     if block.get("SYSTEM", "R").upper() != "R":
         raise block.refuse(f"SYSTEM={block.get('SYSTEM')} is not supported: give rectangular coordinates")
     numbers = array("q")
-    for row in block.each():
-        number = row.whole(0)
+    for row in block.iter_rows():
+        number = row.integer(0)
         if len(row.entries) > 4 and any(row.entries[4:]):
             raise row.refuse(f"node {number} has more than three coordinates")
         position = array("d", (row.number(1, 0.0), row.number(2, 0.0), row.number(3, 0.0)))
@@ -52,8 +52,8 @@ def cells(content: Content, part: Part, block: Block) -> None:
         content.note(block, f"{name}: {kind.note}")
     members = array("q")
     for row in _element_rows(block, n_nodes):
-        number = row.whole(0)
-        connectivity = array("q", (row.whole(i) for i, entry in enumerate(row.entries) if i and entry))
+        number = row.integer(0)
+        connectivity = array("q", (row.integer(i) for i, entry in enumerate(row.entries) if i and entry))
         if len(connectivity) != n_nodes:
             raise row.refuse(f"element {number} of type {name} has {len(connectivity)} nodes, {n_nodes} are needed")
         if number in part.cells:
@@ -67,7 +67,7 @@ def cells(content: Content, part: Part, block: Block) -> None:
 def _element_rows(block: Block, n_nodes: int) -> Iterator[Row]:
     """Yield the data of each element, which may continue on several lines, as one row at the location of the first line."""
     element_row: Row | None = None
-    for row in block.each():
+    for row in block.iter_rows():
         element_row = row if element_row is None else Row(element_row.location, element_row.entries + row.entries)
         incomplete = len(element_row.entries) < n_nodes + 1
         if not (incomplete and (row.continued or (n_nodes >= LONG and len(row.entries) >= 8))):
@@ -81,9 +81,9 @@ def group(content: Content, part: Part, block: Block) -> None:
     """Read *NSET or *ELSET: a node set or an element set. Raises CaseError if a range of GENERATE is empty."""
     name, instance = block.required(block.keyword), key_of(block.get("INSTANCE"))
     entries: list[Members] = []
-    for row in block.each():
+    for row in block.iter_rows():
         if "GENERATE" in block.parameters:
-            first, last, increment = row.whole(0), row.whole(1), row.whole(2, 1)
+            first, last, increment = row.integer(0), row.integer(1), row.integer(2, 1)
             if increment < 1 or last < first:
                 raise row.refuse(f"the range {first} to {last} by {increment} is empty: it must ascend")
             entries.append(Members(row.location, range(first, last + 1, increment), instance=instance))
@@ -101,7 +101,7 @@ def surface(content: Content, part: Part, block: Block) -> None:
     name, kind = block.required("NAME"), block.choice("TYPE", ("ELEMENT", "NODE"))
     definition = Surface(name, block.location, kind == "NODE")
     register("surface", name, part.surfaces, definition, block)
-    for row in block.each():
+    for row in block.iter_rows():
         label = row.text(1).upper()
         if not definition.of_nodes and label and not (label[0] == "S" and label[1:].isdigit()):
             raise row.refuse(f"face '{row.text(1)[:40]}' is not supported: faces of solids are S1, S2, ...")

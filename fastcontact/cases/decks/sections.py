@@ -60,7 +60,7 @@ class Locks:
         self.number = number
         if not any(condition.new for condition in supports):
             return
-        rows = [row for condition in supports for row in condition.block.each()]
+        rows = [row for condition in supports for row in condition.block.iter_rows()]
         points = {point for row in rows for point in assembly.nodes(row.text(0), row.location)}
         for point in self.begins:
             if point not in points:

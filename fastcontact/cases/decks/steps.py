@@ -57,7 +57,7 @@ def frequency(content: Content, step: Step, block: Block) -> None:
     """Read *FREQUENCY: the number of modes, which is 10 by default."""
     if step.has_procedure or step.n_modes:
         raise block.refuse("a step has either *STATIC or one *FREQUENCY")
-    number = block.rows[0].whole(0, 10) if block.rows else 10
+    number = block.rows[0].integer(0, 10) if block.rows else 10
     if number < 1:
         raise block.rows[0].refuse("the number of modes must be at least 1")
     step.n_modes = number

@@ -20,7 +20,7 @@ from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.hierarchy import Hierarchy, Level
-from fastcontact.linear.multigrid.local_change import LocalChange, SymmetricChange, merged
+from fastcontact.linear.multigrid.local_change import LocalChange, SymmetricChange, sum_of_changes
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, composed, followers
 from fastcontact.linear.springs import Springs
@@ -90,10 +90,10 @@ class ConstrainedHierarchy:
             return
         diagonals = [change.diagonal() for change in changes]
         stiffened = None if elimination is None else self._stiffened(diagonals[0], elimination)
-        self._change_diagonal(finest, merged(*diagonals))
+        self._change_diagonal(finest, sum_of_changes(*diagonals))
         if elimination is not None and stiffened is not None and len(stiffened):
             changes = self._exchange_roles(elimination, springs, stiffened, diagonals[1:])
-        change = merged(*(change.on_coarse(finest.P) for change in changes))
+        change = sum_of_changes(*(change.on_coarse(finest.P) for change in changes))
         for level in self.hierarchy.levels[1:]:
             if level.P is None:
                 self.hierarchy.coarse.set(change.on_all_nodes(level.n))

@@ -48,15 +48,15 @@ class LocalChange:
     def rows(self, dtype: DTypeLike) -> tuple[Any, ...]:
         """Return the change as block rows: `nodes`, `indptr`, `indices` and `data` as in `BlockMatrix`.
 
-        `indices` are numbers of nodes of the complete matrix. `dtype` is the data type of `data`, which is a tuple of one.
+        `indices` are numbers of nodes of the complete matrix. `dtype` is the data type of `data`, a tuple of one array.
         """
         columns = self.nodes[self.blocks.indices].astype(np.int32)
         return self.nodes, self.blocks.indptr, columns, (self.blocks.data.astype(dtype).ravel(),)
 
     def coarser(self, P: BlockMatrix) -> LocalChange:
         """Return the Galerkin product ``P.T change P``, the change of the next coarser matrix with the prolongator P."""
-        coarse_nodes, rows = restriction(P, self.nodes)
-        product = bsr_array(rows.T @ self.blocks @ rows)
+        coarse_nodes, P_rows = rows_of_prolongator(P, self.nodes)
+        product = bsr_array(P_rows.T @ self.blocks @ P_rows)
         product.sort_indices()
         return LocalChange(coarse_nodes, product)
 
@@ -65,7 +65,7 @@ class LocalChange:
         return self.on_nodes(np.arange(n // self.size)).tocsc()
 
     def on_nodes(self, nodes: Indices) -> bsr_array:
-        """Return `blocks` with zero rows and columns added for a superset `nodes` (l,), in ascending order."""
+        """Return `blocks` with zero rows and columns added for `nodes` (l,), an ascending superset of the nodes."""
         index = np.searchsorted(nodes, self.nodes)
         count = np.zeros(len(nodes), np.intp)
         count[index] = np.diff(self.blocks.indptr)
@@ -73,7 +73,7 @@ class LocalChange:
         return bsr_array((self.blocks.data, index[self.blocks.indices], np.r_[0, np.cumsum(count)]), shape=(n, n))
 
 
-def merged(change: LocalChange, *others: LocalChange) -> LocalChange:
+def sum_of_changes(change: LocalChange, *others: LocalChange) -> LocalChange:
     """Return the sum of several changes of the same matrix."""
     for other in others:
         nodes = np.union1d(change.nodes, other.nodes)
@@ -83,7 +83,7 @@ def merged(change: LocalChange, *others: LocalChange) -> LocalChange:
     return change
 
 
-def restriction(P: BlockMatrix, nodes: Indices) -> tuple[Indices, bsr_array]:
+def rows_of_prolongator(P: BlockMatrix, nodes: Indices) -> tuple[Indices, bsr_array]:
     """Return the coarse nodes (l,) that P connects with `nodes` (k,), and P between them, in double precision."""
     rows, cols = len(P.rows), len(P.cols)
     count = np.diff(P.indptr)[nodes]
@@ -150,9 +150,9 @@ class SymmetricChange:
     def on_coarse(self, P: BlockMatrix) -> LocalChange:
         """Return the Galerkin product ``P.T (D.T G + G.T D) P`` with the prolongator P."""
         nodes = np.unique(np.concatenate([self.D.indices, self.G.indices]) // self.size)
-        coarse_nodes, R = restriction(P, nodes)
+        coarse_nodes, P_rows = rows_of_prolongator(P, nodes)
         dofs = (nodes[:, None] * self.size + np.arange(self.size)).ravel()
-        DP, GP = (rows[:, dofs].tobsr((1, self.size)) @ R for rows in (self.D, self.G))
+        DP, GP = (rows[:, dofs].tobsr((1, self.size)) @ P_rows for rows in (self.D, self.G))
         half = bsr_array(DP.T @ GP)
         total = bsr_array(half + half.T)
         total.sort_indices()

@@ -31,7 +31,7 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
     ----------
     mesh : Mesh
     names : mapping or callable
-        New names by old names. Groups whose names a mapping does not contain keep them; the new name None removes the
+        New names by old names. Groups that are not keys of a mapping keep their names; the new name None removes a
         group. Groups with the same new name are united.
 
     Returns
@@ -58,7 +58,7 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
 
 @typed(MeshError)
 def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None) -> Mesh:
-    """Return the mirror image of a mesh, whose cells and facets are oriented positively again.
+    """Return the mirror image of a mesh, in which nodes are reordered to keep cells and facets positively oriented.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
     [0.0, 0.0]
     """
     if not number("scale", scale) > 0.0:
-        raise MeshError(f"scale = {scale:g} is out of range: it must be greater than 0 (reflect with mirrored)")
+        raise MeshError(f"scale = {scale:g} is out of range: it must be greater than 0 (use mirrored for a reflection)")
     points = mesh.points * scale
     if number("rotate", rotate) != 0.0:
         if mesh.dim != 2:
@@ -163,8 +163,8 @@ def union(*meshes: Mesh) -> Mesh:
         raise MeshError("union needs at least one mesh")
     if len({mesh.dim for mesh in meshes}) > 1:
         raise MeshError(f"union needs meshes of one dimension, not {[mesh.dim for mesh in meshes]}")
-    first_points = np.cumsum([0] + [mesh.n_points for mesh in meshes])[:-1]
-    shifted = list(zip(meshes, first_points, strict=True))
+    first_numbers = np.cumsum([0] + [mesh.n_points for mesh in meshes])[:-1]
+    shifted = list(zip(meshes, first_numbers, strict=True))
     cells = _by_name({name: block + shift for name, block in mesh.cells.items()} for mesh, shift in shifted)
     starts = starts_of(cells)
     numbers = [(mesh, _renumbering(mesh, starts)) for mesh in meshes]
@@ -240,7 +240,7 @@ def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
         collapsed = np.flatnonzero((nodes[:, 1:] == nodes[:, :-1]).any(axis=1))
         if len(collapsed):
             raise MeshError(
-                f"tolerance = {tolerance:g} welds two nodes of cell {mesh.offsets[name] + collapsed[0]} ({name}): "
+                f"tolerance = {tolerance:g} merges two nodes of cell {mesh.offsets[name] + collapsed[0]} ({name}): "
                 "it must be smaller than the shortest edge"
             )
     point_groups = {name: target[members] for name, members in mesh.point_groups.items()}
@@ -254,7 +254,7 @@ def with_points_at(mesh: Mesh, positions: Mapping[str, Sequence[float]]) -> Mesh
 
 
 def with_cells_inside(mesh: Mesh, name: str, group: str, inside: Callable[[Array], Mask]) -> Mesh:
-    """Return the mesh with a cell group called `name`, which contains the cells of `group` with all nodes in a region.
+    """Return the mesh with a cell group called `name`, which contains the cells of `group` whose nodes all lie in a region.
 
     The function `inside` (n,) of positions (n, dim) [length] returns whether they are in the region.
     """

@@ -69,7 +69,7 @@ def started(monkeypatch):
     monkeypatch.setattr(ahead.decorators, "threads", lambda: 2)
     monkeypatch.setattr(ahead.kernel_files, "files", {len: None})
     monkeypatch.setattr(compiling, "count", 0)
-    monkeypatch.setattr(compiling, "helpers", [])
+    monkeypatch.setattr(compiling, "helper_requests", [])
     monkeypatch.setattr(compiling, "waiters", [])
     monkeypatch.setattr(compiling, "listeners", [])
     monkeypatch.setattr(ahead, "_runs_with_helpers", set())
@@ -122,7 +122,7 @@ def test_no_help(started, monkeypatch, spoilt):
     monkeypatch.setattr(compiling, "count", 100)
     ahead.expect(["2d"])
     assert started == []
-    assert compiling.helpers == []
+    assert compiling.helper_requests == []
 
 
 class Process:

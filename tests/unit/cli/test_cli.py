@@ -316,8 +316,8 @@ def test_kernels_are_compiled_on_request(capsys):
 @pytest.mark.parametrize(
     ("helper", "end"),
     [
-        ("print(0); raise SystemExit('no memory')", "with exit code 1, 1 of {} kernels begun: no memory"),
-        ("import os; os.kill(os.getpid(), 9)", "by SIGKILL, 0 of {} kernels begun: the memory may have been full"),
+        ("print(0); raise SystemExit('no memory')", "with exit code 1 after starting 1 of {} kernels: no memory"),
+        ("import os; os.kill(os.getpid(), 9)", "on SIGKILL after starting 0 of {} kernels: perhaps out of memory"),
     ],
 )
 def test_a_warm_up_tells_what_failed(helper, end, monkeypatch, capsys):
