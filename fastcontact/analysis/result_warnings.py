@@ -433,14 +433,15 @@ def oscillating(pair: Formulation, contact: ContactResult, model: Model) -> Iter
     """Yield a warning where pressures of nodes whose neighbours are all closed oscillate by a large fraction of their mean.
 
     Open nodes between closed ones count as closed with zero pressure: with wear, every second node may be open.
-    The measure is the median of the differences from the mean of the neighbours, each over this mean. On rings of tri3 cells
-    4.6 times as deep as wide it is 0.30, with pressure errors of 0.16 to 0.27; on wider ones 0.16 (0.09 to 0.13), on
-    quadrangles 0.002; under punches of hex8 and tet4, whose pressures are singular at the edges, 0.10 to 0.12, and under a
-    wearing hex8 sole 0.22. On quadratic facets, the neighbours of corners are the other nodes and vice versa, see
-    `_alternation_matrix`. On rings of quad8 and tri6 cells it is 0.15 or more with pressure errors of 0.14 to 1, and less
-    with errors of up to 0.2, or 0.4 where meshes nearly match: errors then vary along the side, which the median does not
-    show. On a stiff quad8 strip on a soft base with larger facets it is 0.14 with errors of 0.4, and under punches of quad8
-    and tri6 cells with singular edges 0.07 or less. On coarse faces of hex20 under an elastic punch it is up to 0.18.
+    The measure is the median of the differences from the mean of the neighbours, each over the local mean, half the sum of
+    the two, which is not zero where only the neighbours are open. On rings of tri3 cells 4.6 times as deep as wide it is
+    0.30, with pressure errors of 0.16 to 0.27; on wider ones 0.16 (0.09 to 0.13), on quadrangles 0.002; under punches of
+    hex8 and tet4, whose pressures are singular at the edges, 0.10 to 0.12, and under a wearing hex8 sole 0.22. On quadratic
+    facets, the neighbours of corners are the other nodes and vice versa, see `_alternation_matrix`. On rings of quad8 and
+    tri6 cells it is 0.15 or more with pressure errors of 0.14 to 1, and less with errors of up to 0.2, or 0.4 where meshes
+    nearly match: errors then vary along the side, which the median does not show. On a stiff quad8 strip on a soft base with
+    larger facets it is 0.14 with errors of 0.4, and under punches of quad8 and tri6 cells with singular edges 0.07 or less.
+    On coarse faces of hex20 under an elastic punch it is up to 0.18.
 
     Sides that never separate or that adhere carry tension as well. Their mean may be zero or round-off and is not used.
     """
@@ -455,7 +456,7 @@ def oscillating(pair: Formulation, contact: ContactResult, model: Model) -> Iter
         return
     pressure, mean = contact.pressure[inside], (others @ contact.pressure)[inside] / count[inside]
     difference = np.abs(pressure - mean)
-    ratio = float(np.median(difference / np.maximum(mean, TINY)))
+    ratio = float(np.median(difference / np.maximum(0.5 * (pressure + mean), TINY)))
     limit = ALTERNATING_ON_LINES if side.order == 2 and pair.points.shape[1] == 2 else ALTERNATING
     if ratio <= limit or not pressure.mean() > 0.0:
         return

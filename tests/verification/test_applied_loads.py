@@ -481,7 +481,8 @@ def test_a_sub_model_follows_the_stages_of_the_global_model():
         return model
 
     block, half = model(1.0, 4), model(0.5, 2)
-    block.prescribe("TOP", x=[(0.5, 0.0), (1.0, lambda x: 0.004 - 0.001 * x[:, 0])], y=[(0.5, -0.01), (1.0, -0.008)])
+    heights = np.array([(0.5, -0.01), (1.0, -0.008)])  # an array of pairs serves as well as a list
+    block.prescribe("TOP", x=[(0.5, 0.0), (1.0, lambda x: 0.004 - 0.001 * x[:, 0])], y=heights)
     steps = fc.solve(block, 4)
     cut, top = np.flatnonzero(block.mesh.points[:, 1] == 0.5), half.mesh.points_of("TOP")
     order = np.argsort(block.mesh.points[cut, 0])

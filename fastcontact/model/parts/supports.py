@@ -6,7 +6,7 @@ A `Value` is a number, or a function from reference positions (n, dim) [length] 
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -182,7 +182,7 @@ class ModelSupports(ModelContact):
         for axis, value in axes_of(f"the support of '{group}'", components, self.mesh.dim).items():
             name = displacement_name("xyz"[axis], group)
             table = table_of(ramp, f"the ramp of the displacement prescribed on '{group}'")
-            if isinstance(value, Sequence):
+            if isinstance(value, Iterable):
                 if table is not None or rotation is not None:
                     raise ModelError(f"{name} is given at several load factors: leave out ramp and rotation")
                 value = tuple((float(instant), displacement) for instant, displacement in value)
