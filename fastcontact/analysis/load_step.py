@@ -34,6 +34,7 @@ from fastcontact.analysis.work import contact_work
 from fastcontact.arrays import Array, largest
 from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.elasticity import recovery
+from fastcontact.elasticity.inertia_loads import Centrifugal
 from fastcontact.elasticity.loads import Pressure
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.model.pretension import section_results
@@ -286,8 +287,13 @@ def recover(
     sections, reaction = problem.model.pretensions, reaction.reshape(-1, mesh.dim)
     histories = problem.model.temperatures, problem.model.initial_states, sections
     temperature, initial, pretension = (problem.factors(parts, instant[1]) for parts in histories)
-    pressures = problem.factors([load for load in problem.model.loads if isinstance(load, Pressure)], instant[1])
-    factors = {"temperature_factors": temperature, "initial_factors": initial, "pressure_factors": pressures}
+    pressures, spins = (
+        problem.factors([load for load in problem.model.loads if isinstance(load, kind)], instant[1])
+        for kind in (Pressure, Centrifugal)
+    )
+    factors = {
+        "temperature_factors": temperature, "initial_factors": initial, "pressure_factors": pressures, "spin_factors": spins,
+    }  # fmt: skip
     iterations = {**iterations, **{key: multipliers for key, multipliers in factors.items() if multipliers}}
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
     if sections:

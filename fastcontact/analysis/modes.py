@@ -20,7 +20,7 @@ from fastcontact.analysis.stages import stage_of
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.elasticity.constrained_system import System
-from fastcontact.elasticity.inertia_loads import Densities
+from fastcontact.elasticity.inertia_loads import Centrifugal, Densities
 from fastcontact.elasticity.mass import mass, stress_stiffness
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.recovery import CellStress
@@ -160,6 +160,13 @@ class _Vibration:
         field = model.material_field()
         K = _stiffness(model, stressed, field)
         M = mass(model.mesh, model.kinematics, density)
+        for factor, load in zip(
+            [] if stressed is None else stressed.iterations.get("spin_factors", ()),
+            [load for load in model.loads if isinstance(load, Centrifugal)],
+        ):
+            rotating = mass(model.mesh, model.kinematics, density, load.groups)
+            rotating.data = -factor * rotating.data @ load.gradient(model.mesh.dim)
+            K = sum_of_blocks(K, rotating)
         supported, _ = model.prescribed_by_ramp()
         model = model if sectors is None else without_ends(model, sectors)
         held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))

@@ -135,6 +135,11 @@ class Centrifugal(InertiaLoad):
         if mesh.dim == 2 and origin[2]:
             raise ModelError(f"the axis of {self.name} has the origin z = {origin[2]:g} outside the plane of the mesh")
 
+    def gradient(self, dim: int) -> Array:
+        """Return the derivatives (dim, dim) of the acceleration with respect to positions [1 / time^2]."""
+        axis = np.array(self.direction) / np.linalg.norm(self.direction)
+        return np.asarray(self.speed**2 * (np.eye(3) - np.outer(axis, axis))[:dim, :dim])
+
     def acceleration(self, x: Array, kinematics: str) -> Array:
         """Return speed^2 times the vector from the axis (..., dim) [length / time^2] at `x` (..., dim) [length]."""
         radius = np.zeros((*x.shape[:-1], 3))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.sparse import bsr_array
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.energy import cell_volumes, gradients_at, integration_rule
 from fastcontact.elasticity.incompatible_modes import PAIRS
-from fastcontact.elasticity.loads import DensityField
+from fastcontact.elasticity.loads import DensityField, solid_rows
 from fastcontact.elasticity.recovery import CellStress
 from fastcontact.elasticity.stiffness import Sparsity, sparsity
 from fastcontact.errors import ModelError
@@ -22,13 +22,13 @@ from fastcontact.mesh.mesh import Mesh
 AT_ONCE = 2_000_000
 
 
-def mass(mesh: Mesh, kinematics: str, density: DensityField) -> bsr_array:
-    """Return the consistent mass matrix (n_dofs, n_dofs) [mass] of the solid cells, in axisymmetry of the full circle.
+def mass(mesh: Mesh, kinematics: str, density: DensityField, groups: Sequence[str] | None = None) -> bsr_array:
+    """Return the consistent mass matrix (n_dofs, n_dofs) [mass] of groups of solid cells, or of all solid cells.
 
-    Integrals are exact on straight cells with constant density. Raises ModelError if cells have no density, or all densities
-    are zero.
+    In axisymmetry it is that of the full circle. Integrals are exact on straight cells with constant density. Raises
+    ModelError if cells have no density, or all densities are zero.
     """
-    missing = 0
+    missing, selected = 0, solid_rows(mesh, groups)
 
     def local(name: str, rows: Indices) -> Array:
         nonlocal missing
@@ -37,6 +37,7 @@ def mass(mesh: Mesh, kinematics: str, density: DensityField) -> bsr_array:
         N, corners = element.shape(xi), mesh.points[mesh.cells[name][rows]]
         rho = density.at(name, rows, N)
         missing += int(np.isnan(rho).any(axis=1).sum())
+        rho *= np.isin(rows, selected.get(name, ()))[:, None]
         volume = cell_volumes(corners, N, element.gradient(xi), kinematics == "axisymmetric") * weights
         return np.einsum("cq,qa,qb->cab", rho * volume, N, N, optimize=True)[..., None]
 
@@ -46,7 +47,7 @@ def mass(mesh: Mesh, kinematics: str, density: DensityField) -> bsr_array:
             f"modes need densities, but the materials of {missing} solid cells have none: give them density=..., 0.0 for a "
             "body without mass"
         )
-    if not matrix.data.any():
+    if groups is None and not matrix.data.any():
         raise ModelError("all densities are zero, and a massless model has no modes: give the materials density=...")
     return matrix
 

@@ -417,8 +417,8 @@ class StepResult(Suggesting):
           whose amplitude is undetermined.
         - ``scatter``, if round-off prevents the contact geometry from meeting the criterion: relative variation of
           ``displacement`` and of the contact ``force`` [-].
-        - ``temperature_factors``, ``initial_factors``, ``pressure_factors``: multipliers of the temperatures, of the
-          initial stresses and strains, and of the pressures [-].
+        - ``temperature_factors``, ``initial_factors``, ``pressure_factors``, ``spin_factors``: multipliers of the
+          temperatures, of the initial stresses and strains, of the pressures and of the centrifugal forces [-].
         - ``work`` and ``pretension``: data of the properties of the same names.
         - ``parameter``, in vibration modes, whose shapes have no unit: quantity that the load factor represents,
           ``frequency`` or ``phase``.

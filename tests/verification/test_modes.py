@@ -92,6 +92,21 @@ def test_a_clamped_disc_and_a_ring():
     assert fc.modes(ring, step, 1).frequencies[0] == pytest.approx(np.sqrt(1.1) / (2 * np.pi), rel=2e-3)
 
 
+def test_a_rotating_beam_is_softer_in_the_plane_of_rotation():
+    """Frequencies in and out of the plane of rotation differ by the speed: w_out^2 - w_in^2 = Omega^2 (Southwell)."""
+    values = []
+    for direction in ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)):
+        beam = model_of(block((1.0, 0.02), (40, 2), "quad8"), "plane_stress")
+        beam.fix("LEFT", "xy")
+        beam.add_centrifugal(0.01, direction=direction, origin=(0.0, 0.01, 0.0))
+        values.append(fc.modes(beam, fc.solve(beam, 1)[-1], 1).eigenvalues[0])
+    assert values[1] - values[0] == pytest.approx(0.01**2, rel=1e-3)
+    free = (2 * np.pi * fc.modes(beam, n=1).frequencies[0]) ** 2
+    assert values[1] - free == pytest.approx(
+        1.193 * 0.05**2, rel=0.01
+    )  # Southwell's coefficient of a cantilever at the axis
+
+
 def test_pressure_follows_the_vibrating_surface():
     """Hydrostatic pressure does not change the frequencies of a cantilever (small and finite strain agree)."""
     free, loaded = {}, {}
