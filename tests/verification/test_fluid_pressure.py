@@ -78,6 +78,15 @@ def test_the_front_stops_where_the_contact_presses_more():
     assert 0 < reaches[0] < reaches[1] < len(dry.points)
 
 
+@pytest.mark.parametrize("options", FORMULATIONS)
+def test_the_front_is_the_same_from_the_other_side(options):
+    forces = []
+    for source, push in (("LEFT", lambda x: -0.004 - 0.01 * x[:, 0]), ("RIGHT", lambda x: -0.024 + 0.01 * x[:, 0])):
+        model = seal(push=push, source=f"B BOTTOM_{source}", **options)
+        forces.append(fc.solve(model, fc.Ramp((1.0, 6.0), ((0, 0), (30, 30))))[-1].contact["seal"].force)
+    assert forces[0] * [-1, 1] == pytest.approx(forces[1], rel=1e-9)
+
+
 @pytest.mark.parametrize("element", ["hex20", "tet10"])
 def test_on_quadratic_faces_continuous_finds_the_front_of_mortar_to_a_facet(element):
     """Nodal pressures of quadratic faces oscillate: a node beside the front may be wet that mortar keeps dry."""
