@@ -8,8 +8,8 @@ from __future__ import annotations
 import importlib
 import logging
 import os
+import pkgutil
 import re
-from pathlib import Path
 from typing import Any
 
 from fastcontact._version import __version__ as __version__
@@ -21,7 +21,7 @@ os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
 logging.getLogger(__name__).addHandler(logging.NullHandler())  # no output unless the user configures logging
 
 # Modules of the public names. The stub lists them for type checkers, and here they are imported on first use.
-_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+_STUB = (pkgutil.get_data(__name__, "__init__.pyi") or b"").decode()
 _MODULE_OF = {name: module for module, name in re.findall(r"^from ([\w.]+) import \(?\s*(\w+) as", _STUB, re.MULTILINE)}
 __all__ = sorted(_MODULE_OF.keys() - {"__version__"})
 

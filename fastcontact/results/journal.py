@@ -42,7 +42,8 @@ def pending(file: IO[bytes]) -> list[Write]:
     """Return the changes in the journal of a file, which an interruption may have prevented.
 
     The list is empty if there is no journal, or if the journal or the new data are incomplete. Raises FileError for a journal
-    with a valid checksum but invalid lengths or offsets; these are checked before the new data are read.
+    with a valid checksum but invalid lengths or offsets; these are checked before the new data are read. A journal is not
+    read into memory before its checksum is verified, since a forged footer may declare any length.
     """
     size = file.seek(0, io.SEEK_END)
     if size < FOOTER.size:
@@ -54,11 +55,10 @@ def pending(file: IO[bytes]) -> list[Write]:
     end = size - FOOTER.size - length  # end of the contents before the journal
     if length > PIECE + 2 * end:  # changes replace parts of the contents, and their headers and the checksums are short
         raise _damage_error(file, f"declares {length:.3g} bytes")
-    file.seek(end)
-    body = file.read(length)
-    if hashlib.sha256(body).digest() != digest:
+    if _digest(file, end, length) != digest:
         return []
-    records = list(_records(file, body))
+    file.seek(end)
+    records = list(_records(file, file.read(length)))
     new = [(offset, count, checksum) for offset, count, is_new, checksum in records if is_new]
     if sum(count for _, count, _ in new) > end:
         raise _damage_error(file, "counts data twice")

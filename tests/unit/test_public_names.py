@@ -5,9 +5,11 @@ import copy
 import importlib
 import pickle
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
+from new_process import printed
 
 import fastcontact as fc
 from fastcontact.errors import Suggesting
@@ -29,6 +31,16 @@ def test_a_name_is_what_the_stub_says(name):
     home = importlib.import_module(module)
     found = getattr(home, there) if hasattr(home, there) else importlib.import_module(f"{module}.{there}")
     assert getattr(fc, name) is found
+
+
+def test_the_package_has_all_names_of_the_stub_even_in_an_archive(tmp_path):
+    with zipfile.ZipFile(tmp_path / "fastcontact.zip", "w") as archive:
+        for path in FOLDER.glob("*.py*"):
+            archive.write(path, f"fastcontact/{path.name}")
+    code = "import sys; sys.path.insert(0, sys.argv[1]); import fastcontact as fc; print(fc.__file__, *fc.__all__)"
+    file, *names = printed(code, tmp_path / "fastcontact.zip").split()
+    assert file.startswith(str(tmp_path))
+    assert {*names, "__version__"} == set(imports_of_the_stub())
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import textwrap
 import threading
+import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -407,6 +408,21 @@ def test_a_journal_of_gigabytes(sound, tmp_path):
         file.write(journal.FOOTER.pack((1 << 36) - 1000, b"\0" * 32, journal.MAGIC))
     with pytest.raises(fc.FileError, match=r"declares 6.87e\+10 bytes"):
         fc.open_results(path)
+
+
+def test_a_long_journal_that_is_none_takes_no_memory(sound, tmp_path):
+    path, length = tmp_path / "long.vtkhdf", 1 << 27
+    shutil.copy(sound, path)
+    with path.open("r+b") as file:
+        file.truncate(2 * length)
+        file.seek(0, os.SEEK_END)
+        file.write(journal.FOOTER.pack(length, b"\0" * 32, journal.MAGIC))
+    tracemalloc.start()
+    try:
+        assert len(fc.open_results(path)) == 2
+        assert tracemalloc.get_traced_memory()[1] < length / 8
+    finally:
+        tracemalloc.stop()
 
 
 @pytest.mark.parametrize("name", layout.NEEDED_TO_RESUME)
