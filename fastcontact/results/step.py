@@ -529,7 +529,8 @@ class StepResult(Suggesting):
         - ``strain_energy``: energy of the bodies and springs, for nonlinear bodies the elastic energy. Thermal strains are
           treated as external forces.
         - ``plastic_work``: work of plastic deformation.
-        - ``external_work``: work of loads, supports, obstacles and thermal strains.
+        - ``external_work``: work of loads, supports, obstacles and thermal strains, and that of contact pressures on
+          changes of the gap by wear and `clearance_ramp`.
         - ``friction_work``: work dissipated by friction.
         - ``friction_while_touching``: part of the frictional work that is dissipated at nodes in the step in which their
           gaps close. It is overestimated in long steps, and zero in steps that are solved in increments.
