@@ -381,7 +381,7 @@ class FloatingBodies:
             The last position, also if the springs do not become slack or if a contact problem does not converge.
         """
         anchor, last_stretch, iterations, relaxed = start, np.inf, 0, 0.0
-        step, length = None, 1.0
+        step, length, slide_bound = None, 1.0, np.inf
         mixing = Anderson(len(start) + 1, np.arange(len(start)))
         for positions in range(1, MAX_NEWTON_ITERATIONS + 1):
             state = solve_at(anchor)
@@ -397,16 +397,14 @@ class FloatingBodies:
                 slack = stretch <= max(LENGTH_ROUND_OFF * load_stretch, round_off)
             if slack or not state.settled or positions == MAX_NEWTON_ITERATIONS:
                 break
-            bound = np.inf
-            if step is not None:
+            if step is not None and length > 0.5**HALVINGS:
+                # Elongations need not decrease when bodies slide.
                 sliding = step[1] == np.inf
-                bound = (
-                    last_stretch * GROWTH if sliding else last_stretch - DECREASE * length * (last_stretch - step[1])
-                )
-            if stretch > bound and step is not None and length > 0.5**HALVINGS:
-                length *= 0.5
-                anchor = anchor - length * step[0]
-                continue
+                bound = slide_bound if sliding else last_stretch - DECREASE * length * (last_stretch - step[1])
+                if stretch > bound:
+                    length *= 0.5
+                    anchor = anchor - length * step[0]
+                    continue
             step, length = None, 1.0
             if stretch > last_stretch:
                 mixing.restart()
@@ -417,5 +415,7 @@ class FloatingBodies:
             # peeling layer, approach equilibrium slowly.
             anchor = mixing.mixed(anchor, anchor + elongation) if step is None else anchor + step[0]
             last_stretch, relaxed = stretch, 0.0 if step is None else stretch
+            if step is not None and step[1] == np.inf:
+                last_stretch, slide_bound = np.inf, max(GROWTH * stretch, load_stretch)
         state = dataclasses.replace(state, iterations=iterations)
         return RigidPosition(state, anchor, self.stiffness * elongation, positions, slack)

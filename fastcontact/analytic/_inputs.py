@@ -150,7 +150,7 @@ def effective_radius(R1: float, R2: float, names: tuple[str, str] = ("R1", "R2")
     Raises ModelError if R is not positive or both radii are infinite.
     """
     for name, R in zip(names, (R1, R2), strict=True):
-        positive(f"the size of {name}", abs(R) if isinstance(R, (int, float)) and R is not True else R, infinite=True)
+        positive(name, abs(R) if isinstance(R, (int, float)) and R is not True else R, infinite=True)
     if math.isinf(R1) and math.isinf(R2):
         reason = "two planes have no Hertz contact" if names == ("R1", "R2") else "use hertz_line for line contact"
         raise ModelError(f"{names[0]} and {names[1]} are both infinite: {reason}")
