@@ -69,10 +69,10 @@ class StressScatter:
     elements : list of str
         Names of the linear elements without incompatible modes; may be empty.
     energy : float
-        Energy norm of the difference between recovered and computed stress, over that of the computed one [-]; the largest
-        of all bodies together and of each body with a notable part of the energy. Where
-        bodies yield, it is relative to the root of twice the elastic and plastic work: the residual stresses of unloaded
-        bodies scatter by 72 % about recovered ones also where eight cells across a beam bend right.
+        Energy norm of the difference between recovered and computed stress, over that of the computed one [-]. It is the
+        largest of the ratios of all bodies together and of single bodies with a notable part of the energy. Where bodies
+        yield, it is the ratio of all bodies, relative to the root of twice the elastic and plastic work: the residual
+        stresses of unloaded bodies scatter by 72 % about recovered ones also where eight cells across a beam bend right.
     pressure : float
         The same for the root mean square of the mean stress in nearly incompressible triangles and tetrahedra [-].
     nu : float

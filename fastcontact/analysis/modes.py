@@ -158,15 +158,7 @@ class _Vibration:
         """Return the vibration about a step, open at the ends of sectors; the stresses of `stressed` add stiffness."""
         density = Densities([material for material, _ in model.materials], model.material_of_cells())
         field = model.material_field()
-        K = _stiffness(model, stressed, field)
-        M = mass(model.mesh, model.kinematics, density)
-        for factor, load in zip(
-            [] if stressed is None else stressed.iterations.get("spin_factors", ()),
-            [load for load in model.loads if isinstance(load, Centrifugal)],
-        ):
-            rotating = mass(model.mesh, model.kinematics, density, load.groups)
-            rotating.data = -factor * rotating.data @ load.gradient(model.mesh.dim)
-            K = sum_of_blocks(K, rotating)
+        K, M = _stiffness(model, stressed, field, density), mass(model.mesh, model.kinematics, density)
         supported, _ = model.prescribed_by_ramp()
         model = model if sectors is None else without_ends(model, sectors)
         held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
@@ -234,15 +226,19 @@ class _Vibration:
         return pairs_of(vectors, K, wave.real_blocks(self.M), n)
 
 
-def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> bsr_array:
-    """Return the stiffness (n_dofs, n_dofs) of cells and springs, with that of the stresses of a step [force / length]."""
-    mesh, kinematics = model.mesh, model.kinematics
-    bodies = model.nonlinear_bodies(field)
+def _stiffness(model: Model, step: StepResult | None, field: MaterialField, density: Densities) -> bsr_array:
+    """Return the stiffness (n_dofs, n_dofs) of cells and springs, with that of the stresses and loads of a step.
+
+    Its unit is [force / length].
+    """
+    mesh, kinematics, bodies = model.mesh, model.kinematics, model.nonlinear_bodies(field)
     if step is None or bodies is None:
         K = stiffened(stiffness(mesh, kinematics, field.moduli, field.loops, None, field.treatment), model.springs)
     if step is None:
         return K
-    temperature, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
+    temperature, initial, pressures, spins = (
+        step.iterations.get(f"{name}_factors", ()) for name in ("temperature", "initial", "pressure", "spin")
+    )
     deformation = np.zeros_like(step.displacement)
     if bodies is not None:
         if model.strain == "small":
@@ -253,8 +249,12 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> b
         offset = model.stress_offset(temperature, initial, field, step.temperature)
         stresses = CellStress(mesh, kinematics, field.moduli, step.displacement, field.treatment, offset)
         K = sum_of_blocks(K, stress_stiffness(mesh, stresses, field.loops, kinematics == "axisymmetric"))
-    for factor, (pressure, _) in zip(step.iterations.get("pressure_factors", ()), model.following_pressures()):
+    for factor, (pressure, _) in zip(pressures, model.following_pressures()):
         K = sum_of_blocks(K, factor * pressure.at(deformation)[1])
+    for factor, load in zip(spins, [load for load in model.loads if isinstance(load, Centrifugal)]):
+        rotating = mass(mesh, kinematics, density, load.groups)
+        rotating.data = -factor * rotating.data @ load.gradient(mesh.dim)
+        K = sum_of_blocks(K, rotating)
     return K
 
 

@@ -76,14 +76,14 @@ class Layer:
 
 
 def cohesive_rows(
-    law: CohesiveLaw, constraints: Constraints, config: Configuration, initial_gap: Array, bodies: float
+    law: CohesiveLaw, constraints: Constraints, config: Configuration, initial_gap: Array, body_stiffness: float
 ) -> Constraints:
     """Return equations of a cohesive layer at the points of `constraints`, which must have tangents.
 
     The compliance of the equations follows the traction law. A cohesive layer is free of stress at the initial gaps
     `initial_gap` (m,) [length], whereas adhesion acts across them. Broken constraints may close again, with the stiffness of
-    the intact layer. Adhering sides are stiffer in compression, where their stiffness depends on that of the `bodies`, the
-    modulus over the length of the shortest facet [pressure / length].
+    the intact layer. Adhering sides are stiffer in compression, at least by the factor COMPRESSION than the bodies. The
+    `body_stiffness` is the modulus over the length of the shortest facet [pressure / length].
     """
     assert constraints.areas is not None
     m, u, start = len(constraints), config.displacement.ravel(), config.start.ravel()
@@ -105,7 +105,7 @@ def cohesive_rows(
         damage = np.minimum(damage, before.damage)
     intact, jump = damage < 1.0, np.stack([opening, *slips])
     secant = np.tile(np.where(intact, 1.0 - damage, 1.0), (len(jump), 1))
-    compression = max(1.0, COMPRESSION * bodies / law.stiffness) if law.reversible else 1.0
+    compression = max(1.0, COMPRESSION * body_stiffness / law.stiffness) if law.reversible else 1.0
     secant[0, opening < 0.0] = compression
     softening = intact & (damage > (0.0 if law.reversible else before.damage)) & (secant > SOFTENING_SLOPE)
     slope = np.where(softening, SOFTENING_SLOPE, secant)

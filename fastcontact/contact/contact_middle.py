@@ -93,9 +93,8 @@ def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> Unro
 
 def _loop(surface: Surface) -> list[int] | None:
     """Return the nodes, as rows of the points of a surface, in order along its closed line; None if there is no such line."""
-    chains = [
-        chain for block in surface.blocks for chain in np.delete(block.local, 1, axis=1).tolist()
-    ]  # without the end
+    # The nodes of each facet in order along the line, without its end.
+    chains = [chain for block in surface.blocks for chain in np.delete(block.local, 1, axis=1).tolist()]
     following = line_neighbours(surface.ends)[:, 1].tolist()
     order = [0]
     while (facet := following[order[-1]]) > 0 and len(order) < len(chains):

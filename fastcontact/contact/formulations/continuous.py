@@ -103,9 +103,8 @@ class Continuous(PressureFieldFormulation):
         smallest = reference.order + 1
         count = reference.order + 2 if self.n_gauss is None else self.n_gauss
         if self.n_gauss is None and self.options.source is not None:
-            count += (
-                count % 2
-            )  # a point in the middle of a facet would be equally near to several nodes that fluid reaches
+            # Fluid wets the points nearest to a node. A point in the middle of a facet would be nearest to several nodes.
+            count += count % 2
         if count < smallest:
             raise ContactError(
                 f"n_gauss = {count} on facets with {reference.n_nodes} nodes leaves a multiplier undetermined: "

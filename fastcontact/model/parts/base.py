@@ -289,6 +289,11 @@ class ModelBase(Suggesting):
         self._check_all_have_material(numbers)
         return numbers
 
+    def contact_moduli(self) -> dict[str, Array]:
+        """Return the contact modulus of each solid cell (n_cells,), by element type [pressure]."""
+        moduli = np.array([material.contact_modulus for material, _ in self.materials])
+        return {name: moduli[rows] for name, rows in self.material_of_cells().items()}
+
     def _check_material(self, index: int, group: str | None, numbers: Numbers) -> None:
         """Raise ModelError if cells already have a different material, unless that one was assigned to all cells."""
         new = self.materials[index][0]

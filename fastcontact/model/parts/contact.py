@@ -189,10 +189,7 @@ class ModelContact(ModelConnections):
         >>> len(model.add_contacts(friction=0.2))
         1
         """
-        moduli = None
-        if self.materials:
-            stiffness = np.array([material.contact_modulus for material, _ in self.materials])
-            moduli = {name: stiffness[rows] for name, rows in self.material_of_cells().items()}
+        moduli = self.contact_moduli() if self.materials else None
         contacts = find_contacts(self.mesh, distance=distance, angle=angle, groups=groups, moduli=moduli)
         if not contacts.pairs:
             raise ContactError(nothing_found(self.mesh, distance, angle, groups))

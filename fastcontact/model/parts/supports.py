@@ -117,8 +117,8 @@ class ModelSupports(ModelContact):
         Displacements that a global model has at the load factors 0.5 and 1, as functions of position:
 
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
-        >>> pressed, sheared = (lambda points: 0.0 * points[:, 1]), (lambda points: 0.01 * points[:, 1])
-        >>> model.prescribe("LEFT", x=[(0.5, pressed), (1.0, sheared)])
+        >>> x_at_half, x_at_end = (lambda points: 0.0 * points[:, 1]), (lambda points: 0.01 * points[:, 1])
+        >>> model.prescribe("LEFT", x=[(0.5, x_at_half), (1.0, x_at_end)])
 
         A group that turns by a quarter of a circle while the load factor goes from 0 to 1:
 

@@ -575,10 +575,12 @@ def _limits_of_steps(
     mesh: Mesh, steps: Sequence[StepResult], field: str, scale: float, mirrored: bool
 ) -> tuple[tuple[float, float], tuple[Array, Array]]:
     """Return the limits of the colour scale and the corners of the bounding box of the bodies over all steps."""
-    ranges = [field_of(mesh, step, field).range for step in steps]
-    positions = (displaced_points(mesh.points, scale, step.displacement) for step in steps)
-    boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in positions])
-    low, high = boxes.min(axis=0)[0], boxes.max(axis=0)[1]
+    ranges, boxes = [], []
+    for step in steps:  # steps of a result file are read one at a time
+        ranges.append(field_of(mesh, step, field).range)
+        points = displaced_points(mesh.points, scale, step.displacement)
+        boxes.append((points.min(axis=0), points.max(axis=0)))
+    low, high = np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]
     if mirrored and mesh.dim == 2:
         low[0], high[0] = min(low[0], -high[0]), max(high[0], -low[0])
     margin = 0.03 * float((high - low).max())
