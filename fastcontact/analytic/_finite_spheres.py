@@ -81,8 +81,6 @@ def _interpolated(table: Array, x: float) -> tuple[float, float, float]:
     ln s. The ratio of the radius to that of Hertz's theory at equal force tends to 1 for small loads, which adds a point
     to its table.
     """
-    from scipy.interpolate import CubicSpline
-
     s = np.sqrt(table[:, 0])
     hertz = [_hertz(1.0, 1.0, approach) for approach in table[:, 0]]
     force_excess = (table[:, 1] / [h.force for h in hertz] - 1.0) / s
@@ -91,10 +89,17 @@ def _interpolated(table: Array, x: float) -> tuple[float, float, float]:
     valid = np.isfinite(radius_excess)
 
     at_approach, root = _hertz(1.0, 1.0, x), np.sqrt(x)
-    force = at_approach.force * (1.0 + root * CubicSpline(np.log(s), force_excess)(np.log(root)))
-    pressure = at_approach.pressure_max * (1.0 + root * CubicSpline(np.log(s), pressure_excess)(np.log(root)))
-    excess = CubicSpline(np.append(0.0, s[valid]), np.append(0.0, radius_excess[valid]))(root)
+    force = at_approach.force * (1.0 + root * _at(np.log(root), np.log(s), force_excess))
+    pressure = at_approach.pressure_max * (1.0 + root * _at(np.log(root), np.log(s), pressure_excess))
+    excess = _at(root, np.append(0.0, s[valid]), np.append(0.0, radius_excess[valid]))
     return float(force), float(pressure), float(at_approach.at_force(float(force)).radius * (1.0 + excess))
+
+
+def _at(x: float, points: Array, values: Array) -> float:
+    """Return the value at x of the cubic polynomial through the four points around x."""
+    first = np.clip(np.searchsorted(points, x) - 2, 0, len(points) - 4)
+    around = slice(first, first + 4)
+    return float(np.polynomial.Polynomial.fit(points[around], values[around], 3)(x))
 
 
 def finite_half_spheres(approach: float, *, R: float = 50.0, E: float = 20_000.0, nu: float = NU) -> FiniteHalfSpheres:
