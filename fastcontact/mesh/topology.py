@@ -21,7 +21,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import MeshError
-from fastcontact.mesh import elements
+from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.mesh import Mesh, facets_of_cells
 
 Result = TypeVar("Result")
@@ -41,7 +41,7 @@ def corner_measures(mesh: Mesh, name: str) -> Array:
     corners = mesh.points[mesh.cells[name][:, : linear.n_nodes]]
     # Adding one quadrature point at a time limits the memory to a few arrays of length n_cells.
     jacobians = (np.einsum("cni,nj->cij", corners, gradient) for gradient in gradients)
-    return np.asarray(sum(w * np.linalg.det(J) for w, J in zip(weights, jacobians, strict=True)))
+    return np.asarray(sum(w * quadrature.determinants(J) for w, J in zip(weights, jacobians, strict=True)))
 
 
 @typed(MeshError)

@@ -211,3 +211,9 @@ def test_jacobians_and_edges_against_plain_numpy(name):
     np.testing.assert_allclose(measure, det @ weights, rtol=0, atol=1e-13 * np.abs(det).max())
     ends = points[cells][:, np.array(element.edges)]
     np.testing.assert_allclose(longest, np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1), rtol=1e-14)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_determinants_equal_those_of_lapack(dim):
+    J = np.random.default_rng(3).normal(size=(5, 4, dim, dim))
+    assert rules.determinants(J) == pytest.approx(np.linalg.det(J), rel=1e-12)
