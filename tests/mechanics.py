@@ -50,7 +50,7 @@ def out_of_balance(model: fc.Model, step: fc.StepResult, factor: float, toleranc
 def stiffness_of(model: fc.Model) -> csr_array:
     """Return the stiffness (n_dofs, n_dofs) of the solid cells [force / length]."""
     field = model.material_field()
-    return stiffness(model.mesh, model.kinematics, field.moduli, field.loops, None, field.treatment)
+    return stiffness(model.mesh, model.kinematics, field.moduli, field.moduli_rows, None, field.treatment)
 
 
 def contact_forces(step: fc.StepResult) -> np.ndarray:

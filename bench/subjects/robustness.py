@@ -134,7 +134,7 @@ def figures(model, solver="amg", repeats=1):
         "pairings": result.iterations["geometry_updates"],
         "closed": int(contact.active.sum()), "nodes": len(contact.points),
         "sliding": int((contact.active & ~contact.sticking).sum()), "residual": out_of_balance(problem, state.u, contact),
-        "gave_up": getattr(problem.solver, "gave_up", ""),
+        "replacement_reason": getattr(problem.solver, "replacement_reason", ""),
     }  # fmt: skip
 
 
@@ -161,6 +161,6 @@ def lines(found):
         table.append(
             f"{begin} {row['closed']:>4}/{row['nodes']:<4} {row['sliding']:>5} {row['linear']['iterations']:>6} "
             f"{step['iterations']:>5} {step['ratio']:>6.1f} {row['residual']:>8.1e}  "
-            f"{'factors took over' if row['gave_up'] else 'multigrid'}"
+            f"{'factors took over' if row['replacement_reason'] else 'multigrid'}"
         )
     return table

@@ -304,7 +304,7 @@ def recover(
         offset, field = None, problem.field
         if temperature or initial or heat is not None:
             offset = problem.model.stress_offset(temperature, initial, field, heat)
-        materials = field.moduli, field.loops, u, field.treatment
+        materials = field.moduli, field.moduli_rows, u, field.treatment
         stress = recovery.nodal_stress(mesh, problem.model.kinematics, *materials, problem.sides, offset)
     by_material = None
     if len(problem.sides.points):

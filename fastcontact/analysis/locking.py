@@ -124,7 +124,7 @@ class StressScatter:
         n = len(mesh.cells[name])
         for rows in np.array_split(np.arange(n), n * dN.nbytes // BATCH + 1):
             cells, numbers = mesh.cells[name][rows], field.rows[name][rows]
-            computed = stress.at(name, xi, cells, field.loops[name][rows], rows)
+            computed = stress.at(name, xi, cells, field.moduli_rows[name][rows], rows)
             difference = N @ recovered[rows] - computed
             volume = cell_volumes(mesh.points[cells], N, dN, problem.model.kinematics == "axisymmetric") * weights
             compliance = field.compliance[numbers][:, None]

@@ -233,7 +233,9 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField, dens
     """
     mesh, kinematics, bodies = model.mesh, model.kinematics, model.nonlinear_bodies(field)
     if step is None or bodies is None:
-        K = stiffened(stiffness(mesh, kinematics, field.moduli, field.loops, None, field.treatment), model.springs)
+        K = stiffened(
+            stiffness(mesh, kinematics, field.moduli, field.moduli_rows, None, field.treatment), model.springs
+        )
     if step is None:
         return K
     temperature, initial, pressures, spins = (
@@ -248,7 +250,7 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField, dens
     else:
         offset = model.stress_offset(temperature, initial, field, step.temperature)
         stresses = CellStress(mesh, kinematics, field.moduli, step.displacement, field.treatment, offset)
-        K = sum_of_blocks(K, stress_stiffness(mesh, stresses, field.loops, kinematics == "axisymmetric"))
+        K = sum_of_blocks(K, stress_stiffness(mesh, stresses, field.moduli_rows, kinematics == "axisymmetric"))
     for factor, (pressure, _) in zip(pressures, model.following_pressures()):
         K = sum_of_blocks(K, factor * pressure.at(deformation)[1])
     for factor, load in zip(spins, [load for load in model.loads if isinstance(load, Centrifugal)]):

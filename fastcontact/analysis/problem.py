@@ -312,7 +312,7 @@ def prepare(
     field = model.material_field()
     solver.contrast = field.contrast
     sides = material_sides(mesh, field.distinct)
-    K = stiffness(mesh, model.kinematics, field.moduli, field.loops, None, field.treatment)
+    K = stiffness(mesh, model.kinematics, field.moduli, field.moduli_rows, None, field.treatment)
     warnings = too_stiff(K, model.springs)
     K = stiffened(K, model.springs)
     system = System(

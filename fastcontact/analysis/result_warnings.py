@@ -83,8 +83,10 @@ def result_warnings(
         warnings += locking_warning(problem, state.u) or scatter_warnings(problem, state, last)
     else:
         warnings += nonlinear_scatter_warnings(problem, state, last) or scatter_warnings(problem, state, last)
-    if problem.solver.gave_up:
-        warnings.append(f'{problem.solver.gave_up}. linear_solver="direct" factorises the matrix from the start')
+    if problem.solver.replacement_reason:
+        warnings.append(
+            f'{problem.solver.replacement_reason}. linear_solver="direct" factorises the matrix from the start'
+        )
     load = problem.load_at(last.load_factor)
     loaded, sag = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)
     clearances = _clearances(problem, state)
@@ -275,11 +277,11 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
         interior[interface.points] = False
         strain = float((recovery.von_mises(interface.stress) / (3 * shear[interface.material])).max())
     for name, block in problem.model.mesh.solids.items():
-        for number in np.unique(field.number[name]):
-            nodes = np.unique(block[field.number[name] == number])
+        for number in np.unique(field.material_numbers[name]):
+            nodes = np.unique(block[field.material_numbers[name] == number])
             stress = last.von_mises[nodes[interior[nodes]]]
             strain = max(strain, float(stress.max(initial=0.0) / (3 * shear[number])))
-        others = np.flatnonzero(np.isinf(shear[field.number[name]]))
+        others = np.flatnonzero(np.isinf(shear[field.material_numbers[name]]))
         mean = last.stress[block[others]].mean(axis=1)
         strains = np.einsum("cij,cj->ci", field.compliance[field.rows[name][others]], mean)
         strain = max(strain, float(recovery.equivalent_strain(strains).max(initial=0.0)))

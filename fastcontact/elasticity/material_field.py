@@ -54,10 +54,10 @@ class MaterialField:
         Points at which varying materials are evaluated.
     owner : ndarray of int (n_moduli,)
         Number of the material to which each matrix in `moduli` belongs.
-    number, rows : dict of str to ndarray of int (n_cells,)
+    material_numbers, rows : dict of str to ndarray of int (n_cells,)
         Number of the material of each cell, and its row in `moduli` (that of the cell centre if the material varies), by
         solid element type.
-    inside : dict of str to ndarray of int (n_cells, n_q)
+    rows_at_points : dict of str to ndarray of int (n_cells, n_q)
         Row in `moduli` of each quadrature point, by solid element type. Only element types with materials that vary within
         cells have an entry.
     """
@@ -67,14 +67,14 @@ class MaterialField:
     moduli: Array
     evaluations: Sequence[EvaluationPoints]
     owner: Numbers
-    number: dict[str, Numbers]
+    material_numbers: dict[str, Numbers]
     rows: dict[str, Numbers]
-    inside: dict[str, Numbers]
+    rows_at_points: dict[str, Numbers]
 
     @cached_property
-    def loops(self) -> dict[str, Numbers]:
-        """Rows of moduli for the element loops, by element type: those of `inside` if present, otherwise those of `rows`."""
-        return {**self.rows, **self.inside}
+    def moduli_rows(self) -> dict[str, Numbers]:
+        """Rows of moduli that the element loops use, by element type: `rows_at_points` if present, otherwise `rows`."""
+        return {**self.rows, **self.rows_at_points}
 
     @cached_property
     def averaged(self) -> Mask:
@@ -147,7 +147,7 @@ class MaterialField:
         at_nodes = np.zeros(n_points) if rise is None else rise
         return StressOffset(at_nodes, np.nan_to_num(self.expansion), tuple(states))
 
-    def without_expansion(self, mesh: Mesh, rise: Array) -> int:
+    def n_cells_without_expansion(self, mesh: Mesh, rise: Array) -> int:
         """Return the number of cells of materials without expansion whose `rise` (n_points,) [temperature] is not zero."""
         no_expansion = np.isnan(self.expansion[:, 0])
         return sum(
@@ -164,11 +164,11 @@ class MaterialField:
         first_number: dict[object, int] = {}
         laws = [_law(material, moduli) for material, moduli in zip(self.materials, self.moduli, strict=False)]
         representative = np.array([first_number.setdefault(law, number) for number, law in enumerate(laws)], np.int32)
-        return {name: representative[values] for name, values in self.number.items()}
+        return {name: representative[values] for name, values in self.material_numbers.items()}
 
 
 def material_field(
-    mesh: Mesh, kinematics: str, materials: Sequence[Material], number: Mapping[str, Numbers]
+    mesh: Mesh, kinematics: str, materials: Sequence[Material], material_numbers: Mapping[str, Numbers]
 ) -> MaterialField:
     """Return the materials of all solid cells.
 
@@ -177,13 +177,13 @@ def material_field(
     mesh : Mesh
     kinematics : str
     materials : sequence of Material
-    number : mapping of str to ndarray of int (n_cells,)
+    material_numbers : mapping of str to ndarray of int (n_cells,)
         Number of the material of each cell, by solid element type.
     """
     size = 6 if kinematics == "3d" else 4
     moduli = [np.zeros((1, size, size)) if m.varies else m.moduli(kinematics)[None] for m in materials]
     owner = [np.arange(len(materials), dtype=np.int32)]
-    rows, inside = {name: values.copy() for name, values in number.items()}, dict[str, Numbers]()
+    rows, rows_at_points = {name: values.copy() for name, values in material_numbers.items()}, dict[str, Numbers]()
     evaluations: list[EvaluationPoints] = []
 
     def add(index: int, points: Array, constants: Any) -> Numbers:
@@ -195,7 +195,7 @@ def material_field(
         return first + np.arange(len(points), dtype=np.int32)
 
     of_materials = [
-        (index, material, name, block, np.flatnonzero(number[name] == index))
+        (index, material, name, block, np.flatnonzero(material_numbers[name] == index))
         for index, material in enumerate(materials)
         for name, block in mesh.solids.items()
     ]
@@ -206,11 +206,13 @@ def material_field(
     for index, material, name, block, cells in of_materials:
         if material.varies_inside:
             N = elements.get(name).tables[0]
-            inside.setdefault(name, np.repeat(rows[name][:, None], len(N), axis=1))
+            rows_at_points.setdefault(name, np.repeat(rows[name][:, None], len(N), axis=1))
             at_points = add(index, positions(mesh, block[cells], N), material.constants_at(name, cells, N))
-            inside[name][cells] = at_points.reshape(len(cells), len(N))
+            rows_at_points[name][cells] = at_points.reshape(len(cells), len(N))
     all_moduli, owners = np.concatenate(moduli), np.concatenate(owner)
-    return MaterialField(materials, kinematics, all_moduli, evaluations, owners, dict(number), rows, inside)
+    return MaterialField(
+        materials, kinematics, all_moduli, evaluations, owners, dict(material_numbers), rows, rows_at_points
+    )
 
 
 def _law(material: Material, moduli: Array) -> tuple[object, ...]:

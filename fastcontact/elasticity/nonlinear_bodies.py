@@ -78,12 +78,12 @@ class NonlinearBodies:
     def __init__(self, mesh: Mesh, kinematics: str, strain: str, field: MaterialField) -> None:
         self.mesh, self.kinematics, self.finite = mesh, kinematics, strain == "finite"
         if kinematics == "plane_stress":  # the kernels compute the out-of-plane strain from the law
-            field = material_field(mesh, "plane_strain", field.materials, field.number)
+            field = material_field(mesh, "plane_strain", field.materials, field.material_numbers)
         self._materials, self._owner = field.materials, field.owner
         size = field.moduli.shape[1]
         self._moduli, self._expansion = np.zeros((len(field.moduli), 6, 6)), np.zeros((len(field.moduli), 6))
         self._moduli[:, :size, :size], self._expansion[:, :size] = field.moduli, np.nan_to_num(field.expansion)
-        self._cells = {name: _at_points(field.loops[name], name) for name in mesh.solids}
+        self._cells = {name: _at_points(field.moduli_rows[name], name) for name in mesh.solids}
         self._averaged = field.averaged & (kinematics != "plane_stress")
         self._constants = self._constants_of_laws()
         self._pattern: Sparsity = sparsity(mesh)

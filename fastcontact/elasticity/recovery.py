@@ -219,7 +219,7 @@ def stress_at_points(
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
         From `LinearElastic.moduli` [pressure].
     material : dict of str to ndarray of int (n_cells,) or (n_cells, n_q)
-        Material number of each cell, or of each quadrature point, by solid element type (`MaterialField.loops`).
+        Material number of each cell, or of each quadrature point, by solid element type (`MaterialField.moduli_rows`).
     displacement : ndarray (n_points, dim)
         Displacements of all points [length].
     averaged : ndarray of bool or uint8 (n_materials,), optional

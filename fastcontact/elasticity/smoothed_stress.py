@@ -69,7 +69,7 @@ def smoothed_stress(mesh: Mesh, field: MaterialField, stress: CellStress | Point
         for name, rows in rows_of_material.items():
             xi, extrapolation = sampling(name)
             cells = mesh.cells[name][rows]
-            average.add(cells, extrapolation, stress.at(name, xi, cells, field.loops[name][rows], rows))
+            average.add(cells, extrapolation, stress.at(name, xi, cells, field.moduli_rows[name][rows], rows))
         nodal = average.result()
         for name, rows in rows_of_material.items():
             at_nodes[name][rows] = nodal[mesh.cells[name][rows]]

@@ -194,7 +194,7 @@ class LinearSolver(Protocol):
     asked : float, optional
         The original tolerance, if `improve` has reduced it [-].
     counters : Counters
-    gave_up : str
+    replacement_reason : str
         Reason why a different method has replaced this one; empty if none has.
     contrast : float
         Largest ratio of the stiffnesses of a cell in different deformations, such as dilatation and shear of a nearly
@@ -205,7 +205,7 @@ class LinearSolver(Protocol):
     tolerance: float
     counters: Counters
     asked: float | None = None
-    gave_up: str = ""
+    replacement_reason: str = ""
     contrast: float = 1.0
 
     @property

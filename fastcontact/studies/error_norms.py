@@ -186,7 +186,7 @@ def _stress_in_cells(
     xi, weights = integration_rule(element, n_points)
     N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
     cells, field = mesh.cells[name][rows], model.material_field()
-    numbers = field.loops[name][rows]
+    numbers = field.moduli_rows[name][rows]
     cell_stress = CellStress(mesh, model.kinematics, field.moduli, displacement, field.treatment, offset)
     stress = cell_stress.at(name, xi, cells, numbers, np.arange(len(mesh.cells[name]))[rows])
     elastic = field.compliance[numbers.reshape(len(numbers), -1)]
@@ -314,7 +314,7 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
     nodal = np.zeros(mesh.n_points)
     nodal[result.points] = result.pressure
     starts = starts_of(mesh.solids)
-    E, material = np.array([law.young[0] for law, _ in model.materials]), model.material_field().number
+    E, material = np.array([law.young[0] for law, _ in model.materials]), model.material_field().material_numbers
     for block in surface(mesh, pair.secondary).blocks:
         xi, weights = fine_rule(block.element)
         reference = elements.get(block.element)

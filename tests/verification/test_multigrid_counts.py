@@ -125,7 +125,7 @@ def checked(make, *given, most, pairings=None, **options):
     """Return the figures of a step of `bench robustness` that takes so many times the iterations of a linear solution."""
     robustness = suite("subjects").load("robustness")
     found = robustness.figures(getattr(robustness, make)(*given, **options))
-    assert not found["gave_up"]
+    assert not found["replacement_reason"]
     assert pairings is None or found["pairings"] <= pairings
     assert found["step"]["iterations"] <= most * found["linear"]["iterations"]
     assert found["residual"] < 1e-6

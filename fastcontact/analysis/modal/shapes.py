@@ -117,7 +117,7 @@ class Modes(Shapes):
     def _step(self, number: int) -> StepResult:
         model, u = self._model, self.shapes[number]
         stress = recovery.nodal_stress(
-            model.mesh, model.kinematics, self._field.moduli, self._field.loops, u, self._field.treatment
+            model.mesh, model.kinematics, self._field.moduli, self._field.moduli_rows, u, self._field.treatment
         )
         return _mode_step(number, self.frequencies[number], u.copy(), stress, model)
 

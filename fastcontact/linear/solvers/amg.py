@@ -34,10 +34,11 @@ from fastcontact.linear.springs import Springs
 from fastcontact.round_off import ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# By the number of components per node: a factorisation is cheaper if one load step takes more iterations than MAX_ITERATIONS
-# plus this number for each unknown. In 3D, a factorisation and a load step with it cost as much as 300 iterations plus 0.04
-# per unknown for two bodies in contact, and three times as much in stacks with friction (measured, see bench/README.md).
-COST_OF_UNKNOWN = {1: 0.0, 2: 0.0, 3: 0.08}
+# A factorisation is cheaper if one load step takes more iterations than MAX_ITERATIONS plus this number for each unknown. The
+# keys are the numbers of components per node. In 3D, a factorisation and a load step with it cost as much as 300 iterations
+# plus 0.04 per unknown for two bodies in contact, and three times as much in stacks with friction (measured, see
+# bench/README.md).
+ITERATIONS_PER_UNKNOWN = {1: 0.0, 2: 0.0, 3: 0.08}
 
 
 class Amg(Multigrid, LinearSolver):
@@ -45,9 +46,9 @@ class Amg(Multigrid, LinearSolver):
 
     Attributes
     ----------
-    instead : Direct or None
+    replacement : Direct or None
         The direct solver that has replaced multigrid; None as long as multigrid is used.
-    gave_up : str
+    replacement_reason : str
         Reason for the replacement; empty if multigrid is used.
     """
 
@@ -55,28 +56,28 @@ class Amg(Multigrid, LinearSolver):
 
     def __init__(self, tolerance: float = TOLERANCE, precision: str = "single") -> None:
         super().__init__(tolerance, precision)
-        self.instead: Direct | None = None
+        self.replacement: Direct | None = None
         self._factor_solver: Direct | None = None  # kept when an analysis returns to a state before the replacement
-        self.gave_up = ""
+        self.replacement_reason = ""
 
     def __repr__(self) -> str:
         if not hasattr(self, "hierarchy"):
             return "Amg(not prepared)"
-        if self.instead is not None:
-            return f"Amg(gave up, {self.instead})"
+        if self.replacement is not None:
+            return f"Amg(gave up, {self.replacement})"
         return f"Amg({self.hierarchy}, {self.nbytes / 1e6:.1f} MB, {self.precision} precision)"
 
     @property
     def iterative(self) -> bool:
         """Whether a solution with a larger tolerance costs less: True until a factorisation has replaced multigrid."""
-        return self.instead is None
+        return self.replacement is None
 
     def prepare(
         self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array | Product:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
         self.build(K, rigid_modes, release)
-        self._involved, self.instead, self._factor_solver, self.gave_up = involved, None, None, ""
+        self._involved, self.replacement, self._factor_solver, self.replacement_reason = involved, None, None, ""
         return self.K if release else K
 
     def load(self, f: Array) -> Loaded:
@@ -89,12 +90,12 @@ class Amg(Multigrid, LinearSolver):
     def affordable(self) -> int:
         """Number of iterations in one load step above which a factorisation is cheaper."""
         n, size = self.K.shape[0], self.K.blocksize[0]
-        return MAX_ITERATIONS + int(COST_OF_UNKNOWN[size] * n)
+        return MAX_ITERATIONS + int(ITERATIONS_PER_UNKNOWN[size] * n)
 
     def improve(self, excess: float) -> bool:
         """Reduce the tolerance or, if it is near round-off, replace multigrid by a factorisation; see `LinearSolver`."""
-        if self.instead is not None:
-            return self.instead.improve(excess)
+        if self.replacement is not None:
+            return self.replacement.improve(excess)
         if self._may_factorise and not self.tolerance > ROUND_OFF * excess:
             self._factorise(
                 "multigrid gave up and a factorisation replaced it, which costs more time and memory: at its tolerance of "
@@ -108,7 +109,7 @@ class Amg(Multigrid, LinearSolver):
 
         See `LinearSolver.snapshot`. The keys are names in result files and must not be changed.
         """
-        instead = None if self.instead is None else {"why": self.gave_up, **self.instead.snapshot()}
+        instead = None if self.replacement is None else {"why": self.replacement_reason, **self.replacement.snapshot()}
         return {
             "precision": self.precision, "tolerance": self.tolerance, "bounds": self.hierarchy.bounds,
             "asked": list(self.columns.asked), **self._constrained_by(), "instead": instead,
@@ -126,10 +127,10 @@ class Amg(Multigrid, LinearSolver):
     def put_back(self, snapshot: Mapping[str, Any]) -> None:
         """See `LinearSolver.put_back`."""
         if (instead := snapshot.get("instead")) is not None:
-            (self.instead or self._factorise(instead["why"])).put_back(instead)
+            (self.replacement or self._factorise(instead["why"])).put_back(instead)
             return
-        if self.instead is not None:  # The factorisation replaced multigrid after the time of the snapshot.
-            self._factor_solver, self.instead, self.gave_up = self.instead, None, ""
+        if self.replacement is not None:  # The factorisation replaced multigrid after the time of the snapshot.
+            self._factor_solver, self.replacement, self.replacement_reason = self.replacement, None, ""
         self._reuses_levels[0] = snapshot.get("lasting", True)
         put_back_tolerance(self, snapshot)
         if snapshot["precision"] != self.precision:
@@ -177,11 +178,11 @@ class Amg(Multigrid, LinearSolver):
             self._factor_solver.prepare(self.K.restored(), self._modes.astype(float), self._involved)
         else:
             self._factor_solver.put_back({"asked": [], "loads": []})
-        self.gave_up, self.instead = why, self._factor_solver
+        self.replacement_reason, self.replacement = why, self._factor_solver
         # From now on the tolerance is that of the direct solver.
         self.asked = self.tolerance if self.asked is None else self.asked
-        self.tolerance = self.instead.tolerance
-        return self.instead
+        self.tolerance = self.replacement.tolerance
+        return self.replacement
 
 
 def _equal(first: Mapping[str, Any] | None, second: Mapping[str, Any] | None) -> bool:
@@ -203,7 +204,7 @@ def _with_fallback(method: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(method)
     def wrapper(self: _Loaded, *args: Any, **options: Any) -> Any:
-        if self._solver.instead is None:
+        if self._solver.replacement is None:
             try:
                 return method(self, *args, **options)
             except (StallError, TooManyColumnsError) as stalled:
@@ -224,13 +225,13 @@ class _Loaded(LoadedMultigrid):
     @functools.cached_property
     def _factored(self) -> Loaded:
         """The factorisation with the same right-hand side."""
-        return self._solver.instead.load(self._f)
+        return self._solver.replacement.load(self._f)
 
     def solve_nonsymmetric(
         self, B: csr_array, c: Array, nodes: Indices, guess: Array, tolerance: float,
         friction: FrictionTerms | None = None, C: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        if self._solver.instead is not None:
+        if self._solver.replacement is not None:
             raise ConvergenceError("with a factorisation, the friction problem is solved with the Delassus operator")
         try:
             return super().solve_nonsymmetric(B, c, nodes, guess, tolerance, friction, C)

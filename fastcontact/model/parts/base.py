@@ -360,5 +360,5 @@ class ModelBase(Suggesting):
             if self.temperatures or self.heat_loads:
                 raise ModelError("forces of bodies with thermal expansion depend on the temperature: see step.reaction")
             return bodies.at(np.reshape(displacement, shape), bodies.beginning).force
-        K = stiffness(self.mesh, self.kinematics, field.moduli, field.loops, None, field.treatment)
+        K = stiffness(self.mesh, self.kinematics, field.moduli, field.moduli_rows, None, field.treatment)
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)

@@ -286,7 +286,7 @@ class ModelInitialStates(ModelLoads):
         field = self.material_field()
         for temperature in self.temperatures:
             rise = temperature.rise(self.mesh)
-            missing = field.without_expansion(self.mesh, rise)
+            missing = field.n_cells_without_expansion(self.mesh, rise)
             if missing:
                 raise ModelError(
                     f"{temperature.name} acts on {missing} solid cells whose material has no coefficient of thermal "
@@ -317,5 +317,5 @@ class ModelInitialStates(ModelLoads):
     def _forces_of(self, field: MaterialField, offset: StressOffset | None) -> Array:
         """Return the nodal forces (n_points, dim) [force] of a stress offset."""
         u, treatment = np.zeros(self.mesh.points.shape), field.treatment
-        stress = stress_at_points(self.mesh, self.kinematics, field.moduli, field.loops, u, treatment, offset)
+        stress = stress_at_points(self.mesh, self.kinematics, field.moduli, field.moduli_rows, u, treatment, offset)
         return -internal_force(self.mesh, self.kinematics, stress)

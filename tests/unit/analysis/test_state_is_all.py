@@ -100,10 +100,10 @@ def test_multigrid_that_was_given_up_is_taken_up_again():
     _, expected = load_step(problem, state, 2, 0.5)
     factors = problem.solver._factorise("for want of patience")
     later, _ = load_step(problem, replace(state, solver=problem.solver.snapshot()), 2, 0.5)
-    assert problem.solver.instead is factors
+    assert problem.solver.replacement is factors
     assert_same(load_step(problem, state, 2, 0.5)[1], expected)
-    assert problem.solver.instead is None
-    assert not problem.solver.gave_up
+    assert problem.solver.replacement is None
+    assert not problem.solver.replacement_reason
     assert problem.solver.tolerance == 1e-10
     load_step(problem, later, 3, 0.75)
-    assert problem.solver.instead is factors
+    assert problem.solver.replacement is factors

@@ -75,7 +75,7 @@ def test_the_tangent_begins_as_linear_stiffness(element: str, law: str) -> None:
     for kinematics in ("plane_strain", "plane_stress", "axisymmetric") if flat else ("3d",):
         model, bodies = single(element, kinematics, material, strain)
         field = model.material_field()
-        K = stiffness(model.mesh, kinematics, field.moduli, field.loops, None, field.treatment).toarray()
+        K = stiffness(model.mesh, kinematics, field.moduli, field.moduli_rows, None, field.treatment).toarray()
         found = bodies.at(np.zeros_like(model.mesh.points), bodies.beginning).K.toarray()
         assert np.abs(found - K).max() <= 1e-11 * np.abs(K).max()
 

@@ -294,7 +294,7 @@ def test_an_elimination_takes_weights_of_pivots_themselves(kind):
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_standard_multipliers_over_a_whole_interface_cost_multigrid_what_dual_ones_do(friction):
     solver, step = solved(pressed(10, friction=friction, multipliers="standard"), "amg")
-    assert not solver.gave_up
+    assert not solver.replacement_reason
     assert not solver.columns.asked
     dual = solved(pressed(10, friction=friction, multipliers="dual"), "amg")[0]
     assert solver.counters.iterations <= 2 * dual.counters.iterations
@@ -318,8 +318,8 @@ def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_man
     monkeypatch.setattr("fastcontact.linear.elimination.pivot_order.FULL_UP_TO", 8)
     model = pressed(5, element, **options)
     solver, step = solved(model, "amg")
-    assert "columns of the inverse stiffness" in solver.gave_up
-    assert "dual" in solver.gave_up
+    assert "columns of the inverse stiffness" in solver.replacement_reason
+    assert "dual" in solver.replacement_reason
     force = solved(model, "direct")[1].contact["c"].force
     assert step.contact["c"].force == pytest.approx(force, abs=1e-9)
     monkeypatch.setattr(amg, "AFFORDABLE", {3: 100})

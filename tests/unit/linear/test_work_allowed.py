@@ -21,9 +21,9 @@ def test_multigrid_that_costs_more_than_factors_hands_over_in_time_and_says_at_w
     monkeypatch.setattr("fastcontact.linear.multigrid.solver.MOST_COLUMNS", 100_000)
     model = columns_with_friction()
     solver, found = solved(model, "amg")
-    assert solver.counters.iterations <= solver.affordable + 1 + solver.instead.counters.iterations
-    assert f"{solver.affordable} iterations in one load step take longer" in solver.gave_up
-    assert f"a factorisation of {model.n_dofs} unknowns" in solver.gave_up
+    assert solver.counters.iterations <= solver.affordable + 1 + solver.replacement.counters.iterations
+    assert f"{solver.affordable} iterations in one load step take longer" in solver.replacement_reason
+    assert f"a factorisation of {model.n_dofs} unknowns" in solver.replacement_reason
     exact = solved(model, "direct")[1]
     assert found.displacement == pytest.approx(exact.displacement, abs=1e-10 * np.abs(exact.displacement).max())
     force = exact.contact["c"].force_vectors
@@ -32,9 +32,9 @@ def test_multigrid_that_costs_more_than_factors_hands_over_in_time_and_says_at_w
 
 def test_after_factors_took_over_solutions_are_as_accurate_as_theirs(monkeypatch):
     monkeypatch.setattr(amg, "MAX_ITERATIONS", 0)
-    monkeypatch.setattr(amg, "COST_OF_UNKNOWN", {3: 0.0})
+    monkeypatch.setattr(amg, "ITERATIONS_PER_UNKNOWN", {3: 0.0})
     solver, found = solved(pressed(friction=0.3, ratio=1e-3, n=6), "amg")
-    assert solver.gave_up
+    assert solver.replacement_reason
     direct, exact = solved(pressed(friction=0.3, ratio=1e-3, n=6), "direct")
     assert solver.tolerance == direct.tolerance
     assert found.displacement == pytest.approx(exact.displacement, abs=1e-11 * np.abs(exact.displacement).max())
@@ -42,10 +42,10 @@ def test_after_factors_took_over_solutions_are_as_accurate_as_theirs(monkeypatch
 
 def test_without_factors_that_fit_any_work_is_allowed(monkeypatch):
     monkeypatch.setattr(amg, "MAX_ITERATIONS", 0)
-    monkeypatch.setattr(amg, "COST_OF_UNKNOWN", {3: 0.0})
+    monkeypatch.setattr(amg, "ITERATIONS_PER_UNKNOWN", {3: 0.0})
     monkeypatch.setattr(amg, "AFFORDABLE", {3: 100})
     solver, _ = solved(pressed(friction=0.3, n=6), "amg")
-    assert not solver.gave_up
+    assert not solver.replacement_reason
     assert solver.counters.iterations > 10
 
 
@@ -53,13 +53,13 @@ def test_work_is_that_of_one_load_step_with_changes_of_the_hierarchy(monkeypatch
     model = pressed(friction=0.3, n=6)
     solver, _ = solved(model, "amg")
     assert solver.work > solver.counters.iterations
-    monkeypatch.setattr(amg, "COST_OF_UNKNOWN", {3: 0.0})
+    monkeypatch.setattr(amg, "ITERATIONS_PER_UNKNOWN", {3: 0.0})
     monkeypatch.setattr(amg, "MAX_ITERATIONS", 2 * solver.work)
     again, _ = solved(model, "amg", steps=8)
     assert again.work > again.affordable
-    assert not again.gave_up
+    assert not again.replacement_reason
     monkeypatch.setattr(amg, "MAX_ITERATIONS", solver.work // 2)
-    assert solved(model, "amg")[0].gave_up
+    assert solved(model, "amg")[0].replacement_reason
 
 
 def estimated(A):
