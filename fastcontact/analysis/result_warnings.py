@@ -47,7 +47,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 # - the frictional work of nodes in the steps in which they close, relative to the total frictional work;
 # - the work of the stresses on strains that linear kinematics neglect, relative to that on strains;
 # - strains, because the fraction of a strain that linear kinematics neglect is about as large as the strain;
-# - the depth of wear, relative to the size of the model;
+# - the wear depth, relative to the size of the model;
 # - the excess of the largest nodal pressure near the edge over means of neighbouring facets, where bodies yield.
 NEGLECTED = 0.1
 # Error of the moment of friction above which a warning is given. Linear kinematics apply forces at undeformed positions. In
@@ -145,7 +145,7 @@ def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
     depth, size = float(state.worn[name].depth.max()), float(np.ptp(pair.points, axis=0).max())
     if factor > MANY_STEPS or depth > NEGLECTED * size:
         yield (
-            f"contact '{name}' has a depth of wear of {depth:.3g}, {depth / size:.2g} times the size of the model, and load "
+            f"contact '{name}' has a wear depth of {depth:.3g}, {depth / size:.2g} times the size of the model, and load "
             f"steps that are {factor:.2g} times too large for this wear: is the option 'wear' Archard's coefficient divided "
             "by the hardness, in units of 1/pressure?"
         )

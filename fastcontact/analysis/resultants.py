@@ -264,7 +264,7 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
 
 @typed(ContactError)
 def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: float) -> Array:
-    """Return the depth of wear at the secondary nodes of a contact pair by Archard's law, accumulated over the load steps.
+    """Return the wear depth at the secondary nodes of a contact pair by Archard's law, accumulated over the load steps.
 
     ``depth = sum of coefficient * integral of pressure over slip``. With friction the integral of a step is
     `ContactResult.sliding_load`. Without friction it is the slip times the mean of the pressures at both ends, where slip is

@@ -1,6 +1,6 @@
 """Wear of the secondary nodes of a contact pair by slip.
 
-By the law of Archard (J. Appl. Phys. 24, 1953), the depth of wear is proportional to the product of pressure and sliding
+By the law of Archard (J. Appl. Phys. 24, 1953), the wear depth is proportional to the product of pressure and sliding
 distance. In this module m is the number of secondary nodes.
 """
 

@@ -96,7 +96,7 @@ class Check:
         ``"PROBE.stress.yy"`` or ``"PROBE.displacement.x"``. Quantity of a contact pair: ``"PAIR.force"`` and its
         component ``"PAIR.force.x"``, on the secondary side; ``"PAIR.pressure_max"``; ``"PAIR.radius"`` or
         ``"PAIR.stick_radius"``, the midpoint of the bracket; ``"PAIR.moment.z"``, about the middle of the contact;
-        ``"PAIR.torque"``, of a rotating obstacle about its axis; ``"PAIR.wear_max"``, the largest depth of wear; or
+        ``"PAIR.torque"``, of a rotating obstacle about its axis; ``"PAIR.wear_max"``, the largest wear depth; or
         ``"PAIR.heat"``, the heat flow to the primary side.
     tolerance : float
         Largest admissible relative deviation [-].

@@ -90,7 +90,7 @@ CONTACT_FIELDS = {
     "contact_pressure": ("contact pressure", "pressure"),
     "contact_slip": ("slip of the step", "length"),
     "contact_slip_total": ("total slip", "length"),
-    "contact_wear": ("depth of wear", "length"),
+    "contact_wear": ("wear depth", "length"),
     "contact_damage": ("damage", ""),
     "contact_fluid_pressure": ("fluid pressure", "pressure"),
 }

@@ -39,7 +39,7 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
     - REAC_NODA (DX, DY [, DZ]): reactions [force]. In axisymmetry they are integrated over the full circle, in code_aster
       over one radian.
     - PRES_CONT (PRES): contact pressure, zero at nodes outside the contact surfaces [pressure].
-    - USUR_CONT (USUR), in models with wear: depth of wear, zero at nodes outside the contact surfaces [length].
+    - USUR_CONT (USUR), in models with wear: wear depth, zero at nodes outside the contact surfaces [length].
     - ENDO_CONT (ENDO), in models with cohesive layers or adhesion: damage, zero at the same nodes [-].
     - PRES_FLUI (PRES), in models with fluid pressures: fluid pressure, zero at the same nodes [pressure].
     - TEMP (TEMP), with heat conduction: temperature [temperature].

@@ -204,7 +204,7 @@ class ContactResult(Suggesting):
         Direction along which half-widths are measured in 2D [-]. It is None in axisymmetry, in 3D, and on a ring in contact
         along its entire circumference, where `place` is used instead.
     wear : ndarray (m,), optional
-        Accumulated depth of wear at the end of the step, with the option ``wear`` [length].
+        Accumulated wear depth at the end of the step, with the option ``wear`` [length].
     heat_flux : ndarray (m,), optional
         Heat flux from the secondary to the primary side per unit reference area, with the option ``conductance``
         [power / area].

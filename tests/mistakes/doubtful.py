@@ -211,7 +211,7 @@ DOUBTS = [
             "motion = { y = -0.2 }\nrotation = { angle = 0.1, centre = [0.0, 5.0] }\nwear = 1.0\n",
         ),
         (
-            r"contact 'drum' has a depth of wear of \S+, \S+ times the size of the model, and load steps that are \S+ times too large for this wear: is the option 'wear' Archard's coefficient divided by the hardness, in units of 1/pressure\?",
+            r"contact 'drum' has a wear depth of \S+, \S+ times the size of the model, and load steps that are \S+ times too large for this wear: is the option 'wear' Archard's coefficient divided by the hardness, in units of 1/pressure\?",
         ),
     ),
     Doubt(

@@ -96,7 +96,7 @@ def test_xarray_gets_the_fields_of_all_steps(results):
     [
         ("damage", "ENDO_CONT", "damage"),
         ("fluid_pressure", "PRES_FLUI", "fluid pressure [MPa]"),
-        ("wear", "USUR_CONT", "depth of wear [mm]"),
+        ("wear", "USUR_CONT", "wear depth [mm]"),
     ],
 )
 def test_fields_of_special_contacts_are_in_every_export(name, med, caption, tmp_path):
