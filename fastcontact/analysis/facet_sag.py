@@ -20,10 +20,12 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import fine_rule, gauss_rule
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import Candidates
+from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import FacetBlock
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
 from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.round_off import TINY
 
 # Estimated error over the mean pressure above which a warning is given, by the order of facets. On rings the errors of nodal
 # pressures were 0.2 to 3.2 of the estimate on linear facets, except where contact opens due to the error, and up to 3 on
@@ -32,6 +34,9 @@ RELATIVE_ERROR_LIMIT = {1: 0.2, 2: 0.1}
 # Ratio of the estimate to E d / L if the gaps are weighted means: the inverse mass matrix amplifies gaps that alternate from
 # node to node.
 MEAN_GAP_FACTOR = 2.0
+
+# Error of tangential forces over the friction limit above which a warning is given.
+FRICTION_ERROR_LIMIT = 0.1
 
 
 def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, str]:
@@ -43,7 +48,9 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
         if corrected or pair.options.tied or pair.options.gap_only or not (contact.pressure > 0.0).any():
             continue
         configuration = problem.configuration(name, state, load, displacement, state.u)
-        text = _warning(pair, *_sag(pair, configuration, contact.active), contact)
+        text = _warning(pair, *_sag(pair, configuration, contact.active), contact) or _inclination(
+            pair, configuration, contact
+        )
         if text:
             warnings[name] = f"contact '{name}': {text}"
     return warnings
@@ -67,6 +74,28 @@ def _warning(pair: Formulation, spread: float, slope: float, contact: ContactRes
         f"facets of '{side.group}' and of the other side deviate from their arcs by up to {spread:.3g}, which may change "
         f"pressures by about {error:.3g}, compared with a mean of {mean:.3g}: {remedy}; "
         f"{'quadratic elements, or ' if order == 1 else ''}{finer} reduce the error"
+    )
+
+
+def _inclination(pair: Formulation, configuration: Configuration, contact: ContactResult) -> str:
+    """Return a warning if facets that are inclined to the smooth surface change friction; an empty string otherwise.
+
+    Node-to-segment contact acts along the normals of primary facets. If the nodes of both sides coincide, all facets may be
+    inclined in the same direction relative to the smooth surface, such as the teeth of a ratchet.
+    """
+    if pair.name != "node_to_segment" or pair.normals != "facet" or not pair.friction:
+        return ""
+    smooth = -nodal_normals(pair.secondary, pair.points + configuration.displacement)
+    force, traction = (contact.force_vectors * contact.normal).sum(axis=1), np.linalg.norm(contact.shear, axis=1)
+    along = contact.shear / np.maximum(traction, TINY)[:, None]
+    inclination = ((contact.normal - smooth) * along).sum(axis=1)
+    share = abs(float(force @ inclination)) / max(pair.friction * float(force.sum()), TINY)
+    if share <= FRICTION_ERROR_LIMIT:
+        return ""
+    return (
+        f"facets of the primary side are inclined to the smooth surface, by {np.abs(inclination).max():.2g} radian along the "
+        f"friction, which changes tangential forces by about {share:.0%} of the friction limit: use the default formulation, "
+        "surface_smoothing=True, or smaller facets"
     )
 
 
