@@ -59,7 +59,7 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
 def _warning(pair: Formulation, spread: float, slope: float, contact: ContactResult) -> str:
     """Return a warning about the pressure error due to the sag, see `_sag`; an empty string if it is small."""
     side, order = pair.secondary, pair.secondary.order
-    length = _facet_length(pair)
+    length = facet_length(pair)
     limit, power = RELATIVE_ERROR_LIMIT[order], 2 * order - 1
     remedy = "surface_smoothing=True measures the gap between the arcs"
     if isinstance(pair.primary, RigidSide):
@@ -104,7 +104,7 @@ def _lengths(pair: Formulation, block: FacetBlock) -> Array:
     return np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
 
 
-def _facet_length(pair: Formulation) -> float:
+def facet_length(pair: Formulation) -> float:
     """Return the median length of the facets of the secondary side [length]."""
     return float(np.median(np.concatenate([_lengths(pair, block) for block in pair.secondary.blocks])))
 
@@ -115,7 +115,7 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
     points = Candidates.inside(pair.secondary, [xi for xi, _ in rules])
     deformed, closed = pair.points + configuration.displacement, np.zeros(len(pair.points), bool)
     closed[pair.secondary.points[active]] = True
-    extent = max(float(np.linalg.norm(np.ptp(pair.points[closed], axis=0))), _facet_length(pair))
+    extent = max(float(np.linalg.norm(np.ptp(pair.points[closed], axis=0))), facet_length(pair))
     if isinstance(pair.primary, RigidSide):
         rows = np.flatnonzero(closed[points.nodes].all(axis=1))
         nodes, pose = points.nodes[rows], configuration.pose
@@ -137,7 +137,7 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
     sag[rows] = smoothing.overlap((points.facet[rows], points.xi[rows]), (pairing.facet[rows], pairing.xi[rows]), axes)
     sag_in_contact = sag[rows[in_contact]]
     spread, offset = float(np.ptp(sag_in_contact)), abs(float(sag_in_contact.mean())) / extent
-    ratio = spread / _facet_length(pair) if pair.secondary.order == 2 else max(offset, _slope(pair, rules, sag, closed))
+    ratio = spread / facet_length(pair) if pair.secondary.order == 2 else max(offset, _slope(pair, rules, sag, closed))
     return spread, ratio
 
 
