@@ -20,10 +20,12 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import fine_rule, gauss_rule
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import Candidates
+from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import FacetBlock
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
 from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.round_off import TINY
 
 # Estimated error over the mean pressure above which a warning is given, by the order of facets. On rings the errors of nodal
 # pressures were 0.2 to 3.2 of the estimate on linear facets, except where contact opens due to the error, and up to 3 on
@@ -32,6 +34,9 @@ RELATIVE_ERROR_LIMIT = {1: 0.2, 2: 0.1}
 # Ratio of the estimate to E d / L if the gaps are weighted means: the inverse mass matrix amplifies gaps that alternate from
 # node to node.
 MEAN_GAP_FACTOR = 2.0
+
+# Error of tangential forces over the friction limit above which a warning is given.
+FRICTION_ERROR_LIMIT = 0.1
 
 
 def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, str]:
@@ -43,7 +48,9 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
         if corrected or pair.options.tied or pair.options.gap_only or not (contact.pressure > 0.0).any():
             continue
         configuration = problem.configuration(name, state, load, displacement, state.u)
-        text = _warning(pair, *_sag(pair, configuration, contact.active), contact)
+        text = _warning(pair, *_sag(pair, configuration, contact.active), contact) or _inclination(
+            pair, configuration, contact
+        )
         if text:
             warnings[name] = f"contact '{name}': {text}"
     return warnings
@@ -52,7 +59,7 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
 def _warning(pair: Formulation, spread: float, slope: float, contact: ContactResult) -> str:
     """Return a warning about the pressure error due to the sag, see `_sag`; an empty string if it is small."""
     side, order = pair.secondary, pair.secondary.order
-    length = _facet_length(pair)
+    length = facet_length(pair)
     limit, power = RELATIVE_ERROR_LIMIT[order], 2 * order - 1
     remedy = "surface_smoothing=True measures the gap between the arcs"
     if isinstance(pair.primary, RigidSide):
@@ -70,12 +77,34 @@ def _warning(pair: Formulation, spread: float, slope: float, contact: ContactRes
     )
 
 
+def _inclination(pair: Formulation, configuration: Configuration, contact: ContactResult) -> str:
+    """Return a warning if facets that are inclined to the smooth surface change friction; an empty string otherwise.
+
+    Node-to-segment contact acts along the normals of primary facets. If the nodes of both sides coincide, all facets may be
+    inclined in the same direction relative to the smooth surface, such as the teeth of a ratchet.
+    """
+    if pair.name != "node_to_segment" or pair.normals != "facet" or not pair.friction:
+        return ""
+    smooth = -nodal_normals(pair.secondary, pair.points + configuration.displacement)
+    force, traction = (contact.force_vectors * contact.normal).sum(axis=1), np.linalg.norm(contact.shear, axis=1)
+    along = contact.shear / np.maximum(traction, TINY)[:, None]
+    inclination = ((contact.normal - smooth) * along).sum(axis=1)
+    share = abs(float(force @ inclination)) / max(pair.friction * float(force.sum()), TINY)
+    if share <= FRICTION_ERROR_LIMIT:
+        return ""
+    return (
+        f"facets of the primary side are inclined to the smooth surface, by {np.abs(inclination).max():.2g} radian along the "
+        f"friction, which changes tangential forces by about {share:.0%} of the friction limit: use the default formulation, "
+        "surface_smoothing=True, or smaller facets"
+    )
+
+
 def _lengths(pair: Formulation, block: FacetBlock) -> Array:
     """Return the lengths (n_facets,) of the facets of a block [length]."""
     return np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
 
 
-def _facet_length(pair: Formulation) -> float:
+def facet_length(pair: Formulation) -> float:
     """Return the median length of the facets of the secondary side [length]."""
     return float(np.median(np.concatenate([_lengths(pair, block) for block in pair.secondary.blocks])))
 
@@ -86,7 +115,7 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
     points = Candidates.inside(pair.secondary, [xi for xi, _ in rules])
     deformed, closed = pair.points + configuration.displacement, np.zeros(len(pair.points), bool)
     closed[pair.secondary.points[active]] = True
-    extent = max(float(np.linalg.norm(np.ptp(pair.points[closed], axis=0))), _facet_length(pair))
+    extent = max(float(np.linalg.norm(np.ptp(pair.points[closed], axis=0))), facet_length(pair))
     if isinstance(pair.primary, RigidSide):
         rows = np.flatnonzero(closed[points.nodes].all(axis=1))
         nodes, pose = points.nodes[rows], configuration.pose
@@ -108,7 +137,7 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
     sag[rows] = smoothing.overlap((points.facet[rows], points.xi[rows]), (pairing.facet[rows], pairing.xi[rows]), axes)
     sag_in_contact = sag[rows[in_contact]]
     spread, offset = float(np.ptp(sag_in_contact)), abs(float(sag_in_contact.mean())) / extent
-    ratio = spread / _facet_length(pair) if pair.secondary.order == 2 else max(offset, _slope(pair, rules, sag, closed))
+    ratio = spread / facet_length(pair) if pair.secondary.order == 2 else max(offset, _slope(pair, rules, sag, closed))
     return spread, ratio
 
 

@@ -196,3 +196,21 @@ def test_an_obstacle_has_no_facets_to_smooth():
     plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     with pytest.raises(fc.ContactError, match="leave it out at an obstacle"):
         model.add_obstacle("rod", secondary="BORE", obstacle=plane, surface_smoothing=True)
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_facets_that_interlock_where_nodes_coincide_are_told(smooth):
+    """A shaft turns in a hub whose nodes coincide with its own: facets inclined like the teeth of a ratchet hold it."""
+    mesh, axes = fc.generate.rings("quad4", divisions_inner=(2, 8), divisions_outer=(2, 8)), fc.CylindricalAxes()
+    model = made_of(mesh, "plane_stress", STEEL)
+    model.fix("BORE", "y", axes=axes)
+    model.prescribe("RIM", y=0.1, axes=axes, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
+    model.add_cyclic_symmetry("SYMMETRY_X", "SYMMETRY_Y", sectors=4)
+    model.add_contact(
+        "fit", secondary="CONT_OUTER", primary="CONT_INNER", friction=0.15, clearance=-0.1,
+        formulation="node_to_segment", surface_smoothing=smooth,
+    )  # fmt: skip
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        last = fc.solve(model, [1.0, 2.0])[-1]
+    assert any("inclined to the smooth surface" in text for text in last.warnings) != smooth
