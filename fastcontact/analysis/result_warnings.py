@@ -26,6 +26,7 @@ from fastcontact.arrays import Array, Mask, largest
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.found_contacts import SOFTER
 from fastcontact.contact.integration import lumped_areas
+from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.energy import slopes_at
@@ -120,7 +121,7 @@ def result_warnings(
 def _beyond_ends(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     """Yield a warning if surfaces slide past each other at periodic ends, beyond which there is no opposite facet."""
     largest, points = 0.0, pair.points[pair.secondary.points]
-    for first, second, _ in pair.secondary.periodic_ends:
+    for first, second, _ in () if isinstance(pair.primary, RigidSide) else pair.secondary.periodic_ends:
         across = points[second] - points[first]
         length = np.linalg.norm(across, axis=1, keepdims=True)
         slip = contact.slip_total[first] * contact.active[first, None]
