@@ -89,7 +89,9 @@ def torque(dim, turned, angle, strain="small", **options):
     return abs(float((x[:, 0] * force[:, 1] - x[:, 1] * force[:, 0]).sum())), last.warnings
 
 
-@pytest.mark.filterwarnings("ignore:moments of friction", "ignore:.*across its radius")
+@pytest.mark.filterwarnings(
+    "ignore:moments of friction", "ignore:.*across its radius", "ignore:.*past each other at the periodic ends"
+)
 @pytest.mark.parametrize(
     ("dim", "turned", "angle", "options", "error"),
     first_of(4, [
