@@ -167,20 +167,22 @@ def _unbalanced(state: State) -> Iterator[str]:
 
 
 def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
-    """Yield a warning where nodes that close and slide in one step do much of the frictional work.
+    """Yield a warning where nodes that close or open and slide in one step do much of the frictional work.
 
-    This part must also exceed the energy of a notable error of the displacement, NOTABLE squared times the strain energy.
+    This part must also exceed the energy of a notable error of the displacement, NOTABLE squared times the largest energy.
     Under a sphere that sticks, with a coefficient of 0.6, the frictional work is 2e-4 of the strain energy in long steps,
     and 1e-5 if slip counts from first contact.
     """
     work = state.work
-    if work is not None and work.touching > max(NEGLECTED * work.friction, NOTABLE**2 * work.strain_energy, 0.0):
+    if work is not None and work.touching > max(NEGLECTED * work.friction, NOTABLE**2 * work.largest, 0.0):
         share = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
-        remedy = ", or Criteria(friction_while_touching=0.01)" if criteria.friction_while_touching is None else ""
+        remedy = (
+            "" if criteria.friction_while_touching else ", or Criteria(friction_while_touching=0.01) if nodes close"
+        )
         yield (
             f"{share:.0%} of the work of friction is done at nodes in the load step in which they "
-            "close, where slip counts from the beginning of the step instead of first contact: the work of friction and the "
-            f"tractions are inaccurate. Use more load steps{remedy}"
+            "close or open, where the slip of the complete step counts, not that in contact: the work of friction, and the "
+            f"tractions at nodes that close, are inaccurate. Use more load steps{remedy}"
         )
 
 

@@ -533,7 +533,7 @@ class StepResult(Suggesting):
           changes of the gap by wear and `clearance_ramp`.
         - ``friction_work``: work dissipated by friction.
         - ``friction_while_touching``: part of the frictional work that is dissipated at nodes in the step in which their
-          gaps close. It is overestimated in long steps, and zero in steps that are solved in increments.
+          gaps close or open, unless other nodes take over their forces. It is overestimated in long steps.
         - ``penalty_energy``: energy of penalties and cohesive layers, and of the small compliance of pressure fields.
         - ``energy_released``: energy dissipated by damage of cohesive layers.
         - ``imbalance``: external work minus the sum of all other energies.
