@@ -397,6 +397,10 @@ def _unresolved(pair: Formulation, contact: ContactResult, state: State) -> Iter
     """Yield a warning where too few elements lie across the radius of a contact that carries a force."""
     if pair.options.always_closed or largest(contact.force_vectors) <= SINGLE_PRECISION * state.largest_force:
         return
+    if not contact.active.any():
+        if contact.fluid_pressure is not None and (contact.fluid_pressure > 0.0).all():
+            yield f"contact '{contact.name}' is blown open: the fluid acts on all of its nodes, so that a seal leaks"
+        return
     count = across(pair.secondary, contact.active, pair.options.excluded_nodes(pair.secondary))
     if count is not None and count < ACROSS:
         yield (

@@ -176,7 +176,7 @@ class ContactResult(Suggesting):
         in finite strain in the deformed configuration. In 3D, pairs of a closed and an open node with a common facet are
         considered; the lower bound is the smallest distance of their closed nodes and the upper bound the largest distance of
         their open nodes, so that all semi-axes of an elliptic contact lie between the bounds. If the contact is a ring around
-        an open middle, the bounds refer to its outer edge.
+        an open middle, the bounds refer to its outer edge. The upper bound is infinite if the side is closed to its end.
     shear : ndarray (m, dim)
         Tangential traction on the secondary side, zero in frictionless contact [pressure].
     sticking : ndarray of bool (m,)
@@ -299,7 +299,9 @@ class ContactResult(Suggesting):
         """Names and values of the force, the largest pressure, the closed nodes and the contact radius, for reprs."""
         low, high = self.radius
         inside, outside = (with_unit(f"{end:.4g}", self.units, "length") for end in (low, high))
-        radius = f"{low:.4g} to {outside}" if np.isfinite(high) else f"{inside}, to its end"
+        radius = f"{low:.4g} to {outside}" if np.isfinite(high) else "none, closed to its end"
+        if self.is_ring:
+            radius = f"ring from {self.place[self.active].min():.4g} to {outside if np.isfinite(high) else inside}"
         return {
             "force": force_text(self.force.tolist(), self.force_parts, self.normal_force, self.units),
             "largest pressure": with_unit(f"{self.pressure_max:.6g}", self.units, "pressure"),
@@ -320,6 +322,11 @@ class ContactResult(Suggesting):
         """Whether `place` contains distances from the axis of symmetry instead of arc lengths or distances in 3D."""
         flat = self.coordinates.shape[1] == 2 and self.tangent is None  # in plane models only rings have no tangent
         return flat and bool(self.middle[0] == 0.0) and bool(np.array_equal(self.place, np.abs(self.coordinates[:, 0])))
+
+    @property
+    def is_ring(self) -> bool:
+        """Whether the contact area of an axisymmetric model does not contain the axis, so that it has two edges."""
+        return self.measured_from_axis and 0.0 < float(self.place[self.active].min(initial=np.inf)) < np.inf
 
     @property
     def extent(self) -> str:
