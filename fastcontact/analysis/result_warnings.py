@@ -167,7 +167,7 @@ def _unbalanced(state: State) -> Iterator[str]:
 
 
 def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
-    """Yield a warning where nodes that close or open and slide in one step do much of the frictional work.
+    """Yield a warning where nodes that close and slide in one step, or slide until contact is lost, do much of the work.
 
     This part must also exceed the energy of a notable error of the displacement, NOTABLE squared times the largest energy.
     Under a sphere that sticks, with a coefficient of 0.6, the frictional work is 2e-4 of the strain energy in long steps,
@@ -181,8 +181,8 @@ def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
         )
         yield (
             f"{share:.0%} of the work of friction is done at nodes in the load step in which they "
-            "close or open, where the slip of the complete step counts, not that in contact: the work of friction, and the "
-            f"tractions at nodes that close, are inaccurate. Use more load steps{remedy}"
+            "close, or contact is lost, where the slip of the complete step counts, not that in contact: the work of "
+            f"friction, and the tractions at nodes that close, are inaccurate. Use more load steps{remedy}"
         )
 
 

@@ -96,7 +96,7 @@ class Work:
     friction : float
         Frictional work.
     touching : float
-        Part of the frictional work that is done in the step in which a gap closes or opens.
+        Part of the frictional work that is done in the step in which a gap closes, or in which the contact is lost.
     imbalance : float
         External work that the other terms do not account for.
     stored : float
@@ -199,7 +199,7 @@ def contact_work(
     ratio = np.divide(pressure * areas, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
     work_at_end, work_at_begin = (-0.5 * np.einsum("md,md->m", f, slips) for f in (force, areas[:, None] * traction))
     mu, normal_before = constraints.friction, pressure * areas
-    closing, opening = pressure == 0.0, (pressure != 0.0) & (normal == 0.0)
+    closing = pressure == 0.0
     moved, moved_away = _moved(normal, normal_before)
     if (
         solution.integrals is not None
@@ -220,7 +220,8 @@ def contact_work(
             open_before = gap[facing] > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
             closing &= open_before[nearest(pair.points[pair.secondary.points[facing]], constraints.positions)[1]]
     friction, touching = float(work.sum()), (1.0 - moved) * float(work_at_end[closing].sum())
-    touching += (1.0 - moved_away) * float(work[opening].sum())
+    if not normal.any():  # the contact is lost at an unknown instant
+        touching += friction
     slip_integrals = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(slips, axis=1)
     np.divide(work, mu, out=slip_integrals, where=mu > 0.0)
     sliding = float((work_at_end + work_at_begin).sum())

@@ -540,7 +540,8 @@ class StepResult(Suggesting):
           changes of the gap by wear and `clearance_ramp`.
         - ``friction_work``: work dissipated by friction.
         - ``friction_while_touching``: part of the frictional work that is dissipated at nodes in the step in which their
-          gaps close or open, unless other nodes take over their forces. It is overestimated in long steps.
+          gaps close, unless they take over the forces of other nodes, and in the step in which a contact is lost. It is
+          overestimated in long steps.
         - ``penalty_energy``: energy of penalties and cohesive layers, and of the small compliance of pressure fields.
         - ``energy_released``: energy dissipated by damage of cohesive layers.
         - ``imbalance``: external work minus the sum of all other energies.
