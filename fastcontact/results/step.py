@@ -426,7 +426,7 @@ class StepResult(Suggesting):
           ``displacement`` and of the contact ``force`` [-].
         - ``temperature_factors``, ``initial_factors``, ``pressure_factors``, ``spin_factors``: multipliers of the
           temperatures, of the initial stresses and strains, of the pressures and of the centrifugal forces [-].
-        - ``work`` and ``pretension``: data of the properties of the same names.
+        - ``work``, ``pretension`` and ``reference_reactions``: data of the properties of the same names.
         - ``parameter``, in vibration modes, whose shapes have no unit: quantity that the load factor represents,
           ``frequency`` or ``phase``.
     warnings : tuple of str
@@ -528,6 +528,15 @@ class StepResult(Suggesting):
     def pretension(self) -> dict[str, dict[str, float]]:
         """The ``force``, positive in tension [force], and ``shortening`` [length] of pretension sections, by name."""
         return dict(self.iterations.get("pretension", {}))
+
+    @property
+    def reference_reactions(self) -> dict[str, dict[str, list[float]]]:
+        """The ``force`` (dim,) [force] and ``moment`` [force times length] of the supports of reference points, by name.
+
+        The moment has one component in the plane and three in 3D. In `reaction` these forces are those of the coupled nodes,
+        and the values at reference points are zero.
+        """
+        return dict(self.iterations.get("reference_reactions", {}))
 
     @property
     def work(self) -> dict[str, float]:
