@@ -18,12 +18,10 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.elasticity.nonlinear_bodies import PLASTIC_STRAIN
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
-from fastcontact.model.rigid_motions import grouped, least_held
+from fastcontact.model.rigid_motions import NEARLY_SLIDING, grouped, least_held
 from fastcontact.round_off import SINGLE_PRECISION
 
 Nodes = dict[str, list[int]]
-# Fraction of the frictional capacity above which floating bodies are reported as about to slide.
-NEARLY_SLIDING = 0.9
 
 
 def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Array, limit: int) -> str:
@@ -89,14 +87,18 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
 def friction_exceeded(factor: float, bodies: list[str], coefficients: Array) -> str:
     """Return the message for loads that move `bodies`, which `factor` times the friction `coefficients` would hold."""
     distinct = np.unique(coefficients[coefficients > 0.0])
-    digits = next((n for n in range(3, 12) if f"{factor:.{n}g}" != "1"), 12)
+    pairs = (factor, 1.0), (factor * distinct[0], distinct[0])
+    digits = next((n for n in range(3, 12) if all(f"{a:.{n}g}" != f"{b:.{n}g}" for a, b in pairs)), 12)
     needed = (
         f"a coefficient of about {factor * distinct[0]:.{digits}g} where the largest is {distinct[0]:.{digits}g}"
         if np.isclose(distinct[0], distinct[-1])
         else f"about {factor:.{digits}g} times the coefficients given, which are from {distinct[0]:.3g} to {distinct[-1]:.3g}"
     )
+    held, more = "cannot hold", ""
+    if factor < 1.0:
+        held, more = "hardly holds", ", if the bodies were rigid, and more for elastic bodies"
     return (
-        f"friction cannot hold {', '.join(bodies)} against the loads: this would require {needed}. Lower "
+        f"friction {held} {', '.join(bodies)} against the loads: this would require {needed}{more}. Lower "
         "the loads along the contact, press harder, or support the bodies along the contact"
     )
 

@@ -21,6 +21,7 @@ from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.resultants import reference_reactions
 from fastcontact.analysis.state import State
 from fastcontact.analysis.thermal_coupling import (
     HeatSolution,
@@ -296,6 +297,8 @@ def recover(
     }  # fmt: skip
     iterations = {**iterations, **{key: multipliers for key, multipliers in factors.items() if multipliers}}
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
+    if references := reference_reactions(problem.model, reaction.ravel(), u.ravel()):
+        iterations["reference_reactions"] = references
     if sections:
         iterations["pretension"] = section_results(sections, u, reaction, pretension)
     if bodies is not None:

@@ -110,11 +110,14 @@ def modes(
     if sectors is None or diameters is None:
         values, vectors = vibration.lowest(n, linear_solver, None if sectors is None else Wave(sectors, 0))
         vibration.warn_of_sliding_modes(values, vectors)
-        return _modes(vibration, values, vectors)
-    waves = [Wave(sectors, d) for d in diameters]
-    return _ring_modes(
-        vibration, sectors, [(wave, *vibration.wave_eigenpairs(wave, n, linear_solver)) for wave in waves]
-    )
+        found = _modes(vibration, values, vectors)
+    else:
+        waves = [Wave(sectors, d) for d in diameters]
+        pairs = [(wave, *vibration.wave_eigenpairs(wave, n, linear_solver)) for wave in waves]
+        found = _ring_modes(vibration, sectors, pairs)
+    if found.unstable.any():
+        warn(f"{found.remarks()[0]}: the loads exceed a buckling load, or nodes slide (hold_sliding=True)")
+    return found
 
 
 def _diameters(

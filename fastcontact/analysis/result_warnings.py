@@ -199,20 +199,22 @@ def _unbalanced(state: State) -> Iterator[str]:
 
 
 def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
-    """Yield a warning where nodes that close and slide in one step do much of the frictional work.
+    """Yield a warning where nodes that close and slide in one step, or slide until contact is lost, do much of the work.
 
-    This part must also exceed the energy of a notable error of the displacement, NOTABLE squared times the strain energy.
+    This part must also exceed the energy of a notable error of the displacement, NOTABLE squared times the largest energy.
     Under a sphere that sticks, with a coefficient of 0.6, the frictional work is 2e-4 of the strain energy in long steps,
     and 1e-5 if slip counts from first contact.
     """
     work = state.work
-    if work is not None and work.touching > max(NEGLECTED * work.friction, NOTABLE**2 * work.strain_energy, 0.0):
+    if work is not None and work.touching > max(NEGLECTED * work.friction, NOTABLE**2 * work.largest, 0.0):
         share = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
-        remedy = ", or Criteria(friction_while_touching=0.01)" if criteria.friction_while_touching is None else ""
+        remedy = (
+            "" if criteria.friction_while_touching else ", or Criteria(friction_while_touching=0.01) if nodes close"
+        )
         yield (
             f"{share:.0%} of the work of friction is done at nodes in the load step in which they "
-            "close, where slip counts from the beginning of the step instead of first contact: the work of friction and the "
-            f"tractions are inaccurate. Use more load steps{remedy}"
+            "close, or contact is lost, where the slip of the complete step counts, not that in contact: the work of "
+            f"friction, and the tractions at nodes that close, are inaccurate. Use more load steps{remedy}"
         )
 
 
@@ -426,6 +428,10 @@ def _depth_of_primary(problem: Problem, pair: Formulation, last: StepResult) -> 
 def _unresolved(pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:
     """Yield a warning where too few elements lie across the radius of a contact that carries a force."""
     if pair.options.always_closed or largest(contact.force_vectors) <= SINGLE_PRECISION * state.largest_force:
+        return
+    if not contact.active.any():
+        if contact.fluid_pressure is not None and (contact.fluid_pressure > 0.0).all():
+            yield f"contact '{contact.name}' is blown open: the fluid acts on all of its nodes, so that a seal leaks"
         return
     count = across(pair.secondary, contact.active, pair.options.excluded_nodes(pair.secondary))
     if count is not None and count < ACROSS:

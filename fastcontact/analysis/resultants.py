@@ -20,6 +20,7 @@ from fastcontact.contact.integration import lumped_areas
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.elasticity.springs import ground_force
 from fastcontact.errors import ContactError, ModelError, unknown
+from fastcontact.mesh.mesh import ROTATION
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -417,6 +418,29 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
         resultant = (relation.rows.T @ force).reshape(supported.shape).sum(axis=0)
         by_support[group] = by_support.get(group, 0.0) + resultant
     return by_support
+
+
+def reference_reactions(model: Model, reaction: Array, u: Array) -> dict[str, dict[str, list[float]]]:
+    """Return `StepResult.reference_reactions`, given the reactions (n_dofs,) [force] and displacements (n_dofs,) [length]."""
+    groups, supported = model.mesh.point_groups, model.prescribed()[0]
+    points = {
+        name: (model.mesh.point(name), model.mesh.point(name + ROTATION))
+        for name in groups
+        if name + ROTATION in groups
+    }
+    points = {name: pair for name, pair in points.items() if supported[list(pair)].any()}
+    if not points:
+        return {}
+    rows = [relation.rows for relation in model.relations] + [s.row(model.n_dofs) for s in model.pretensions]
+    reaction = reaction - ground_force(model.springs, u)
+    forces = multipliers(reaction, rows, supported.ravel())
+    nodal = reaction - sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(model.n_dofs))
+    nodal = nodal.reshape(supported.shape)
+    moments = 1 if model.mesh.dim == 2 else 3
+    return {
+        name: {"force": nodal[point].tolist(), "moment": nodal[rotation, :moments].tolist()}
+        for name, (point, rotation) in points.items()
+    }
 
 
 def multipliers(reaction: Array, rows: Sequence[csr_array], supported: Mask) -> list[Array]:

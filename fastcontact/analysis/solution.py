@@ -175,16 +175,22 @@ class SlipSoFar:
         Slip vectors since the beginning of the step [length].
     slip_before_closing : ndarray (m, dim)
         Part of `slip` before the constraint closed in this step, zero if it was closed at the beginning [length].
-    work : ndarray (m,)
-        Frictional work since the beginning of the step [energy].
+    traction : ndarray (m, dim)
+        Tangential force vectors [force].
+    integrals : ndarray (2, m)
+        See `Solution.integrals`, of the increments before the last one.
     normal : ndarray (m,)
         Normal forces [force].
+    begin : float
+        Fraction of the step before the last increment.
     """
 
     slip: Array
     slip_before_closing: Array
-    work: Array
+    traction: Array
+    integrals: Array
     normal: Array
+    begin: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,8 +226,9 @@ class Solution:
         Unit tangents.
     response : callable, optional
         Function without arguments that returns the `Response` of this solution, for a constant contact state.
-    work : ndarray (m,), optional
-        Frictional work in the step [energy]; only if the step is solved in increments.
+    integrals : ndarray (2, m), optional
+        Frictional work in the step [energy], and mean normal forces in the step [force]; only if the step is solved in
+        increments.
     slip_before_closing : ndarray (m, k), optional
         Part of `slip` before the constraint closed in this step [length]; only if the step is solved in increments.
     slip_so_far : SlipSoFar, optional
@@ -241,7 +248,7 @@ class Solution:
     residual: float = 0.0
     directions: tuple[Array, ...] = ()
     response: Callable[[], Response] | None = field(default=None, repr=False)
-    work: Array | None = None
+    integrals: Array | None = None
     slip_before_closing: Array | None = None
     slip_so_far: SlipSoFar | None = None
 
@@ -265,7 +272,7 @@ class Solution:
 
 def in_increments(
     lag: Array, closing: Array, y: Array, waiting: Mask, solve: Increment
-) -> tuple[Forces, Array, tuple[Array, Array, Array, Array]]:
+) -> tuple[Forces, Array, tuple[Array, Array, Array, Array, Array, float]]:
     """Return the forces at the end of a load step that is solved in increments, which end where constraints close.
 
     Parameters
@@ -286,11 +293,11 @@ def in_increments(
         Forces at the end of the step, with the slips of the last increment.
     gaps : ndarray (1 + k, m)
         Gaps at the end of the step, and the slips of the whole step [length].
-    before : (ndarray (k, m), ndarray (k, m), ndarray (m,), ndarray (m,))
-        Slips along the tangents, and their part before the constraint closed [length], frictional work [energy] and
-        normal forces [force] at the beginning of the last increment; see `SlipSoFar`.
+    before : tuple
+        `SlipSoFar`, with vectors by their components (k, m) along the tangents.
     """
-    closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros(lag.shape[1]), 0, True
+    closed, slip, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), 0, True
+    integrals = np.zeros((2, lag.shape[1]))
     gap = last_gap = closing[0]
     slip_before_closing = np.zeros_like(slip)
     added = np.where(gap > 0.0, closing[1:], 0.0)
@@ -322,8 +329,8 @@ def in_increments(
             waiting = waiting & ~touching
             forces = increment(end)
             iterations += forces.iterations
-        before = slip, slip_before_closing, work.copy(), y[0]
-        work += friction_work(y[0], forces.y[0], forces.y[1:], np.where(forces.closed, forces.gaps[1:], 0.0))
+        before = slip, slip_before_closing, y[1:], integrals, y[0], begin
+        integrals = integrals + _integrals(y, forces.y, forces.gaps[1:], end - begin)
         total_slip = slip + forces.gaps[1:]
         slip = slip_after(forces.gaps[1:], forces.gaps[0])
         begin, y, closed, last_gap = end, forces.y, forces.closed, forces.gaps[0]
@@ -346,23 +353,24 @@ def _next_to_close(begin: Array, end: Array, waiting: Mask, count: int) -> tuple
     return fraction, closing & (fraction <= last * (1.0 + SINGLE_PRECISION))
 
 
-def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) -> Array:
-    """Return the frictional work (m,) in an increment [energy].
+def _integrals(before: Array, after: Array, slip: Array, duration: float) -> Array:
+    """Return the `Solution.integrals` (2, m) of an increment, which is the fraction `duration` of the step.
 
     The tangential force is integrated over the slip by the trapezoidal rule. Since sliding friction is at its limit, the
-    tangential force at the beginning is that at the end, scaled by the ratio of the normal forces.
+    tangential force at the beginning is that at the end, scaled by the ratio of the normal forces. The slip of a constraint
+    that opens is that of the whole increment, because other constraints take over its force.
 
     Parameters
     ----------
-    before, normal : ndarray (m,)
-        Normal forces at the beginning and at the end of the increment [force].
-    tangential : ndarray (k, m)
-        Tangential forces at the end of the increment [force].
+    before, after : ndarray (1 + k, m)
+        Normal and tangential forces at the beginning and at the end of the increment [force].
     slip : ndarray (k, m)
         Slips in the increment [length].
     """
-    ratio = np.divide(before, normal, out=np.zeros_like(normal), where=normal > 0.0)
-    return np.asarray(-0.5 * (1.0 + ratio) * (tangential * slip).sum(axis=0))
+    ratio = np.divide(before[0], after[0], out=np.zeros_like(after[0]), where=after[0] > 0.0)
+    at_begin, at_end = (-0.5 * (forces[1:] * slip).sum(axis=0) for forces in (before, after))
+    work = np.where(after[0] > 0.0, (1.0 + ratio) * at_end, np.maximum(at_begin, 0.0))
+    return np.stack([work, 0.5 * duration * (before[0] + after[0])])
 
 
 def in_last_increment(constraints: Constraints, slip_so_far: SlipSoFar) -> Constraints:
@@ -372,11 +380,11 @@ def in_last_increment(constraints: Constraints, slip_so_far: SlipSoFar) -> Const
 
 
 def over_whole_step(solution: Solution, slip_so_far: SlipSoFar) -> Solution:
-    """Return the solution with the slips and the frictional work of the step, given the solution of its last increment."""
-    last = np.where(solution.active[:, None], solution.slip, 0.0)
-    work = slip_so_far.work + friction_work(slip_so_far.normal, solution.multiplier, solution.tangential.T, last.T)
-    before, slip_before_closing = (
+    """Return the solution with the slips and the integrals of the step, given the solution of its last increment."""
+    before, slip_before_closing, traction = (
         np.stack([(vectors * tangent).sum(axis=1) for tangent in solution.directions], axis=1)
-        for vectors in (slip_so_far.slip, slip_so_far.slip_before_closing)
+        for vectors in (slip_so_far.slip, slip_so_far.slip_before_closing, slip_so_far.traction)
     )
-    return replace(solution, slip=solution.slip + before, work=work, slip_before_closing=slip_before_closing)
+    forces = (np.vstack([slip_so_far.normal, traction.T]), np.vstack([solution.multiplier, solution.tangential.T]))
+    integrals = slip_so_far.integrals + _integrals(*forces, solution.slip.T, 1.0 - slip_so_far.begin)
+    return replace(solution, slip=solution.slip + before, integrals=integrals, slip_before_closing=slip_before_closing)

@@ -1,9 +1,9 @@
 """Energy balance of a load step: strain energy, external work, frictional work, penalty energy, and imbalance.
 
 The work of a force in a step is integrated by the trapezoidal rule: it is the mean of the forces at the beginning and at
-the end, multiplied by the displacement. There are two exceptions. A normal force does no work on a gap that is open at the
+the end, multiplied by the displacement. There are three exceptions. A normal force does no work on a gap that is open at the
 beginning or the end of the step. Sliding friction has its limit traction during the complete step, whatever it was at the
-beginning.
+beginning. If a contact moves over a surface, its force acts during the complete step, although constraints close and open.
 
 The external work is the sum of the strain energy, the plastic and frictional work, the energies of penalties and cohesive
 layers, and the imbalance. The imbalance is the work of contact forces at constraints that stay closed or stick. It is an
@@ -96,7 +96,7 @@ class Work:
     friction : float
         Frictional work.
     touching : float
-        Part of the frictional work that is done in the step in which a gap closes.
+        Part of the frictional work that is done in the step in which a gap closes, or in which the contact is lost.
     imbalance : float
         External work that the other terms do not account for.
     stored : float
@@ -198,11 +198,20 @@ def contact_work(
     pressure, traction = before.at(constraints.positions)
     ratio = np.divide(pressure * areas, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
     work_at_end, work_at_begin = (-0.5 * np.einsum("md,md->m", f, slips) for f in (force, areas[:, None] * traction))
-    work = np.where(normal != 0.0, (1.0 + ratio) * work_at_end, np.maximum(work_at_begin, 0.0))
+    mu, normal_before = constraints.friction, pressure * areas
     closing = pressure == 0.0
-    if solution.work is not None:  # the work of all increments, in which constraints carry no force before they close
-        work, closing = solution.work[rows], np.zeros_like(closing)
-    elif work_at_end[closing].any():
+    moved, moved_away = _moved(normal, normal_before)
+    if (
+        solution.integrals is not None
+    ):  # the work of all increments, in which constraints carry no force before they close
+        (work, mean_force), closing = solution.integrals[:, rows], np.zeros_like(closing)
+        mean_total = 0.5 * float((normal_before + normal).sum())
+        work = work * (1.0 + moved * (mean_total / float(mean_force.sum()) - 1.0) if mean_total else 1.0)
+    else:
+        mobilised = np.linalg.norm(force, axis=1).sum() / max(float(mu @ normal), np.finfo(float).tiny)
+        leaving = 0.5 * moved_away * mobilised * mu * normal_before * np.linalg.norm(slips, axis=1)
+        work = np.where(normal != 0.0, (1.0 + ratio) * work_at_end, np.maximum(work_at_begin, leaving))
+    if work_at_end[closing].any():
         # A constraint was open at the beginning of the step if this holds for the nearest secondary node that faced the other
         # side at that time.
         gap = pair.nodal_gap(replace(configuration, displacement=configuration.start, pose=configuration.pose_start))[0]
@@ -210,7 +219,9 @@ def contact_work(
         if facing.any():
             open_before = gap[facing] > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
             closing &= open_before[nearest(pair.points[pair.secondary.points[facing]], constraints.positions)[1]]
-    touching, friction, mu = float(work_at_end[closing].sum()), float(work.sum()), constraints.friction
+    friction, touching = float(work.sum()), (1.0 - moved) * float(work_at_end[closing].sum())
+    if not normal.any():  # the contact is lost at an unknown instant
+        touching += friction
     slip_integrals = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(slips, axis=1)
     np.divide(work, mu, out=slip_integrals, where=mu > 0.0)
     sliding = float((work_at_end + work_at_begin).sum())
@@ -226,6 +237,17 @@ def contact_work(
     gained -= 0.5 * float((after.pressing + before.pressing) @ added_gap)
     gained -= 0.5 * float(((after.tangential + before.tangential) * displacement).sum())
     return after, (friction, touching, gained - (after.stored - before.stored) - sliding), slip_integrals
+
+
+def _moved(normal: Array, before: Array) -> tuple[float, float]:
+    """Return the parts of the increase and of the decrease of normal forces that compensate each other, between 0 and 1.
+
+    `before` and `normal` are the forces (m,) at the beginning and at the end of the step [force]. A contact that moves over
+    a surface leaves as much force behind as it gains ahead. Such a force acts during the complete step.
+    """
+    increase, decrease = (float(np.maximum(change, 0.0).sum()) for change in (normal - before, before - normal))
+    largest = max(increase, decrease, np.finfo(float).tiny)
+    return decrease / largest, increase / largest
 
 
 def _forces(

@@ -57,8 +57,7 @@ def sentences(model: Any) -> Iterator[str]:
         parts = [f"{COMPONENTS[number]} = {value:g}" for number, value in state.components.items()]
         kind, groups = state.name.removeprefix("the initial ").split(" of ", 1)
         yield f"Initial {kind}: {', '.join(parts)} in {groups}{_history(None if state.ramp == ALWAYS else state.ramp)}."
-    for relation in model.relations:
-        yield f"Relation: {relation.name}{_history(relation.ramp)}."
+    yield from dict.fromkeys(f"Relation: {relation.name}{_history(relation.ramp)}." for relation in model.relations)
     for spring in model.springs:
         yield f"Spring: {spring.name.removeprefix('the spring ')}."
     for pair in model.contact:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,8 +34,19 @@ PUBLIC = (
 )  # fmt: skip
 
 
+def _public(names: Iterable[str]) -> list[str]:
+    return sorted(name for name in names if name in PUBLIC or name.startswith(("__", "add_")))
+
+
+class _PublicNames(type):
+    """Class whose `dir` lists the public names only, as that of its instances."""
+
+    def __dir__(cls) -> list[str]:
+        return _public(super().__dir__())
+
+
 @typed(ModelError)
-class Model(ModelSupports):
+class Model(ModelSupports, metaclass=_PublicNames):
     """A contact problem of elastic or elastoplastic bodies.
 
     Each method checks its arguments, and `check` checks the complete model. A check that fails raises MeshError, ModelError
@@ -84,8 +95,7 @@ class Model(ModelSupports):
         return f"Model({self.kinematics}, {self.mesh!r}, {self.n_dofs} degrees of freedom; contact: {pairs or 'none'})"
 
     def __dir__(self) -> list[str]:
-        special = [name for name in super().__dir__() if name.startswith(("__", "add_"))]
-        return sorted([*special, *PUBLIC])
+        return _public(super().__dir__())
 
     def _repr_html_(self) -> str:
         """Return `describe` as a table for notebooks."""

@@ -34,6 +34,8 @@ FAR = 1e3
 # Number of edges of the pyramid that is circumscribed to Coulomb's cone in three dimensions. Tangential forces at its edges
 # exceed those of the cone by 8 %.
 EDGES = 8
+# Fraction of the frictional capacity above which floating bodies are reported as about to slide.
+NEARLY_SLIDING = 0.9
 # Largest factor on the coefficients of friction with which friction is assumed to hold a body.
 MOST_FRICTION = 100.0
 # Largest number of motions of parts between hinges. A mesh with more motions is defective.
@@ -365,13 +367,13 @@ def needed_friction(
 ) -> tuple[float, list[str]] | None:
     """Return the smallest factor on the coefficients of friction with which rigid bodies stop [-], and the moving bodies.
 
-    Returns None if the given coefficients suffice even with the pyramid inscribed in Coulomb's cone, or if no factor up to
-    MOST_FRICTION suffices. `u` (n_dofs,) are the displacements [length]; `work` and `size` are as in `stopped_at`.
+    Returns None if a factor of NEARLY_SLIDING suffices even with the pyramid inscribed in Coulomb's cone, or if no factor up
+    to MOST_FRICTION suffices. `u` (n_dofs,) are the displacements [length]; `work` and `size` are as in `stopped_at`.
     """
     if not constraints.friction.any():
         return None
     inscribed = 1.0 if len(constraints.tangents) == 1 else np.cos(np.pi / EDGES)
-    low, high = inscribed, MOST_FRICTION
+    low, high = NEARLY_SLIDING * inscribed, MOST_FRICTION
 
     def slide(factor: float) -> Array:
         rows, gap0 = resisting(constraints, factor)

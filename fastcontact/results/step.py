@@ -176,7 +176,7 @@ class ContactResult(Suggesting):
         in finite strain in the deformed configuration. In 3D, pairs of a closed and an open node with a common facet are
         considered; the lower bound is the smallest distance of their closed nodes and the upper bound the largest distance of
         their open nodes, so that all semi-axes of an elliptic contact lie between the bounds. If the contact is a ring around
-        an open middle, the bounds refer to its outer edge.
+        an open middle, the bounds refer to its outer edge. The upper bound is infinite if the side is closed to its end.
     shear : ndarray (m, dim)
         Tangential traction on the secondary side, zero in frictionless contact [pressure].
     sticking : ndarray of bool (m,)
@@ -299,7 +299,9 @@ class ContactResult(Suggesting):
         """Names and values of the force, the largest pressure, the closed nodes and the contact radius, for reprs."""
         low, high = self.radius
         inside, outside = (with_unit(f"{end:.4g}", self.units, "length") for end in (low, high))
-        radius = f"{low:.4g} to {outside}" if np.isfinite(high) else f"{inside}, to its end"
+        radius = f"{low:.4g} to {outside}" if np.isfinite(high) else "none, closed to its end"
+        if self.is_ring:
+            radius = f"ring from {self.place[self.active].min():.4g} to {outside if np.isfinite(high) else inside}"
         return {
             "force": force_text(self.force.tolist(), self.force_parts, self.normal_force, self.units),
             "largest pressure": with_unit(f"{self.pressure_max:.6g}", self.units, "pressure"),
@@ -320,6 +322,11 @@ class ContactResult(Suggesting):
         """Whether `place` contains distances from the axis of symmetry instead of arc lengths or distances in 3D."""
         flat = self.coordinates.shape[1] == 2 and self.tangent is None  # in plane models only rings have no tangent
         return flat and bool(self.middle[0] == 0.0) and bool(np.array_equal(self.place, np.abs(self.coordinates[:, 0])))
+
+    @property
+    def is_ring(self) -> bool:
+        """Whether the contact area of an axisymmetric model does not contain the axis, so that it has two edges."""
+        return self.measured_from_axis and 0.0 < float(self.place[self.active].min(initial=np.inf)) < np.inf
 
     @property
     def extent(self) -> str:
@@ -419,7 +426,7 @@ class StepResult(Suggesting):
           ``displacement`` and of the contact ``force`` [-].
         - ``temperature_factors``, ``initial_factors``, ``pressure_factors``, ``spin_factors``: multipliers of the
           temperatures, of the initial stresses and strains, of the pressures and of the centrifugal forces [-].
-        - ``work`` and ``pretension``: data of the properties of the same names.
+        - ``work``, ``pretension`` and ``reference_reactions``: data of the properties of the same names.
         - ``parameter``, in vibration modes, whose shapes have no unit: quantity that the load factor represents,
           ``frequency`` or ``phase``.
     warnings : tuple of str
@@ -523,6 +530,15 @@ class StepResult(Suggesting):
         return dict(self.iterations.get("pretension", {}))
 
     @property
+    def reference_reactions(self) -> dict[str, dict[str, list[float]]]:
+        """The ``force`` (dim,) [force] and ``moment`` [force times length] of the supports of reference points, by name.
+
+        The moment has one component in the plane and three in 3D. In `reaction` these forces are those of the coupled nodes,
+        and the values at reference points are zero.
+        """
+        return dict(self.iterations.get("reference_reactions", {}))
+
+    @property
     def work(self) -> dict[str, float]:
         """Energies at the end of the step, and work accumulated over all steps [energy].
 
@@ -533,7 +549,8 @@ class StepResult(Suggesting):
           changes of the gap by wear and `clearance_ramp`.
         - ``friction_work``: work dissipated by friction.
         - ``friction_while_touching``: part of the frictional work that is dissipated at nodes in the step in which their
-          gaps close. It is overestimated in long steps, and zero in steps that are solved in increments.
+          gaps close, unless they take over the forces of other nodes, and in the step in which a contact is lost. It is
+          overestimated in long steps.
         - ``penalty_energy``: energy of penalties and cohesive layers, and of the small compliance of pressure fields.
         - ``energy_released``: energy dissipated by damage of cohesive layers.
         - ``imbalance``: external work minus the sum of all other energies.

@@ -49,6 +49,13 @@ def _quantity_sentences(series: Series, quantity: str) -> list[str]:
     mesh_error += f" ({series.finest.n_dofs} degrees of freedom)"
     if series.converges_to_theory(quantity) is False:
         text = _not_to_theory(series, quantity, start, split)
+    elif not series.has_model_error(quantity):
+        orders = ", ".join(f"{order:.2g}" for order in series.orders(quantity)[1:])
+        text = (
+            f"{start} differs from theory by {percent(split.total)} on the finest mesh ({series.finest.n_dofs} degrees of "
+            f"freedom). Its values do not change monotonically with the mesh size (observed orders {orders}): they do not "
+            "support an extrapolation, and no model error is stated. Compute more levels."
+        )
     elif split.resolved and not series.exact_theory:
         text = (
             f"{start} differs from theory by {percent(split.total)}. Of that, {percent(split.model, split.uncertainty)} "
@@ -87,7 +94,8 @@ def _cancellation_sentences(series: Series, quantity: str, split: Split) -> list
     differences = series.from_theory(quantity)
     closest = int(np.nanargmin(np.abs(differences)))
     difference, level = differences[closest], series.levels[closest]
-    if series.exact_theory or not split.resolved or not abs(difference) < 0.5 * abs(split.model):
+    stated = split.resolved and not series.exact_theory and series.has_model_error(quantity)
+    if not stated or not abs(difference) < 0.5 * abs(split.model):
         return []
     return [
         f"Level {level.number} ({level.n_dofs} degrees of freedom) lies only {percent(difference)} from theory because its "
@@ -177,7 +185,7 @@ def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
         "order": f"{order} +- {limit.order_uncertainty:.2f}" if math.isfinite(limit.order) else "-",
         "order alone": order,
         "theory": number(series.theory.get(quantity, math.nan), 8),
-        "model error": percent(split.model if split else None),
+        "model error": percent(split.model if split and series.has_model_error(quantity) else None),
         "mesh error": percent(series.mesh_error(quantity)),
         "at equal force": percent(at_force.model if at_force else None),
     }
@@ -232,7 +240,9 @@ def _quantity_dict(series: Series, name: str) -> dict[str, Any]:
         **_fields(limit, limit="value", **same),
         "converges_to_theory": series.converges_to_theory(name),
         "theory": series.theory.get(name),
-        **_fields(split, model_error="model", model_error_uncertainty="uncertainty"),
+        **_fields(
+            split if series.has_model_error(name) else None, model_error="model", model_error_uncertainty="uncertainty"
+        ),
         "mesh_error": finite(series.mesh_error(name)),
     }
     if reference is not None:

@@ -103,7 +103,9 @@ def secondary(case: Case, pair: str) -> Surface:
 
 
 def contact_radius(contact: ContactResult) -> float:
-    """Return the distance [length] from the contact centre at which the pressure vanishes; NaN if the contact is open.
+    """Return the distance [length] from the contact centre at which the pressure vanishes.
+
+    It is NaN if the contact is open, if it has no edge, because the side is closed to its end, and if it is a ring.
 
     Near the edge of a smooth contact, the square of the pressure is linear in the square of the distance; in Hertzian
     contact it is linear everywhere. A line is fitted to the closed nodes beyond 0.4 of the radius, except for the last two
@@ -112,9 +114,8 @@ def contact_radius(contact: ContactResult) -> float:
     punch, the radius is the upper bound of the bracket. With fewer than three such nodes, it is the midpoint of the bracket.
     """
     lower, upper = contact.radius
-    if not np.isfinite(lower):
+    if not np.isfinite(upper) or contact.is_ring:
         return float("nan")
-    upper = upper if np.isfinite(upper) else lower
     r = np.abs(contact.across)
     nodes = np.flatnonzero(contact.active & (contact.pressure > 0) & (r > 0.4 * lower) & (r < upper))
     nodes = nodes[np.argsort(r[nodes])]

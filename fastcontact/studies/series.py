@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from fastcontact.arrays import AnyArray
 from fastcontact.cases.summary import finite
 from fastcontact.studies.fit import Limit, step_orders
@@ -202,6 +204,20 @@ class Series:
         """Return the model and the mesh error at equal approach; None without a limit or a theory."""
         limit, theory = self.limits.get(quantity), self.theory.get(quantity)
         return split(self.values(quantity)[-1], limit, theory) if limit and theory else None
+
+    def has_model_error(self, quantity: str) -> bool:
+        """Return whether the model error at equal approach is known.
+
+        The theory is exact, or the values on successive meshes increase or decrease monotonically, or the model error is
+        larger than their range. Otherwise they do not support an extrapolation.
+        """
+        split, values = self.split(quantity), np.array(self.values(quantity))
+        if split is None:
+            return False
+        values = values[np.isfinite(values)]
+        changes = np.diff(values)
+        monotonic = (changes >= 0.0).all() or (changes <= 0.0).all()
+        return bool(self.exact_theory or monotonic or np.ptp(values) < abs(split.model * split.theory))
 
     def converges_to_theory(self, quantity: str) -> bool | None:
         """Return whether the limit is settled and agrees with an exact theory; None without an exact theory.

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from fastcontact.arrays import AnyArray
 from fastcontact.studies.quantities import column, title
 from fastcontact.studies.report import Report, Rows, frame, marker, message, number, panels, percent, rows_from_columns
 from fastcontact.studies.series import Point, TheoryCurve, Value
+
+if TYPE_CHECKING:
+    import pandas
 
 # Smallest ratio of the largest to the smallest value of a parameter for which its axis is logarithmic.
 WIDE = 9.0
@@ -209,7 +213,7 @@ class Sweep(Report):
     def table(self) -> AnyArray:
         """Return a structured array (n_points,) with a row for each solved point, as ``--csv`` writes it.
 
-        Points that could not be solved are in `failed` and have no row, also in `to_pandas`.
+        Points that could not be solved are in `failed` and have no row. In `to_pandas` they have one.
 
         The fields are the parameters, ``h`` [length] if known, ``n_dofs``, ``seconds`` [s] and, for each quantity, its value
         [unit of the quantity] and, if known, the relative differences ``..._from_theory``, ``..._from_theory_at_equal_force``
@@ -224,6 +228,24 @@ class Sweep(Report):
                 columns[f"{name}_{key}"] = [point.ratio(name, other) - 1.0 for point in points]
         results = {f"computed_{name}" if name in self.parameters else name: values for name, values in columns.items()}
         return self.structured_known({name: [p.parameters[name] for p in points] for name in self.parameters} | results)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return `table` as a ``pandas.DataFrame``, see `Report`.
+
+        Points that could not be solved have a row with their parameters and NaN, and the column ``failed`` has the reason.
+        """
+        solved = super().to_pandas()
+        if not self.failed:
+            return solved
+        import pandas
+
+        rows = pandas.concat([solved, pandas.DataFrame([choice | {"failed": text} for choice, text in self.failed])])
+        choices = list(itertools.product(*self.parameters.values()))
+        of_rows = rows[list(self.parameters)].itertuples(index=False, name=None)
+        rows["position"] = [choices.index(choice) for choice in of_rows]
+        rows = rows.sort_values("position", ignore_index=True).drop(columns="position")
+        rows.attrs = solved.attrs
+        return rows
 
     def remarks(self) -> list[str]:
         """See `Report`."""

@@ -2,6 +2,7 @@
 
 import inspect
 import re
+import tomllib
 
 import pages
 import pytest
@@ -93,6 +94,15 @@ def test_every_formulation_solver_shape_and_theory_is_named():
         assert f"| `{name}`" in text("howto/rigid-indenter.md"), name
     for name in fc.analytic.THEORIES:
         assert f"`{name}`" in text("theory/analytic.md"), name
+
+
+def test_every_extra_is_named_in_the_installation():
+    extras = tomllib.loads((pages.ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
+        "optional-dependencies"
+    ]
+    assert "gmsh" in extras
+    for name in {*extras} - {"all"}:
+        assert f"| `{name}` |" in text("install.md"), name
 
 
 def test_every_method_that_builds_a_model_is_named_in_a_how_to_page():

@@ -498,3 +498,27 @@ def test_a_sub_model_follows_the_stages_of_the_global_model():
         assert contact.force == pytest.approx(expected.force, rel=1e-9)
         assert contact.dissipation == pytest.approx(expected.dissipation, rel=1e-6, abs=1e-12)
     assert expected.dissipation > 0.0
+
+
+@pytest.mark.parametrize("along_normals", [False, True])
+def test_displacements_along_axes_and_normals_follow_pairs(along_normals):
+    """A turned block; every node has a history of its own."""
+    along, up = np.array([np.cos(0.3), np.sin(0.3)]), np.array([-np.sin(0.3), np.cos(0.3)])
+    block = fc.generate.block((2.0, 1.0), (2, 2))
+    model = elastic_model(block.replace(points=block.points @ [along, up]), "plane_strain", BOTTOM="xy")
+    pairs = [(0.5, lambda x: 0.01 * (x @ along)), (1.0, -0.02)]
+    if along_normals:
+        model.prescribe("TOP", normal=pairs)
+    else:
+        model.prescribe("TOP", y=pairs, axes=tuple(along))
+    top = block.points_of("TOP")
+    for step, first, last in zip(fc.solve(model, 4), (0.5, 1.0, 0.5, 0.0), (0.0, 0.0, 0.5, 1.0), strict=True):
+        expected = 0.01 * first * block.points[top, 0] - 0.02 * last
+        assert step.displacement[top] @ up == pytest.approx(expected, abs=1e-12)
+    forces = fc.support_forces(model, step)
+    assert forces["TOP"] == pytest.approx(-forces["BOTTOM"], rel=1e-6)
+    assert model.describe().count("'TOP'") == 1
+    other = elastic_model(block, "plane_strain", BOTTOM="xy", TOP={"y": 0.01, "ramp": [(0, 0), (1, 1)]})
+    other.prescribe("TOP", y=-0.02)
+    with pytest.raises(fc.ModelError, match=r"or give both histories as pairs: y=\[\(0\.5, f\), \(1\.0, g\)\]"):
+        other.check()

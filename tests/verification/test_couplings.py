@@ -62,6 +62,28 @@ def test_a_force_at_an_arm_is_a_force_and_a_moment(kind):
     assert step.reaction[model.mesh.points_of("LEFT")].sum(axis=0) == pytest.approx([-FORCE, 0.0], abs=1e-12)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("held", ["x", "xy"])
+def test_a_supported_reference_point_has_a_force_and_a_moment(kind, held):
+    """The load F acts at an arm of 1 along x and of 2.5 along y from the reference point, which is held in part."""
+    mesh = fc.generate.with_reference_points(fc.generate.block((4.0, 2.0), (4, 2), "quad8"), {"HUB": (1.0, -0.5)})
+    model = elastic_model(mesh, "plane_strain", E=E)
+    model.add_coupling("HUB", "BOTTOM", kind=kind)
+    model.fix("HUB", held)
+    model.fix("HUB rotation", "x")
+    if held == "x":
+        model.add_force("HUB", y=2.0 * FORCE)
+        model.add_spring("TOP_RIGHT", y=1.0)
+    model.add_force("TOP", x=FORCE, y=-2.0 * FORCE)
+    (step,) = fc.solve(model, 1)
+    spring = step.reaction[mesh.points_of("TOP_RIGHT"), 1].sum()
+    along_y = 2.0 * FORCE if held == "xy" else 0.0
+    told = step.reference_reactions["HUB"]
+    assert told["force"] == pytest.approx([-FORCE, along_y], abs=1e-9)
+    assert told["moment"] == pytest.approx([2.0 * FORCE + 2.5 * FORCE - 3.0 * spring], abs=1e-8)
+    assert fc.support_forces(model, step)["HUB"] == pytest.approx([-FORCE, along_y], abs=1e-9)
+
+
 def test_a_moment_on_facets_is_that_on_a_distributing_coupling():
     model, other = beam("distributing"), beam("distributing")
     model.add_moment("REF", z=MOMENT)

@@ -1,5 +1,7 @@
 """Modes: bars, beams, plates and rings of textbooks; bodies joined by contact as one body; closed forms with preload."""
 
+import warnings
+
 import numpy as np
 import pytest
 from models import elastic_model, supported
@@ -255,8 +257,27 @@ def test_a_loaded_disc_between_plates_turns_freely(solver):
         plate = fc.obstacles.HalfSpace((0.0, y), (0.0, -np.sign(y)))
         model.add_obstacle(name, secondary="CONT1", obstacle=plate, motion=motion)
     step = fc.solve(model, 1)[-1]
-    turn, bounce = fc.modes(model, step, n=2, linear_solver=solver).frequencies
+    modes = fc.modes(model, step, n=2, linear_solver=solver)
+    turn, bounce = modes.frequencies
     assert abs(turn) < 0.02 * bounce
+    assert not modes.unstable.any()
+    assert ("1 of 2 modes with omega^2 < 0 are rotations of rigid bodies" in repr(modes)) == (turn < 0.0)
+
+
+def test_a_column_beyond_its_buckling_load_is_unstable():
+    """With 102 % of the Euler load the lowest eigenvalue is negative, with 98 % it is positive."""
+    stable, unstable = [], "1 of 2 modes are unstable: omega^2 < 0"
+    for share in (0.98, 1.02):
+        model = model_of(block((50.0, 1.0), (20, 2), "quad8"), "plane_stress")
+        model.fix("LEFT", "xy")
+        model.add_traction("RIGHT", x=-share * np.pi**2 / 12.0 / (4.0 * 50.0**2))
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            modes = fc.modes(model, fc.solve(model, 1)[-1], n=2)
+        stable.append(not modes.unstable.any())
+        assert (unstable in repr(modes)) == (unstable in modes._repr_html_().replace("&lt;", "<")) == (not stable[-1])
+        assert any(unstable in str(warning.message) for warning in told) == (not stable[-1])
+    assert stable == [True, False]
 
 
 @pytest.mark.filterwarnings("ignore:contact 'joint' penetrates")

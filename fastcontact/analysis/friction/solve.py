@@ -234,15 +234,17 @@ def _response(
 
 
 def _slip_so_far(
-    before: tuple[Array, Array, Array, Array], Q: csr_array | None, rows: Indices, constraints: Constraints
+    before: tuple[Array, Array, Array, Array, Array, float],
+    Q: csr_array | None,
+    rows: Indices,
+    constraints: Constraints,
 ) -> SlipSoFar:
     """Return the data at the beginning of the last increment, for all constraints.
 
     Parameters
     ----------
-    before : (ndarray (k, q), ndarray (k, q), ndarray (q,), ndarray (q,))
-        Slips, slips when constraints close [length], frictional work [energy] and normal forces [force] that
-        `in_increments` returns.
+    before : tuple
+        The data that `in_increments` returns, of q constraints.
     Q : csr_array, optional
         Rotation of the tangents, which is undone.
     rows : ndarray of int (q,)
@@ -250,17 +252,18 @@ def _slip_so_far(
     constraints : Constraints
         All m constraints.
     """
-    *slips, work, normal = before
+    *components, integrals, normal, begin = before
     m, dim = constraints.positions.shape
-    slip_so_far = SlipSoFar(np.zeros((m, dim)), np.zeros((m, dim)), np.zeros(m), np.zeros(m))
-    for vectors, slip in zip((slip_so_far.slip, slip_so_far.slip_before_closing), slips, strict=True):
-        unrotated = slip
+    all_vectors, all_integrals, all_normal = np.zeros((3, m, dim)), np.zeros((2, m)), np.zeros(m)
+    for vectors, along in zip(all_vectors, components, strict=True):
+        unrotated = along
         if Q is not None:
-            unrotated = (Q.T @ np.vstack([np.zeros(len(rows)), slip]).ravel()).reshape(-1, len(rows))[1:]
+            unrotated = (Q.T @ np.vstack([np.zeros(len(rows)), along]).ravel()).reshape(-1, len(rows))[1:]
         tangents = np.stack([tangent[rows] for tangent in constraints.directions])
         vectors[rows] = np.einsum("km,kmd->md", unrotated, tangents)
-    slip_so_far.work[rows], slip_so_far.normal[rows] = work, normal
-    return slip_so_far
+    all_integrals[:, rows], all_normal[rows] = integrals, normal
+    slip, slip_before_closing, traction = all_vectors
+    return SlipSoFar(slip, slip_before_closing, traction, all_integrals, all_normal, begin)
 
 
 def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:

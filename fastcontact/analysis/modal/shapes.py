@@ -5,24 +5,28 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.html_table import html_table
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.modal.cyclic import Sectors
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.material_axes import rotations
 from fastcontact.elasticity.material_field import MaterialField
+from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.errors import ModelError
 from fastcontact.mesh.generate import union
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import rigid_parts
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult, StepSequence, phases
 from fastcontact.results.tables import data_frame
-from fastcontact.round_off import ROUND_OFF
+from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
 if TYPE_CHECKING:
     import pandas
@@ -67,7 +71,7 @@ class Modes(Shapes):
     ----------
     frequencies : ndarray (n,)
         Natural frequencies, ascending for each number of nodal diameters [1 / time]; about zero for rigid-body modes,
-        negative for unstable modes.
+        negative for modes with a negative eigenvalue, see `unstable`.
     eigenvalues : ndarray (n,)
         Squares of the angular frequencies [1 / time^2].
     shapes : ndarray (n, n_points, dim)
@@ -111,6 +115,40 @@ class Modes(Shapes):
         """Effective modal masses (n, dim) [mass], the squares of the participation factors, whose sum is the total mass."""
         return np.asarray(self.participation**2)
 
+    @cached_property
+    def unstable(self) -> Mask:
+        """Whether each mode (n,) is unstable: it deforms a body, and its eigenvalue is negative."""
+        return (self.eigenvalues < 0.0) & ~self._rigid
+
+    @property
+    def _rigid(self) -> Mask:
+        """Whether each mode (n,) moves the bodies like rigid bodies."""
+        parts, rigid = rigid_parts(self._model.mesh), np.ones(len(self), bool)
+        for nodes in map(parts.nodes_of, range(parts.count)):
+            basis = np.linalg.qr(rigid_modes(self._model.mesh.points[nodes], self._model.kinematics))[0]
+            u = self.shapes[:, nodes].reshape(len(self), -1).T
+            rigid &= np.linalg.norm(u - basis @ (basis.T @ u), axis=0) < NOTABLE * np.linalg.norm(
+                self.shapes, axis=(1, 2)
+            )
+        return rigid
+
+    def remarks(self) -> list[str]:
+        """Return sentences on modes with negative eigenvalues, without full stops."""
+        negative = self.eigenvalues < -SINGLE_PRECISION * np.abs(self.eigenvalues).max()
+        unstable, turning = int(self.unstable.sum()), int((negative & ~self.unstable).sum())
+        remarks = []
+        if unstable:
+            remarks.append(
+                f"{unstable} of {len(self)} modes are unstable: omega^2 < 0, and the imaginary frequency is given as a "
+                "negative one"
+            )
+        if turning:
+            remarks.append(
+                f"{turning} of {len(self)} modes with omega^2 < 0 are rotations of rigid bodies, which loads of constant "
+                "direction turn over"
+            )
+        return remarks
+
     def __len__(self) -> int:
         return len(self.frequencies)
 
@@ -130,10 +168,12 @@ class Modes(Shapes):
     def __repr__(self) -> str:
         rows = [self._columns, *self._rows("{:.6g}")]
         widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-        return "\n".join("  ".join(text.rjust(width) for text, width in zip(row, widths)) for row in rows)
+        lines = ["  ".join(text.rjust(width) for text, width in zip(row, widths)) for row in rows]
+        return "\n".join(lines + self.remarks())
 
     def _repr_html_(self) -> str:
-        return html_table(self._rows("{:.6g}"), self._columns, "Modes")
+        remarks = "".join(f"<p>{escape(remark)}</p>" for remark in self.remarks())
+        return html_table(self._rows("{:.6g}"), self._columns, "Modes") + remarks
 
     @property
     def _columns(self) -> tuple[str, ...]:

@@ -72,7 +72,7 @@ class ModelSupports(ModelContact):
         self,
         group: str,
         *,
-        normal: Value | None = None,
+        normal: Value | Sequence[tuple[float, Value]] | None = None,
         axes: SupportAxes = None,
         rotation: Mapping[str, Any] | None = None,
         ramp: History = None,
@@ -83,7 +83,7 @@ class ModelSupports(ModelContact):
         Parameters
         ----------
         group : str
-        normal : float or callable, optional
+        normal : float, callable or sequence of (float, float or callable), optional
             Outward displacement along the mean normal of the facets at each node; the group must contain facets [length].
         axes : sequence or callable, optional
             Directions (k, 3) [-] of x, y and z: unit vectors in rows, or a function of position that returns them, as
@@ -98,9 +98,9 @@ class ModelSupports(ModelContact):
             History of the displacement.
         **components : float, callable or sequence of (float, float or callable)
             Displacements ``x``, ``y`` and ``z`` at multiplier 1: numbers, or functions from reference positions (n, dim)
-            [length] to displacements (n,) [length]. Fields that are not proportional to one history are given as pairs
-            (load factor, displacement): displacements are interpolated linearly between these load factors, beginning with
-            zero at the load factor 0.
+            [length] to displacements (n,) [length]. Fields that are not proportional to one history are given as pairs of
+            a load factor and a displacement, also for `normal` and with `axes`: displacements are interpolated linearly
+            between these load factors, beginning with zero at the load factor 0.
 
         Raises
         ------
@@ -137,13 +137,8 @@ class ModelSupports(ModelContact):
             self._add_along_axes(group, components, axes, ramp)
             return
         if normal is not None:
-            name = displacement_name("normal", group)
-            check_value(name, normal)
             nodes, directions = normals_of(self.mesh, group)
-            values = evaluated(normal, self.mesh.points[nodes], name)
-            table = table_of(ramp, f"the ramp of {name}")
-            rows = along(nodes, directions, self.n_dofs)
-            self._add_related_support(group, MultiPointConstraint(name, rows, values, table))
+            self._add_along(group, displacement_name("normal", group), nodes, directions, normal, ramp)
         if components or normal is None:
             self._add_support(group, components, ramp)
 
@@ -158,20 +153,29 @@ class ModelSupports(ModelContact):
         except ModelError as error:
             raise ModelError(str(error).replace("a material", name).replace("a point of a cell", "a node")) from None
         for axis, value in axes_of(name, components, dim).items():
-            caption = displacement_name("xyz"[axis], group)
-            check_value(caption, value)
             direction = frame[:, axis]
             if dim == 2 and np.abs(direction[:, 2]).max() > SINGLE_PRECISION:
                 raise ModelError(f"{name}: its axes have components out of the plane of the model")
-            rows = along(nodes, np.ascontiguousarray(direction[:, :dim]), self.n_dofs)
-            table = table_of(ramp, f"the ramp of {caption}")
-            values = evaluated(value, positions, caption)
-            self._add_related_support(group, MultiPointConstraint(f"{caption} along axes", rows, values, table))
+            directions, caption = np.ascontiguousarray(direction[:, :dim]), displacement_name("xyz"[axis], group)
+            self._add_along(group, f"{caption} along axes", nodes, directions, value, ramp)
 
-    def _add_related_support(self, group: str, relation: MultiPointConstraint) -> None:
-        """Add a support that is expressed as a multi-point constraint."""
-        self.relations.append(relation)
-        self.related_supports.append((group, relation))
+    def _add_along(self, group: str, name: str, nodes: Indices, directions: Array, value: Any, ramp: History) -> None:
+        """Prescribe the displacements of `nodes` (n,) along `directions` (n, dim) by multi-point constraints."""
+        value, table = _checked(name, value, table_of(ramp, f"the ramp of {name}"))
+        rows, positions = along(nodes, directions, self.n_dofs), self.mesh.points[nodes]
+        if isinstance(value, tuple):  # the displacement of each node has a history of its own
+            histories = zip(
+                *(evaluated(displacement, positions, name).tolist() for _, displacement in value), strict=True
+            )
+            begin, instants = [(0.0, 0.0)] if value[0][0] else [], [instant for instant, _ in value]
+            relations = [
+                MultiPointConstraint(name, rows[[row]], 1.0, (*begin, *zip(instants, history, strict=True)))
+                for row, history in enumerate(histories)
+            ]
+        else:
+            relations = [MultiPointConstraint(name, rows, evaluated(value, positions, name), table)]
+        self.relations += relations
+        self.related_supports += [(group, relation) for relation in relations]
 
     def _add_support(
         self, group: str, components: Mapping[str, Any], ramp: History, rotation: Rotation | None = None,
@@ -182,13 +186,7 @@ class ModelSupports(ModelContact):
         for axis, value in axes_of(f"the support of '{group}'", components, self.mesh.dim).items():
             name = displacement_name("xyz"[axis], group)
             table = table_of(ramp, f"the ramp of the displacement prescribed on '{group}'")
-            if isinstance(value, Iterable):
-                if table is not None or rotation is not None:
-                    raise ModelError(f"{name} is given at several load factors: leave out ramp and rotation")
-                value = tuple((float(instant), displacement) for instant, displacement in value)
-                table = interpolation_tables([instant for instant, _ in value], name)[-1]
-            for _, displacement in value if isinstance(value, tuple) else [(1.0, value)]:
-                check_value(name, displacement)
+            value, table = _checked(name, value, table, rotation is not None)
             self.supports.append(Support(group, axis, value, table, rotation, rotation_ramp))
 
     def prescribed(self) -> tuple[Mask, Array]:
@@ -228,9 +226,11 @@ class ModelSupports(ModelContact):
             if before.component == support.component and node in self.mesh.points_of(before.group):
                 break
         value, other = (float(np.sum(list(s.by_history(self.mesh.points[[node]]).values()))) for s in (support, before))
+        axis = "xyz"[support.component]
         raise ModelError(
-            f"'{support.group}' prescribes {'xyz'[support.component]} = {value:g} at point {node}, but '{before.group}' "
+            f"'{support.group}' prescribes {axis} = {value:g} at point {node}, but '{before.group}' "
             f"prescribes {other:g} there{' with another ramp' if value == other else ''}: remove one of the two"
+            + (f", or give both histories as pairs: {axis}=[(0.5, f), (1.0, g)]" if support.ramp != before.ramp else "")
         )
 
     def _fix_axis(self, fixed: Mask, by_ramp: Mapping[PartHistory, Array]) -> None:
@@ -257,3 +257,15 @@ class ModelSupports(ModelContact):
         nodes = np.setdiff1d(self.axis_nodes, np.concatenate(supported)) if supported else self.axis_nodes
         if len(nodes):
             log.info("axis of symmetry: x is fixed at %d nodes with x = 0 (first: point %d)", len(nodes), nodes[0])
+
+
+def _checked(name: str, value: Any, table: Table | None, rotates: bool = False) -> tuple[Any, Table | None]:
+    """Return a displacement and its history after checks: a number, a function, or a tuple of (load factor, displacement)."""
+    if isinstance(value, Iterable):
+        if table is not None or rotates:
+            raise ModelError(f"{name} is given at several load factors: leave out ramp and rotation")
+        value = tuple((float(instant), displacement) for instant, displacement in value)
+        table = interpolation_tables([instant for instant, _ in value], name)[-1]
+    for _, displacement in value if isinstance(value, tuple) else [(1.0, value)]:
+        check_value(name, displacement)
+    return value, table

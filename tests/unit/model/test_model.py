@@ -20,6 +20,7 @@ def test_dir_shows_what_a_user_calls():
     model = fc.Model(fc.generate.block(), "plane_strain")
     shown = [name for name in dir(model) if not name.startswith("__")]
     assert all(hasattr(model, name) for name in shown)
+    assert {*dir(fc.Model)} <= {*dir(model)}
     assert {"add_contact", "add_material", "fix", "prescribe", "check", "describe", "mesh", "contact"} <= {*shown}
     assert not {"bind", "forces_by_ramp", "material_field", "holding_rows", "conducts"} & {*shown}
 

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
@@ -112,7 +113,7 @@ def test_where_no_vertex_is_near_the_node_itself_is_taken():
 def contact(pressure, radius, r=None):
     r = np.linspace(0.0, 1.0, len(pressure)) if r is None else r
     pressure = np.asarray(pressure, float)
-    return SimpleNamespace(radius=radius, across=r, active=pressure > 0, pressure=pressure)
+    return SimpleNamespace(radius=radius, across=r, active=pressure > 0, pressure=pressure, is_ring=False)
 
 
 def test_the_radius_is_where_the_pressure_of_hertz_ends():
@@ -125,6 +126,7 @@ def test_the_radius_is_where_the_pressure_of_hertz_ends():
     ("pressure", "bracket", "radius"),
     [
         ([0.0] * 5, (np.nan, np.nan), np.nan),  # open
+        ([1.0] * 5, (1.0, np.inf), np.nan),  # closed to its end
         ([1.0, 0.5, 0.0, 0.0, 0.0], (0.25, 0.5), 0.375),  # too few nodes for a line
         ([1.0, 1.0, 1.1, 1.1, 1.2, 1.4, 1.8, 3.0, 0.0], (0.875, 1.0), 1.0),  # a punch
     ],
@@ -198,3 +200,13 @@ def test_a_law_is_a_power_of_the_value_and_nothing_else(law):
 def test_a_power_of_a_negative_number_is_refused():
     with pytest.raises(fc.CaseError, match=r"cannot be evaluated for -2\.0"):
         substitute(linked({"n": {"contact.pair.friction": "value^0.5"}}), {"n": -2.0})
+
+
+def test_a_ring_has_two_edges_and_no_contact_radius():
+    model = elastic_model(fc.generate.block((2.0, 1.0), (20, 8)), "axisymmetric", BOTTOM="y")
+    torus = fc.obstacles.Sphere((1.0, 2.0), 1.0)
+    model.add_obstacle("torus", secondary="TOP", obstacle=torus, motion={"y": -0.02})
+    contact = fc.solve(model, 1)[-1].contact["torus"]
+    assert contact.is_ring
+    assert "contact radius ring from 0.9 to 1.15" in repr(contact)
+    assert np.isnan(contact_radius(contact))

@@ -134,6 +134,19 @@ def test_a_mesh_that_agrees_with_theory_by_chance_is_told(case):
     assert "Level 1 " in text
 
 
+def test_values_that_are_not_monotonic_support_no_model_error(case):
+    levels = [made_up(k) for k in range(4)]
+    for level, value in zip(levels, [0.99935, 1.00091, 1.001, 1.00066], strict=True):
+        level["values"]["force"] = value * FORCE
+    study = gathered(case, [levels])
+    (told,) = (line for line in study.lines() if "contact force differs" in line)
+    assert "observed orders 2.3, -0.42, 4.5" in told
+    assert "no model error is stated" in told
+    quantities = study.as_dict()["quantities"]
+    assert quantities["force"]["model_error"] is None
+    assert quantities["pressure_max"]["model_error"] == pytest.approx(0.04, abs=1e-3)
+
+
 @pytest.fixture(scope="module")
 def on_a_mesh_file(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")

@@ -176,6 +176,10 @@ def test_a_wrong_quantity_stops_a_sweep_at_its_first_point():
     sweep = fc.parameter_sweep(solving, [0.5, 0.25], quantities={"x": late})
     assert [point.parameters for point in sweep.points] == [{"size": 0.5}]
     assert "'x' is a function that failed" in sweep.failed[0][1]
+    table = sweep.to_pandas()
+    assert table["size"].tolist() == [0.5, 0.25]
+    assert table["failed"][1] == sweep.failed[0][1]
+    assert table["x"].isna().tolist() == [False, True]
 
 
 def test_sizes_that_are_numbers_of_cells_are_told():
