@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,15 +11,16 @@ from scipy.sparse import csr_array, vstack
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 from fastcontact.cases.decks import interactions
-from fastcontact.cases.decks.assembled import Element, Target
+from fastcontact.cases.decks.assembled import Element
 from fastcontact.cases.decks.axes import axes_by_cell, local_axes, orientation_of
 from fastcontact.cases.decks.blocks import key_of, look_up, refusing
-from fastcontact.cases.decks.conditions import Component, Conditions, Period
+from fastcontact.cases.decks.conditions import Component, Conditions
 from fastcontact.cases.decks.constraints import make_rotations, relations_of
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
-from fastcontact.cases.decks.fields import add_initial_stresses, add_temperatures
+from fastcontact.cases.decks.fields import add_initial_stresses
 from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
-from fastcontact.cases.decks.histories import ByShape, Histories
+from fastcontact.cases.decks.histories import ByShape
+from fastcontact.cases.decks.loads import add_forces, add_temperatures, body_forces, heat_loads, point_group, pressures
 from fastcontact.cases.decks.materials import law_of, strain_of
 from fastcontact.cases.decks.meshing import deck_mesh_of, group_of_surface, secondary_group
 from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections
@@ -76,24 +76,27 @@ class Building:
         conditions = Conditions(self.assembly)
         self._check_contact_pairs()
         conditions.run()
-        pressures = self._pressures(conditions)
-        heat = conditions.heat.loads(self.thickness)
+        loads = pressures(self.assembly, conditions)
+        if not only_heat:
+            loads += body_forces(self.assembly, conditions)
+        heat = heat_loads(self.assembly, conditions, self.thickness)
         gaps = [] if only_heat else gap_groups(self.assembly)
         mesh = self.assembly.mesh() if only_heat else cut_sections(self.assembly, self.assembly.mesh())
         strain, self.linearised = strain_of(content, [law for law, _ in materials])
-        reference = conditions.heat.reference
-        self.model = Model(mesh, self.assembly.kinematics, case_text, strain=strain, reference_temperature=reference)
+        options: dict[str, Any] = {"strain": strain, "reference_temperature": conditions.reference}
+        self.model = Model(mesh, self.assembly.kinematics, case_text, **options)
         for material, group in materials:
             self.model.add_material(material, group)
         self.local_supports: list[MultiPointConstraint] = []
         self.driven: dict[tuple[int, int], Table] = {}
         self.constraints: list[MultiPointConstraint] = []
         if only_heat:
-            self.model.fix(self._point_group("held", range(mesh.n_points)), "xyz"[: mesh.dim])
+            held = point_group(self.model, self.assembly, "held", range(mesh.n_points))
+            self.model.fix(held, "xyz"[: mesh.dim])
             add_sectors(self.model, self.assembly)
         else:
-            self._mechanics(conditions, pressures)
-        for add in heat:
+            self._mechanics(conditions)
+        for add in [*loads, *heat]:
             add(self.model)
         self._contact()
         self.gap_ends: dict[str, dict[int, int]] = {}
@@ -101,18 +104,15 @@ class Building:
             self.gap_ends.update(add_gap(self.model, self.assembly, gap, conditions))
         self.ramp = self._ramp(conditions)
 
-    def _mechanics(self, conditions: Conditions, pressures: list[Callable[[Model], None]]) -> None:
+    def _mechanics(self, conditions: Conditions) -> None:
         """Add supports, constraints, loads, temperatures and springs to the model."""
         self._supports(conditions)
         self.constraints += relations_of(self.assembly, self.model.mesh)
         self.model.relations += [*self.local_supports, *self.constraints]
         self.constraints += add_sections(self.model, self.assembly, conditions.locks)
         self.constraints += add_sectors(self.model, self.assembly)
-        self._forces(conditions)
-        for add in pressures:
-            add(self.model)
-        self._body_forces(conditions)
-        add_temperatures(self.model, conditions.temperatures)
+        add_forces(self.model, self.assembly, conditions, self.thickness)
+        add_temperatures(self.model, conditions.given_temperatures)
         add_initial_stresses(self.model, self.assembly)
         self._springs()
 
@@ -193,37 +193,14 @@ class Building:
                 raise pair.refuse(f"the pair {pair.name} is given twice")
             pair_names.add(key_of(pair.name))
 
-    def _pressures(self, conditions: Conditions) -> list[Callable[[Model], None]]:
-        """Create groups of facets with the same pressure history, and return functions that add the pressures to a model."""
-        by_shape = ByShape[tuple[str, str]]()
-        for table, names in conditions.loads.distinct():
-            for name in names:
-                for cell, rows in self.assembly.facet_rows([name.face] if name.face else []).items():
-                    by_shape.add((name.keyword, cell), table, rows)
-        pressures: list[Callable[[Model], None]] = []
-        for number, ((_, cell), facets, value, table) in enumerate(by_shape, start=1):
-            self.assembly.groups[group := f"pressure {number}"] = {cell: facets.tolist()}
-            if any(factor for _, factor in table):
-                pressures.append(partial(Model.add_pressure, group=group, value=value, ramp=table))
-        return pressures
-
-    def _point_group(self, kind: str, points: Iterable[int]) -> str:
-        """Return the name of a group of points of the mesh; the group is created unless one with these points exists."""
-        name = self.assembly.add_points(f"{kind} {len(self.assembly.point_groups)}", points)
-        if name not in self.model.mesh.point_groups:
-            self.model.mesh = self.model.mesh.with_groups(points={name: self.assembly.point_groups[name]})
-        return name
-
     def _supports(self, conditions: Conditions) -> None:
         """Add the supports, and record the prescribed motions of nodes that belong to gap elements only."""
-        mesh, by_shape = self.model.mesh, ByShape[int]()
-        temporary = conditions.temporary()
-        self._temporary_supports(conditions, temporary)
-        temporary_names = {name for name, _ in temporary}
+        supports, by_shape = conditions.supports, ByShape[int]()
+        self._temporary_supports(conditions)
         ends = {e.points[1] for e in self.assembly.discrete if e.cell.type == "GAPUNI"}
         free_ends = ends - self.assembly.solid_points if ends else ends
-        for table, names in conditions.supports.distinct():
-            for name in (name for name in names if name not in temporary_names):
+        for table, names in supports.distinct():
+            for name in (name for name in names if supports.tracks[name].always):
                 point, axis, local = name
                 if point in free_ends:
                     self.driven[point, axis] = table
@@ -234,20 +211,20 @@ class Building:
                 else:
                     by_shape.add(axis, table, [point])
         for axis, points, value, table in by_shape:
-            group = self._point_group("support", points)
+            group = point_group(self.model, self.assembly, "support", points)
             if callable(value) or any(factor for _, factor in table):
                 self.model.prescribe(group, ramp=table, **{"xyz"[axis]: value})
             else:
                 self.model.fix(group, "xyz"[axis])
-        if mesh.dim == 2 and self.assembly.rotations:
-            self.model.fix(self._point_group("rotation", self.assembly.rotations.values()), "y")
+        if self.assembly.dim == 2 and (rotations := self.assembly.rotations.values()):
+            self.model.fix(point_group(self.model, self.assembly, "rotation", rotations), "y")
 
-    def _temporary_supports(self, conditions: Conditions, temporary: Sequence[tuple[Component, Period]]) -> None:
+    def _temporary_supports(self, conditions: Conditions) -> None:
         """Add the supports that do not act in all steps; those with the same period and history share a constraint."""
-        by_period: dict[tuple[Period, Table], list[Component]] = {}
-        for name, period in (entry for entry in temporary if entry[1].begins < entry[1].ends):
-            by_period.setdefault((period, conditions.supports.table(name)), []).append(name)
-        for (period, table), names in by_period.items():
+        for table, period, group in conditions.supports.in_periods():
+            names = [name for name in group if not conditions.supports.tracks[name].always]
+            if not names:
+                continue
             ends = "" if period.ends == np.inf else f" to {period.ends:g}"
             line = f", line {period.location.line}" if period.location else ""
             label = f"the support of {conditions.description(names[0])}{line}, from {period.begins:g}{ends}"
@@ -260,49 +237,6 @@ class Building:
         point, axis, local = name
         direction = (conditions.directions[point] if local else np.eye(3))[[axis], : self.assembly.dim]
         return along(np.array([point]), direction, self.model.n_dofs)
-
-    def _forces(self, conditions: Conditions) -> None:
-        """Add the nodal forces; those along local axes are resolved into their global components."""
-        by_shape = ByShape[int]()
-        for table, names in conditions.forces.distinct():
-            by_cosine: dict[tuple[int, float], list[int]] = {}
-            for point, axis, local in names:
-                direction = conditions.directions[point][axis] if local else np.eye(3)[axis]
-                for k in np.flatnonzero(np.abs(direction[: self.assembly.dim]) > 1e-12).tolist():
-                    by_cosine.setdefault((k, float(direction[k])), []).append(point)
-            for (k, cosine), points in by_cosine.items():
-                by_shape.add(k, tuple((t, v * cosine / self.thickness) for t, v in table), points)
-        for axis, nodes, value, table in by_shape:
-            if any(factor for _, factor in table):
-                group = self._point_group("force", nodes)
-                self.model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: value})
-
-    def _body_forces(self, conditions: Conditions) -> None:
-        """Add the body forces, weights and centrifugal forces as forces per volume."""
-        by_shape = ByShape[tuple[str, tuple[float, ...], str]]()
-        for table, names in conditions.loads.distinct():
-            for name in (name for name in names if name.face is None):
-                by_density: dict[tuple[str, float], list[int]] = {}
-                for element in name.elements:
-                    if element.type is not None:
-                        cell, density = element.type.element, self._density(element, name)
-                        by_density.setdefault((cell, density), []).append(self.model.mesh.offsets[cell] + element.row)
-                for (cell, density), cells in by_density.items():
-                    scaled = tuple((time, density * value) for time, value in table)
-                    by_shape.add((name.kind, name.numbers, cell), scaled, cells)
-        loads = [(f"load {number}", *load) for number, load in enumerate(by_shape, start=1)]
-        self.model.mesh = self.model.mesh.with_groups(cells={group: cells for group, _, cells, _, _ in loads})
-        for group, (kind, vector, _), _, value, table in loads:
-            self.model.add_body_force(group, ramp=table, **_body_force(kind, vector, value, self.assembly.dim))
-
-    def _density(self, element: Element, load: Target) -> float:
-        """Return the factor of a body force at an element: the density of its material, or 1 for a force per volume."""
-        if load.kind[0] == "B":
-            return 1.0
-        material = self._material(element.assigned_section)
-        if material.density is None:
-            raise load.location.refuse(f"material '{material.name}' has no *DENSITY, which {load.kind} requires")
-        return material.density
 
     def _springs(self) -> None:
         """Add the springs. Raises CaseError if an element of *SPRING is not a spring, or a spring has no stiffness."""
@@ -325,7 +259,8 @@ class Building:
 
     def _node_based_options(self, pair: Pair, secondary: str) -> dict[str, Any]:
         """Return the options that exclude nodes from contact: those on the facets, but not in the node-based surface."""
-        options: dict[str, Any] = {"excluded": self._point_group("without contact", self.assembly.excluded[secondary])}
+        excluded = point_group(self.model, self.assembly, "without contact", self.assembly.excluded[secondary])
+        options: dict[str, Any] = {"excluded": excluded}
         if all(map(all_nodes_carry, self.assembly.groups[secondary])):
             options["formulation"] = "node_to_segment"
         self.content.note(
@@ -413,36 +348,12 @@ class Building:
             for number, step in enumerate(steps):
                 count = max(1, round(min(MOST_INCREMENTS, step.period / min(step.increment, step.period))))
                 instants.update(number + k / count for k in range(1, count))  # ends of equal increments
-        mechanical: tuple[Histories[Any], ...] = (conditions.supports, conditions.forces, conditions.loads)
-        for histories in (*mechanical, conditions.temperatures, *conditions.heat.histories):
+        for histories in conditions.histories:
             for track in {id(track): track for track in histories.tracks.values()}.values():
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
             raise steps[0].refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
-
-
-def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> dict[str, Any]:
-    """Return the components of a body force for a load multiplier of 1, times the factor `value` of the cells."""
-
-    def times(component: Any) -> Any:
-        if not callable(value):
-            return component
-        return lambda points: value(points) * (component(points) if callable(component) else component)
-
-    if kind[0] == "B":
-        return {kind[1].lower(): times(1.0)}
-    if kind == "GRAV":
-        direction = np.array(vector) / np.linalg.norm(vector)
-        return {"xyz"[k]: times(float(direction[k])) for k in range(dim) if direction[k]}
-    origin, axis = np.array(vector[:3]), np.array(vector[3:])
-    axis = axis / np.linalg.norm(axis)
-
-    def outward(k: int, points: Array) -> Array:
-        relative = np.pad(points, ((0, 0), (0, 3 - points.shape[1]))) - origin
-        return np.asarray((relative - np.outer(relative @ axis, axis))[:, k])
-
-    return {"xyz"[k]: times(partial(outward, k)) for k in range(dim) if abs(axis[k]) < 1.0}
 
 
 def nodal_gaps(model: Model, secondary: str, primary: str, excluded: Sequence[int]) -> tuple[Array, Array]:
