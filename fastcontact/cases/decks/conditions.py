@@ -84,8 +84,8 @@ class Conditions:
         """Record the supports and loads of all steps."""
         for condition in self.assembly.content.supports:
             self._supports(condition, before=True)
-        self.supports.begin()
-        self.fixed_temperatures.begin()
+        for history in (self.supports, self.fixed_temperatures):
+            history.initial, history.step_values = history.step_values, {}
         for number, step in enumerate(self.assembly.content.steps, start=1):
             self.locks.begin(number, [g for g in step.conditions if g.block.keyword == "BOUNDARY"], self.assembly)
             for condition in step.conditions:

@@ -112,7 +112,7 @@ class Histories(Generic[Name]):
     rest : mapping
         Values in the absence of a load or support, by default zero.
     initial : dict
-        Values given before all steps by name, which the first step reaches unless it changes them.
+        Values given before all steps by name, which the first step reaches unless it changes or removes them.
     kept : set
         Names of the values that the current step keeps (FIXED).
     time : float
@@ -138,6 +138,7 @@ class Histories(Generic[Name]):
             )
         self.step_values[name] = value
         self.removals.pop(name, None)
+        self.kept.discard(name)
 
     def record(self, condition: Condition, entries: Iterable[tuple[Iterable[Name], float, Location]]) -> None:
         """Set the values of the lines of a block; OP=NEW first removes the earlier values of its keyword."""
@@ -150,20 +151,12 @@ class Histories(Generic[Name]):
 
     def keep(self, name: Name, value: Value) -> None:
         """Keep the value at the end of the last step in the current step or, if none acts then, set the given value."""
-        self.kept.add(name)
         if name in self.tracks and self.tracks[name].alive:
             self.step_values[name] = Value(self.tracks[name].last, "", value.location)
             self.removals.pop(name, None)
         else:
             self.set_value(name, value)
-
-    def begin(self) -> None:
-        """Begin the histories of the values that are given before all steps. They start at the values of `rest`."""
-        tracks: dict[tuple[float, bool], Track] = {}
-        for name in self.step_values:
-            key = rest, keeps = self.rest.get(name, 0.0), name in self.kept
-            self.tracks[name] = tracks.setdefault(key, Track(array("d", (0.0, rest)), (Period(keeps=keeps),)))
-        self.initial, self.step_values, self.kept = self.step_values, {}, set()
+        self.kept.add(name)
 
     def remove_earlier(self, keyword: str = "") -> None:
         """Mark the values of earlier steps for removal, except those whose names have a keyword other than `keyword`."""
@@ -181,7 +174,7 @@ class Histories(Generic[Name]):
         for name in (*current, *self.removals):
             before, rest, given = self.tracks.get(name), self.rest.get(name, 0.0), current.get(name)
             value, amplitude = given[:2] if given else (rest, "")
-            periods = self._periods(name, before, begin)
+            periods = self._periods(name, given, begin)
             key = before, value, amplitude, rest, periods
             if key not in changed:
                 numbers = array("d", (0.0, rest)) if before is None else before.numbers[:]
@@ -199,20 +192,20 @@ class Histories(Generic[Name]):
             track.add(_amplitude_points(*in_total_time[track], begin, start, step.period))
         self.step_values, self.initial, self.removals, self.kept = {}, {}, {}, set()
 
-    def _periods(self, name: Name, before: Track | None, begin: float) -> tuple[Period, ...]:
-        """Return the periods of a value after the current step, which begins at the load factor `begin`.
+    def _periods(self, name: Name, given: Value | None, begin: float) -> tuple[Period, ...]:
+        """Return the periods of a quantity with the value `given` in the current step, which begins at load factor `begin`.
 
         A new value ends the period of a value with FIXED, and a new period begins.
         """
-        periods, given = () if before is None else before.periods, self.step_values.get(name)
-        acts = before is not None and before.alive
-        released = acts and given is not None and periods[-1].keeps and name not in self.kept
-        if name in self.removals or released:
+        before, keeps = self.tracks.get(name), name in self.kept
+        periods = before.periods if before else ()
+        if before and before.alive:
+            if given is not None and (keeps or not periods[-1].keeps):
+                return periods
             periods = (*periods[:-1], replace(periods[-1], ends=begin))
-        if given is not None and (released or not acts):
-            location = given.location if begin else None
-            periods = (*periods, Period(begin, location=location, keeps=name in self.kept))
-        return periods
+        if given is None:
+            return periods
+        return (*periods, Period(begin, location=given.location if begin else None, keeps=keeps))
 
     def table(self, name: Name) -> Table:
         """Return the history as pairs of load factor and value, up to the end of the last step of the deck."""
