@@ -19,11 +19,11 @@ from fastcontact.cases.decks.constraints import make_rotations, relations_of
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
 from fastcontact.cases.decks.fields import add_initial_stresses
 from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
-from fastcontact.cases.decks.histories import ByShape
+from fastcontact.cases.decks.histories import ByShape, Period
 from fastcontact.cases.decks.loads import add_forces, add_temperatures, body_forces, heat_loads, point_group, pressures
 from fastcontact.cases.decks.materials import law_of, strain_of
 from fastcontact.cases.decks.meshing import deck_mesh_of, group_of_surface, secondary_group
-from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections
+from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections, sections_by_point
 from fastcontact.cases.decks.steps import MOST_INCREMENTS
 from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.elasticity.material_axes import CylindricalAxes
@@ -54,6 +54,8 @@ class Building:
         Load steps.
     thickness : float
         Thickness of a plane model [length]. The forces in the model are per unit thickness.
+    sections : dict of int to PretensionSection
+        Pretension sections by the points of their nodes.
     constraints : list of MultiPointConstraint
         Multi-point constraints that are not supports.
     local_supports : list of MultiPointConstraint
@@ -73,6 +75,7 @@ class Building:
         if not only_heat:
             make_rotations(self.assembly)
         materials, self.thickness = self._materials()
+        self.sections = sections_by_point(self.assembly)
         conditions = Conditions(self.assembly)
         self._check_contact_pairs()
         conditions.run()
@@ -109,7 +112,7 @@ class Building:
         self._supports(conditions)
         self.constraints += relations_of(self.assembly, self.model.mesh)
         self.model.relations += [*self.local_supports, *self.constraints]
-        self.constraints += add_sections(self.model, self.assembly, conditions.locks)
+        self.constraints += add_sections(self.model, self.assembly, self.sections, conditions)
         self.constraints += add_sectors(self.model, self.assembly)
         add_forces(self.model, self.assembly, conditions, self.thickness)
         add_temperatures(self.model, conditions.given_temperatures)
@@ -202,6 +205,8 @@ class Building:
         for table, names in supports.distinct():
             for name in (name for name in names if supports.tracks[name].always):
                 point, axis, local = name
+                if self._locks(name, supports.tracks[name].periods[-1]):
+                    continue
                 if point in free_ends:
                     self.driven[point, axis] = table
                 elif local:
@@ -222,7 +227,8 @@ class Building:
     def _temporary_supports(self, conditions: Conditions) -> None:
         """Add the supports that do not act in all steps; those with the same period and history share a constraint."""
         for table, period, group in conditions.supports.in_periods():
-            names = [name for name in group if not conditions.supports.tracks[name].always]
+            temporary = (name for name in group if not conditions.supports.tracks[name].always)
+            names = [name for name in temporary if not self._locks(name, period)]
             if not names:
                 continue
             ends = "" if period.ends == np.inf else f" to {period.ends:g}"
@@ -231,6 +237,10 @@ class Building:
             rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
             limits = (period.begins, period.ends)
             self.local_supports.append(TemporaryConstraint(label, rows, 1.0, table, *limits, keeps=period.keeps))
+
+    def _locks(self, name: Component, period: Period) -> bool:
+        """Return whether a support in a period locks a pretension section instead, see `add_sections`."""
+        return period.keeps and name[:2] in {(point, 0) for point in self.sections}
 
     def _support_row(self, conditions: Conditions, name: Component) -> csr_array:
         """Return the constraint row (1, n_dofs) [-] of the displacement component that a support prescribes."""

@@ -13,7 +13,6 @@ from fastcontact.cases.decks.content import Condition
 from fastcontact.cases.decks.fields import initial_temperatures, reference_temperature, temperature_of
 from fastcontact.cases.decks.histories import Histories, Value
 from fastcontact.cases.decks.meshing import DeckMesh
-from fastcontact.cases.decks.sections import Locks
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Components that the named supports of *BOUNDARY prescribe.
@@ -74,7 +73,6 @@ class Conditions:
             self.fixed_temperatures,
             *dict.fromkeys(self.of_keyword.values()),
         )
-        self.locks = Locks(assembly)
         self.directions = local_directions(assembly)
         if assembly.dim == 3:  # rotations refer to the local axes of their node
             rotations, rotated = assembly.rotations, self.directions
@@ -87,7 +85,6 @@ class Conditions:
         for history in (self.supports, self.fixed_temperatures):
             history.initial, history.step_values = history.step_values, {}
         for number, step in enumerate(self.assembly.content.steps, start=1):
-            self.locks.begin(number, [g for g in step.conditions if g.block.keyword == "BOUNDARY"], self.assembly)
             for condition in step.conditions:
                 if condition.block.keyword == "BOUNDARY":
                     self._supports(condition)
@@ -211,8 +208,6 @@ class Conditions:
         if name is None:
             if prescribed.value:
                 raise prescribed.location.refuse(f"component {component} does not exist at nodes of this model")
-            return
-        if self.locks.record(point, component, fixed):
             return
         if name[0] in self.directions:
             name, sign = self._local_component(*name[:2])
