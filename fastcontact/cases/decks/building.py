@@ -197,24 +197,29 @@ class Building:
             pair_names.add(key_of(pair.name))
 
     def _supports(self, conditions: Conditions) -> None:
-        """Add the supports, and record the prescribed motions of nodes that belong to gap elements only."""
-        supports, by_shape = conditions.supports, ByShape[int]()
-        self._temporary_supports(conditions)
+        """Add the supports, and record the prescribed motions of nodes that belong to gap elements only.
+
+        Supports that do not act in all steps share a constraint if they have the same period and history. A support that
+        locks a pretension section is left to `add_sections`.
+        """
+        by_shape, local_supports = ByShape[int](), []
         ends = {e.points[1] for e in self.assembly.discrete if e.cell.type == "GAPUNI"}
         free_ends = ends - self.assembly.solid_points if ends else ends
-        for table, names in supports.distinct():
-            for name in (name for name in names if supports.tracks[name].always):
+        for table, period, components in conditions.supports.in_periods():
+            names = [name for name in components if not (period.keeps and name[1] == 0 and name[0] in self.sections)]
+            if names and not period.always:
+                self.local_supports.append(self._temporary_support(conditions, table, period, names))
+            for name in names if period.always else ():
                 point, axis, local = name
-                if self._locks(name, supports.tracks[name].periods[-1]):
-                    continue
                 if point in free_ends:
                     self.driven[point, axis] = table
                 elif local:
                     label = f"the support of {conditions.description(name)} on local axes"
                     row = self._support_row(conditions, name)
-                    self.local_supports.append(MultiPointConstraint(label, row, 1.0, table))
+                    local_supports.append(MultiPointConstraint(label, row, 1.0, table))
                 else:
                     by_shape.add(axis, table, [point])
+        self.local_supports += local_supports
         for axis, points, value, table in by_shape:
             group = point_group(self.model, self.assembly, "support", points)
             if callable(value) or any(factor for _, factor in table):
@@ -224,23 +229,15 @@ class Building:
         if self.assembly.dim == 2 and (rotations := self.assembly.rotations.values()):
             self.model.fix(point_group(self.model, self.assembly, "rotation", rotations), "y")
 
-    def _temporary_supports(self, conditions: Conditions) -> None:
-        """Add the supports that do not act in all steps; those with the same period and history share a constraint."""
-        for table, period, group in conditions.supports.in_periods():
-            temporary = (name for name in group if not conditions.supports.tracks[name].always)
-            names = [name for name in temporary if not self._locks(name, period)]
-            if not names:
-                continue
-            ends = "" if period.ends == np.inf else f" to {period.ends:g}"
-            line = f", line {period.location.line}" if period.location else ""
-            label = f"the support of {conditions.description(names[0])}{line}, from {period.begins:g}{ends}"
-            rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
-            limits = (period.begins, period.ends)
-            self.local_supports.append(TemporaryConstraint(label, rows, 1.0, table, *limits, keeps=period.keeps))
-
-    def _locks(self, name: Component, period: Period) -> bool:
-        """Return whether a support in a period locks a pretension section instead, see `add_sections`."""
-        return period.keeps and name[:2] in {(point, 0) for point in self.sections}
+    def _temporary_support(
+        self, conditions: Conditions, table: Table, period: Period, names: Sequence[Component]
+    ) -> TemporaryConstraint:
+        """Return the constraint of displacement components that are prescribed in a period."""
+        ends = "" if period.ends == np.inf else f" to {period.ends:g}"
+        line = f", line {period.location.line}" if period.location else ""
+        label = f"the support of {conditions.description(names[0])}{line}, from {period.begins:g}{ends}"
+        rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
+        return TemporaryConstraint(label, rows, 1.0, table, period.begins, period.ends, keeps=period.keeps)
 
     def _support_row(self, conditions: Conditions, name: Component) -> csr_array:
         """Return the constraint row (1, n_dofs) [-] of the displacement component that a support prescribes."""

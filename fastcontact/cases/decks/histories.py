@@ -42,6 +42,11 @@ class Period:
     location: Location | None = None
     keeps: bool = False
 
+    @property
+    def always(self) -> bool:
+        """Whether all steps belong to the period."""
+        return self.begins == 0.0 and self.ends == np.inf
+
 
 @dataclass(eq=False, slots=True)
 class Track:
@@ -60,11 +65,6 @@ class Track:
     def alive(self) -> bool:
         """Whether no step has removed the quantities."""
         return bool(self.periods) and self.periods[-1].ends == np.inf
-
-    @property
-    def always(self) -> bool:
-        """Whether the quantities act in all steps."""
-        return self.alive and self.periods[-1].begins == 0.0
 
     @property
     def last(self) -> float:
