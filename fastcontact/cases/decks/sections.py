@@ -84,9 +84,9 @@ def add_sections(
 ) -> list[MultiPointConstraint]:
     """Add the pretension `sections`, by the points of their nodes, to a model.
 
-    Returns their constraints, including those of locked sections.
+    Returns their constraints.
     """
-    n_before, links, locked = len(model.relations), [], []
+    n_before, links = len(model.relations), []
     for point, section in sections.items():
         group, location = group_of_surface(deck_mesh, section.surface), section.location
         normal = None if section.normal is None else section.normal[: deck_mesh.dim]
@@ -95,10 +95,8 @@ def add_sections(
         row = _orientation_sign(deck_mesh, section) * model.pretensions[-1].row(model.n_dofs)
         node = csr_array((np.ones(1), ([0], [point * deck_mesh.dim])), shape=row.shape)
         links.append(MultiPointConstraint(f"*{location.keyword} of line {location.line}", csr_array(row - node)))
-        if locked_from is not None:
-            locked.append(MultiPointConstraint(f"the locked length of line {location.line}", row))
     model.relations.extend(links)
-    return [*model.relations[n_before:], *locked]
+    return model.relations[n_before:]
 
 
 def _orientation_sign(deck_mesh: DeckMesh, section: PretensionSection) -> float:
