@@ -56,10 +56,9 @@ class Building:
         Thickness of a plane model [length]. The forces in the model are per unit thickness.
     sections : dict of int to PretensionSection
         Pretension sections by the points of their nodes.
-    constraints : list of MultiPointConstraint
-        Multi-point constraints that are not supports.
     local_supports : list of MultiPointConstraint
-        Supports that are expressed as constraints, because they act along local axes or not in all steps.
+        Supports that are expressed as constraints, because they act along local axes or not in all steps. They are the first
+        constraints of the model.
     linearised : str
         Reason why small strains are assumed although a step has NLGEOM; otherwise empty.
     driven : dict of (int, int) to Table
@@ -79,9 +78,7 @@ class Building:
         conditions = Conditions(self.assembly)
         self._check_contact_pairs()
         conditions.run()
-        loads = pressures(self.assembly, conditions)
-        if not only_heat:
-            loads += body_forces(self.assembly, conditions)
+        loads = [*pressures(self.assembly, conditions), *body_forces(self.assembly, conditions)]
         heat = heat_loads(self.assembly, conditions, self.thickness)
         gaps = [] if only_heat else gap_groups(self.assembly)
         mesh = self.assembly.mesh() if only_heat else cut_sections(self.assembly, self.assembly.mesh())
@@ -92,7 +89,6 @@ class Building:
             self.model.add_material(material, group)
         self.local_supports: list[MultiPointConstraint] = []
         self.driven: dict[tuple[int, int], Table] = {}
-        self.constraints: list[MultiPointConstraint] = []
         if only_heat:
             held = point_group(self.model, self.assembly, "held", range(mesh.n_points))
             self.model.fix(held, "xyz"[: mesh.dim])
@@ -110,10 +106,9 @@ class Building:
     def _mechanics(self, conditions: Conditions) -> None:
         """Add supports, constraints, loads, temperatures and springs to the model."""
         self._supports(conditions)
-        self.constraints += relations_of(self.assembly, self.model.mesh)
-        self.model.relations += [*self.local_supports, *self.constraints]
-        self.constraints += add_sections(self.model, self.assembly, self.sections, conditions)
-        self.constraints += add_sectors(self.model, self.assembly)
+        self.model.relations += [*self.local_supports, *relations_of(self.assembly, self.model.mesh)]
+        add_sections(self.model, self.assembly, self.sections, conditions)
+        add_sectors(self.model, self.assembly)
         add_forces(self.model, self.assembly, conditions, self.thickness)
         add_temperatures(self.model, conditions.given_temperatures)
         add_initial_stresses(self.model, self.assembly)

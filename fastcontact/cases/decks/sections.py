@@ -81,12 +81,9 @@ def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
 
 def add_sections(
     model: Model, deck_mesh: DeckMesh, sections: Mapping[int, PretensionSection], conditions: Conditions
-) -> list[MultiPointConstraint]:
-    """Add the pretension `sections`, by the points of their nodes, to a model.
-
-    Returns their constraints.
-    """
-    n_before, links = len(model.relations), []
+) -> None:
+    """Add the pretension `sections`, by the points of their nodes, to a model."""
+    links = []
     for point, section in sections.items():
         group, location = group_of_surface(deck_mesh, section.surface), section.location
         normal = None if section.normal is None else section.normal[: deck_mesh.dim]
@@ -96,7 +93,6 @@ def add_sections(
         node = csr_array((np.ones(1), ([0], [point * deck_mesh.dim])), shape=row.shape)
         links.append(MultiPointConstraint(f"*{location.keyword} of line {location.line}", csr_array(row - node)))
     model.relations.extend(links)
-    return model.relations[n_before:]
 
 
 def _orientation_sign(deck_mesh: DeckMesh, section: PretensionSection) -> float:
@@ -128,9 +124,9 @@ def cyclic_symmetry_model(content: Content, block: Block) -> None:
     content.sectors.append(Sectors(block.location, int(text), block.get("TIE"), points))
 
 
-def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]:
-    """Add the cyclic symmetries of a deck to the model and return their constraints."""
-    content, n_before = deck_mesh.content, len(model.relations)
+def add_sectors(model: Model, deck_mesh: DeckMesh) -> None:
+    """Add the cyclic symmetries of a deck to the model."""
+    content = deck_mesh.content
     used: set[int] = set()
     for sectors in content.sectors:
         ends = _ends(content, sectors)
@@ -150,7 +146,6 @@ def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]
     for ends in content.sector_ends:
         if id(ends) not in used:
             raise ends.refuse("no *CYCLIC SYMMETRY MODEL defines the number of sectors and the axis")
-    return model.relations[n_before:]
 
 
 def _ends(content: Content, sectors: Sectors) -> SectorEnds:
