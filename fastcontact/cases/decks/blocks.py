@@ -18,8 +18,9 @@ MAX_SIZE = 1 << 28
 MAX_FILES = 200
 # Largest number of characters of a line, or of a keyword with its continuation lines. Abaqus and CalculiX allow far fewer.
 LONGEST_LINE = 1 << 16
-_KEYWORD_LINE = re.compile(rb"^(?=[^\S\n]*\*(?!\*))", re.MULTILINE)
-_LONG_LINE = re.compile(rb"^(?![^\S\n]*\*\*)[^\n]{%d}" % (LONGEST_LINE + 1), re.MULTILINE)
+_BLANKS = rb"(?:[^\S\n]|\xc2\xa0)*"  # also no-break spaces
+_KEYWORD_LINE = re.compile(rb"^(?=%s\*(?!\*))" % _BLANKS, re.MULTILINE)
+_LONG_LINE = re.compile(rb"^(?!%s\*\*)[^\n]{%d}" % (_BLANKS, LONGEST_LINE + 1), re.MULTILINE)
 _TOO_LONG = f"the line has more than {LONGEST_LINE} characters: break it between two entries"
 LONGEST_QUOTED = 80  # length to which messages cut names and entries
 LARGEST_INTEGER = 1 << 53  # every integer up to this one is exact in double precision
