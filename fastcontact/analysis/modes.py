@@ -23,6 +23,7 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.inertia_loads import Centrifugal, Densities
 from fastcontact.elasticity.mass import mass, stress_stiffness
 from fastcontact.elasticity.material_field import MaterialField
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.recovery import CellStress
 from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import stiffness
@@ -192,9 +193,8 @@ class _Vibration:
     def lowest(self, n: int, linear_solver: str, wave: Wave | None = None) -> tuple[Array, Array]:
         """Return the n lowest eigenvalues (n,) and displacements (n_dofs, n); for a wave, those of its real form."""
         model, driven = self.model, self.model.force_driven
-        locked_lengths = [
-            bolt.locked(model.mesh.points.size, 0.0) for bolt in model.pretensions
-        ]  # at their current length
+        # Pretension sections keep their current length.
+        locked_lengths = [MultiPointConstraint(bolt.name, bolt.row(model.n_dofs)) for bolt in model.pretensions]
         relations = [*model.relations, *locked_lengths]
         K, M, nullspace = (
             driven.stiffness(self.K),

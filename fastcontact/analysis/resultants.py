@@ -405,7 +405,6 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     coupling = [relation for relation in model.relations if not any(relation is other for other in related)]
     reaction = step.reaction.ravel() - ground_force(model.springs, step.displacement.ravel())
     rows = [relation.rows for relation in (*related, *coupling)]
-    rows += [section.row(n) for section in model.pretensions]  # a locked section transmits a force like a constraint
     forces = multipliers(reaction, rows, supported.ravel())
     reaction = reaction - sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(n))
     by_support: dict[str, Array] = {}

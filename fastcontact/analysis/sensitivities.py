@@ -30,6 +30,7 @@ from fastcontact.analysis.sensitivity.quantities import check_quantity, with_gra
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.stages import stage_of
 from fastcontact.arrays import Array
+from fastcontact.elasticity.multipoint_constraints import TemporaryConstraint
 from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, RampLike, ramp_of
@@ -206,7 +207,7 @@ def recomputed_step(
     case = restart.identity(model, ramp, criteria)
     restart.check(step, case, model)
     model.check(ramp)
-    problem = prepare(model, ramp, criteria, linear_solver=linear_solver)
+    problem = prepare(stage_of(model, step), ramp, criteria, linear_solver=linear_solver)
     touched = frozenset(name for name, contact in step.contact.items() if contact.active.any())
     state, load = restart.put_back(problem, step, touched), problem.load_at(step.load_factor)
     state = replace(state, obstacles=problem.obstacles_at(load, state.u))
@@ -233,7 +234,8 @@ def _check_independent_of_path(model: Model, step: StepResult, criteria: Criteri
                 f"contact '{pair.name}' keeps nodes closed that closed in earlier load steps, and sensitivities consider a "
                 "single step. Use finite differences of two solutions"
             )
-    if stage_of(model, step) is not model:
+    begin = float(np.nextafter(step.load_factor, -np.inf))
+    if any(isinstance(relation, TemporaryConstraint) and relation.acts_from(begin) for relation in model.relations):
         raise ModelError(
             "pretension sections or temporary supports hold positions from earlier load steps, and sensitivities consider a "
             "single step. Request them in the last step before the lock, or use finite differences of two solutions"

@@ -1,7 +1,7 @@
 """The model of a load step, if parts of it are temporary.
 
-Pretension sections are locked from a given instant on, and constraints, prescribed temperatures and convection films may
-act only in some load steps. The model of a step, called its stage, contains those that act in this step.
+Constraints, such as those of locked pretension sections, prescribed temperatures and convection films may act only in some
+load steps. The model of a step, called its stage, contains those that act in this step.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from fastcontact.arrays import Array
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.heat.loads import FixedTemperature, TemporaryHeat
 from fastcontact.model.model import TEMPORARY, Model
-from fastcontact.model.pretension import locked_lengths
 from fastcontact.results.step import StepResult
 
 
@@ -69,7 +68,7 @@ def _names(model: Model) -> list[str]:
 
 def _stage(
     model: Model, begin: float, displacement: Array, rise: Array | None, stored: Mapping[str, Any]
-) -> tuple[Model, dict[str, float | Array]]:
+) -> tuple[Model, dict[str, Array]]:
     """Return the model of the load step that begins at an instant, and the initial values of its temporary parts.
 
     Parameters
@@ -91,27 +90,24 @@ def _stage(
     values : dict
         For each part, by its name, the value at the instant at which it became active; see `State.locked`.
     """
-    lengths = locked_lengths(model.pretensions, begin, displacement, stored)
-    n = model.mesh.points.size
-    locks = [item.locked(n, lengths[item.label]) for item in model.pretensions if item.label in lengths]
-    values: dict[str, float | Array] = {**lengths}
+    values: dict[str, Array] = {}
     relations: list[MultiPointConstraint] = []
     for item in model.relations:
         if not isinstance(item, TemporaryConstraint):
             relations.append(item)
         elif item.acts_from(begin):
-            values[item.name] = stored[item.name] if item.name in stored else item.rows @ displacement.ravel()
-            relations += item.after(np.asarray(values[item.name]))
+            values[item.name] = np.asarray(stored.get(item.name, item.rows @ displacement.ravel()))
+            relations += item.after(values[item.name])
     loads: list[Any] = []
     for load in model.heat_loads:
         if isinstance(load, FixedTemperature) and load.begins > -np.inf and load.acts_from(begin):
             initial_rise = np.zeros(len(displacement)) if rise is None else rise
-            values[load.label] = stored.get(load.label, initial_rise)
-            loads.append(replace(load, reached=np.asarray(values[load.label])))
+            values[load.label] = np.asarray(stored.get(load.label, initial_rise))
+            loads.append(replace(load, reached=values[load.label]))
         elif not isinstance(load, TemporaryHeat) or load.acts_from(begin):
             loads.append(load)
-    if not locks and not any(isinstance(item, TEMPORARY) for item in (*model.relations, *model.heat_loads)):
+    if not any(isinstance(item, TEMPORARY) for item in (*model.relations, *model.heat_loads)):
         return model, values
     stage = copy.copy(model)
-    stage.relations, stage.heat_loads = [*relations, *locks], loads
+    stage.relations, stage.heat_loads = relations, loads
     return stage, values

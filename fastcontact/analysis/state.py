@@ -62,10 +62,10 @@ class State:
         For each contact pair in three dimensions, the point of first contact [length] and the unit normal there [-].
     bonds : dict of str to Bond
         State of the cohesive layer, for each contact pair that has one.
-    locked : dict of str to float or ndarray
-        Values that were stored when a part of the model became active. For a locked pretension section it is its shortening
-        at that time [length]; for a temporary constraint, the initial values (m,) of its m equations [length]; for a
-        temperature that begins after the first step, the temperature rise (n_points,) at its beginning [temperature].
+    locked : dict of str to ndarray
+        Values that were stored when a part of the model became active. For a temporary constraint, such as that of a locked
+        pretension section, they are the initial values (m,) of its m equations [length]; for a temperature that begins after
+        the first step, the temperature rise (n_points,) at its beginning [temperature].
     extrapolation : Extrapolation
         The last converged steps, from which the displacements of the next one are extrapolated.
     largest_force, largest_rigid_force : float

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array, vstack
@@ -12,7 +11,7 @@ from scipy.sparse import csr_array, vstack
 from fastcontact._tools.argument_types import finite_vector
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table, check_number
-from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import OPPOSITE, Mesh
 from fastcontact.model.relation_rows import along, matched, minus_first, normals_of
@@ -74,9 +73,10 @@ class Pretension:
         return csr_array(along(self.nodes, directions, n_dofs) - along(self.opposite, directions, n_dofs))
 
     def relations(self, n_dofs: int) -> list[MultiPointConstraint]:
-        """Return the permanent constraints.
+        """Return the constraints.
 
-        The sides do not slide relative to each other, and the shortening is equal at all nodes and, if given, prescribed.
+        The sides do not slide relative to each other, and the shortening is equal at all nodes and, if given, prescribed. A
+        locked section keeps its shortening.
         """
         rows = [self._approach(direction, n_dofs) for direction in _tangents(self.normal)]
         approach = self._approach(self.normal, n_dofs)
@@ -87,15 +87,14 @@ class Pretension:
         constraints = [MultiPointConstraint(f"the sides of {self.name}", matrix)]
         if self.shortening is not None:
             constraints.append(MultiPointConstraint(self.prescribed, self.row(n_dofs), self.shortening, self.ramp))
+        if self.locked_from is not None:
+            name = f"the locked length of {self.name}"
+            constraints.append(TemporaryConstraint(name, self.row(n_dofs), begins=self.locked_from, keeps=True))
         return constraints
 
     def shortened(self, displacement: Array) -> float:
         """Return the approach of the sides at displacements (n_points, dim) [length]."""
         return float((self.row(displacement.size) @ displacement.ravel())[0])
-
-    def locked(self, n_dofs: int, reached: float) -> MultiPointConstraint:
-        """Return the constraint that keeps the shortening `reached` [length]."""
-        return MultiPointConstraint(f"the locked length of {self.name}", self.row(n_dofs), reached, ((0.0, 1.0),))
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,18 +224,6 @@ def _tangents(normal: Array) -> Array:
     directions = [unit for k, unit in enumerate(np.eye(len(normal))) if k != axis]
     basis = np.linalg.qr(np.column_stack([normal, *directions]))[0][:, 1:].T
     return np.asarray(np.where(np.abs(basis) < ROUND_OFF, 0.0, basis))
-
-
-def locked_lengths(
-    sections: Sequence[Pretension], begin: float, displacement: Array, stored: Mapping[str, Any]
-) -> dict[str, float]:
-    """Return by label the shortenings [length] of the sections that are locked in a load step that begins at `begin`.
-
-    The shortening of a section that is locked in this step is computed from displacements (n_points, dim) [length]. Later
-    steps use the `stored` value, because their displacements reproduce it only up to round-off.
-    """
-    locked = [bolt for bolt in sections if bolt.locked_from is not None and begin >= bolt.locked_from]
-    return {bolt.label: stored[bolt.label] if bolt.label in stored else bolt.shortened(displacement) for bolt in locked}
 
 
 def loose_bolts(sections: Sequence[Pretension], modes: Array, force: Array) -> str:

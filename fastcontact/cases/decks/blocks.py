@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from codecs import BOM_UTF8
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 from fastcontact.errors import CaseError, FastcontactError, FileError
 
@@ -16,6 +18,9 @@ MAX_SIZE = 1 << 28
 MAX_FILES = 200
 # Largest number of characters of a line, or of a keyword with its continuation lines. Abaqus and CalculiX allow far fewer.
 LONGEST_LINE = 1 << 16
+_BLANKS = rb"(?:[^\S\n]|\xc2\xa0)*"  # also no-break spaces
+_KEYWORD_LINE = re.compile(rb"^(?=%s\*(?!\*))" % _BLANKS, re.MULTILINE)
+_LONG_LINE = re.compile(rb"^(?!%s\*\*)[^\n]{%d}" % (_BLANKS, LONGEST_LINE + 1), re.MULTILINE)
 _TOO_LONG = f"the line has more than {LONGEST_LINE} characters: break it between two entries"
 LONGEST_QUOTED = 80  # length to which messages cut names and entries
 LARGEST_INTEGER = 1 << 53  # every integer up to this one is exact in double precision
@@ -99,18 +104,18 @@ class Row(Item):
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """The data lines of a keyword as bytes `begin` to `end` of a file, from which iteration yields one row at a time."""
+    """The data lines of a keyword, from which iteration yields one row at a time; `location` is that of the first line."""
 
     location: Location
     contents: bytes = field(repr=False)
-    begin: int
-    end: int
 
     def __iter__(self) -> Iterator[Row]:
-        for line in _lines(self.contents, self.begin, self.end, self.location.line):
-            if not line.text.startswith("**"):
-                location = Location(self.location.file, line.number, self.location.keyword)
-                yield Row(location, tuple(_entries(line.text.removesuffix(","))), line.text.endswith(","))
+        # A list of all rows would take several times the memory of the file.
+        for number, line in enumerate(BytesIO(self.contents), start=self.location.line):
+            text = _text(line)
+            if not text.startswith("**"):
+                location = Location(self.location.file, number, self.location.keyword)
+                yield Row(location, tuple(_entries(text.removesuffix(","))), text.endswith(","))
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,15 +232,6 @@ def files_of_deck(path: Path) -> list[Path]:
     return source.files
 
 
-class _Line(NamedTuple):
-    """A line: its number, the byte offsets of its start and of the next line, and its text without surrounding blanks."""
-
-    number: int
-    begin: int
-    end: int
-    text: str
-
-
 def _contents(path: Path, source: Source) -> bytes:
     """Return the contents of a file with Unix line endings.
 
@@ -252,65 +248,59 @@ def _contents(path: Path, source: Source) -> bytes:
     return contents.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
 
-def _lines(contents: bytes, begin: int, end: int, number: int = 1) -> Iterator[_Line]:
-    """Yield the lines between two byte offsets; a list of all lines would take several times the memory of the file."""
-    while begin < end:
-        next_begin = contents.find(b"\n", begin, end) + 1 or end
-        yield _Line(number, begin, next_begin, contents[begin:next_begin].decode("utf-8", "replace").strip())
-        number, begin = number + 1, next_begin
-
-
 def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
     """Yield the blocks of a file and of its included files. Raises CaseError if data precede the first keyword."""
     source.open.append(path.resolve())
-    current: Block | None = None
-    contents = _contents(path, source)
-    lines = _lines(contents, 0, len(contents))
-    last = _Line(0, 0, 0, "")  # last line of the current keyword
-    for line in lines:
-        if line.text.startswith("**"):
-            continue
-        if len(line.text) > LONGEST_LINE:
-            keyword = _keyword(line.text) if line.text.startswith("*") else current.keyword if current else ""
-            raise Location(name, line.number, keyword).refuse(_TOO_LONG)
-        if not line.text.startswith("*"):
-            if line.text and current is None:
-                raise Location(name, line.number, "").refuse("a data line before any keyword")
-            continue
-        if current is not None:
-            yield _with_data(current, contents, last, line.begin)
-        location = Location(name, line.number, _keyword(line.text))
-        last = _join_lines(location, line, lines)
-        current = Block(location, _parameters(location, last.text))
-        if location.keyword == "INCLUDE":
-            yield from _read_include(current, name, source)
-            current = None
-    if current is not None:
-        yield _with_data(current, contents, last, len(contents))
+    first, *others = _KEYWORD_LINE.split(_contents(path, source))
+    start = Location(name, 1, "")
+    _check_lengths(start, first)
+    _check_empty(Lines(start, first))
+    number = 1 + first.count(b"\n")
+    for contents in others:
+        block = _block(name, number, contents)
+        if block.keyword == "INCLUDE":
+            yield from _read_include(block, name, source)
+            _check_empty(block.lines)
+        else:
+            yield block
+        number += contents.count(b"\n")
     source.open.pop()
 
 
-def _with_data(block: Block, contents: bytes, last: _Line, end: int) -> Block:
-    """Return a block with its data lines, from `last`, the last line of its keyword, to the byte offset `end`."""
-    if last.end >= end:
-        return block
-    location = Location(block.location.file, last.number + 1, block.keyword)
-    return Block(block.location, block.parameters, Lines(location, contents, last.end, end))
+def _check_lengths(location: Location, contents: bytes) -> None:
+    """Raise CaseError if one of the lines from a location on is too long."""
+    if match := _LONG_LINE.search(contents):
+        raise replace(location, line=location.line + contents.count(b"\n", 0, match.start())).refuse(_TOO_LONG)
 
 
-def _join_lines(location: Location, line: _Line, lines: Iterator[_Line]) -> _Line:
-    """Return a keyword line joined with its continuation lines, which follow a line that ends with a comma."""
-    while line.text.endswith(","):
-        following = next(lines, None)
-        if following is None:
-            break
-        continuation = "" if following.text.startswith("**") else f" {following.text}"
-        line = _Line(following.number, line.begin, following.end, line.text + continuation)
-        if len(line.text) > LONGEST_LINE:
+def _check_empty(lines: Iterable[Row]) -> None:
+    """Raise CaseError if there are data in lines that belong to no keyword."""
+    for row in lines:
+        if any(row.entries):
+            raise replace(row.location, keyword="").refuse("a data line before any keyword")
+
+
+def _block(name: str, number: int, contents: bytes) -> Block:
+    """Return the block in line `number` of a file: a keyword line with its continuation lines, and data lines.
+
+    Continuation lines follow a line that ends with a comma.
+    """
+    lines = BytesIO(contents)
+    text, n_lines = _text(lines.readline()), 1
+    location = Location(name, number, _keyword(text))
+    _check_lengths(location, contents)
+    while text.endswith(",") and (line := lines.readline()):
+        n_lines += 1
+        if not (continuation := _text(line)).startswith("**"):
+            text += f" {continuation}"
+        if len(text) > LONGEST_LINE:
             raise location.refuse(_TOO_LONG)
-        if not following.text:
-            break
-    return line
+    return Block(location, _parameters(location, text), Lines(replace(location, line=number + n_lines), lines.read()))
+
+
+def _text(line: bytes) -> str:
+    """Return the text of a line without surrounding blanks."""
+    return line.decode("utf-8", "replace").strip()
 
 
 def _keyword(line: str) -> str:

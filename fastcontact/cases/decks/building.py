@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,18 +11,19 @@ from scipy.sparse import csr_array, vstack
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 from fastcontact.cases.decks import interactions
-from fastcontact.cases.decks.assembled import Element, Target
+from fastcontact.cases.decks.assembled import Element
 from fastcontact.cases.decks.axes import axes_by_cell, local_axes, orientation_of
 from fastcontact.cases.decks.blocks import key_of, look_up, refusing
-from fastcontact.cases.decks.conditions import Component, Conditions, Period
+from fastcontact.cases.decks.conditions import Component, Conditions
 from fastcontact.cases.decks.constraints import make_rotations, relations_of
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
-from fastcontact.cases.decks.fields import add_initial_stresses, add_temperatures
+from fastcontact.cases.decks.fields import add_initial_stresses
 from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
-from fastcontact.cases.decks.histories import ByShape, Histories
+from fastcontact.cases.decks.histories import ByShape, Period
+from fastcontact.cases.decks.loads import add_forces, add_temperatures, body_forces, heat_loads, point_group, pressures
 from fastcontact.cases.decks.materials import law_of, strain_of
 from fastcontact.cases.decks.meshing import deck_mesh_of, group_of_surface, secondary_group
-from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections
+from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections, sections_by_point
 from fastcontact.cases.decks.steps import MOST_INCREMENTS
 from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.elasticity.material_axes import CylindricalAxes
@@ -54,10 +54,11 @@ class Building:
         Load steps.
     thickness : float
         Thickness of a plane model [length]. The forces in the model are per unit thickness.
-    constraints : list of MultiPointConstraint
-        Multi-point constraints that are not supports.
+    sections : dict of int to PretensionSection
+        Pretension sections by the points of their nodes.
     local_supports : list of MultiPointConstraint
-        Supports that are expressed as constraints, because they act along local axes or not in all steps.
+        Supports that are expressed as constraints, because they act along local axes or not in all steps. They are the first
+        constraints of the model.
     linearised : str
         Reason why small strains are assumed although a step has NLGEOM; otherwise empty.
     driven : dict of (int, int) to Table
@@ -73,27 +74,28 @@ class Building:
         if not only_heat:
             make_rotations(self.assembly)
         materials, self.thickness = self._materials()
+        self.sections = sections_by_point(self.assembly)
         conditions = Conditions(self.assembly)
         self._check_contact_pairs()
         conditions.run()
-        pressures = self._pressures(conditions)
-        heat = conditions.heat.loads(self.thickness)
+        loads = [*pressures(self.assembly, conditions), *body_forces(self.assembly, conditions)]
+        heat = heat_loads(self.assembly, conditions, self.thickness)
         gaps = [] if only_heat else gap_groups(self.assembly)
         mesh = self.assembly.mesh() if only_heat else cut_sections(self.assembly, self.assembly.mesh())
         strain, self.linearised = strain_of(content, [law for law, _ in materials])
-        reference = conditions.heat.reference
-        self.model = Model(mesh, self.assembly.kinematics, case_text, strain=strain, reference_temperature=reference)
+        options: dict[str, Any] = {"strain": strain, "reference_temperature": conditions.reference}
+        self.model = Model(mesh, self.assembly.kinematics, case_text, **options)
         for material, group in materials:
             self.model.add_material(material, group)
         self.local_supports: list[MultiPointConstraint] = []
         self.driven: dict[tuple[int, int], Table] = {}
-        self.constraints: list[MultiPointConstraint] = []
         if only_heat:
-            self.model.fix(self._point_group("held", range(mesh.n_points)), "xyz"[: mesh.dim])
+            held = point_group(self.model, self.assembly, "held", range(mesh.n_points))
+            self.model.fix(held, "xyz"[: mesh.dim])
             add_sectors(self.model, self.assembly)
         else:
-            self._mechanics(conditions, pressures)
-        for add in heat:
+            self._mechanics(conditions)
+        for add in [*loads, *heat]:
             add(self.model)
         self._contact()
         self.gap_ends: dict[str, dict[int, int]] = {}
@@ -101,18 +103,14 @@ class Building:
             self.gap_ends.update(add_gap(self.model, self.assembly, gap, conditions))
         self.ramp = self._ramp(conditions)
 
-    def _mechanics(self, conditions: Conditions, pressures: list[Callable[[Model], None]]) -> None:
+    def _mechanics(self, conditions: Conditions) -> None:
         """Add supports, constraints, loads, temperatures and springs to the model."""
         self._supports(conditions)
-        self.constraints += relations_of(self.assembly, self.model.mesh)
-        self.model.relations += [*self.local_supports, *self.constraints]
-        self.constraints += add_sections(self.model, self.assembly, conditions.locks)
-        self.constraints += add_sectors(self.model, self.assembly)
-        self._forces(conditions)
-        for add in pressures:
-            add(self.model)
-        self._body_forces(conditions)
-        add_temperatures(self.model, conditions.temperatures)
+        self.model.relations += [*self.local_supports, *relations_of(self.assembly, self.model.mesh)]
+        add_sections(self.model, self.assembly, self.sections, conditions)
+        add_sectors(self.model, self.assembly)
+        add_forces(self.model, self.assembly, conditions, self.thickness)
+        add_temperatures(self.model, conditions.given_temperatures)
         add_initial_stresses(self.model, self.assembly)
         self._springs()
 
@@ -193,116 +191,54 @@ class Building:
                 raise pair.refuse(f"the pair {pair.name} is given twice")
             pair_names.add(key_of(pair.name))
 
-    def _pressures(self, conditions: Conditions) -> list[Callable[[Model], None]]:
-        """Create groups of facets with the same pressure history, and return functions that add the pressures to a model."""
-        by_shape = ByShape[tuple[str, str]]()
-        for table, names in conditions.loads.distinct():
-            for name in names:
-                for cell, rows in self.assembly.facet_rows([name.face] if name.face else []).items():
-                    by_shape.add((name.keyword, cell), table, rows)
-        pressures: list[Callable[[Model], None]] = []
-        for number, ((_, cell), facets, value, table) in enumerate(by_shape, start=1):
-            self.assembly.groups[group := f"pressure {number}"] = {cell: facets.tolist()}
-            if any(factor for _, factor in table):
-                pressures.append(partial(Model.add_pressure, group=group, value=value, ramp=table))
-        return pressures
-
-    def _point_group(self, kind: str, points: Iterable[int]) -> str:
-        """Return the name of a group of points of the mesh; the group is created unless one with these points exists."""
-        name = self.assembly.add_points(f"{kind} {len(self.assembly.point_groups)}", points)
-        if name not in self.model.mesh.point_groups:
-            self.model.mesh = self.model.mesh.with_groups(points={name: self.assembly.point_groups[name]})
-        return name
-
     def _supports(self, conditions: Conditions) -> None:
-        """Add the supports, and record the prescribed motions of nodes that belong to gap elements only."""
-        mesh, by_shape = self.model.mesh, ByShape[int]()
-        temporary = conditions.temporary()
-        self._temporary_supports(conditions, temporary)
-        temporary_names = {name for name, _ in temporary}
+        """Add the supports, and record the prescribed motions of nodes that belong to gap elements only.
+
+        Supports that do not act in all steps share a constraint if they have the same period and history. A support that
+        locks a pretension section is left to `add_sections`.
+        """
+        by_shape, local_supports = ByShape[int](), []
         ends = {e.points[1] for e in self.assembly.discrete if e.cell.type == "GAPUNI"}
         free_ends = ends - self.assembly.solid_points if ends else ends
-        for table, names in conditions.supports.distinct():
-            for name in (name for name in names if name not in temporary_names):
+        for table, period, components in conditions.supports.in_periods():
+            names = [name for name in components if not (period.keeps and name[1] == 0 and name[0] in self.sections)]
+            if names and not period.always:
+                self.local_supports.append(self._temporary_support(conditions, table, period, names))
+            for name in names if period.always else ():
                 point, axis, local = name
                 if point in free_ends:
                     self.driven[point, axis] = table
                 elif local:
                     label = f"the support of {conditions.description(name)} on local axes"
                     row = self._support_row(conditions, name)
-                    self.local_supports.append(MultiPointConstraint(label, row, 1.0, table))
+                    local_supports.append(MultiPointConstraint(label, row, 1.0, table))
                 else:
                     by_shape.add(axis, table, [point])
+        self.local_supports += local_supports
         for axis, points, value, table in by_shape:
-            group = self._point_group("support", points)
+            group = point_group(self.model, self.assembly, "support", points)
             if callable(value) or any(factor for _, factor in table):
                 self.model.prescribe(group, ramp=table, **{"xyz"[axis]: value})
             else:
                 self.model.fix(group, "xyz"[axis])
-        if mesh.dim == 2 and self.assembly.rotations:
-            self.model.fix(self._point_group("rotation", self.assembly.rotations.values()), "y")
+        if self.assembly.dim == 2 and (rotations := self.assembly.rotations.values()):
+            self.model.fix(point_group(self.model, self.assembly, "rotation", rotations), "y")
 
-    def _temporary_supports(self, conditions: Conditions, temporary: Sequence[tuple[Component, Period]]) -> None:
-        """Add the supports that do not act in all steps; those with the same period and history share a constraint."""
-        by_period: dict[tuple[Period, Table], list[Component]] = {}
-        for name, period in (entry for entry in temporary if entry[1].begins < entry[1].ends):
-            by_period.setdefault((period, conditions.supports.table(name)), []).append(name)
-        for (period, table), names in by_period.items():
-            ends = "" if period.ends == np.inf else f" to {period.ends:g}"
-            line = f", line {period.location.line}" if period.location else ""
-            label = f"the support of {conditions.description(names[0])}{line}, from {period.begins:g}{ends}"
-            rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
-            limits = (period.begins, period.ends)
-            self.local_supports.append(TemporaryConstraint(label, rows, 1.0, table, *limits, keeps=period.keeps))
+    def _temporary_support(
+        self, conditions: Conditions, table: Table, period: Period, names: Sequence[Component]
+    ) -> TemporaryConstraint:
+        """Return the constraint of displacement components that are prescribed in a period."""
+        ends = "" if period.ends == np.inf else f" to {period.ends:g}"
+        line = f", line {period.location.line}" if period.location else ""
+        label = f"the support of {conditions.description(names[0])}{line}, from {period.begins:g}{ends}"
+        rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
+        return TemporaryConstraint(label, rows, 1.0, table, period.begins, period.ends, keeps=period.keeps)
 
     def _support_row(self, conditions: Conditions, name: Component) -> csr_array:
         """Return the constraint row (1, n_dofs) [-] of the displacement component that a support prescribes."""
         point, axis, local = name
         direction = (conditions.directions[point] if local else np.eye(3))[[axis], : self.assembly.dim]
         return along(np.array([point]), direction, self.model.n_dofs)
-
-    def _forces(self, conditions: Conditions) -> None:
-        """Add the nodal forces; those along local axes are resolved into their global components."""
-        by_shape = ByShape[int]()
-        for table, names in conditions.forces.distinct():
-            by_cosine: dict[tuple[int, float], list[int]] = {}
-            for point, axis, local in names:
-                direction = conditions.directions[point][axis] if local else np.eye(3)[axis]
-                for k in np.flatnonzero(np.abs(direction[: self.assembly.dim]) > 1e-12).tolist():
-                    by_cosine.setdefault((k, float(direction[k])), []).append(point)
-            for (k, cosine), points in by_cosine.items():
-                by_shape.add(k, tuple((t, v * cosine / self.thickness) for t, v in table), points)
-        for axis, nodes, value, table in by_shape:
-            if any(factor for _, factor in table):
-                group = self._point_group("force", nodes)
-                self.model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: value})
-
-    def _body_forces(self, conditions: Conditions) -> None:
-        """Add the body forces, weights and centrifugal forces as forces per volume."""
-        by_shape = ByShape[tuple[str, tuple[float, ...], str]]()
-        for table, names in conditions.loads.distinct():
-            for name in (name for name in names if name.face is None):
-                by_density: dict[tuple[str, float], list[int]] = {}
-                for element in name.elements:
-                    if element.type is not None:
-                        cell, density = element.type.element, self._density(element, name)
-                        by_density.setdefault((cell, density), []).append(self.model.mesh.offsets[cell] + element.row)
-                for (cell, density), cells in by_density.items():
-                    scaled = tuple((time, density * value) for time, value in table)
-                    by_shape.add((name.kind, name.numbers, cell), scaled, cells)
-        loads = [(f"load {number}", *load) for number, load in enumerate(by_shape, start=1)]
-        self.model.mesh = self.model.mesh.with_groups(cells={group: cells for group, _, cells, _, _ in loads})
-        for group, (kind, vector, _), _, value, table in loads:
-            self.model.add_body_force(group, ramp=table, **_body_force(kind, vector, value, self.assembly.dim))
-
-    def _density(self, element: Element, load: Target) -> float:
-        """Return the factor of a body force at an element: the density of its material, or 1 for a force per volume."""
-        if load.kind[0] == "B":
-            return 1.0
-        material = self._material(element.assigned_section)
-        if material.density is None:
-            raise load.location.refuse(f"material '{material.name}' has no *DENSITY, which {load.kind} requires")
-        return material.density
 
     def _springs(self) -> None:
         """Add the springs. Raises CaseError if an element of *SPRING is not a spring, or a spring has no stiffness."""
@@ -325,7 +261,8 @@ class Building:
 
     def _node_based_options(self, pair: Pair, secondary: str) -> dict[str, Any]:
         """Return the options that exclude nodes from contact: those on the facets, but not in the node-based surface."""
-        options: dict[str, Any] = {"excluded": self._point_group("without contact", self.assembly.excluded[secondary])}
+        excluded = point_group(self.model, self.assembly, "without contact", self.assembly.excluded[secondary])
+        options: dict[str, Any] = {"excluded": excluded}
         if all(map(all_nodes_carry, self.assembly.groups[secondary])):
             options["formulation"] = "node_to_segment"
         self.content.note(
@@ -413,36 +350,12 @@ class Building:
             for number, step in enumerate(steps):
                 count = max(1, round(min(MOST_INCREMENTS, step.period / min(step.increment, step.period))))
                 instants.update(number + k / count for k in range(1, count))  # ends of equal increments
-        mechanical: tuple[Histories[Any], ...] = (conditions.supports, conditions.forces, conditions.loads)
-        for histories in (*mechanical, conditions.temperatures, *conditions.heat.histories):
+        for histories in conditions.histories:
             for track in {id(track): track for track in histories.tracks.values()}.values():
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
             raise steps[0].refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
-
-
-def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> dict[str, Any]:
-    """Return the components of a body force for a load multiplier of 1, times the factor `value` of the cells."""
-
-    def times(component: Any) -> Any:
-        if not callable(value):
-            return component
-        return lambda points: value(points) * (component(points) if callable(component) else component)
-
-    if kind[0] == "B":
-        return {kind[1].lower(): times(1.0)}
-    if kind == "GRAV":
-        direction = np.array(vector) / np.linalg.norm(vector)
-        return {"xyz"[k]: times(float(direction[k])) for k in range(dim) if direction[k]}
-    origin, axis = np.array(vector[:3]), np.array(vector[3:])
-    axis = axis / np.linalg.norm(axis)
-
-    def outward(k: int, points: Array) -> Array:
-        relative = np.pad(points, ((0, 0), (0, 3 - points.shape[1]))) - origin
-        return np.asarray((relative - np.outer(relative @ axis, axis))[:, k])
-
-    return {"xyz"[k]: times(partial(outward, k)) for k in range(dim) if abs(axis[k]) < 1.0}
 
 
 def nodal_gaps(model: Model, secondary: str, primary: str, excluded: Sequence[int]) -> tuple[Array, Array]:

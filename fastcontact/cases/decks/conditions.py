@@ -1,20 +1,18 @@
-"""Supports and loads of a deck over all steps, as histories of displacements, nodal forces, pressures and body forces."""
+"""Supports and loads of a deck over all steps, as histories of displacements, forces, temperatures and heat flows."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from fastcontact.cases.decks.assembled import Target, targets
+from fastcontact.cases.decks.assembled import Face, Target, targets
 from fastcontact.cases.decks.axes import local_directions
-from fastcontact.cases.decks.blocks import Block, Location
+from fastcontact.cases.decks.blocks import Location, Row
 from fastcontact.cases.decks.content import Condition
-from fastcontact.cases.decks.fields import OF_HEAT, HeatConditions, initial_temperatures, temperatures_of_block
+from fastcontact.cases.decks.fields import initial_temperatures, reference_temperature, temperature_of
 from fastcontact.cases.decks.histories import Histories, Value
 from fastcontact.cases.decks.meshing import DeckMesh
-from fastcontact.cases.decks.sections import Locks
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Components that the named supports of *BOUNDARY prescribe.
@@ -25,48 +23,56 @@ NAMED = {
     "ENCASTRE": (1, 2, 3, 4, 5, 6),
     "PINNED": (1, 2, 3),
 }
+# Number of the degree of freedom of the temperature.
+TEMPERATURE = 11
 # Point, component counted from 0, and whether the component is along a local axis.
 Component = tuple[int, int, bool]
 
 
-@dataclass(frozen=True, slots=True)
-class Period:
-    """Period in which a support acts.
+class Conditions:
+    """Supports, loads and temperatures of a deck with their histories.
 
     Attributes
     ----------
-    location : Location or None
-        Line of the deck that prescribes the support, if it acts only from a later step on; otherwise None.
-    begins, ends : float
-        Load factors [-] between which the support acts.
-    keeps : bool
-        True if the displacement remains equal to its value at the start of the period (FIXED).
+    supports, forces, loads : Histories
+        Displacements, nodal forces, and pressures and body forces.
+    given_temperatures, fixed_temperatures : Histories
+        Temperatures of *TEMPERATURE, and those that *BOUNDARY prescribes where temperatures are computed.
+    powers, fluxes, films : Histories
+        Nodal heat flows, heat fluxes and volumetric sources, and ambient temperatures of films.
+    of_keyword : dict of str to Histories
+        Histories of loads and temperatures by keyword.
+    histories : tuple of Histories
+        All histories.
+    reference : float
+        Initial temperature of the bodies where temperatures are computed.
     """
-
-    location: Location | None
-    begins: float
-    ends: float = np.inf
-    keeps: bool = False
-
-
-ALWAYS = Period(None, 0.0)
-
-
-class Conditions:
-    """Supports and loads of a deck with their histories, and the periods of the supports that do not act in all steps."""
 
     def __init__(self, assembly: DeckMesh) -> None:
         self.assembly, content = assembly, assembly.content
+        initial = initial_temperatures(assembly, content.initial_temperatures)
+        self.reference = reference_temperature(assembly, initial) if content.heat else 0.0
+        uniform = dict.fromkeys(range(len(assembly.points)), self.reference) if content.heat else {}
+        self.absent_films: dict[Target, float] = {}
         self.supports: Histories[Component] = Histories(content)
         self.forces: Histories[Component] = Histories(content)
         self.loads: Histories[Target] = Histories(content)
-        initial = initial_temperatures(assembly, content.initial_temperatures)
-        self.temperatures: Histories[int] = Histories(content, rest=initial)
-        self.periods: dict[Component, Period] = {}  # latest periods; supports without an entry act from the start
-        self.ended: list[tuple[Component, Period]] = []  # earlier periods
-        self.fixed_in_step: set[Component] = set()  # supports with FIXED in the current step
-        self.heat = HeatConditions(assembly, initial)
-        self.locks = Locks(assembly)
+        self.given_temperatures: Histories[int] = Histories(content, rest=initial)
+        self.fixed_temperatures: Histories[int] = Histories(content, rest=uniform)
+        self.powers: Histories[int] = Histories(content)
+        self.fluxes: Histories[Target] = Histories(content)
+        self.films: Histories[Target] = Histories(content, rest=self.absent_films)
+        self.film_of: dict[tuple[str, Face | None], Target] = {}
+        self.of_keyword: dict[str, Histories[Any]] = {
+            "CLOAD": self.forces, "TEMPERATURE": self.given_temperatures, "CFLUX": self.powers,
+            **dict.fromkeys(("DLOAD", "DSLOAD"), self.loads), **dict.fromkeys(("DFLUX", "DSFLUX"), self.fluxes),
+            **dict.fromkeys(("FILM", "SFILM"), self.films),
+        }  # fmt: skip
+        self.histories: tuple[Histories[Any], ...] = (
+            self.supports,
+            self.fixed_temperatures,
+            *dict.fromkeys(self.of_keyword.values()),
+        )
         self.directions = local_directions(assembly)
         if assembly.dim == 3:  # rotations refer to the local axes of their node
             rotations, rotated = assembly.rotations, self.directions
@@ -74,58 +80,74 @@ class Conditions:
 
     def run(self) -> None:
         """Record the supports and loads of all steps."""
-        content = self.assembly.content
-        for condition in content.supports:
+        for condition in self.assembly.content.supports:
             self._supports(condition, before=True)
-        self.supports.begin()
-        self.heat.temperatures.begin()
-        self.periods.update((name, replace(ALWAYS, keeps=True)) for name in self.fixed_in_step)
-        for number, step in enumerate(content.steps, start=1):
-            self.locks.begin(number, [g for g in step.conditions if g.block.keyword == "BOUNDARY"], self.assembly)
+        for history in (self.supports, self.fixed_temperatures):
+            history.initial, history.step_values = history.step_values, {}
+        for number, step in enumerate(self.assembly.content.steps, start=1):
             for condition in step.conditions:
-                self._record_block(condition)
-            self._update_periods(number)
-            for histories in (self.supports, self.forces, self.loads, self.temperatures, self.heat):
-                histories.advance(number, step)  # type: ignore[attr-defined]
+                if condition.block.keyword == "BOUNDARY":
+                    self._supports(condition)
+                else:
+                    histories = self.of_keyword[condition.block.keyword]
+                    histories.record(condition, map(self._load, condition.block.iter_rows()))
+            for history in self.histories:
+                history.advance(number, step)
 
-    def _record_block(self, condition: Condition) -> None:
-        """Record a block of supports or loads of the current step."""
-        keyword, block = condition.block.keyword, condition.block
+    def _load(self, row: Row) -> tuple[list[Any], float, Location]:
+        """Return the points, components or targets, the value and the location of a line of a load or a temperature."""
+        keyword = row.location.keyword
         if keyword == "TEMPERATURE":
-            self.temperatures.record(condition, temperatures_of_block(self.assembly, condition.block))
-        elif keyword in OF_HEAT:
-            self.heat.record(condition)
-        elif keyword == "BOUNDARY":
-            self._supports(condition)
-        elif keyword == "CLOAD":
-            self.forces.record(condition, self._forces(block))
+            return temperature_of(self.assembly, row)
+        if keyword == "CLOAD":
+            names: list[Any] = self._force_components(row)
+        elif keyword == "CFLUX":
+            if row.integer(1, TEMPERATURE) not in (0, TEMPERATURE):
+                raise row.refuse(f"degree of freedom {row.text(1)} is not 11, the temperature")
+            names = self._points_of_solids(row)
+        elif keyword in ("FILM", "SFILM"):
+            names = self._films(row)
         else:
-            entries = ((targets(self.assembly, row), row.number(2), row.location) for row in block.iter_rows())
-            self.loads.record(condition, entries)
+            names = targets(self.assembly, row)
+        return names, row.number(2), row.location
 
-    def _update_periods(self, number: int) -> None:
-        """Record the supports that begin or end at the start of step `number`, counted from 1."""
-        begin, step_values = number - 1.0, self.supports.step_values
-        # A value in this step ends the period of a support with FIXED, and a new period begins.
-        candidates = (name for name in self.periods if name in step_values and name not in self.fixed_in_step)
-        released = dict.fromkeys(name for name in candidates if self._acts(name) and self.periods[name].keeps)
-        for name in (*self.supports.removals, *released):
-            self.ended.append((name, replace(self.periods.pop(name, ALWAYS), ends=begin)))
-        new_periods: dict[tuple[Location | None, bool], Period] = {}
-        for name in step_values:
-            if name in released or not self._acts(name):
-                key = step_values[name].location if begin else None, name in self.fixed_in_step
-                self.periods[name] = new_periods.setdefault(key, Period(key[0], begin, keeps=key[1]))
-        self.fixed_in_step.clear()
+    def _force_components(self, row: Row) -> list[Component]:
+        """Return the components on which the nodal force of a line acts."""
+        component = row.integer(1)
+        points = self.assembly.nodes(row.text(0), row.location)
+        names = [self._component(point, component) if 1 <= component <= 6 else None for point in points]
+        if None in names:
+            raise row.refuse(f"a force cannot act on component {component} of this node")
+        return [(*name[:2], name[0] in self.directions) for name in names if name]
 
-    def _acts(self, name: Component) -> bool:
-        """Return whether a support acts at the end of the steps recorded so far."""
-        track = self.supports.tracks.get(name)
-        return track is not None and track.alive
+    def _points_of_solids(self, row: Row) -> list[int]:
+        """Return the points of the node set in a line. Raises CaseError if a point belongs to no solid."""
+        points = self.assembly.nodes(row.text(0), row.location)
+        for point in points:
+            if point not in self.assembly.solid_points:
+                raise row.refuse(f"node {self.assembly.number_of(point)} belongs to no solid, so it has no temperature")
+        return points
 
-    def temporary(self) -> list[tuple[Component, Period]]:
-        """Return the supports that do not act in all steps, with their periods."""
-        return [*self.ended, *((name, period) for name, period in self.periods.items() if period.begins > 0.0)]
+    def _films(self, row: Row) -> list[Target]:
+        """Return the films of a line, and remove earlier films of the same faces with another coefficient.
+
+        Raises CaseError if the current step defines both.
+        """
+        coefficient, films = row.number(3), self.films
+        if coefficient < 0.0:
+            raise row.refuse(f"the film coefficient {coefficient:g} must not be negative")
+        names = targets(self.assembly, row, (coefficient,))
+        for film in names:
+            self.absent_films[film] = self.reference
+            earlier = self.film_of.get((film.keyword, film.face), film)
+            if earlier != film and earlier in films.step_values:
+                raise row.refuse(
+                    f"{coefficient:g} is the second film coefficient of this face in one step, after {earlier.numbers[0]:g}"
+                )
+            if earlier != film and earlier in films.tracks and films.tracks[earlier].alive:
+                films.removals[earlier] = None
+            self.film_of[film.keyword, film.face] = film
+        return names
 
     def description(self, component: Component) -> str:
         """Return the description of a displacement component in terms of the deck, for messages."""
@@ -142,11 +164,11 @@ class Conditions:
             raise block.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
         if condition.new:
             self.supports.remove_earlier()
-            self.heat.temperatures.remove_earlier()
+            self.fixed_temperatures.remove_earlier()
         driven = False
         for row in block.iter_rows():
             if row.text(1) == "11":
-                self.heat.prescribe(condition, row)
+                self._fix_temperature(condition, row)
                 continue
             points = self.assembly.nodes(row.text(0), row.location)
             components, value = NAMED.get(row.text(1).upper()), 0.0
@@ -166,6 +188,17 @@ class Conditions:
         if driven:
             self.assembly.content.note(block, "a displacement prescribed before the first step is applied in that step")
 
+    def _fix_temperature(self, condition: Condition, row: Row) -> None:
+        """Record the prescribed temperature of nodes in a line of *BOUNDARY."""
+        if not self.assembly.content.heat:
+            raise row.refuse(
+                "degree of freedom 11 (temperature) is not within 1 to 6: in static steps use *TEMPERATURE"
+            )
+        if "FIXED" in condition.block.parameters:
+            raise row.refuse("FIXED is not supported for temperatures: give their values")
+        for point in self._points_of_solids(row):
+            self.fixed_temperatures.set_value(point, Value(row.number(3, 0.0), condition.amplitude, row.location))
+
     def _support(self, point: int, component: int, prescribed: Value, fixed: bool) -> None:
         """Record a support of a point; `fixed` is true for FIXED.
 
@@ -176,17 +209,11 @@ class Conditions:
             if prescribed.value:
                 raise prescribed.location.refuse(f"component {component} does not exist at nodes of this model")
             return
-        if self.locks.record(point, component, fixed):
-            return
         if name[0] in self.directions:
             name, sign = self._local_component(*name[:2])
             prescribed = prescribed._replace(value=sign * prescribed.value)
-        if fixed:
-            self.fixed_in_step.add(name)
-            if self._acts(name):
-                self.supports.hold(name, prescribed.location)
-                return
-        self.supports.set_value(name, prescribed)
+        record = self.supports.keep if fixed else self.supports.set_value
+        record(name, prescribed)
 
     def _component(self, point: int, component: int) -> Component | None:
         """Return a component of a point or, for rotations, of the point that represents them; None if it does not exist."""
@@ -205,13 +232,3 @@ class Conditions:
         if abs(abs(direction[axis]) - 1.0) < LENGTH_ROUND_OFF and axis < self.assembly.dim:
             return (point, axis, False), float(np.sign(direction[axis]))
         return (point, number, True), 1.0
-
-    def _forces(self, block: Block) -> Iterator[tuple[list[Component], float, Location]]:
-        """Yield the components, the value [force] and the location of each line of a *CLOAD block."""
-        for row in block.iter_rows():
-            component, value = row.integer(1), row.number(2)
-            points = self.assembly.nodes(row.text(0), row.location)
-            names = [self._component(point, component) if 1 <= component <= 6 else None for point in points]
-            if None in names:
-                raise row.refuse(f"a force cannot act on component {component} of this node")
-            yield [(*name[:2], name[0] in self.directions) for name in names if name], value, row.location

@@ -179,7 +179,7 @@ class Deck:
 
         The Lagrange multipliers of the constraints follow from the reactions at components without a support.
         """
-        constraints = self.building.constraints
+        constraints = self.model.relations[len(self.building.local_supports) :]
         if not constraints:
             return reaction.copy()
         supported = self.model.prescribed()[0].ravel()

@@ -153,11 +153,11 @@ def _prescribed_motion(gap: GapGroup, conditions: Conditions) -> Table:
 
     Raises CaseError unless it is prescribed and uniform.
     """
-    supports, temporary = conditions.supports, {name for name, _ in conditions.temporary()}
+    supports = conditions.supports
     by_axis: list[tuple[float, Array]] = []
     for axis in np.flatnonzero(gap.direction).tolist():
         names = [(end, axis, False) for end in gap.ends[:, 1].tolist()]
-        prescribed = [name for name in names if name in supports.tracks and name not in temporary]
+        prescribed = [name for name in names if name in supports.tracks and supports.tracks[name].periods[-1].always]
         tables = {supports.table(name) for name in prescribed}
         if len(tables) != 1 or len(prescribed) < len(names):
             raise gap.refuse(

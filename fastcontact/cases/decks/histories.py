@@ -5,7 +5,7 @@ from __future__ import annotations
 from array import array
 from bisect import bisect_left, bisect_right
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -23,18 +23,48 @@ JUMP = 1e-9
 DECIMALS = 12
 
 
+@dataclass(frozen=True, slots=True)
+class Period:
+    """Period in which a support or load acts.
+
+    Attributes
+    ----------
+    begins, ends : float
+        Load factors [-] between which it acts.
+    location : Location or None
+        Line of the deck that prescribes it, if it acts only from a later step on; otherwise None.
+    keeps : bool
+        True if the value remains equal to that at the start of the period (FIXED).
+    """
+
+    begins: float = 0.0
+    ends: float = np.inf
+    location: Location | None = None
+    keeps: bool = False
+
+    @property
+    def always(self) -> bool:
+        """Whether all steps belong to the period."""
+        return self.begins == 0.0 and self.ends == np.inf
+
+
 @dataclass(eq=False, slots=True)
 class Track:
     """The common history of quantities that have had equal values in all steps so far.
 
     `numbers` alternates between load factors and values, since each node may have a separate track and a list of pairs would
-    take three times the memory. `alive` is false once a step has removed the quantities. `shape` is the current value with
-    its amplitude, if that is in total time.
+    take three times the memory. `periods` are those in which the quantities act. `shape` is the current value with its
+    amplitude, if that is in total time.
     """
 
     numbers: array[float]
-    alive: bool = True
+    periods: tuple[Period, ...] = ()
     shape: tuple[float, Amplitude] | None = None
+
+    @property
+    def alive(self) -> bool:
+        """Whether no step has removed the quantities."""
+        return bool(self.periods) and self.periods[-1].ends == np.inf
 
     @property
     def last(self) -> float:
@@ -65,7 +95,7 @@ class Value(NamedTuple):
     location: Location
 
 
-@dataclass
+@dataclass(eq=False)
 class Histories(Generic[Name]):
     """Histories of loads or supports by name.
 
@@ -82,7 +112,9 @@ class Histories(Generic[Name]):
     rest : mapping
         Values in the absence of a load or support, by default zero.
     initial : dict
-        Values given before all steps by name, which the first step reaches unless it changes them.
+        Values given before all steps by name, which the first step reaches unless it changes or removes them.
+    kept : set
+        Names of the values that the current step keeps (FIXED).
     time : float
         Total time [time] at the start of the current step.
     """
@@ -93,6 +125,7 @@ class Histories(Generic[Name]):
     removals: dict[Name, None] = field(default_factory=dict)
     rest: Mapping[Name, float] = field(default_factory=dict)
     initial: dict[Name, Value] = field(default_factory=dict)
+    kept: set[Name] = field(default_factory=set)
     time: float = 0.0
 
     def set_value(self, name: Name, value: Value) -> None:
@@ -105,6 +138,7 @@ class Histories(Generic[Name]):
             )
         self.step_values[name] = value
         self.removals.pop(name, None)
+        self.kept.discard(name)
 
     def record(self, condition: Condition, entries: Iterable[tuple[Iterable[Name], float, Location]]) -> None:
         """Set the values of the lines of a block; OP=NEW first removes the earlier values of its keyword."""
@@ -115,19 +149,14 @@ class Histories(Generic[Name]):
             for name in names:
                 self.set_value(name, shared)
 
-    def hold(self, name: Name, location: Location) -> None:
-        """Set the value for the current step to that at the end of the last step."""
-        if name in self.tracks:
-            self.step_values[name] = Value(self.tracks[name].last, "", location)
+    def keep(self, name: Name, value: Value) -> None:
+        """Keep the value at the end of the last step in the current step or, if none acts then, set the given value."""
+        if name in self.tracks and self.tracks[name].alive:
+            self.step_values[name] = Value(self.tracks[name].last, "", value.location)
             self.removals.pop(name, None)
-
-    def begin(self) -> None:
-        """Begin the histories of the values that are given before all steps. They start at the values of `rest`."""
-        tracks: dict[float, Track] = {}
-        for name in self.step_values:
-            rest = self.rest.get(name, 0.0)
-            self.tracks[name] = tracks.setdefault(rest, Track(array("d", (0.0, rest))))
-        self.initial, self.step_values = self.step_values, {}
+        else:
+            self.set_value(name, value)
+        self.kept.add(name)
 
     def remove_earlier(self, keyword: str = "") -> None:
         """Mark the values of earlier steps for removal, except those whose names have a keyword other than `keyword`."""
@@ -145,10 +174,11 @@ class Histories(Generic[Name]):
         for name in (*current, *self.removals):
             before, rest, given = self.tracks.get(name), self.rest.get(name, 0.0), current.get(name)
             value, amplitude = given[:2] if given else (rest, "")
-            key = before, value, amplitude, rest, given is None
+            periods = self._periods(name, given, begin)
+            key = before, value, amplitude, rest, periods
             if key not in changed:
                 numbers = array("d", (0.0, rest)) if before is None else before.numbers[:]
-                track = changed[key] = Track(numbers, given is not None)
+                track = changed[key] = Track(numbers, periods)
                 track.add([(begin, track.last)])
                 if amplitude:
                     shape = self.content.amplitudes[key_of(amplitude)]
@@ -160,7 +190,22 @@ class Histories(Generic[Name]):
         in_total_time = {track: track.shape for track in self.tracks.values() if track.shape is not None}
         for track in in_total_time.keys() - changed.values():
             track.add(_amplitude_points(*in_total_time[track], begin, start, step.period))
-        self.step_values, self.initial, self.removals = {}, {}, {}
+        self.step_values, self.initial, self.removals, self.kept = {}, {}, {}, set()
+
+    def _periods(self, name: Name, given: Value | None, begin: float) -> tuple[Period, ...]:
+        """Return the periods of a quantity with the value `given` in the current step, which begins at load factor `begin`.
+
+        A new value ends the period of a value with FIXED, and a new period begins.
+        """
+        before, keeps = self.tracks.get(name), name in self.kept
+        periods = before.periods if before else ()
+        if before and before.alive:
+            if given is not None and (keeps or not periods[-1].keeps):
+                return periods
+            periods = (*periods[:-1], replace(periods[-1], ends=begin))
+        if given is None:
+            return periods
+        return (*periods, Period(begin, location=given.location if begin else None, keeps=keeps))
 
     def table(self, name: Name) -> Table:
         """Return the history as pairs of load factor and value, up to the end of the last step of the deck."""
@@ -174,6 +219,15 @@ class Histories(Generic[Name]):
             members.setdefault(track.numbers.tobytes(), []).append(name)
         for names in members.values():
             yield self.table(names[0]), names
+
+    def in_periods(self) -> Iterator[tuple[Table, Period, list[Name]]]:
+        """Yield each distinct history with each period in which it acts, and the names that share both."""
+        for table, names in self.distinct():
+            members: dict[Period, list[Name]] = {}
+            for name in names:
+                for period in self.tracks[name].periods:
+                    members.setdefault(period, []).append(name)
+            yield from ((table, period, group) for period, group in members.items() if period.begins < period.ends)
 
 
 class ByShape(Generic[Name]):

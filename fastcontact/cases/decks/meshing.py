@@ -77,6 +77,11 @@ class DeckMesh(Assembly):
             rows.setdefault(name, []).append(row)
         return rows
 
+    def add_cells(self, group: str, cell: str, rows: Indices) -> str:
+        """Make a group of cells of one type, given by their rows, and return its name."""
+        self.groups[group] = {cell: rows.tolist()}
+        return group
+
     def add_solids(self, group: str, solids: Iterable[Element]) -> str:
         """Make a group of solids and return its name."""
         self.groups[group] = rows_by_type(solids)

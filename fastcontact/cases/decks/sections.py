@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.cases.decks.assembled import Assembly, facet_points
 from fastcontact.cases.decks.blocks import Block, key_of, refusing
-from fastcontact.cases.decks.content import Condition, Content, PretensionSection, SectorEnds, Sectors
+from fastcontact.cases.decks.conditions import Conditions
+from fastcontact.cases.decks.content import Content, PretensionSection, SectorEnds, Sectors
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.mesh.generate.cut import cut
@@ -27,54 +30,35 @@ def pretension_section(content: Content, block: Block) -> None:
     content.pretension_sections.append(PretensionSection(block.location, *names, normal))
 
 
-class Locks:
-    """Load factors at which pretension sections are locked.
+def sections_by_point(assembly: Assembly) -> dict[int, PretensionSection]:
+    """Return the pretension sections by the points of their nodes.
 
-    The constructor raises CaseError if the node of a section belongs to a body or to another section.
-
-    Attributes
-    ----------
-    points : dict of int to PretensionSection
-        Sections by the point of their node.
-    begins : dict of int to float
-        Load factor [-] from which the shortening of a section is constant, by the point of its node.
-    number : int
-        Number of the current step, counted from 1.
+    Raises CaseError if the node of a section belongs to a body or to another section.
     """
+    sections: dict[int, PretensionSection] = {}
+    for section in assembly.content.pretension_sections:
+        point = assembly.node(section.node, section.location)
+        if point in assembly.solid_points:
+            raise section.refuse(f"node {section.node} belongs to an element: a section needs a separate node")
+        if point in sections:
+            line = sections[point].location.line
+            raise section.refuse(f"node {section.node} has a section already, in line {line}")
+        sections[point] = section
+    return sections
 
-    def __init__(self, assembly: Assembly) -> None:
-        self.points: dict[int, PretensionSection] = {}
-        self.begins: dict[int, float] = {}
-        self.number = 0
-        for section in assembly.content.pretension_sections:
-            point = assembly.node(section.node, section.location)
-            if point in assembly.solid_points:
-                raise section.refuse(f"node {section.node} belongs to an element: a section needs a separate node")
-            if point in self.points:
-                line = self.points[point].location.line
-                raise section.refuse(f"node {section.node} has a section already, in line {line}")
-            self.points[point] = section
 
-    def begin(self, number: int, supports: list[Condition], assembly: Assembly) -> None:
-        """Advance to step `number`. Raises CaseError if it releases a locked section."""
-        self.number = number
-        if not any(condition.new for condition in supports):
-            return
-        rows = [row for condition in supports for row in condition.block.iter_rows()]
-        points = {point for row in rows for point in assembly.nodes(row.text(0), row.location)}
-        for point in self.begins:
-            if point not in points:
-                location = next(condition.block.location for condition in supports if condition.new)
-                raise location.refuse(
-                    f"node {self.points[point].node} of a pretension section is released here: a locked section stays locked"
-                )
-
-    def record(self, point: int, component: int, fixed: bool) -> bool:
-        """Return whether a support locks a section, and record the lock."""
-        if point not in self.points or component != 1 or not fixed:
-            return False
-        self.begins.setdefault(point, float(self.number - 1))
-        return True
+def _locked_from(point: int, section: PretensionSection, conditions: Conditions) -> float | None:
+    """Return the load factor from which FIXED locks a section, or None. Raises CaseError if a later step releases it."""
+    track = conditions.supports.tracks.get((point, 0, False))
+    for period in (period for period in track.periods if period.keeps) if track else ():
+        if period.ends < np.inf:
+            step = conditions.assembly.content.steps[int(period.ends)]
+            supports = [condition for condition in step.conditions if condition.block.keyword == "BOUNDARY"]
+            raise max(supports, key=lambda condition: condition.new).block.refuse(
+                f"node {section.node} of a pretension section is released here: a locked section stays locked"
+            )
+        return period.begins
+    return None
 
 
 def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
@@ -95,20 +79,20 @@ def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
     return mesh
 
 
-def add_sections(model: Model, deck_mesh: DeckMesh, locks: Locks) -> list[MultiPointConstraint]:
-    """Add the pretension sections to a model and return their constraints, including those of locked sections."""
-    n_before, links, locked = len(model.relations), [], []
-    for point, section in locks.points.items():
+def add_sections(
+    model: Model, deck_mesh: DeckMesh, sections: Mapping[int, PretensionSection], conditions: Conditions
+) -> None:
+    """Add the pretension `sections`, by the points of their nodes, to a model."""
+    links = []
+    for point, section in sections.items():
         group, location = group_of_surface(deck_mesh, section.surface), section.location
         normal = None if section.normal is None else section.normal[: deck_mesh.dim]
-        model.add_pretension(group, group, force=0.0, locked_from=locks.begins.get(point), normal=normal)
+        locked_from = _locked_from(point, section, conditions)
+        model.add_pretension(group, group, force=0.0, locked_from=locked_from, normal=normal)
         row = _orientation_sign(deck_mesh, section) * model.pretensions[-1].row(model.n_dofs)
         node = csr_array((np.ones(1), ([0], [point * deck_mesh.dim])), shape=row.shape)
         links.append(MultiPointConstraint(f"*{location.keyword} of line {location.line}", csr_array(row - node)))
-        if point in locks.begins:
-            locked.append(MultiPointConstraint(f"the locked length of line {location.line}", row))
     model.relations.extend(links)
-    return [*model.relations[n_before:], *locked]
 
 
 def _orientation_sign(deck_mesh: DeckMesh, section: PretensionSection) -> float:
@@ -140,9 +124,9 @@ def cyclic_symmetry_model(content: Content, block: Block) -> None:
     content.sectors.append(Sectors(block.location, int(text), block.get("TIE"), points))
 
 
-def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]:
-    """Add the cyclic symmetries of a deck to the model and return their constraints."""
-    content, n_before = deck_mesh.content, len(model.relations)
+def add_sectors(model: Model, deck_mesh: DeckMesh) -> None:
+    """Add the cyclic symmetries of a deck to the model."""
+    content = deck_mesh.content
     used: set[int] = set()
     for sectors in content.sectors:
         ends = _ends(content, sectors)
@@ -162,7 +146,6 @@ def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]
     for ends in content.sector_ends:
         if id(ends) not in used:
             raise ends.refuse("no *CYCLIC SYMMETRY MODEL defines the number of sectors and the axis")
-    return model.relations[n_before:]
 
 
 def _ends(content: Content, sectors: Sectors) -> SectorEnds:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fastcontact.arrays import Indices
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.files.meshio_content import VERTEX, mesh_of
+from fastcontact.mesh.files.meshio_content import VERTEX, Block, build_mesh
 from fastcontact.mesh.mesh import Mesh
 
 # Element types by keyword.
@@ -35,7 +37,7 @@ Word = tuple[str, int]
 
 
 def read(path: Path) -> tuple[Mesh, dict[str, int]]:
-    """Return the mesh of a file, and the numbers of omitted cells by kind, see `meshio_content.mesh_of`.
+    """Return the mesh of a file, and the numbers of omitted cells by kind, see `meshio_content.build_mesh`.
 
     Raises
     ------
@@ -49,7 +51,7 @@ def read(path: Path) -> tuple[Mesh, dict[str, int]]:
     for keyword, line in words:
         if keyword.upper() == "FIN":
             try:
-                return mesh_of(content.parts())
+                return content.mesh()
             except MeshError as error:
                 raise MeshError(f"'{path}': {error}") from None
         content.add(keyword.upper(), line, _read_block(path, keyword, line, words))
@@ -88,7 +90,7 @@ class _Content:
         self._path = path
         self._points: dict[str, int] = {}
         self._coordinates: list[list[float]] = []
-        self._cells: dict[str, dict[str, list[str]]] = {}
+        self._cells: dict[str, dict[str, list[int]]] = {}
         self._groups: dict[str, dict[str, list[Word]]] = {"GROUP_NO": {}, "GROUP_MA": {}}
 
     def add(self, keyword: str, line: int, words: list[Word]) -> None:
@@ -101,7 +103,8 @@ class _Content:
             count = 1 if KINDS[keyword] == VERTEX else elements.get(KINDS[keyword]).n_nodes
             block = self._cells.setdefault(keyword, {})
             for name, *nodes in self._rows(keyword, line, words, 1 + count):
-                block[name[0]] = [self._point(node) for node in nodes]
+                points = list(map(self._point, nodes))
+                block[name[0]] = [points[k] for k in NODE_ORDER.get(keyword, range(count))]
         elif keyword in self._groups:
             if not words:
                 raise self._error(line, f"{keyword} has no name")
@@ -110,28 +113,19 @@ class _Content:
             keywords = ", ".join([*COORDINATES, *KINDS, *self._groups])
             raise self._error(line, f"{keyword[:40]} is not known; a mesh has {keywords}")
 
-    def parts(self) -> dict[str, Any]:
-        """Return points, cells and groups in the format of `meshio_process.plain_content`."""
-        cells: list[Any] = []
-        sets: dict[str, Any] = {}
-        row_of: dict[str, dict[str, int]] = {}
+    def mesh(self) -> tuple[Mesh, dict[str, int]]:
+        """Return the mesh, and the numbers of omitted cells by kind."""
+        self._check_members("GROUP_MA", set().union(*self._cells.values()), "cell")
+        self._check_members("GROUP_NO", self._points, "node")
+        cell_groups, point_groups = self._groups["GROUP_MA"], self._groups["GROUP_NO"]
+        blocks = []
         for keyword, block in self._cells.items():
-            nodes = np.array([[self._points[node] for node in row] for row in block.values()], np.intp)
-            nodes = nodes[:, NODE_ORDER[keyword]] if keyword in NODE_ORDER else nodes
-            kind = VERTEX if KINDS[keyword] == VERTEX else elements.get(KINDS[keyword]).meshio
-            cells.append([kind, len(nodes), nodes])
-            row_of[keyword] = {name: row for row, name in enumerate(block)}
-        for group, members in self._groups["GROUP_MA"].items():
-            self._check_members(members, set().union(*row_of.values()), "cell")
-            sets[group] = [np.array([rows[w] for w, _ in members if w in rows], np.intp) for rows in row_of.values()]
-        points = {}
-        for group, members in self._groups["GROUP_NO"].items():
-            self._check_members(members, self._points, "node")
-            points[group] = np.array([self._points[word] for word, _ in members], np.intp)
-        return {
-            "points": np.array(self._coordinates, np.float64), "cells": cells, "cell_data": {}, "point_data": {},
-            "cell_sets": sets, "point_sets": points, "field_data": {}, "output": "",
-        }  # fmt: skip
+            row_of = {name: row for row, name in enumerate(block)}
+            members = {name: _numbers(words, row_of) for name, words in cell_groups.items()}
+            nodes = np.array(list(block.values()), np.intp)
+            blocks.append(Block(KINDS[keyword], nodes, {name: rows for name, rows in members.items() if len(rows)}))
+        points = {name: _numbers(members, self._points) for name, members in point_groups.items()}
+        return build_mesh(np.array(self._coordinates), blocks, points, cell_groups)
 
     def _rows(self, keyword: str, line: int, words: list[Word], width: int) -> Iterator[list[Word]]:
         """Yield the words of a block in rows of `width` words."""
@@ -146,18 +140,23 @@ class _Content:
         except ValueError:
             raise self._error(word[1], f"'{word[0][:40]}' is not a number") from None
 
-    def _point(self, word: Word) -> str:
-        """Return the name of a node. Raises FileError if the node is not defined."""
+    def _point(self, word: Word) -> int:
+        """Return the number of a node. Raises FileError if the node is not defined."""
         if word[0] not in self._points:
             raise self._error(word[1], f"there is no node '{word[0][:40]}' before this line")
-        return word[0]
+        return self._points[word[0]]
 
-    def _check_members(self, members: list[Word], names: Any, kind: str) -> None:
+    def _check_members(self, keyword: str, names: Any, kind: str) -> None:
         """Raise FileError if a member of a group is not among the `names` of nodes or cells."""
-        for word, line in members:
+        for word, line in chain.from_iterable(self._groups[keyword].values()):
             if word not in names:
                 raise self._error(line, f"there is no {kind} '{word[:40]}'")
 
     def _error(self, line: int, text: str) -> FileError:
         """Return a FileError with the file, the line and a text."""
         return FileError(f"'{self._path}', line {line}: {text}")
+
+
+def _numbers(members: list[Word], number_of: dict[str, int]) -> Indices:
+    """Return the numbers of the members of a group that are among the names `number_of`."""
+    return np.array([number_of[word] for word, _ in members if word in number_of], np.intp)

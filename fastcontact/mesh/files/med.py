@@ -61,12 +61,12 @@ def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
     with open_hdf5(path) as file:
         name = _chosen_mesh(file, path, mesh_name)
         try:
-            mesh, n_vertices = _read_mesh(file, file["ENS_MAA"][name])
+            mesh, omitted = _read_mesh(file, file["ENS_MAA"][name])
         except MeshError as error:
             raise MeshError(f"mesh '{name}' of '{path}': {error}") from None
         info = file.get("INFOS_GENERALES", file)
         version = [str(int(attribute(info, key))) for key in ("MAJ", "MIN", "REL") if key in info.attrs]
-        return MedContent(mesh, name, ".".join(version), n_vertices)
+        return MedContent(mesh, name, ".".join(version), omitted["vertex"])
 
 
 def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
@@ -83,8 +83,8 @@ def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
     return str(names[0])
 
 
-def _read_mesh(file: Any, group: Any) -> tuple[Mesh, int]:
-    """Return the mesh stored in an HDF5 group, and the number of its one-node cells."""
+def _read_mesh(file: Any, group: Any) -> tuple[Mesh, dict[str, int]]:
+    """Return the mesh stored in an HDF5 group, and the numbers of omitted cells by kind."""
     if int(attribute(group, "TYP", 0)) != 0:
         raise MeshError("it is a structured grid: convert it to an unstructured mesh")
     step = _first_step(group)
@@ -95,11 +95,10 @@ def _read_mesh(file: Any, group: Any) -> tuple[Mesh, int]:
     blocks = list(_read_blocks(step, families))
     point_groups: dict[str, Any] = dict.fromkeys(_group_names(families, +1), ())
     point_groups.update(_members(step["NOE"], len(points), families))
-    n_vertices = sum(len(block.nodes) for block in blocks if block.kind == VERTEX)
     for block in blocks:
         if len(block.nodes) and (block.nodes.min() < 0 or block.nodes.max() >= len(points)):
             raise MeshError(f"a cell refers to node {block.nodes.max() + 1}, but nodes go from 1 to {len(points)}")
-    return build_mesh(points, blocks, point_groups, _group_names(families, -1)), n_vertices
+    return build_mesh(points, blocks, point_groups, _group_names(families, -1))
 
 
 def _group_names(families: Families, sign: int) -> list[str]:

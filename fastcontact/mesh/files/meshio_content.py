@@ -47,14 +47,10 @@ def mesh_of(content: Mapping[str, Any], file_format: str = "") -> tuple[Mesh, di
     MeshError
         If there are no cells, or cells of an unknown kind. Inconsistent arrays raise one of the exceptions `UNFIT`.
     """
-    blocks = merged(_blocks(content, NODE_ORDER.get(file_format, {})))
-    n_duplicates = sum(len(block.nodes) for block in blocks)
-    if file_format == "gmsh":  # version 2 of this format repeats a cell for each of its groups
-        blocks = [block if block.kind == VERTEX else without_duplicates(block) for block in blocks]
-    n_duplicates -= sum(len(block.nodes) for block in blocks)
-    mesh = build_mesh(content["points"], blocks, _point_groups(content), _cell_group_names(content, file_format))
-    n_vertices = sum(len(block.nodes) for block in blocks if block.kind == VERTEX)
-    return mesh, {"vertex": n_vertices, "duplicate": n_duplicates}
+    # Version 2 of Gmsh's format repeats a cell for each of its groups.
+    is_gmsh, blocks = file_format == "gmsh", _blocks(content, NODE_ORDER.get(file_format, {}))
+    names = _cell_group_names(content, file_format)
+    return build_mesh(content["points"], blocks, _point_groups(content), names, repeats=is_gmsh)
 
 
 def _cell_group_names(content: Mapping[str, Any], file_format: str) -> list[str]:
@@ -131,19 +127,22 @@ class Block:
 
 
 def build_mesh(
-    points: AnyArray, blocks: Iterable[Block], point_groups: Mapping[str, AnyArray], names: Iterable[str] = ()
-) -> Mesh:
-    """Return a `Mesh` of all blocks, with `points` (n_points, 2 or 3) [length].
+    points: AnyArray, blocks: Iterable[Block], point_groups: Mapping[str, AnyArray], names: Iterable[str] = (), *,
+    repeats: bool = False,
+) -> tuple[Mesh, dict[str, int]]:  # fmt: skip
+    """Return a `Mesh` of all blocks, with `points` (n_points, 2 or 3) [length], and the numbers of omitted cells.
 
-    Blocks of the same kind are joined. Groups of vertex cells become groups of points, and `names` without cells become
-    empty groups. A flat mesh with three coordinates becomes a 2D mesh.
+    Blocks of the same kind are joined, and cells given several times are merged if `repeats` is true. Groups of vertex cells
+    become groups of points, and `names` without cells become empty groups. A flat mesh with three coordinates becomes a 2D
+    mesh. The omitted cells are ``"vertex"`` and ``"duplicate"``.
     """
     try:
         coordinates = np.asarray(points, np.float64)
     except (TypeError, ValueError):
         raise MeshError("its coordinates are not numbers: check that the file is complete") from None
-    joined = merged(blocks)
-    solid = [block for block in joined if block.kind != VERTEX and len(block.nodes)]
+    joined = [block for block in merged(blocks) if len(block.nodes)]
+    given = [block for block in joined if block.kind != VERTEX]
+    solid = list(map(without_duplicates, given)) if repeats else given
     vertices = [block for block in joined if block.kind == VERTEX]
     if not solid:
         raise MeshError("the mesh has no cells: nothing can be computed on points alone")
@@ -154,7 +153,9 @@ def build_mesh(
             cell_groups.pop(name, None)
     dim = max(elements.get(block.kind).dim for block in solid)
     cells = {block.kind: block.nodes for block in solid}
-    return Mesh(_without_flat_z(coordinates, dim), cells, cell_groups, all_point_groups)
+    n_duplicates = sum(len(block.nodes) - len(cells[block.kind]) for block in given)
+    omitted = {"vertex": sum(len(block.nodes) for block in vertices), "duplicate": n_duplicates}
+    return Mesh(_without_flat_z(coordinates, dim), cells, cell_groups, all_point_groups), omitted
 
 
 def check_kinds(unknown: Mapping[str, int], known: Iterable[str]) -> None:

@@ -290,6 +290,12 @@ def test_a_block_has_keyword_parameters_and_lines(tmp_path):
     assert str(found.location) == "a.inp, line 2, *CONTACT PAIR"
 
 
+def test_a_keyword_does_not_continue_into_another(tmp_path):
+    found = read(tmp_path, "*Step, nlgeom,\n** no\n\u00a0*Static,\n1.\n")
+    assert [(block.keyword, block.location.line) for block in found] == [("STEP", 1), ("STATIC", 3)]
+    assert found[1].parameters == {"1.": None}
+
+
 def test_names_in_quotation_marks_keep_commas(tmp_path):
     (found,) = read(tmp_path, '*Cload\n"Upper, Plate-1".1, 1, 0.\n')
     assert found.rows[0].entries == ('"Upper, Plate-1".1', "1", "0.")

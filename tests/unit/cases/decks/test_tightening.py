@@ -64,11 +64,11 @@ def test_without_a_lock_the_force_stays(tmp_path):
 
 
 def test_a_shortening_in_the_place_of_a_force(tmp_path):
-    text = (
-        BAR.replace("0., 0., 1.\n*Boundary", "*Boundary") + "*Step\n*Static\n*Boundary\nbolt, 1, 1, 0.01\n*End Step\n"
-    )
-    (step,) = deck_of(tmp_path, text).solve()
-    assert step.pretension["cut"] == pytest.approx({"force": 5.0, "shortening": 0.01}, rel=1e-9)
+    pulled = "*Step\n*Static\n*Boundary\nbolt, 1, 1, 0.01\n*End Step\n"
+    deck = deck_of(tmp_path, BAR.replace("0., 0., 1.\n*Boundary", "*Boundary") + pulled + cooled(HELD))
+    for step, force in zip(deck.solve(), (5.0, 25.0), strict=True):
+        assert step.pretension["cut"] == pytest.approx({"force": force, "shortening": 0.01}, rel=1e-9)
+        assert step.reaction[deck.point(99), 0] == pytest.approx(force, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -95,6 +95,10 @@ def test_a_shortening_in_the_place_of_a_force(tmp_path):
         (
             BAR + TIGHT + cooled(HELD) + cooled("*Boundary, op=new\nbottom, 1, 3\ntop, 1, 3\n"),
             "node 99 of a pretension section is released here: a locked section stays locked",
+        ),
+        (
+            BAR + TIGHT + cooled(HELD) + cooled("*Boundary\nbolt, 1, 1, 1.\n"),
+            "line 64, .*: node 99 .* is released here",
         ),
     ],
 )

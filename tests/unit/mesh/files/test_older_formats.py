@@ -105,7 +105,7 @@ def mail(mesh):
             nodes = [f"N{node}" for node in row]
             text += [f"M{number} {' '.join(nodes[:7])}", f"   {' '.join(nodes[7:])}"]  # rows go on in the next line
         text += ["FINSF"]
-    text += ["POI1", "MP N1", "FINSF", "GROUP_MA NOM=TIP", "MP", "FINSF"]
+    text += ["HEXA20", "FINSF", "POI1", "MP N1", "FINSF", "GROUP_MA NOM=TIP", "MP", "FINSF"]  # no hexahedra
     for group, members in mesh.cell_groups.items():
         text += ["GROUP_MA", group, *(f"M{m + 1}" for m in members), "FINSF"]
     return "\n".join([*text, "GROUP_NO", "PAIR N1 N2", "FINSF", "FIN", "what follows is not read"])
