@@ -63,8 +63,8 @@ ACROSS = 4
 # Relative residual of the displacement or of the forces above which a warning is given.
 NOTABLE_RESIDUAL = 1e-4
 # Sliding past periodic ends, relative to the length of facets, above which a warning is given: for mortar contact with dual
-# multipliers, and for others. On a strip with friction 0.3 under a uniform pressure, pressures at the ends change by 0.03 times
-# this share with dual multipliers and by 0.7 times it with standard ones; in press fits with these, by 1.7 times.
+# multipliers, and for others. On a strip with friction 0.3 under a uniform pressure, pressures at the ends change by 0.03
+# times this share with dual multipliers and by 0.7 times it with standard ones; in press fits with these, by 1.7 times.
 SLIDE_PAST_ENDS = 0.3, 0.01
 # Smallest number of nodes for which the median is meaningful.
 ENOUGH_NODES = 10
