@@ -297,7 +297,7 @@ def recover(
     }  # fmt: skip
     iterations = {**iterations, **{key: multipliers for key, multipliers in factors.items() if multipliers}}
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
-    if references := reference_reactions(problem.model, reaction.ravel(), u.ravel()):
+    if references := reference_reactions(problem.model, reaction, u):
         iterations["reference_reactions"] = references
     if sections:
         iterations["pretension"] = section_results(sections, u, reaction, pretension)
