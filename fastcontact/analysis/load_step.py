@@ -168,7 +168,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         # rest is the first of the extrapolated states.
         quantities = [load.lift, load_as_force.force, *(() if problem.bodies is None else load.obstacles.values())]
         extrapolation = state.extrapolation
-        if problem.bodies is not None and not (extrapolation.loads or state.u.any()):
+        if not (extrapolation.loads or state.u.any()):
             extrapolation = extrapolation.to(*map(np.zeros_like, quantities)).converged(state.u, {})
         start = replace(start, extrapolation=extrapolation.to(*quantities))
     return StepContext(problem, start, load, loaded, problem.dofs, start.extrapolation, expected, index)
