@@ -26,7 +26,7 @@ from fastcontact.contact.formulations._formulation import LEANING
 from fastcontact.contact.held_motions import SAME_DIRECTION
 from fastcontact.contact.pairing import FACING
 from fastcontact.contact.projection import closest, nodal_normals
-from fastcontact.contact.surface import Surface, line_neighbours
+from fastcontact.contact.surface import Surface
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Largest distance of nodes from a plane of symmetry, relative to the size of the surface, and smallest cosine of the angle
@@ -95,7 +95,7 @@ def _loop(surface: Surface) -> list[int] | None:
     """Return the nodes, as rows of the points of a surface, in order along its closed line; None if there is no such line."""
     # The nodes of each facet in order along the line, without its end.
     chains = [chain for block in surface.blocks for chain in np.delete(block.local, 1, axis=1).tolist()]
-    following = line_neighbours(surface.ends)[:, 1].tolist()
+    following = surface.line_neighbours[:, 1].tolist()
     order = [0]
     while (facet := following[order[-1]]) > 0 and len(order) < len(chains):
         order.append(facet)

@@ -14,8 +14,8 @@ import numpy as np
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations._overlap import Coupling, Overlap, OverlapPoints
 from fastcontact.contact.pairing import FACING, Candidates, pair
-from fastcontact.contact.projection import CORNER, closest, facet_normals, nodal_normals
-from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
+from fastcontact.contact.projection import CORNER, closest, nodal_normals, normals_at_nodes
+from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
@@ -102,7 +102,7 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     side, near which points do not face the flank. It is unsuitable elsewhere: at a concave corner with a gap or an
     interference, the closest point jumps from one facet to the next as the bodies move.
     """
-    ends, first = np.unique(np.concatenate([lines.local[:, :2].ravel() for lines in primary.blocks]), return_index=True)
+    ends, first = np.unique(primary.ends, return_index=True)
     foot, normal = deformed[primary.points[ends]], normals[ends]
     opposite = closest(foot, deformed[block.facets])
     xi_0 = opposite.xi[:, 0]
@@ -110,7 +110,7 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     smooth = has_two_facets & ~_corners(primary, deformed, normals)[ends]
     in_facet = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(xi_0) < INSIDE) & ~smooth)
     rows = np.flatnonzero(has_two_facets)
-    facets = np.column_stack([opposite.facet[rows], line_neighbours(block.local)[opposite.facet[rows]]])
+    facets = np.column_stack([opposite.facet[rows], block.neighbours[opposite.facet[rows]]])
     distance = _signed_distances(deformed[block.facets[facets]], foot[rows][:, None], normal[rows][:, None])
     distance[facets < 0] = 1.0
     row, xi = _zeros(distance.reshape(-1, block.facets.shape[1]))
@@ -119,10 +119,9 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
 
 def _corners(side: Surface, coordinates: Array, normals: Array) -> Mask:
     """Return which nodes (m,) of a side are corners, where facet normals deviate strongly from the nodal `normals` (m, 2)."""
-    cosine = np.ones(len(side.points))
-    for block in side.blocks:
-        facet_normal = facet_normals(block, coordinates)
-        np.minimum.at(cosine, block.local, np.einsum("fad,fad->fa", facet_normal, normals[block.local]))
+    cosine, own = np.ones(len(side.points)), side.node_weights > 0.0
+    deviation = np.einsum("fad,fad->fa", normals_at_nodes(side, coordinates), normals[side.all_local])
+    np.minimum.at(cosine, side.all_local[own], deviation[own])
     return np.asarray(cosine < np.cos(np.radians(0.5 * CORNER)))
 
 

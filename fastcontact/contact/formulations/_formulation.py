@@ -43,7 +43,6 @@ from fastcontact.contact.pairing import (
 )
 from fastcontact.contact.projection import (
     BESIDE,
-    at_nodes_of_facets,
     interpolate,
     nodal_normals,
     places,
@@ -626,8 +625,7 @@ class Formulation(ABC):
         rows = np.flatnonzero(pairing.paired)
         feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
-        primary_normals = at_nodes_of_facets(smooth_normals(self.primary, deformed))[pairing.facet[rows]]
-        primary_normals = interpolate(primary_normals, feet)
+        primary_normals = interpolate(smooth_normals(self.primary, deformed)[pairing.facet[rows]], feet)
         mean = primary_normals - self._secondary_normals(Candidates(nodes, shape), deformed)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > LENGTH_ROUND_OFF)

@@ -35,10 +35,10 @@ from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.integration import NO_AREA, areas_of_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import Closing, Differences, LinearisedPoints, NodalNormals, Points, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import FACING, Candidates, Normals, padded, pair, tangents
-from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
+from fastcontact.contact.pairing import FACING, Candidates, Normals, pair, tangents
+from fastcontact.contact.projection import nodal_normals, normals_at_nodes, smooth_normals
 from fastcontact.contact.search.limits import BEYOND
-from fastcontact.contact.surface import Surface
+from fastcontact.contact.surface import Surface, padded
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, scaled
 from fastcontact.mesh import elements
@@ -457,14 +457,14 @@ class WeightedMortar(Formulation):
         if not isinstance(self.normals, str):
             return np.tile(np.array(self.normals), (len(self.secondary.points), 1))
         mean = np.zeros((len(self.secondary.points), deformed.shape[1]))
-        normals_of = {
-            block.element: facet_normals(block, deformed) if self.normals == "facet" else smooth
-            for block, smooth in zip(self.primary.blocks, smooth_normals(self.primary, deformed), strict=True)
-        }
+        normals = (normals_at_nodes if self.normals == "facet" else smooth_normals)(self.primary, deformed)
+        of_blocks = np.split(normals, np.cumsum(self.primary.sizes)[:-1])
+        normals_of = dict(zip((block.element for block in self.primary.blocks), of_blocks, strict=True))
         tests = dict(zip((block.element for block in self.secondary.blocks), self._test, strict=True))
         for coupling in overlap.couplings:
             secondary_facet, primary_facet = coupling.pairs.T
-            integral = coupling.integrals @ normals_of[coupling.primary.element][primary_facet]
+            at_nodes = normals_of[coupling.primary.element][primary_facet, : coupling.primary.facets.shape[1]]
+            integral = coupling.integrals @ at_nodes
             np.add.at(mean, coupling.secondary.local[secondary_facet], tests[coupling.secondary.element] @ integral)
         self.secondary.add_across_ends(mean)
         length, overall = np.linalg.norm(mean, axis=1, keepdims=True), mean.sum(axis=0)

@@ -11,7 +11,6 @@ from fastcontact.contact.pairing import pair
 from fastcontact.contact.projection import (
     along_line_normals,
     along_normals,
-    at_nodes_of_facets,
     closest_of_kinds,
     facet_normals,
     interpolate,
@@ -35,7 +34,7 @@ def wavy(element, n=8):
 
 def projected(candidates, side, points, project=along_normals):
     """Return the normals at the nodes of facets, the closest points, and the projection along the normals."""
-    normals = at_nodes_of_facets(smooth_normals(side, points))
+    normals = smooth_normals(side, points)
     start = closest_of_kinds(candidates, side.corners(points))
     return normals, start, project(candidates, side, points, normals, start)
 
@@ -236,7 +235,7 @@ def test_corners_are_taken_one_by_one():
     side = surface(mesh.replace(cell_groups={**mesh.cell_groups, "ALL": np.concatenate(
         [mesh.cell_groups[name] for name in ("XMIN", "XMAX", "YMIN", "YMAX", "ZMIN", "ZMAX")]
     )}), "ALL")  # fmt: skip
-    (normals,) = smooth_normals(side, mesh.points)
+    normals = smooth_normals(side, mesh.points)
     assert normals == pytest.approx(facet_normals(side.blocks[0], mesh.points), abs=1e-15)
 
 
