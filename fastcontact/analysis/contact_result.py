@@ -18,6 +18,7 @@ from fastcontact.contact.contact_middle import ContactMiddle, contact_middle
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import NO_AREA, lumped_areas
 from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.pair_options import ALWAYS_CLOSED
 from fastcontact.contact.pairing import normals
 from fastcontact.contact.surface import Surface
 from fastcontact.model.periodicity import PeriodicInterface
@@ -88,7 +89,7 @@ def contact_result(
     closed, pressure, nodal_multiplier, scale = _closed_nodes(
         pair, constraints, multiplier, active_gaps, gap, configuration
     )
-    if pair.options.tied:  # normals of the undeformed configuration
+    if pair.options.kind == "tied":  # normals of the undeformed configuration
         normal = pair.nodal_gap(replace(configuration, displacement=np.zeros_like(configuration.displacement)))[1]
     shear, sticking, tangential = _tangential_results(constraints, solution, rows, normal, closed, scale)
     if pair.axisymmetric:  # The radial traction is an odd function of the radius.
@@ -149,7 +150,7 @@ def _contact_radius(
     side = pair.secondary
     place = middle.places(pair.points[side.points])
     if pair.points.shape[1] == 3 and closed[place.argmin()]:  # not a ring around an open middle
-        free = ~closed & ~pair.options.excluded_nodes(side)
+        free = ~closed & ~pair.excluded[side.points]
         low = min(low, float(place[closed & (side.beside @ free > 0)].min(initial=np.inf)))
         high = max(high, float(place[free & (side.beside @ closed > 0)].max(initial=0.0)))
     return low, high
@@ -210,11 +211,11 @@ def _closed_nodes(
         well; zero at open nodes. If the formulation has negative pressures anywhere, the ratio is at most 1, since its
         pressure at a node may then nearly vanish [-].
     """
-    field, excluded = constraints.nodal, pair.options.excluded_nodes(pair.secondary)
+    field, excluded = constraints.nodal, pair.excluded[pair.secondary.points]
     assert field is not None
     forces = constraints.normal_forces(constraints.contact_forces(multiplier))
     side_pressure, covered = field.over_whole_side(forces), field.covered
-    if pair.options.always_closed:
+    if pair.options.kind in ALWAYS_CLOSED:
         # Nodes beyond the end of the other side are unpaired, but parts of their facets may face it.
         closed = np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
     else:

@@ -228,7 +228,7 @@ def accumulate_results(
         pair, contact, constraints = problem.pairs[name], results[name], settled.constraints.parts[name]
         configuration = problem.configuration(name, start, load, displacement, end.u)
         slip = np.zeros_like(contact.coordinates)
-        if contact.active.any() and not pair.options.tied:
+        if contact.active.any() and pair.options.kind != "tied":
             rigid_stick = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
             slip = pair.nodal_slip(configuration) - mean_slip_before_closing(
                 constraints, settled.solution, rows, contact
@@ -238,7 +238,7 @@ def accumulate_results(
         results_so_far[name] = replace(contact, slip=slip, slip_total=slipped[name])
         if name in end.bonds:
             results_so_far[name] = replace(results_so_far[name], damage=end.bonds[name].at(contact.coordinates)[1])
-        elif not (pair.options.tied or pair.options.gap_only):
+        elif pair.options.kind not in ("tied", "gap_only"):
             arguments = constraints, settled.solution, rows, configuration, contact, start.forces.get(name)
             forces[name], work_of_pair, slip_integrals = contact_work(pair, *arguments)
             load_of_pair = None

@@ -76,6 +76,11 @@ class Candidates:
         return cls(padded(nodes), padded(shapes), facet, np.concatenate(coordinates))
 
     @classmethod
+    def at(cls, nodes: Numbers) -> Candidates:
+        """Return the `nodes` (n,), given by their point numbers, as candidates."""
+        return cls(nodes[:, None], np.ones((len(nodes), 1)))
+
+    @classmethod
     def nodes_of(cls, side: Surface) -> Candidates:
         """Return the nodes of a side as candidates; each is located on one of its facets."""
         facet, xi, first = np.zeros(len(side.points), np.intp), np.zeros((len(side.points), 1)), 0

@@ -112,7 +112,7 @@ def nodal_normals(side: Surface, coordinates: Array) -> Array:
 
 
 def _nodal_means(side: Surface, normal: Array, angle: Array) -> Array:
-    """Return unit nodal normals (m, dim), given `normals_at_nodes` (n_facets, k, dim) and `_angles` (n_facets, k) of a side."""
+    """Return unit nodal normals (m, dim) of a side, given the results of `normals_at_nodes` and `_angles`."""
     weighted_normals = (angle[..., None] * normal).reshape(-1, normal.shape[2]).T
     node = side.all_local.ravel()
     total: Array = np.column_stack([np.bincount(node, component, len(side.points)) for component in weighted_normals])

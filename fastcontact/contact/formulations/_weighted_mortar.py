@@ -154,7 +154,9 @@ class WeightedMortar(Formulation):
         """See `Formulation`; a node with dual functions and a small overlap may have a gap in every other pairing."""
         covered = np.zeros(1) if constraints.nodal is None else np.asarray(constraints.nodal.covered)
         small = (
-            self.multipliers == "dual" and not self.options.tied and bool(((covered > 0.0) & (covered < LEAST)).any())
+            self.multipliers == "dual"
+            and self.options.kind != "tied"
+            and bool(((covered > 0.0) & (covered < LEAST)).any())
         )
         return small or super().alternates(constraints)
 
@@ -162,7 +164,7 @@ class WeightedMortar(Formulation):
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
         means = self._means(self.points + config.displacement, config)
         # Tied pairs have separate equations for the directions in which both sides are held.
-        held = self.without_slip(config) if self.has_tangents and not self.options.tied else []
+        held = self.without_slip(config) if self.has_tangents and self.options.kind != "tied" else []
         constraints, slip_data = self._weighted_gaps(config, means, held)
         return replace(constraints, geometry=partial(self._linearised, config, means, held, constraints, slip_data))
 
@@ -190,11 +192,12 @@ class WeightedMortar(Formulation):
         constraints = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=pressures)
         if not self.has_tangents:
             return constraints, None
-        candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
         projectors = np.zeros((*normal.shape, normal.shape[1]))
         for axis, nodes_held in held:
             projectors[nodes_held] += axis[nodes_held, :, None] * axis[nodes_held, None, :]
-        mu, directions, slip_axes = self.options.friction_axes(self.friction, tangents(normal, projectors), candidates)
+        mu, directions, slip_axes = self.options.friction_axes(
+            self.friction, tangents(normal, projectors), self.at_nodes
+        )
         slips, additional = self._slips(slip_axes, held, coverage, mean, rows, weight)
         length, closing_direction = self._closing_motion(constraints, normal, config)
         closing = length[:, None] * closing_direction
@@ -226,7 +229,7 @@ class WeightedMortar(Formulation):
             coverage = self._coverage(overlap, weights, like.with_gap, like.values)
         rows, across, closer = self._weighted_integrals(coverage)
         # The gap of an excluded node is omitted, but the functions of its neighbours are not extended over its area.
-        sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
+        sums = np.where(self.excluded[self.secondary.points], 0.0, np.asarray(rows.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         mean = scaled(csr_array(rows - across), 1.0 / weight)
         normal = self._mean_normals(overlap, deformed, config.pose)
@@ -302,9 +305,10 @@ class WeightedMortar(Formulation):
         mean = csr_array(assembled(tests, size)[:, rows])
         separate_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
-            column = self.secondary.points[:, None]
-            at_nodes, all_nodes = Candidates(column, np.ones(column.shape)), np.arange(len(column))
-            separate_normals = faced(at_nodes, pairing, all_nodes, self.primary, deformed, self.normals, config.pose)
+            all_nodes = np.arange(len(self.secondary.points))
+            separate_normals = faced(
+                self.at_nodes, pairing, all_nodes, self.primary, deformed, self.normals, config.pose
+            )
         elif self.normals == "secondary":
             separate_normals = NodalNormals(self.secondary, deformed)
         return LinearisedPoints(self.secondary, points, weighted, means.normal, multiplier, mean, separate_normals)
