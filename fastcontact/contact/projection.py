@@ -132,9 +132,10 @@ def smooth_normals(side: Surface, coordinates: Array, corner: float = CORNER) ->
     normals, angles = normals_at_nodes(side, coordinates), _angles(side, coordinates)
     smooth, normal, angle = _nodal_means(side, normals, angles)[node], normals.reshape(-1, dim), angles.ravel()
     # A node is a corner if the normal of one of its facets deviates from the mean by more than half of the angle.
-    deviates = (np.einsum("pd,pd->p", normal, smooth) < np.cos(np.radians(0.5 * corner))) & (angle > 0.0)
-    corners = np.unique(node[deviates])
-    by_node, start = np.argsort(node, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(node))])
+    own = np.flatnonzero(side.node_weights)
+    deviates = np.einsum("pd,pd->p", normal[own], smooth[own]) < np.cos(np.radians(0.5 * corner))
+    corners = np.unique(node[own[deviates]])
+    by_node, start = own[np.argsort(node[own], kind="stable")], np.append(0, np.cumsum(np.bincount(node[own])))
     for node_at_corner in corners:
         entries = by_node[start[node_at_corner] : start[node_at_corner + 1]]
         similar = normal[entries] @ normal[entries].T >= np.cos(np.radians(corner)) - LENGTH_ROUND_OFF
