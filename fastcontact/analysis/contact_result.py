@@ -43,13 +43,14 @@ def contact_results(
     """
     displacement = problem.displacement(end.u)
     paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
-    results = {
-        name: contact_result(
-            name, problem.pairs[name], settled.constraints.parts[name], settled.solution, rows,
-            problem.configuration(name, start, load, paired_at, end.u), end.first_contact.get(name), displacement,
+    results = {}
+    for name, rows in settled.constraints.rows.items():
+        constraints, configuration = (
+            settled.constraints.parts[name],
+            problem.configuration(name, start, load, paired_at, end.u),
         )
-        for name, rows in settled.constraints.rows.items()
-    }  # fmt: skip
+        arguments = constraints, settled.solution, rows, configuration, end.first_contact.get(name), displacement
+        results[name] = contact_result(name, problem.pairs[name], *arguments)
     if problem.model.periodic_interfaces:
         results = _with_periodic_nodes(problem, results)
     if problem.model.strain == "small":
@@ -318,11 +319,10 @@ def mean_slip_before_closing(
 ) -> Array:
     """Return the part (n_nodes, dim) of the nodal slips in this step that precedes the closing of the nodes [length].
 
-    It is a mean over the constraints near each node, weighted by their contact forces, and zero unless the step was solved
-    in increments. For parameters see `contact_result`.
+    It is a mean over the constraints near each node, weighted by their contact forces, if the step was solved in increments.
+    For parameters see `contact_result`.
     """
-    if solution.slip_before_closing is None or not constraints.tangents:
-        return np.zeros_like(contact.coordinates)
+    assert solution.slip_before_closing is not None
     assert constraints.nodal is not None
     forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
     slips = np.einsum("mk,kmd->md", solution.slip_before_closing[rows], np.stack(constraints.directions))

@@ -144,6 +144,8 @@ class StepContext:
         Scale of the displacements in the first step, if only forces act [length].
     index : int
         Number of the step.
+    condensed_size : float
+        Largest absolute value of the unknowns that are condensed, at the beginning of the step [length].
     path : Path or SlipSoFar, optional
         Load path of the step, if friction is solved along it in increments; or the data at the beginning of its last
         increment, if only this increment is solved again.
@@ -157,7 +159,13 @@ class StepContext:
     extrapolation: Extrapolation = field(default_factory=Extrapolation)
     expected: float = 0.0
     index: int = 0
+    condensed_size: float = 0.0
     path: Path | SlipSoFar | None = None
+
+    @property
+    def linearises_contact(self) -> bool:
+        """Whether Newton's method applies to the contact geometry: with a direct solver, without fluid pressure."""
+        return not (self.problem.solver.iterative or self.load.fluids)
 
     @cached_property
     def prescribed_motion(self) -> Array:

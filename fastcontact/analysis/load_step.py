@@ -104,7 +104,7 @@ def _end_of_step(
         start, u=u, largest_force=balance.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
         instant=instant[1], rise=None if heat_solution is None else heat_solution.rise,
     )  # fmt: skip
-    bodies = None if solution.terms.bodies is None else solution.terms.bodies.at(u)
+    bodies = None if solution.terms is None else solution.terms.bodies.at(u)
     if bodies is not None:
         end = replace(end, history=bodies.history)
     # In the first step, which begins without a history, the path is unknown.
@@ -230,9 +230,9 @@ def accumulate_results(
         slip = np.zeros_like(contact.coordinates)
         if contact.active.any() and pair.options.kind != "tied":
             rigid_stick = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
-            slip = pair.nodal_slip(configuration) - mean_slip_before_closing(
-                constraints, settled.solution, rows, contact
-            )
+            slip = pair.nodal_slip(configuration)
+            if settled.solution.slip_before_closing is not None and constraints.tangents:
+                slip -= mean_slip_before_closing(constraints, settled.solution, rows, contact)
             slip = np.where((contact.active & ~rigid_stick)[:, None], slip, 0.0)
         slipped[name] = slip + start.slipped.get(name, 0.0)
         results_so_far[name] = replace(contact, slip=slip, slip_total=slipped[name])
@@ -285,19 +285,18 @@ def recover(
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
     sections, reaction = problem.model.pretensions, reaction.reshape(-1, mesh.dim)
-    histories = problem.model.temperatures, problem.model.initial_states, sections
-    temperature, initial, pretension = (problem.factors(parts, instant[1]) for parts in histories)
-    pressures, spins = (
-        problem.factors([load for load in problem.model.loads if isinstance(load, kind)], instant[1])
-        for kind in (Pressure, Centrifugal)
-    )
-    factors = {
-        "temperature_factors": temperature, "initial_factors": initial, "pressure_factors": pressures, "spin_factors": spins,
-    }  # fmt: skip
-    iterations = {**iterations, **{key: multipliers for key, multipliers in factors.items() if multipliers}}
+    loads, iterations = problem.model.loads, dict(iterations)
+    temperature = problem.factors(problem.model.temperatures, instant[1])
+    initial = problem.factors(problem.model.initial_states, instant[1])
+    pressures = problem.factors([load for load in loads if isinstance(load, Pressure)], instant[1])
+    spins = problem.factors([load for load in loads if isinstance(load, Centrifugal)], instant[1])
+    for name, factors in (("temperature", temperature), ("initial", initial), ("pressure", pressures), ("spin", spins)):
+        if factors:
+            iterations[f"{name}_factors"] = factors
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
     if sections:
-        iterations["pretension"] = section_results(sections, u, reaction, pretension)
+        factors = problem.factors(sections, instant[1])
+        iterations["pretension"] = section_results(sections, u, reaction, factors)
     if bodies is not None:
         stress = recovery.nodal_average(mesh, bodies.stress, problem.sides)
     else:

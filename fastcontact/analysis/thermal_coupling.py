@@ -111,7 +111,7 @@ def settle_heat(
         f"heat and contact do not converge: after {limit} times temperatures still change by {change:.3g}, for "
         "instance because a contact opens when heat flows through it and closes when none does; let its "
         "conductance fall gradually with the gap, or grow from zero with the pressure",
-        equilibrium.history,
+        [] if equilibrium.settled is None else equilibrium.settled.iterate.history,
     )
 
 

@@ -266,7 +266,7 @@ def _slip_so_far(
 def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
     """Add, in place, the compliance of the constraints `rows` (q,) to their Delassus operator F ((1 + k) q, (1 + k) q)."""
     if constraints.compliance is not None and len(rows):
-        frame = np.stack([direction[rows] for direction in constraints.coupled_directions or constraints.directions])
+        frame = np.stack(constraints.coupled_directions or constraints.directions)[:, rows]
         F += _componentwise(constraints.compliance.block(rows), frame)
     if constraints.low_rank_compliance.size and len(rows):
         Z = constraints.low_rank_compliance[:, rows].reshape(len(F), -1)
