@@ -273,7 +273,9 @@ class _Mixing:
             if newton_result is not None:
                 next_pairing, self.contraction = newton_result
                 return next_pairing
-        state = settled.constraints.state(solution.active).tobytes()
+        branches = settled.constraints.branches
+        # While this state is constant, the solution depends smoothly on the geometry.
+        state = solution.active.tobytes() + (b"" if branches is None else branches.tobytes())
         same_state = self._last_state == state
         self._cycles |= not (same_state or self._newton) and state in self._earlier_states
         self._last_state = state if solution.settled else b""

@@ -186,7 +186,9 @@ class StepContext:
         ndarray (k, m)
             Imposed slip along each of k tangents of the m constraints [-].
         """
-        slips = np.stack([T @ self.prescribed_motion for T in constraints.tangents])
+        slips = np.empty_like(constraints.slip0)
+        for k, T in enumerate(constraints.tangents):
+            slips[k] = T @ self.prescribed_motion
         # Without prescribed displacements in this step, `prescribed_motion` is the round-off of earlier displacements.
         scale = max(largest(self.prescribed_motion), largest(self.state.u))
         if isinstance(constraints, StackedConstraints):

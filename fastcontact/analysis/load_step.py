@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from fastcontact._jit import parallel
+from fastcontact._tools.argument_types import unchecked
 from fastcontact.analysis.contact_result import contact_results, mean_slip_before_closing, sliding_load
 from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact
@@ -41,6 +43,9 @@ from fastcontact.model.pretension import section_results
 from fastcontact.model.rigid_motions import generalised
 from fastcontact.results.step import ContactResult, StepResult, by_largest_von_mises
 from fastcontact.results.units import units_of_results
+
+nodal_stress = unchecked(recovery.nodal_stress)
+von_mises, von_mises_signed = unchecked(recovery.von_mises), unchecked(recovery.von_mises_signed)
 
 
 @parallel.on_one_blas_thread
@@ -252,8 +257,8 @@ def accumulate_results(
             before = start.worn.get(name, Worn.nothing(len(contact.points)))
             worn[name] = before.after(pair, configuration, results_so_far[name], pair.options.wear)
             results_so_far[name] = replace(results_so_far[name], wear=worn[name].depth)
-    stored = sum(entry.stored for entry in forces.values()) + sum(entry.stored for entry in end.bonds.values())
-    released = sum(entry.released for entry in end.bonds.values())
+    stored = sum(map(attrgetter("stored"), (*forces.values(), *end.bonds.values())))
+    released = sum(map(attrgetter("released"), end.bonds.values()))
     work = None if start.work is None else start.work.after(energy, stored, works.tolist(), released)
     touched = start.touched.union(name for name, contact in results.items() if contact.active.any())
     first = {name: positions for name, positions in end.first_contact.items() if name in touched}
@@ -304,14 +309,14 @@ def recover(
         if temperature or initial or heat is not None:
             offset = problem.model.stress_offset(temperature, initial, field, heat)
         materials = field.moduli, field.loops, u, field.treatment
-        stress = recovery.nodal_stress(mesh, problem.model.kinematics, *materials, problem.sides, offset)
+        stress = nodal_stress(mesh, problem.model.kinematics, *materials, problem.sides, offset)
     by_material = None
     if len(problem.sides.points):
         materials_of_cells = np.concatenate(list(problem.field.distinct.values()))
         stress, by_material = by_largest_von_mises(problem.sides, materials_of_cells, stress, mesh.n_points)
-    von_mises, units = recovery.von_mises(stress), problem.model.units
+    equivalent, units = von_mises(stress), problem.model.units
     return StepResult(
-        *instant, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction, contact,
+        *instant, u.copy(), stress, equivalent, von_mises_signed(stress, equivalent), reaction, contact,
         iterations, material_stress=by_material,
         cell_fields={} if bodies is None or problem.bodies is None else problem.bodies.cell_fields(bodies, u),
         temperature=heat, units=units and units_of_results(units, problem.model.kinematics),

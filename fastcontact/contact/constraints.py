@@ -374,14 +374,6 @@ class StackedConstraints(Constraints):
     parts: Mapping[str, Constraints] = field(default_factory=dict)
     rows: Mapping[str, slice] = field(default_factory=dict)
 
-    def state(self, active: Mask) -> AnyArray:
-        """Return the active set (m,) and the `branches` of all pairs, in one array.
-
-        While this array is constant, the solution depends smoothly on the geometry.
-        """
-        branches = (pair.branches for pair in self.parts.values() if pair.branches is not None)
-        return np.concatenate([active.astype(np.int8), *branches])
-
 
 def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
     """Return the stacked constraints of contact pairs, given the constraints of each pair by its name."""
@@ -391,6 +383,7 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
     if len(pairs) == 1:
         return StackedConstraints(**vars(pairs[0]), parts=by_pair, rows=rows_of_pairs)
     count, nodes = max(len(pair.tangents) for pair in pairs), [pair.nodes for pair in pairs if pair.nodes is not None]
+    branches = [pair.branches for pair in pairs if pair.branches is not None]
     tangents = [pair.tangents or (csr_array(pair.B.shape),) * count for pair in pairs]
 
     columns: dict[str, Any] = {
@@ -409,6 +402,7 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
         directions=_stacked_directions(pairs),
         low_rank_compliance=np.stack([block_diag(*component) for component in zip(*factors, strict=True)]),
         nodes=None if len(nodes) < len(pairs) else np.concatenate(nodes),
+        branches=np.concatenate(branches) if branches else None,
         coupled_directions=_stacked_directions(pairs, coupled=True),
         parts=by_pair,
         rows=rows_of_pairs,

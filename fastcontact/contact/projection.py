@@ -113,9 +113,9 @@ def nodal_normals(side: Surface, coordinates: Array) -> Array:
 
 def _nodal_means(side: Surface, normal: Array, angle: Array) -> Array:
     """Return unit nodal normals (m, dim) of a side, given the results of `normals_at_nodes` and `_angles`."""
-    weighted_normals = (angle[..., None] * normal).reshape(-1, normal.shape[2]).T
-    node = side.all_local.ravel()
-    total: Array = np.column_stack([np.bincount(node, component, len(side.points)) for component in weighted_normals])
+    node, total = side.all_local.ravel(), np.empty((len(side.points), normal.shape[2]))
+    for axis, component in enumerate((angle[..., None] * normal).reshape(-1, normal.shape[2]).T):
+        total[:, axis] = np.bincount(node, component, len(total))
     side.add_across_ends(total)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.divide(total, length, out=np.zeros_like(total), where=length != 0.0)

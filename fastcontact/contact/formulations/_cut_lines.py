@@ -140,8 +140,9 @@ def _opposite_ends(
     offset, facets, coordinates = 0, [], []
     for primary_block in primary.blocks:
         shape = elements.get(primary_block.element).shape
-        for end, s in [(end, sign * position) for end, sign in ((0, -1.0), (1, 1.0)) for position in ends]:
-            free = np.flatnonzero(~primary.inner_ends[offset : offset + len(primary_block.facets), end])
+        inner_ends = primary.inner_ends[offset : offset + len(primary_block.facets)]
+        for end, s in zip(np.repeat([0, 1], len(ends)), np.outer([-1.0, 1.0], ends).ravel(), strict=True):
+            free = np.flatnonzero(~inner_ends[:, end])
             weights = shape(np.array([[s]]))[0]
             foot = np.einsum("k,fkd->fd", weights, deformed[primary_block.facets[free]])
             normal = np.einsum("k,fkd->fd", weights, normals[primary_block.local[free]])

@@ -16,7 +16,15 @@ from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.cohesive_layer import cohesive_rows
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints, Linearised
-from fastcontact.contact.held_motions import SAME_DIRECTION, HeldMotions, deflate, direction_fields, eigenspaces
+from fastcontact.contact.held_motions import (
+    LEANING,
+    SAME_DIRECTION,
+    HeldMotions,
+    deflate,
+    direction_fields,
+    eigenspaces,
+    symmetry_planes,
+)
 from fastcontact.contact.linearised_geometry import (
     Closing,
     InterpolatedNormals,
@@ -56,9 +64,6 @@ from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 SLIPS = ("symmetric", "primary")
-# Sine of the largest angle between the normal of a surface and a plane of symmetry at which the surface of the full model has
-# no corner at the plane. Octagons, with an angle of 22.5 degrees, have corners there irrespective of round-off.
-LEANING = float(np.sin(np.radians(21.0)))
 
 
 @dataclass(eq=False)
@@ -161,6 +166,12 @@ class Formulation(ABC):
         return Smoothing.of(self.secondary, self.primary, self.points)
 
     @cached_property
+    def symmetry_planes(self) -> list[tuple[Array, Indices]]:
+        """The planes of symmetry at the ends of the secondary surface, see `held_motions.symmetry_planes`."""
+        opposite = self.points[self.primary.points]
+        return [] if self.held is None else symmetry_planes(self.held, self.secondary, self.points, opposite)
+
+    @cached_property
     def at_nodes(self) -> Candidates:
         """The secondary nodes as candidates."""
         return Candidates.nodes_of(self.secondary)
@@ -210,7 +221,8 @@ class Formulation(ABC):
         if self.tied is not None:
             return self.tied.constraints()
         constraints = self.unilateral(config)
-        if self.options.cohesion is None:
+        has_penalty = self.options.penalty is not None or self.options.tangential_penalty is not None
+        if has_penalty and self.options.cohesion is None:
             constraints = self._with_penalties(constraints, config)
         if config.elastic_slip is not None and constraints.tangents:
             previous_slip = _values_at(config.elastic_slip, constraints.positions)
@@ -238,10 +250,8 @@ class Formulation(ABC):
         return with_fluid_pressure(constraints, config, areas, self.options.source[self.secondary.points])
 
     def _with_penalties(self, constraints: Constraints, config: Configuration) -> Constraints:
-        """Return the constraints with the compliances of normal and tangential penalties, if the pair has any."""
+        """Return the constraints with the compliances of normal and tangential penalties."""
         normal, tangential, areas = self.options.penalty, self.options.tangential_penalty, constraints.areas
-        if normal is None and tangential is None:
-            return constraints
         if areas is None:
             raise ContactError(f"formulation '{self.name}' supports no penalty: leave out the option")
         if isinstance(normal, OverclosureLaw):
@@ -701,9 +711,9 @@ class Formulation(ABC):
         pairing = self.facing(nodes, config, np.inf)
         directions = tangents(pairing.normal)
         rows, slip0 = self.slips(nodes, pairing, directions, config)
-        components = np.stack([row @ (config.displacement - config.start).ravel() for row in rows])
-        components += slip0
-        slip = np.einsum("kn,knd->nd", components, np.stack(directions))
+        slip, displacement = np.zeros_like(pairing.normal), (config.displacement - config.start).ravel()
+        for row, constant, direction in zip(rows, slip0, directions, strict=True):
+            slip += (row @ displacement + constant)[:, None] * direction
         return np.where(pairing.paired[:, None], slip, 0.0)
 
 

@@ -91,7 +91,7 @@ class PressureField(NodalField):
     @classmethod
     def of_points(
         cls, points: tuple[Indices, Array], areas: tuple[Array, Array], rho: float,
-        field: tuple[csr_array, Indices], renewed: bool,
+        field: tuple[csr_array, Indices], renewed: bool, eliminable: bool = False, quadratic: bool = False,
     ) -> PressureField:  # fmt: skip
         """Return the pressure field of m integration points.
 
@@ -105,14 +105,15 @@ class PressureField(NodalField):
             The constant of the augmented Lagrangian [pressure / length].
         field : (csr_array (n_nodes, k), ndarray of int (k,))
             `nodes` and `independent`.
-        renewed : bool
+        renewed, eliminable, quadratic : bool
+            See `PressureField` and `Projection`.
         """
         (around, shape), (nodes, independent), (usable_areas, full_areas) = points, field, areas
         P = shapes_at(shape, around, nodes.shape[0])
         covered, total = P.T @ usable_areas, P.T @ full_areas
         P = csr_array(P @ nodes)
         mass = splu((P.T @ diags_array(usable_areas) @ P).tocsc()) if len(independent) else None
-        projection = Projection(P, usable_areas, rho, mass)
+        projection = Projection(P, usable_areas, rho, mass, eliminable, quadratic)
         return cls(projection, nodes, independent, around, shape, renewed, total, covered)
 
     def pressure(self, force: Array) -> Array:
@@ -262,7 +263,7 @@ class PressureFieldFormulation(Formulation):
         self, candidates: Candidates, pairing: Pairing, field: PressureField, config: Configuration
     ) -> Constraints:
         """Return the constraints of paired integration points, with the compliance C of the pressure field."""
-        projection = replace(field.projection, eliminable=self.eliminable, quadratic=self.secondary.order > 1)
+        projection = field.projection
         constraints = self.assembled(candidates, pairing, projection, config)
         directions, turning = constraints.directions, self.options.turning
         if constraints.tangents and turning is not None:

@@ -85,8 +85,9 @@ class Continuous(PressureFieldFormulation):
         P = shapes_at(self._candidates.shape, nodes, len(self.secondary.points))
         field = self._independent_values(P, areas_of_points)
         field = field if self.options.same_place is None else self.repeated(field, self.options.same_place)
-        points = nodes, self._candidates.shape
-        self._field = PressureField.of_points(points, (areas_of_points, all_areas), float(rho), field, renewed=False)
+        points, areas_of_all = (nodes, self._candidates.shape), (areas_of_points, all_areas)
+        kind = {"renewed": False, "eliminable": self.eliminable, "quadratic": self.secondary.order > 1}
+        self._field = PressureField.of_points(points, areas_of_all, float(rho), field, **kind)
 
     def _rule(self, element: str) -> quadrature.Rule:
         """Return the integration points and weights on the reference facet of an element type."""
