@@ -224,7 +224,10 @@ def _store_solution(
     change = largest(displacement - before)
     significant = size and change > step.state.gap_round_off
     last_update = _Update(before, change, size, change / size if significant else 0.0)
-    iterate.remember(constraints, solution)
+    for name, rows in constraints.rows.items():
+        iterate.active[name] = solution.wanted[rows]
+        forces = constraints.parts[name].contact_forces(solution.multiplier[rows])
+        iterate.pressure[name] = constraints.parts[name].pressure(forces)  # without fluid pressure
     entry = {"displacement_change": last_update.relative, "active": int(solution.active.sum())}
     entry |= {"active_set_iterations": solution.iterations, "settled": solution.settled}
     iterate.history.append(entry | ({"rounded": True} if iterate.rounded else {}))

@@ -73,13 +73,6 @@ class Iterate:
         """Return the initial iterate of a load step."""
         return cls(state.u.copy(), dict(state.active), dict(state.pressure))
 
-    def remember(self, constraints: StackedConstraints, solution: Solution) -> None:
-        """Store for each pair the active set that the solution predicts, and the nodal pressures without fluid pressure."""
-        for name, rows in constraints.rows.items():
-            self.active[name] = solution.wanted[rows]
-            forces = constraints.parts[name].contact_forces(solution.multiplier[rows])
-            self.pressure[name] = constraints.parts[name].pressure(forces)
-
 
 def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Iterate) -> StackedConstraints:
     """Return the constraints of all pairs, from the deformed or, with `keep_pairing`, from the undeformed configuration."""

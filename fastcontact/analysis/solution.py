@@ -158,11 +158,9 @@ class Path:
         closed : ndarray (1 + k, q)
             Gaps, then the components of `closing` [length].
         """
-        forces, closed = (
-            np.vstack([normal[rows], *((vectors[rows] * tangent[rows]).sum(axis=1) for tangent in directions)])
-            for normal, vectors in ((self.normal, self.traction), (self.gap, self.closing))
-        )
-        return forces, closed
+        tangents, (traction, closing) = np.stack(directions)[:, rows], (self.traction[rows], self.closing[rows])
+        forces = np.vstack([self.normal[rows], (traction * tangents).sum(axis=2)])
+        return forces, np.vstack([self.gap[rows], (closing * tangents).sum(axis=2)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,8 +257,8 @@ class Solution:
         """
         if self.tangential.shape != (m, len(directions)):
             return None
-        vectors = sum(t[:, None] * along for t, along in zip(self.tangential.T, self.directions, strict=True))
-        return np.vstack([self.multiplier, *((vectors * tangent).sum(axis=1) for tangent in directions)])
+        vectors = (self.tangential.T[:, :, None] * np.stack(self.directions)).sum(axis=0)
+        return np.vstack([self.multiplier, (vectors * np.stack(directions)).sum(axis=2)])
 
 
 def in_increments(
@@ -367,7 +365,7 @@ def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) 
 
 def in_last_increment(constraints: Constraints, slip_so_far: SlipSoFar) -> Constraints:
     """Return the constraints with slips measured from the beginning of the last increment."""
-    before = np.stack([(slip_so_far.slip * tangent).sum(axis=1) for tangent in constraints.directions])
+    before = (slip_so_far.slip * np.stack(constraints.directions)).sum(axis=2)
     return replace(constraints, slip0=constraints.slip0 - before)
 
 
@@ -375,8 +373,7 @@ def over_whole_step(solution: Solution, slip_so_far: SlipSoFar) -> Solution:
     """Return the solution with the slips and the frictional work of the step, given the solution of its last increment."""
     last = np.where(solution.active[:, None], solution.slip, 0.0)
     work = slip_so_far.work + friction_work(slip_so_far.normal, solution.multiplier, solution.tangential.T, last.T)
-    before, slip_before_closing = (
-        np.stack([(vectors * tangent).sum(axis=1) for tangent in solution.directions], axis=1)
-        for vectors in (slip_so_far.slip, slip_so_far.slip_before_closing)
-    )
+    directions = np.stack(solution.directions, axis=1)
+    before = (slip_so_far.slip[:, None] * directions).sum(axis=2)
+    slip_before_closing = (slip_so_far.slip_before_closing[:, None] * directions).sum(axis=2)
     return replace(solution, slip=solution.slip + before, work=work, slip_before_closing=slip_before_closing)

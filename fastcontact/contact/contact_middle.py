@@ -166,11 +166,8 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
         return ContactMiddle(np.array([0.0, float(weight @ points[:, 1])]), direction=np.array([0.0, 1.0]))
     planes = pair.symmetry_planes
     if closed.any():  # only the planes that the contact reaches
-        reached = [
-            any(closed[block.local[np.isin(block.local, nodes).any(axis=1)]].any() for block in surface.blocks)
-            for _, nodes in planes
-        ]
-        planes = [plane for plane, is_reached in zip(planes, reached, strict=True) if is_reached]
+        near_closed = surface.beside @ closed > 0
+        planes = [(axis, nodes) for axis, nodes in planes if near_closed[nodes].any()]
     if dim == 2:
         return _middle_in_2d(surface, pair.points, weight, planes, mean)
     return _middle_in_3d(points, weight, planes, mean)

@@ -314,11 +314,6 @@ class Closing:
         opening_along_mean = np.einsum("nd,nd->n", mean, opening)
         return cls(mean, size, secondary, opening, opening_along_mean if length is None else length, length is None)
 
-    @property
-    def vector(self) -> Array:
-        """The vectors q m (n, dim) [length]."""
-        return self.length[:, None] * self.mean
-
     def along(self, du: Array, normal: tuple[Array, Array], primary: Array, opening: Array) -> Array:
         """Return the variation (n, dim) of q m [length].
 

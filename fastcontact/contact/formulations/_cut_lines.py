@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.formulations._overlap import Coupling, Overlap, OverlapPoints
 from fastcontact.contact.pairing import FACING, Candidates, pair
 from fastcontact.contact.projection import CORNER, closest, nodal_normals, normals_at_nodes
@@ -107,7 +107,10 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     opposite = closest(foot, deformed[block.facets])
     xi_0 = opposite.xi[:, 0]
     has_two_facets = primary.inner_ends.ravel()[first]
-    smooth = has_two_facets & ~_corners(primary, deformed, normals)[ends]
+    cosine = np.ones(len(primary.points))  # between the normals of facets and of nodes, small at corners
+    deviation = np.einsum("fad,fad->fa", normals_at_nodes(primary, deformed), normals[primary.all_local])
+    np.minimum.at(cosine, primary.all_local, np.where(primary.node_weights > 0.0, deviation, 1.0))
+    smooth = has_two_facets & ~(cosine < np.cos(np.radians(0.5 * CORNER)))[ends]
     in_facet = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(xi_0) < INSIDE) & ~smooth)
     rows = np.flatnonzero(has_two_facets)
     facets = np.column_stack([opposite.facet[rows], block.neighbours[opposite.facet[rows]]])
@@ -115,14 +118,6 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     distance[facets < 0] = 1.0
     row, xi = _zeros(distance.reshape(-1, block.facets.shape[1]))
     return np.concatenate([opposite.facet[in_facet], facets.ravel()[row]]), np.concatenate([xi_0[in_facet], xi])
-
-
-def _corners(side: Surface, coordinates: Array, normals: Array) -> Mask:
-    """Return which nodes (m,) of a side are corners, where facet normals deviate strongly from the nodal `normals` (m, 2)."""
-    cosine, own = np.ones(len(side.points)), side.node_weights > 0.0
-    deviation = np.einsum("fad,fad->fa", normals_at_nodes(side, coordinates), normals[side.all_local])
-    np.minimum.at(cosine, side.all_local[own], deviation[own])
-    return np.asarray(cosine < np.cos(np.radians(0.5 * CORNER)))
 
 
 def _signed_distances(points: Array, foot: Array, normal: Array) -> Array:

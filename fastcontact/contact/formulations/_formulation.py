@@ -357,29 +357,25 @@ class Formulation(ABC):
         `compliance` couples the constraints, see `Constraints.compliance`.
         """
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
-        gap0 += self.added_gap(candidates, pairing, config) - self.smoothing_overlap(candidates, pairing, config)
+        added = self.added_gap(candidates, pairing, config)
+        gap0 += added if self.smoothing is None else added - self.smoothing_overlap(candidates, pairing, config)
         constraints, directions = (
             Constraints(B, gap0, candidates.positions(self.points), compliance),
             tuple[Array, ...](),
         )
         if self.has_tangents:
-            axes = tangents(pairing.normal, self._held_directions(candidates))
+            projectors = None
+            if self.friction and self.held is not None and len(self.held.nodes):
+                # Projectors onto the directions in which all nodes of a candidate are held.
+                held = np.einsum("nk,nkde->nde", candidates.shape, self.held.at(candidates.nodes))
+                projectors = eigenspaces(held, 1.0 - LENGTH_ROUND_OFF)
+            axes = tangents(pairing.normal, projectors)
             friction, directions, slip_axes = self.options.friction_axes(self.friction, axes, candidates)
             rows, slip0 = self.slips(candidates, pairing, slip_axes, config)
             constraints = replace(constraints, tangents=rows, directions=directions, friction=friction, slip0=slip0)
         if self.normals == "secondary":  # derivatives are not implemented
             return constraints
         return replace(constraints, geometry=partial(self._linearised_points, candidates, pairing, config, directions))
-
-    def _held_directions(self, candidates: Candidates) -> Array | None:
-        """Return projectors (n, dim, dim) onto the directions in which all nodes of a candidate are held.
-
-        None without friction, or if no node is held.
-        """
-        if self.held is None or not len(self.held.nodes) or not self.friction:
-            return None
-        held = np.einsum("nk,nkde->nde", candidates.shape, self.held.at(candidates.nodes))
-        return eigenspaces(held, 1.0 - LENGTH_ROUND_OFF)
 
     def _linearised_points(
         self, candidates: Candidates, pairing: Pairing, config: Configuration, directions: Sequence[Array],
@@ -390,7 +386,7 @@ class Formulation(ABC):
         The last three arguments are those of `Geometry`.
         """
         coordinates, rows = self.points + config.displacement, np.flatnonzero(pairing.paired & (multiplier != 0.0))
-        rise = self.smoothing_slope(candidates, pairing, rows, coordinates)
+        rise = None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, coordinates)
         points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, config.pose, rise=rise)
         at_rows = rows, len(multiplier)
         forces = LinearisedPoints(self.secondary, points, None, points.normal, multiplier[rows], place=at_rows)
@@ -409,7 +405,7 @@ class Formulation(ABC):
         closing = Closing.of(
             averaged.normal, InterpolatedNormals(nodal, local, candidates.shape[rows]), points.motion @ slips.start
         )
-        slips = replace(slips, total=slips.total + closing.vector, closing=closing)
+        slips = replace(slips, total=slips.total + closing.length[:, None] * closing.mean, closing=closing)
         return replace(forces, slips=slips, smooth=smooth)
 
     def _load_step_slips(self, mean: csr_array, directions: Array, tangential: Array, config: Configuration) -> Slips:
@@ -476,12 +472,9 @@ class Formulation(ABC):
     def smoothing_overlap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
         """Return the lengths (n,) by which smooth surfaces reduce the gaps of candidates, compared with facets [length]."""
         overlap, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
-        if (
-            self.smoothing is None
-            or candidates.facet is None
-            or candidates.xi is None
-            or not isinstance(self.primary, Surface)
-        ):
+        assert self.smoothing is not None
+        assert isinstance(self.primary, Surface)
+        if candidates.facet is None or candidates.xi is None:
             return overlap
         deformed = self.points + config.displacement
         axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
@@ -490,12 +483,14 @@ class Formulation(ABC):
         return overlap
 
     def smoothing_slope(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
-        """Return the derivatives (n, dim - 1) of `smoothing_overlap` along primary facets [length]; None without smoothing.
+        """Return the derivatives (n, dim - 1) of `smoothing_overlap` along primary facets [length].
 
         `rows` (n,) are numbers of candidates, and `deformed` (n_points, dim) the current coordinates. The derivatives are
         zero on the straight extensions of facets.
         """
-        if self.smoothing is None or candidates.facet is None or not isinstance(self.primary, Surface):
+        assert self.smoothing is not None
+        assert isinstance(self.primary, Surface)
+        if candidates.facet is None:
             return None
         axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
         factor = self.smoothing.shared(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
@@ -696,7 +691,8 @@ class Formulation(ABC):
         nodes = self.at_nodes
         pairing = self.facing(nodes, config, max(self.projection_tolerance or 0.0, BESIDE))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
-        gap0 -= self.smoothing_overlap(nodes, pairing, config)
+        if self.smoothing is not None:
+            gap0 -= self.smoothing_overlap(nodes, pairing, config)
         if with_clearance:
             gap0 += self.added_gap(nodes, pairing, config)
         u = config.displacement if displacement is None else displacement

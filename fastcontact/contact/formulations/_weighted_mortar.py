@@ -263,7 +263,7 @@ class WeightedMortar(Formulation):
         if not isinstance(self.primary, RigidSide) and self.slip == "symmetric":
             opening = means.motion @ slips.start - means.closer
             closing = Closing.of(means.normal, NodalNormals(self.secondary, deformed), opening, length)
-            slips = replace(slips, total=slips.total + closing.vector, closing=closing)
+            slips = replace(slips, total=slips.total + closing.length[:, None] * closing.mean, closing=closing)
         return replace(linearised, slips=slips)
 
     def _ends_within(self, config: Configuration, multiplier: Array) -> bool:
@@ -299,7 +299,7 @@ class WeightedMortar(Formulation):
         pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", config.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
         normals = "facet" if self.normals == "secondary" else self.normals
-        rise = self.smoothing_slope(candidates, pairing, rows, deformed)
+        rise = None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, deformed)
         points = faced(candidates, pairing, rows, self.primary, deformed, normals, config.pose, True, rise)
         weighted = scaled(csr_array(values.T @ assembled(functions, size)[:, rows]), 1.0 / means.weight)
         mean = csr_array(assembled(tests, size)[:, rows])

@@ -209,7 +209,9 @@ class SegmentMortar(PressureFieldFormulation):
         paired = np.repeat(pairing_of_points.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
         covered = np.bincount(facet, weights=np.where(paired, area, 0.0))
-        usable = paired & (covered > NO_AREA * total)[facet] & (area > 0) & ~candidates.belonging_to(self.excluded)
+        usable = paired & (covered > NO_AREA * total)[facet] & (area > 0)
+        if self.excluded.any():
+            usable &= ~candidates.belonging_to(self.excluded)
         pairing = replace(pairing_of_points, paired=usable)
         usable_area, (n, k) = np.where(usable, area, 0.0), self.secondary.facets.shape
         mass = np.zeros((n, k, k))
