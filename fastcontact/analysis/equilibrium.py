@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
+from operator import itemgetter
 from typing import Any, Protocol
 
 import numpy as np
@@ -353,7 +354,7 @@ class StepEquilibrium:
         history, scatter = ([], None) if self.settled is None else (self.settled.iterate.history, self.settled.scatter)
         counts: dict[str, Any] = {
             "geometry_updates": max(len(history) - 1, 0),
-            "active_set_iterations": sum(entry["active_set_iterations"] for entry in history),
+            "active_set_iterations": sum(map(itemgetter("active_set_iterations"), history)),
             "linear_iterations": linear_iterations,
             "history": history,
             **({} if scatter is None else {"scatter": asdict(scatter)}),
@@ -361,7 +362,7 @@ class StepEquilibrium:
         if self.terms is None:
             return counts
         keys = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
-        newton_sums = {name: sum(entry[key] for entry in self.newton) for name, key in keys.items()}
+        newton_sums = {name: sum(map(itemgetter(key), self.newton)) for name, key in keys.items()}
         return {**counts, **newton_sums, "history": self.newton}
 
 

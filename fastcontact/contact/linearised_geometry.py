@@ -63,7 +63,8 @@ class NodalNormals:
     def along(self, du: Array) -> Array:
         """Return the variation (m, dim) [-] of the normals for a variation `du` (n_points, dim) of displacements [length]."""
         rate = (largest(du[self._side.points]) or 1.0) / self._step
-        ahead, behind = (nodal_normals(self._side, self._coordinates + sign / rate * du) for sign in (0.5, -0.5))
+        ahead = nodal_normals(self._side, self._coordinates + 0.5 / rate * du)
+        behind = nodal_normals(self._side, self._coordinates - 0.5 / rate * du)
         return np.asarray(rate * (ahead - behind))
 
 

@@ -26,7 +26,7 @@ from fastcontact.analysis.friction.cone_newton import (
     compliance_of_each,
     held_tangents,
 )
-from fastcontact.analysis.solution import Accuracy, Forces, Path, Response, SlipSoFar, Solution, in_increments, response
+from fastcontact.analysis.solution import Accuracy, Forces, Path, SlipSoFar, Solution, in_increments, response
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import normals
@@ -203,35 +203,8 @@ def _with_included(
         u, all_forces[0], gaps[0], active, active, result.settled, result.iterations, all_forces[1:].T, gaps[1:].T,
         sticking, result.residual, constraints.directions,
         slip_so_far=None if before is None else _slip_so_far(before, Q, rows, constraints),
-        response=partial(_response, loaded, (R, rows, Q), held_slips, (F, Law(mu, equations), at_end)),
+        response=lambda: response(loaded, R, rows, dense.response(F, Law(mu, equations), at_end, held_slips, Q)),
     )  # fmt: skip
-
-
-def _response(
-    loaded: Loaded, rows_and_rotation: tuple[csr_array, Indices, csr_array | None], held_slips: Mask,
-    forces: tuple[Array, Law, Forces],
-) -> Response:  # fmt: skip
-    """Return the linear response of a solution to additional forces and gaps.
-
-    Parameters
-    ----------
-    loaded : Loaded
-    rows_and_rotation : (csr_array ((1 + k) q, n), ndarray of int (q,), csr_array or None)
-        R, and the numbers of its q constraints; rotation Q of their tangents.
-    held_slips : ndarray of bool (k, q)
-        Held tangents, along which slips do not vary.
-    forces : tuple
-        Arguments of `dense.response`.
-    """
-    (R, rows, Q), force_change = rows_and_rotation, dense.response(*forces)
-
-    def forces_of(values: Array) -> Array:
-        values = (values if Q is None else Q @ values).reshape(1 + len(held_slips), len(rows))
-        values[1:][held_slips] = 0.0
-        change = force_change(values).ravel()
-        return change if Q is None else np.asarray(Q.T @ change)
-
-    return response(loaded, R, rows, forces_of)
 
 
 def _slip_so_far(
