@@ -100,22 +100,9 @@ class Surface:
         """Order of the facets: 1 if all facets are linear, otherwise 2."""
         return max(elements.get(block.element).order for block in self.blocks)
 
-    @cached_property
-    def element(self) -> str:
-        """Name of the element type of the facets; ContactError if there are several types."""
-        return self._only_block().element
-
-    @cached_property
-    def facets(self) -> Numbers:
-        """`FacetBlock.facets` (n_facets, n_nodes) of the only block; ContactError if there are several."""
-        return self._only_block().facets
-
-    @cached_property
-    def local(self) -> Indices:
-        """`FacetBlock.local` (n_facets, n_nodes) of the only block; ContactError if there are several."""
-        return self._only_block().local
-
-    def _only_block(self) -> FacetBlock:
+    @property
+    def only_block(self) -> FacetBlock:
+        """The only block of facets; ContactError if there are several."""
         if len(self.blocks) > 1:
             raise ContactError(
                 f"group '{self.group}' mixes facets of {' and '.join(block.element for block in self.blocks)}, which this "

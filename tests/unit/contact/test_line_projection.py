@@ -52,7 +52,7 @@ def cross(a, b):
 def test_against_a_plain_root_on_every_facet(element):
     """Height over the surface is small, so that each point has one projection: that of a bracketed root."""
     mesh, side = wavy(element)
-    reference = elements.get(side.element)
+    reference = elements.get(side.only_block.element)
     rng = np.random.default_rng(5)
     x = rng.uniform(0.1, 3.9, 60)
     candidates = np.column_stack([x, 1.0 + 0.3 * np.sin(2.5 * x) + rng.uniform(0.0, 0.1, 60)])
@@ -61,7 +61,7 @@ def test_against_a_plain_root_on_every_facet(element):
 
         def aside(s, f, point=point):
             N = reference.shape(np.array([[s]]))[0]
-            return float(cross(point - N @ mesh.points[side.facets[f]], N @ normals[f]))
+            return float(cross(point - N @ mesh.points[side.only_block.facets[f]], N @ normals[f]))
 
         roots = [
             (f, brentq(aside, -1.0, 1.0, args=(f,), xtol=1e-14))
