@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,7 @@ from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies, NonlinearBodies
 from fastcontact.elasticity.springs import stiffened, too_stiff
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
@@ -47,6 +49,8 @@ from fastcontact.model.rigid_motions import FreeMotions, free_motions
 from fastcontact.round_off import SINGLE_PRECISION
 
 ByRamp = Mapping[PartHistory, Array]
+# Shear of nodes that close and slide which is neglected by default, relative to the frictional capacity.
+NEGLIGIBLE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,6 +163,23 @@ class Problem:
         """Whether the contact geometry is updated until displacements converge; otherwise the number of updates is fixed."""
         return self.criteria.geometry_updates is None and not self.criteria.keep_pairing
 
+    @cached_property
+    def friction_while_touching(self) -> float:
+        """`Criteria.friction_while_touching` or its default; 1 means that friction is solved in whole steps.
+
+        With nonlinear bodies it is 1, because their steps are halved instead. Between bodies the default is 1 unless each
+        node has one weighted gap: the other formulations reproduce code_aster, which counts slip from the beginning of the
+        step.
+        """
+        criteria, floats = self.criteria, self.floating_bodies is not None
+        if self.bodies is not None:
+            return 1.0
+        if criteria.friction_while_touching is not None:
+            return criteria.friction_while_touching
+        whole_steps = self.model.mesh.dim == 3 or criteria.geometry_updates is not None or floats
+        pairs = [pair for pair in self.pairs.values() if pair.friction and not isinstance(pair.primary, RigidSide)]
+        return NEGLIGIBLE if not whole_steps and all(pair.weighs_gaps for pair in pairs) else 1.0
+
     @property
     def extrapolates(self) -> bool:
         """Whether load steps start from an extrapolation of earlier ones."""
@@ -173,8 +194,7 @@ class Problem:
     def load_at(self, instant: float) -> StepLoad:
         """Return the loads at an instant of the ramp."""
         prescribed = combined(self.prescribed, self.ramp, instant, self.shape)
-        factors = [multiplier(relation.ramp, self.ramp, instant) for relation in self.model.relations]
-        lift = self.system.lift(prescribed.ravel(), factors)
+        lift = self.system.lift(prescribed.ravel(), self.factors(self.model.relations, instant))
         obstacles, clearance_factors, angles, friction_factors, fluids = {}, {}, {}, {}, {}
         for pair in self.model.contact:
             side = self.pairs[pair.name].primary
@@ -195,9 +215,9 @@ class Problem:
         return StepLoad(lift, force, obstacles, clearance_factors, angles, following, friction_factors, fluids, rise)
 
     def factors(
-        self, histories: Iterable[Temperature | InitialState | Pretension | Load], instant: float
+        self, histories: Iterable[Temperature | InitialState | Pretension | Load | MultiPointConstraint], instant: float
     ) -> list[float]:
-        """Return the multipliers of temperatures, initial states, pretension sections or loads at an instant [-]."""
+        """Return the multipliers of loads, temperatures and other parts of the model at an instant [-]."""
         return [multiplier(history.ramp, self.ramp, instant) for history in histories]
 
     def displacement(self, u: Array) -> Array:

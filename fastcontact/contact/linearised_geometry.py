@@ -32,7 +32,6 @@ from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, Pairing, normals, tangents
 from fastcontact.contact.projection import (
     Places,
-    at_nodes_of_facets,
     nodal_normals,
     places,
     smooth_normals,
@@ -64,7 +63,8 @@ class NodalNormals:
     def along(self, du: Array) -> Array:
         """Return the variation (m, dim) [-] of the normals for a variation `du` (n_points, dim) of displacements [length]."""
         rate = (largest(du[self._side.points]) or 1.0) / self._step
-        ahead, behind = (nodal_normals(self._side, self._coordinates + sign / rate * du) for sign in (0.5, -0.5))
+        ahead = nodal_normals(self._side, self._coordinates + 0.5 / rate * du)
+        behind = nodal_normals(self._side, self._coordinates - 0.5 / rate * du)
         return np.asarray(rate * (ahead - behind))
 
 
@@ -98,7 +98,7 @@ class InterpolatedNormals:
     @classmethod
     def smooth(cls, side: Surface, coordinates: Array, facet: Indices, at: Places) -> InterpolatedNormals:
         """Return the interpolated `smooth_normals` of a side at the places `at` of its facets `facet` (n,)."""
-        at_nodes = at_nodes_of_facets(smooth_normals(side, coordinates))[facet]
+        at_nodes = smooth_normals(side, coordinates)[facet]
         return cls(NodalNormals(side, coordinates), at.local, at.shape, at_nodes)
 
     def bend(self, gradient: Array) -> Array:

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 
 from fastcontact._jit import parallel
-from fastcontact._tools.argument_types import typed
+from fastcontact._tools.argument_types import typed, unchecked
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.elasticity import dilatation, dilatation_kernels, incompatible_modes, incompatible_modes_kernels
 from fastcontact.elasticity.energy import gradients_at
@@ -264,7 +264,7 @@ def nodal_stress(
             rows = slice(first, first + len(buffer))
             values = buffer[: len(block) - first]
             stress.fill(name, xi, block[rows], material[name][rows], values, np.arange(first, first + len(values)))
-            average.add(slots[name][rows], element.extrapolation, values)
+            _add(average, slots[name][rows], element.extrapolation, values)
     return average.result()
 
 
@@ -297,6 +297,9 @@ class NodalAverage:
         """Return the mean (n_points, n_components) [pressure], zero at points without cells; call this method only once."""
         self._total /= np.maximum(self._count, 1.0)[:, None]
         return self._total
+
+
+_add = unchecked(NodalAverage.add)
 
 
 @typed(ModelError)

@@ -43,10 +43,10 @@ from fastcontact.contact.linearised_geometry import (
     faced,
 )
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import FACING, Candidates, Normals, padded, pair, tangents
-from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
+from fastcontact.contact.pairing import FACING, Candidates, Normals, pair, tangents
+from fastcontact.contact.projection import nodal_normals, normals_at_nodes, smooth_normals
 from fastcontact.contact.search.limits import BEYOND
-from fastcontact.contact.surface import Surface
+from fastcontact.contact.surface import Surface, padded
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, scaled
 from fastcontact.mesh import elements
@@ -180,7 +180,9 @@ class WeightedMortar(Formulation):
         """See `Formulation`; a node with dual functions and a small overlap may have a gap in every other pairing."""
         covered = np.zeros(1) if constraints.nodal is None else np.asarray(constraints.nodal.covered)
         small = (
-            self.multipliers == "dual" and not self.options.tied and bool(((covered > 0.0) & (covered < LEAST)).any())
+            self.multipliers == "dual"
+            and self.options.kind != "tied"
+            and bool(((covered > 0.0) & (covered < LEAST)).any())
         )
         return small or super().alternates(constraints)
 
@@ -188,7 +190,7 @@ class WeightedMortar(Formulation):
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
         means = self._means(self.points + config.displacement, config)
         # Tied pairs have separate equations for the directions in which both sides are held.
-        held = self.without_slip(config) if self.has_tangents and not self.options.tied else []
+        held = self.without_slip(config) if self.has_tangents and self.options.kind != "tied" else []
         constraints, slip_data = self._weighted_gaps(config, means, held)
         return replace(constraints, geometry=partial(self._linearised, config, means, held, constraints, slip_data))
 
@@ -215,11 +217,12 @@ class WeightedMortar(Formulation):
         constraints = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=pressures)
         if not self.has_tangents:
             return constraints, None
-        candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
         projectors = np.zeros((*normal.shape, normal.shape[1]))
         for axis, nodes_held in held:
             projectors[nodes_held] += axis[nodes_held, :, None] * axis[nodes_held, None, :]
-        mu, directions, slip_axes = self.options.friction_axes(self.friction, tangents(normal, projectors), candidates)
+        mu, directions, slip_axes = self.options.friction_axes(
+            self.friction, tangents(normal, projectors), self.at_nodes
+        )
         slips, substitutions = self._slips(slip_axes, held, coverage, mean, rows, weight)
         length, closing_direction = self._closing_motion(constraints, normal, config)
         closing = length[:, None] * closing_direction
@@ -249,7 +252,7 @@ class WeightedMortar(Formulation):
             coverage = self._coverage(overlap, weights, like.with_gap, like.values)
         rows, across, closer = self._weighted_integrals(coverage)
         # The gap of an excluded node is omitted, but the functions of its neighbours are not extended over its area.
-        sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
+        sums = np.where(self.excluded[self.secondary.points], 0.0, np.asarray(rows.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         mean = scaled(csr_array(rows - across), 1.0 / weight)
         normal = self._mean_normals(overlap, deformed, config.pose)
@@ -328,7 +331,7 @@ class WeightedMortar(Formulation):
         pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", config.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
         normals = "facet" if self.normals == "secondary" else self.normals
-        rise = self.smoothing_slope(candidates, pairing, rows, deformed)
+        rise = None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, deformed)
         points = faced(candidates, pairing, rows, self.primary, deformed, normals, config.pose, True, rise)
         weights, *others = (
             scaled(csr_array(values.T @ assembled(entries, size)[:, rows]), 1.0 / means.weight) for entries in functions
@@ -336,9 +339,10 @@ class WeightedMortar(Formulation):
         mean = csr_array(assembled(tests, size)[:, rows])
         separate_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
-            column = self.secondary.points[:, None]
-            at_nodes, all_nodes = Candidates(column, np.ones(column.shape)), np.arange(len(column))
-            separate_normals = faced(at_nodes, pairing, all_nodes, self.primary, deformed, self.normals, config.pose)
+            all_nodes = np.arange(len(self.secondary.points))
+            separate_normals = faced(
+                self.at_nodes, pairing, all_nodes, self.primary, deformed, self.normals, config.pose
+            )
         elif self.normals == "secondary":
             separate_normals = NodalNormals(self.secondary, deformed)
         arguments = points, weights, means.normal, multiplier, mean, separate_normals
@@ -491,14 +495,14 @@ class WeightedMortar(Formulation):
         if not isinstance(self.normals, str):
             return np.tile(np.array(self.normals), (len(self.secondary.points), 1))
         mean = np.zeros((len(self.secondary.points), deformed.shape[1]))
-        normals_of = {
-            block.element: facet_normals(block, deformed) if self.normals == "facet" else smooth
-            for block, smooth in zip(self.primary.blocks, smooth_normals(self.primary, deformed), strict=True)
-        }
+        normals = (normals_at_nodes if self.normals == "facet" else smooth_normals)(self.primary, deformed)
+        of_blocks = np.split(normals, np.cumsum(self.primary.sizes)[:-1])
+        normals_of = dict(zip((block.element for block in self.primary.blocks), of_blocks, strict=True))
         tests = dict(zip((block.element for block in self.secondary.blocks), self._test, strict=True))
         for coupling in overlap.couplings:
             secondary_facet, primary_facet = coupling.pairs.T
-            integral = coupling.integrals @ normals_of[coupling.primary.element][primary_facet]
+            at_nodes = normals_of[coupling.primary.element][primary_facet, : coupling.primary.facets.shape[1]]
+            integral = coupling.integrals @ at_nodes
             np.add.at(mean, coupling.secondary.local[secondary_facet], tests[coupling.secondary.element] @ integral)
         self.secondary.add_across_ends(mean)
         length, overall = np.linalg.norm(mean, axis=1, keepdims=True), mean.sum(axis=0)
