@@ -300,8 +300,8 @@ def recover(
         if factors:
             iterations[f"{name}_factors"] = factors
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
-    if references := reference_reactions(problem.model, reaction, u):
-        iterations["reference_reactions"] = references
+    if points := problem.reference_points:
+        iterations["reference_reactions"] = reference_reactions(problem.model, points, reaction, u)
     if sections:
         factors = problem.factors(sections, instant[1])
         iterations["pretension"] = section_results(sections, u, reaction, factors)

@@ -40,6 +40,7 @@ from fastcontact.linear import choice
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 from fastcontact.linear.sparse_rows import stacked_rows, sum_of_blocks
 from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import ROTATION
 from fastcontact.model.contact_pair import angle_at
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.model import Model
@@ -162,6 +163,14 @@ class Problem:
     def until_settled(self) -> bool:
         """Whether the contact geometry is updated until displacements converge; otherwise the number of updates is fixed."""
         return self.criteria.geometry_updates is None and not self.criteria.keep_pairing
+
+    @cached_property
+    def reference_points(self) -> dict[str, tuple[int, int]]:
+        """Numbers of the points with the displacement and the rotation of each supported reference point, by name."""
+        mesh, (supported, _) = self.model.mesh, self.model.prescribed()
+        names = [name for name in mesh.point_groups if name + ROTATION in mesh.point_groups]
+        points = {name: (mesh.point(name), mesh.point(name + ROTATION)) for name in names}
+        return {name: pair for name, pair in points.items() if supported[list(pair)].any()}
 
     @cached_property
     def friction_while_touching(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +21,6 @@ from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.springs import ground_force
 from fastcontact.errors import ContactError, ModelError, unknown
-from fastcontact.mesh.mesh import ROTATION
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -417,19 +416,14 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     return by_support
 
 
-def reference_reactions(model: Model, reaction: Array, u: Array) -> dict[str, dict[str, list[float]]]:
-    """Return `StepResult.reference_reactions`, given the reactions [force] and displacements [length] (n_points, dim)."""
-    groups, supported = model.mesh.point_groups, model.prescribed()[0]
-    points = {
-        name: (model.mesh.point(name), model.mesh.point(name + ROTATION))
-        for name in groups
-        if name + ROTATION in groups
-    }
-    points = {name: pair for name, pair in points.items() if supported[list(pair)].any()}
-    if not points:
-        return {}
-    nodal = _at_supports(model, model.relations, supported, reaction, u)[0]
-    moments = 1 if model.mesh.dim == 2 else 3
+def reference_reactions(
+    model: Model, points: Mapping[str, tuple[int, int]], reaction: Array, u: Array
+) -> dict[str, dict[str, list[float]]]:
+    """Return `StepResult.reference_reactions` of the `points` that `Problem.reference_points` contains.
+
+    The arguments are the reactions [force] and displacements `u` [length] (n_points, dim).
+    """
+    nodal, moments = _at_supports(model, model.relations, model.prescribed()[0], reaction, u)[0], 2 * model.mesh.dim - 3
     return {
         name: {"force": nodal[point].tolist(), "moment": nodal[rotation, :moments].tolist()}
         for name, (point, rotation) in points.items()
