@@ -306,7 +306,7 @@ def prepare(
             )
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,
-        tolerance=choice.tight_enough(linear_tolerance, criteria.relative),
+        tolerance=choice.limited_tolerance(linear_tolerance, criteria.relative),
         columns=not all(pair.eliminable for pair in pairs.values()), quadratic=linear_with_quadratic_cells(model),
     )  # fmt: skip
     field = model.material_field()

@@ -19,7 +19,7 @@ from fastcontact.elasticity.constrained_system import System, supports_apart
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.elimination.coupled_pivots import RepeatedError
 from fastcontact.linear.elimination.elimination import eliminate
-from fastcontact.linear.multigrid.hierarchy import COARSEST
+from fastcontact.linear.multigrid.hierarchy import COARSEST_SIZE
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS, Multigrid
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -58,7 +58,7 @@ def lowest(
         If the iteration does not converge.
     """
     K, M = matrices
-    if free.sum() < max(COARSEST, 3 * n):
+    if free.sum() < max(COARSEST_SIZE, 3 * n):
         return _dense_eigenpairs(K, M, np.flatnonzero(free), n, shift)
     shifted = bsr_array(K + shift * M)
     shifted.sort_indices()

@@ -20,7 +20,8 @@ class Direct(FactorSolver):
 
     def __init__(self, tolerance: float = ATTAINABLE) -> None:
         super().__init__(tolerance)
-        # Symbolic factorisations of tangents (True), which the solvers of all tangents share, and of other matrices (False).
+        # Symbolic factorisation of tangents (True), which is shared by the solvers of all tangents, and that of other
+        # matrices (False).
         self._symbolic: dict[bool, SymbolicFactors] = {}
 
     def __repr__(self) -> str:

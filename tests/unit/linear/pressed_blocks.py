@@ -50,7 +50,7 @@ def assert_agree(model, most, within=1e-8):
     """Multigrid finds what factors find, without columns or factors, in `most` iterations."""
     solver, step = solved(model, "amg")
     assert not solver.replacement_reason
-    assert not solver.columns.asked
+    assert not solver.columns.requests
     assert solver.counters.iterations <= most
     found, exact = step.contact["c"], solved(model, "direct")[1].contact["c"]
     size = np.abs(exact.force_vectors).max()

@@ -401,7 +401,7 @@ def test_bits_do_not_depend_on_the_number_of_threads(monkeypatch):
     found = []
     before = threads()
     monkeypatch.setattr(parallel, "WORTHWHILE", 1000)
-    monkeypatch.setattr(matrices, "SHORTEST", 64)
+    monkeypatch.setattr(matrices, "MIN_ROWS", 64)
     for count in (1, 2, 3):
         set_threads(count)
         solver, f, fixed = prepared()
