@@ -32,7 +32,7 @@ from fastcontact.analysis.inequalities import Iterate, StepContext
 from fastcontact.analysis.problem import Problem, StepLoad, linearised
 from fastcontact.analysis.tolerances import DECLINE, WINDOW
 from fastcontact.arrays import Array, largest
-from fastcontact.elasticity.nonlinear_bodies import WHOLE
+from fastcontact.elasticity.nonlinear_bodies import COMPLETE
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.choice import LOOSEST
 from fastcontact.linear.protocol import TOLERANCE, Loaded
@@ -89,7 +89,7 @@ class Regularisation:
         Whether the springs along closed gaps replace those of floating bodies, provided that they resist all free motions.
     """
 
-    geometric: int = WHOLE
+    geometric: int = COMPLETE
     gap_stiffness: float = 0.0
     stiff: bool = False
     replaces: bool = False
@@ -97,7 +97,7 @@ class Regularisation:
     @property
     def linear(self) -> bool:
         """Whether iterations with this tangent converge linearly only."""
-        return self.geometric < WHOLE or self.gap_stiffness > 0.0
+        return self.geometric < COMPLETE or self.gap_stiffness > 0.0
 
 
 class _Newton:
@@ -279,7 +279,7 @@ class _Newton:
         if self._regularisation in with_springs:
             unmodified = []  # the unmodified tangent failed before
         geometric = self._regularisation.geometric
-        parts = range(min(geometric + 1, WHOLE))[::-1]
+        parts = range(min(geometric + 1, COMPLETE))[::-1]
         return [*unmodified, *with_springs, *(Regularisation(part, stiff=floats) for part in parts)]
 
     def _linearised_contact(
@@ -297,7 +297,7 @@ class _Newton:
             problem = replace(self._problem, linearised_at=u if bodies and bodies.finite else None)
         else:
             K = terms.tangent(u, regularisation.geometric)
-            contact = self._stiffness_of_contact(K, u, regularisation) if regularisation.geometric == WHOLE else None
+            contact = self._stiffness_of_contact(K, u, regularisation) if regularisation.geometric == COMPLETE else None
             problem = linearised(self._problem, K, u, contact, regularisation.stiff, regularisation.replaces)
         unbalanced, floating = self._load.force - terms.residual(u)[0], problem.floating_bodies
         # Under load, the tangent resists rigid-body rotations, which the unknowns of floating bodies do not include.
@@ -309,7 +309,7 @@ class _Newton:
         tolerance = min(max(problem.criteria.geometry, LOOSEST * changes[-1]), NOTABLE)
         inner_problem = replace(problem, criteria=replace(problem.criteria, geometry=tolerance))
         solution = self._contact(inner_problem, load, with_loads(problem, load), u, Extrapolation())
-        self._reusable = problem if regularisation.geometric == WHOLE else None
+        self._reusable = problem if regularisation.geometric == COMPLETE else None
         return solution
 
     def _is_at_rest(self, u: Array) -> bool:

@@ -10,7 +10,7 @@ from pressed_blocks import assert_agree, box, pressed, solved
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 import fastcontact as fc
-from fastcontact.elasticity.constrained_system import supports_apart
+from fastcontact.elasticity.constrained_system import separate_supports
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.linear.multigrid import loaded
 from fastcontact.linear.protocol import FrictionTerms
@@ -207,7 +207,7 @@ def test_springs_alone_precondition_the_matrix_that_they_are_part_of(kind):
         moduli = np.asarray([fc.LinearElastic(E=10.0, nu=0.3).moduli("3d")])
         K = stiffness(mesh, "3d", moduli, {"hex8": np.zeros(8, np.int64)})
         fixed = np.repeat(mesh.points[:, 1] == 0, 3)
-        K, modes = supports_apart(K, fixed)[0], np.where(fixed[:, None], 0.0, rigid_modes(mesh.points, "3d"))
+        K, modes = separate_supports(K, fixed)[0], np.where(fixed[:, None], 0.0, rigid_modes(mesh.points, "3d"))
     B, c = equations(fixed, 6)
     f = np.where(fixed, 0.0, 1.0)
     solver = prepared(K, modes, "double")
