@@ -214,7 +214,7 @@ class NodalForce(Load):
             if len(on_axis):
                 raise ModelError(
                     f"{self.name} has a radial component x on the axis of symmetry (number of points: {len(on_axis)}, first: "
-                    f"point {on_axis[0]}), where the circle that it acts along has no length: leave the points at x = 0 out"
+                    f"point {on_axis[0]}), where the circumference is zero: leave out the points at x = 0"
                 )
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:

@@ -272,8 +272,8 @@ class NonlinearBodies:
         J = np.linalg.det(self._deformation(name, slice(cell, cell + 1), displacement)).min()
         failure = f"is inverted (J = {J:.3g})"
         if status != body_kernels.INVERTED:
-            failure = "has no out-of-plane strain of zero stress"
-        return f"cell {cell} of {name} near {where} {failure}: smaller load steps, or a mesh that is coarser there, may help"
+            failure = "has no out-of-plane strain for which the out-of-plane stress is zero"
+        return f"cell {cell} of {name} near {where} {failure}: try smaller load steps, or a coarser mesh at this point"
 
     def _deformation(self, name: str, rows: slice, displacement: Array) -> Array:
         """Return the deformation gradients (n, n_q, 3, 3) [-] of cells, with F_zz = 1 in plane stress."""

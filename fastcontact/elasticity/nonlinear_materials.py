@@ -128,11 +128,11 @@ class ElasticPlastic(NonlinearElastic):
         if rows[0, 0] < 0.0 or not math.isclose(rows[0, 1], self.yield_stress):
             raise ModelError(
                 f"hardening begins with the yield stress {rows[0, 1]:g} at the plastic strain {rows[0, 0]:g}, where "
-                f"yield_stress = {self.yield_stress:g}: the first pair is (0, yield_stress), or left out"
+                f"yield_stress = {self.yield_stress:g}: the first pair must be (0, yield_stress), or be omitted"
             )
         slopes = np.diff(rows[:, 1]) / np.diff(rows[:, 0])
         if slopes.min(initial=0.0) <= -(3.0 * self.shear_modulus + self.kinematic):
-            raise ModelError("hardening falls faster than the elastic stress can: softening must be slower than 3 G")
+            raise ModelError("the yield stress decreases too fast: its slope must be greater than -(3 G + kinematic)")
         return tuple((float(p), float(s)) for p, s in rows)
 
     @property
@@ -348,9 +348,9 @@ class Ogden(OwnConstants):
         except (TypeError, ValueError, OverflowError):
             raise ModelError("mu and alpha of Ogden must be numbers, or lists with a number for each term") from None
         if len(terms[0]) != len(terms[1]) or not terms[0]:
-            raise ModelError(f"Ogden has {len(terms[0])} mu and {len(terms[1])} alpha: give the same number of both")
+            raise ModelError(f"Ogden has {len(terms[0])} mu and {len(terms[1])} alpha: their numbers must be equal")
         if not all(map(math.isfinite, terms[0] + terms[1])) or 0.0 in terms[1]:
-            raise ModelError("mu and alpha of Ogden must be finite, and no alpha zero")
+            raise ModelError("mu and alpha of Ogden must be finite, and alpha must not be zero")
         object.__setattr__(self, "mu", terms[0])
         object.__setattr__(self, "alpha", terms[1])
         self._set_initial_moduli(sum(terms[0]), "(the sum of mu)", self.bulk)

@@ -94,7 +94,7 @@ def _line(name: str, points: Array, first: int, second: int) -> Array:
     length = float(np.linalg.norm(line))
     if length <= ROUND_OFF * np.abs(points).max():
         raise ModelError(
-            f"{name}: points {first} and {second} coincide, and have no line between them: give x, y or z instead of "
+            f"{name}: points {first} and {second} coincide, so that no line connects them: give x, y or z instead of "
             "axial, or a direction"
         )
     return np.asarray(line / length)

@@ -108,7 +108,7 @@ def histories(
     factors, count = np.asarray(times, float), len(values)
     if factors.shape != (count,) or count < 2:
         raise ModelError(
-            f"the temperature has {count} instants, but {factors.size} times: give the load factor of each, at least two"
+            f"the temperature has {count} instants, but {factors.size} times: give one load factor per instant, at least two"
         )
     if not (np.isfinite(factors).all() and (np.diff(factors) > 0.0).all()):
         raise ModelError(f"the times of the temperature must ascend, not {factors.tolist()}")

@@ -163,8 +163,8 @@ class Varying:
             )
         if not column and len(values) == mesh.n_points and len(values) in (cells.count, total):
             raise ModelError(
-                f"{self._name} has {len(values)} numbers, but there are as many cells as points: give numbers of cells as a "
-                "column, shape (n, 1), and those of points as a function"
+                f"{self._name} has {len(values)} numbers, but there are as many cells as points: give values of cells as a "
+                "column, shape (n, 1), and values of points as a function"
             )
         if not np.isfinite(values).all():
             raise ModelError(f"{self._name} is not finite at row {int(np.flatnonzero(~np.isfinite(values))[0])}")

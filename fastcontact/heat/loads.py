@@ -136,7 +136,7 @@ class NodalHeat(Heating):
     ramp: Table | None = None
 
     def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
-        check_points(mesh, self.group, "nothing can heat it")
+        check_points(mesh, self.group, "no heat can be supplied to it")
 
     def power(self, mesh: Mesh, kinematics: str, deformed: Mesh) -> Array:
         """Return the heat flows (n_points,) [power] at multiplier 1; see `Heating.power`."""

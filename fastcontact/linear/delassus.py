@@ -35,9 +35,9 @@ class TooManyColumnsError(ConvergenceError):
 
     def __init__(self, count: int) -> None:
         super().__init__(
-            f"the contact needs {count} columns of the inverse stiffness, each of which takes a solution, since its "
-            "constraints cannot be eliminated, or its friction does not converge with eliminated constraints: use the direct "
-            f"solver, or {ELIMINABLE} and pairs that share no node"
+            f"the contact requires {count} columns of the inverse stiffness matrix, each of which is the solution of a "
+            "linear system, since its constraints cannot be eliminated, or friction does not converge with eliminated "
+            f"constraints: use the direct solver, or {ELIMINABLE} and pairs that share no node"
         )
 
 
@@ -53,8 +53,8 @@ def check_rows(count: int, limit: int | None = None) -> None:
     if count > limit:
         raise ContactError(
             f"the contact needs the full compliance of {count} constraints, a matrix of {8e-9 * count**2:.1f} GB that is "
-            f"factorised repeatedly (at most {limit} constraints are accepted), since the solver is direct or since they "
-            f'cannot be eliminated: use {ELIMINABLE}, with linear_solver="amg", or a coarser or smaller secondary side'
+            f"factorised repeatedly (at most {limit} constraints are accepted), since the solver is direct or they cannot be "
+            f'eliminated: use {ELIMINABLE}, with linear_solver="amg", or a coarser or smaller secondary side'
         )
 
 

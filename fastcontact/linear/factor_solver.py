@@ -161,7 +161,7 @@ class FactorSolver(LinearSolver):
         """Apply one step of iterative refinement from now on; see `LinearSolver.improve`."""
         if self.refines:
             return False
-        log.info("linear solver: forces are out of balance by %.1e times the bound, solutions are refined", excess)
+        log.info("linear solver: out-of-balance forces are %.1e times the bound; solutions will be refined", excess)
         self.refines = True
         return True
 

@@ -58,7 +58,7 @@ class LoadedIteration(Loaded):
             try:
                 elimination = eliminate(B, c, None, nodes, solver.K.blocksize[0]) if B.shape[0] else None
             except RepeatedError as repeated:
-                log.info("%s: their compliance is formed", repeated)
+                log.info("%s (the Delassus operator is formed instead)", repeated)
             else:
                 u = solver.solution(self._f, elimination, guess, monitor, tolerance)
                 return u, solver.multiplier(elimination, u, self._f)
@@ -85,7 +85,7 @@ def tighten(solver: LinearSolver, excess: float) -> bool:
     if not tolerance < solver.tolerance:
         return False
     log.info(
-        "linear solver: forces are out of balance by %.1e times the bound, its tolerance falls from %.1e to %.1e",
+        "linear solver: out-of-balance forces are %.1e times the bound; the tolerance is reduced from %.1e to %.1e",
         excess, solver.tolerance, tolerance,
     )  # fmt: skip
     solver.original_tolerance = solver.original_tolerance or solver.tolerance

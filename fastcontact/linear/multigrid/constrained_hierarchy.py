@@ -124,17 +124,16 @@ class ConstrainedHierarchy:
         return change.nodes[(factors > SMALLEST_STIFFENING) & ~np.isin(change.nodes, elimination.pivots // size)]
 
     def _exchange_roles(
-        self, elimination: Elimination, springs: Springs | None, stiffened: Indices, spring_changes: list[LocalChange]
+        self, elimination: Elimination, springs: Springs | None, nodes: Indices, spring_changes: list[LocalChange]
     ) -> list[SymmetricChange]:
         """Make stiffened nodes follow the pivots in corrections from coarser levels, and return the changes of these levels.
 
-        `stiffened` (k,) contains the numbers of the nodes, and `spring_changes` the changes of diagonal blocks due to
+        `nodes` (k,) contains the numbers of the stiffened nodes, and `spring_changes` the changes of diagonal blocks due to
         springs. See `stiffened_nodes`.
         """
         finest, size = self.hierarchy.levels[0], len(self.A.rows)
-        inverses = self._inverse_blocks(stiffened, spring_changes)
-        finest.free_motions = FreeMotions(elimination.weights, stiffened, inverses)
-        following = followers(elimination, stiffened, size)
+        finest.free_motions = FreeMotions(elimination.weights, nodes, self._inverse_blocks(nodes, spring_changes))
+        following = followers(elimination, nodes, size)
         rounded = following.weights.astype(finest.b.dtype)
         finest.followers = replace(following, weights=rounded, force_weights=rounded)
         changes = [SymmetricChange.of_equations(self.A, *composed(elimination, following))]

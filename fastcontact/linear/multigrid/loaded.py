@@ -53,7 +53,7 @@ class LoadedMultigrid(LoadedIteration):
                 else:
                     parts = self._parts(B, c, C, nodes)
             except RepeatedError as repeated:
-                log.info("%s: their compliance is formed", repeated)
+                log.info("%s (the Delassus operator is formed instead)", repeated)
         if parts is None:
             return super().solve(B, c, C, guess, monitor, tolerance, nodes)
         return self._solution(parts, c, guess, monitor, tolerance)

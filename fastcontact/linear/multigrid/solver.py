@@ -416,7 +416,7 @@ class Multigrid:
         if times < MAX_RAISES or self.precision == "double":
             self.hierarchy.raise_bounds(BOUND_FACTOR)
             return
-        log.info("multigrid: single precision is not enough for this matrix, the cycle continues in double precision")
+        log.info("multigrid: single precision is insufficient for this matrix; the cycle continues in double precision")
         reduced = self._reduced
         self.build_in("double")
         self.constrain(reduced.elimination, reduced.springs)
