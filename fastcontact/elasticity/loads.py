@@ -297,7 +297,7 @@ def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:
 
 
 def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
-    """Return the facets `block` (n, n_nodes), oriented such that their normals point out of the solid.
+    """Return facets (n, n_nodes), given as `block` (n, n_nodes), with normals that point out of the solid.
 
     Raises ModelError, with the name of the `group`, if a facet does not lie on the outside of a solid.
     """

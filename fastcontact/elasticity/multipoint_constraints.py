@@ -69,7 +69,7 @@ class TemporaryConstraint(MultiPointConstraint):
     def after(self, reached: Array) -> list[MultiPointConstraint]:
         """Return the constraints that begin at the instant `begins`.
 
-        `reached` (m,) contains the values of ``rows @ u`` at this instant [length times the unit of the coefficients].
+        `reached` (m,) [length times the unit of the coefficients] contains the values of ``rows @ u`` at this instant.
         """
         if self.keeps:
             return [MultiPointConstraint(self.name, self.rows, reached, ((0.0, 1.0),))]

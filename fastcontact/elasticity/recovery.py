@@ -79,8 +79,8 @@ class CellStress:
     def at(self, name: str, xi: Array, cells: Numbers, material: Numbers, rows: Indices) -> Array:
         """Return the stresses (n_cells, n, n_components) [pressure] at points `xi` (n, dim) [-] of cells of an element.
 
-        The integer arrays are the nodes of the cells, `cells` (n_cells, n_nodes), the numbers of the cells, `rows`
-        (n_cells,), and the material numbers of cells, `material` (n_cells,), or of quadrature points, (n_cells, n_q).
+        The integer arrays contain the nodes of the cells, `cells` (n_cells, n_nodes), their numbers, `rows` (n_cells,), and
+        the material numbers of cells, `material` (n_cells,), or of quadrature points, (n_cells, n_q).
         """
         out = np.empty((len(cells), len(xi), self._moduli.shape[1]))
         self.fill(name, xi, cells, material, out, rows)
@@ -250,7 +250,7 @@ def nodal_stress(
 
     To save memory, stresses at quadrature points are computed for a limited number of cells at a time. If `sides` is given,
     the result has one row for each slot of `sides` (n_slots, n_components), the mean at a node over the cells of one
-    material. The other arguments are those of `stress_at_points`.
+    material. The other arguments are as for `stress_at_points`.
     """
     stress = CellStress(mesh, kinematics, moduli, displacement, averaged, offset)
     slots = mesh.cells if sides is None else sides.cells

@@ -71,7 +71,7 @@ def joined(
 ) -> Springs:  # fmt: skip
     """Return springs between pairs of the `points` (n_points, dim) [length].
 
-    `ends` contains the first and the second points of the pairs, two arrays (n,) of int. Springs act along each axis in
+    The two arrays `ends` (n,) of int contain the first and the second points of the pairs. Springs act along each axis in
     `stiffness` [force / length]. Springs with the stiffnesses ``along["axial"]`` and ``along["transverse"]`` [force / length]
     act parallel and perpendicular to the line of a pair, or to the unit vector `direction` (dim,) [-]. Raises ModelError if
     the points of a pair are identical, or if they coincide and the line between them is needed.
@@ -115,7 +115,7 @@ def _directions(
 
 
 def with_springs(K: bsr_array, springs: Sequence[Springs]) -> bsr_array:
-    """Return the sum of the stiffness matrix `K` (n, n) and that of the springs [force / length]."""
+    """Return the sum (n, n) [force / length] of the stiffness matrix `K` (n, n) [force / length] and that of the springs."""
     if not springs:
         return K
     return sum_of_blocks(K, spring_stiffness(springs, K.shape[0]))

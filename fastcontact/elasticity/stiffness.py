@@ -170,8 +170,8 @@ def is_isotropic(moduli: Array) -> Mask:
 def of_cells(material: Numbers) -> Numbers:
     """Return one material number for each cell (n_cells,).
 
-    If `material` contains numbers of cells (n_cells,), they are returned unchanged. If it contains numbers of quadrature
-    points (n_cells, n_q), those of the first point of each cell are returned.
+    If `material` (n_cells,) contains numbers of cells, it is returned unchanged. If it contains numbers of quadrature points
+    (n_cells, n_q), those of the first point of each cell are returned.
     """
     return material if material.ndim == 1 else np.ascontiguousarray(material[:, 0])
 
@@ -249,8 +249,8 @@ def rigid_modes(points: Array, kinematics: str) -> Array:
     """Return the rigid-body modes (n_points * dim, n_modes) at `points` (n_points, dim) [length].
 
     The columns are the translation along the axis in axisymmetry, two translations and one rotation in plane models, and
-    three translations and three rotations in 3D. Translations are dimensionless. Rotations are about the mean of the points
-    and have the dimension of a length.
+    three translations and three rotations in 3D. The unit of the translations is [-]. The rotations are about the mean of the
+    points, and their unit is [length].
     """
     (n, dim), x = points.shape, points - points.mean(axis=0)
     planes = [(0, 1)] if dim == 2 else [(1, 2), (2, 0), (0, 1)]
