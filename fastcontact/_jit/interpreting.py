@@ -28,7 +28,7 @@ from fastcontact._jit.cache import KernelFiles, cache_folder
 # Limits for running a kernel in Python: number of entries of all arguments of a call, time of all its calls in one run [s],
 # and time of all its calls in all runs [s]. Python takes 1 to 8 microseconds per entry. The compilation of a kernel takes 0.2
 # to 3 seconds; for most kernels, it takes less than the last limit.
-MAX_ENTRIES, SECONDS, SECONDS_OF_RUNS = 200_000, 0.5, 1.0
+MAX_ENTRIES, MAX_SECONDS, MAX_SECONDS_OF_RUNS = 200_000, 0.5, 1.0
 # Name of the file, in the folder of the compiled kernels, with the time of uncompiled kernels in Python [s], by version.
 TIMES_FILE = "interpreted.json"
 # Types for which NumPy and Numba yield the same results. The two libraries promote smaller types differently, but types of
@@ -73,12 +73,12 @@ class Interpretable:
 
     def _is_small(self, arguments: tuple[Any, ...]) -> bool:
         """Return whether a call may run in Python: it is small, and the time so far is less than that of a compilation."""
-        if self.spent > SECONDS or entries(arguments) > MAX_ENTRIES:
+        if self.spent > MAX_SECONDS or entries(arguments) > MAX_ENTRIES:
             return False
         if _overdue or self.files is None:
             return True
         earlier = _earlier_times(self.files.folder).get(self.files.version, 0.0)
-        _overdue.extend([self] if earlier + self.spent > SECONDS_OF_RUNS else [])
+        _overdue.extend([self] if earlier + self.spent > MAX_SECONDS_OF_RUNS else [])
         return not _overdue
 
 

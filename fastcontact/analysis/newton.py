@@ -34,7 +34,7 @@ from fastcontact.analysis.tolerances import DECLINE, WINDOW
 from fastcontact.arrays import Array, largest
 from fastcontact.elasticity.nonlinear_bodies import COMPLETE
 from fastcontact.errors import ConvergenceError, ModelError
-from fastcontact.linear.choice import LOOSEST
+from fastcontact.linear.choice import MAX_TOLERANCE
 from fastcontact.linear.protocol import TOLERANCE, Loaded
 from fastcontact.round_off import SINGLE_PRECISION
 
@@ -306,7 +306,7 @@ class _Newton:
         iterate.u, iterate.history = u.copy(), []
         self._linear_tolerance = self._forcing(problem, load, u, unbalanced)
         # The contact geometry is iterated no further than the linearisation of the bodies is accurate.
-        tolerance = min(max(problem.criteria.geometry, LOOSEST * changes[-1]), NOTABLE)
+        tolerance = min(max(problem.criteria.geometry, MAX_TOLERANCE * changes[-1]), NOTABLE)
         inner_problem = replace(problem, criteria=replace(problem.criteria, geometry=tolerance))
         solution = self._contact(inner_problem, load, with_loads(problem, load), u, Extrapolation())
         self._reusable = problem if regularisation.geometric == COMPLETE else None
@@ -329,7 +329,7 @@ class _Newton:
             return None
         missing = largest(system.displacement(system.unknowns(u, lift), lift) - u)  # prescribed displacements
         ratio = max(largest(system.reduced(unbalanced)) / scale, missing and missing / max(largest(u), largest(lift)))
-        return LOOSEST * ratio if ratio**2 > self._tolerance else None
+        return MAX_TOLERANCE * ratio if ratio**2 > self._tolerance else None
 
     def _contact(
         self, problem: Problem, load: StepLoad, loaded: Loaded, u: Array, start: Extrapolation

@@ -17,11 +17,11 @@ from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 
 log = logging.getLogger("fastcontact")
 # For each solver that needs an optional package, the name of the package and of the extra of fastcontact that installs it.
-OPTIONAL = {"cholmod": ("kvxopt", "cholmod")}
+PACKAGES = {"cholmod": ("kvxopt", "cholmod")}
 KNOWN = tuple(name for _, name, _ in pkgutil.iter_modules(solvers.__path__))
-SOLVERS = tuple(name for name in KNOWN if name not in OPTIONAL or importlib.util.find_spec(OPTIONAL[name][0]))
+SOLVERS = tuple(name for name in KNOWN if name not in PACKAGES or importlib.util.find_spec(PACKAGES[name][0]))
 # Largest admissible relative residual.
-LOOSEST = 1e-3
+MAX_TOLERANCE = 1e-3
 # Number of unknowns, by dimension, above which a solution by multigrid is cheaper than a factorisation (measured, see
 # bench/README.md). If constraints require columns of K^-1, the limit is AFFORDABLE, because multigrid solves one linear
 # system for each column.
@@ -73,8 +73,8 @@ def make(
 
 def check_solver(name: str) -> None:
     """Raise a ModelError if the name of a linear solver is unknown, or if a package that it needs is missing."""
-    if name in OPTIONAL and name not in SOLVERS:
-        package, extra = OPTIONAL[name]
+    if name in PACKAGES and name not in SOLVERS:
+        package, extra = PACKAGES[name]
         raise ModelError(f"linear solver '{name}' needs the package {package}: pip install 'fastcontact[{extra}]'")
     if name not in (*SOLVERS, "auto"):
         raise ModelError(unknown("linear solver", name, [*SOLVERS, "auto"]))
@@ -82,8 +82,8 @@ def check_solver(name: str) -> None:
 
 def check_tolerance(tolerance: float) -> None:
     """Raise a ModelError if the tolerance of a linear solver is out of range."""
-    if not 0.0 < tolerance <= LOOSEST:
-        raise ModelError(f"linear_tolerance = {tolerance} must be positive and at most {LOOSEST}, such as 1e-10")
+    if not 0.0 < tolerance <= MAX_TOLERANCE:
+        raise ModelError(f"linear_tolerance = {tolerance} must be positive and at most {MAX_TOLERANCE}, such as 1e-10")
 
 
 def limited_tolerance(tolerance: float, relative: float) -> float:

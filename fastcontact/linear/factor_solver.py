@@ -23,11 +23,11 @@ from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF
 log = logging.getLogger("fastcontact")
 # Largest number of unknowns that are eliminated last. If there are more, computing the dense block of K^-1 costs more time
 # than it saves.
-MOST_LAST = 4000
+MAX_LAST_UNKNOWNS = 4000
 # Largest number of unknowns for which a factorisation is affordable, by dimension.
 AFFORDABLE = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 # Relative residual that direct solutions attain.
-ATTAINABLE = ROUND_OFF / 100
+ATTAINABLE_RESIDUAL = ROUND_OFF / 100
 # Number of right-hand sides that are stored. Loads and supports seldom have more independent ramps.
 STORED_LOADS = 4
 
@@ -102,8 +102,8 @@ class FactorSolver(LinearSolver):
     name: str
     iterative = False
 
-    def __init__(self, tolerance: float = ATTAINABLE) -> None:
-        self.tolerance = ATTAINABLE
+    def __init__(self, tolerance: float = ATTAINABLE_RESIDUAL) -> None:
+        self.tolerance = ATTAINABLE_RESIDUAL
         self.counters = Counters()
         self.n = 0
         self.factors: SymmetricFactors
@@ -127,7 +127,7 @@ class FactorSolver(LinearSolver):
             If K is singular.
         """
         self.n, self._K, self.refines = K.shape[0], K, False
-        last = np.empty(0, np.intp) if involved is None or len(involved) > MOST_LAST else involved
+        last = np.empty(0, np.intp) if involved is None or len(involved) > MAX_LAST_UNKNOWNS else involved
         self.factors = self._factorised(K, last)
         self.counters.setups += 1
         self.columns, self.known_loads = InverseColumns(self.n, self.factors.inverse_entries), KnownLoads(self.n)

@@ -73,7 +73,7 @@ def view_without_pyvista(patch):
 
 
 def solver_without_package(patch):
-    name = next(iter(linear.OPTIONAL))
+    name = next(iter(linear.PACKAGES))
     patch.setattr(linear, "SOLVERS", tuple(other for other in linear.SOLVERS if other != name))
     linear.make(name, dim=2, n_dofs=10)
 

@@ -21,7 +21,7 @@ from fastcontact.analysis.tolerances import RESIDUAL
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.choice import LOOSEST
+from fastcontact.linear.choice import MAX_TOLERANCE
 from fastcontact.linear.protocol import MILD_CONTRAST, FrictionTerms, LoadedNonsymmetric
 from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
@@ -198,14 +198,14 @@ class Eliminated:
     def _accuracy(self, y: Array, gaps: Array) -> float:
         """Return the relative residual to which the linear system of a step from forces `y` and `gaps` is solved.
 
-        It is proportional to the residual of the friction law, but at most LOOSEST: less accurate steps would change the
-        directions of small slips. The last step is solved to the full tolerance.
+        It is proportional to the residual of the friction law, but at most MAX_TOLERANCE: less accurate steps would change
+        the directions of small slips. The last step is solved to the full tolerance.
         """
         if not self._inexact:
             return self._tolerance
         force = float(np.abs(y).max(initial=0.0))
         residual = float(np.abs(self.law.residual(y, gaps)).max(initial=0.0))
-        return max(self._tolerance, min(RESIDUAL * residual / force, LOOSEST) if force else LOOSEST)
+        return max(self._tolerance, min(RESIDUAL * residual / force, MAX_TOLERANCE) if force else MAX_TOLERANCE)
 
     def finish(self) -> bool:
         """Use the full tolerance in further steps; return whether the last step was less accurate."""

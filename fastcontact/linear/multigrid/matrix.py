@@ -161,7 +161,7 @@ class ScaledMatrix:
     release : bool
         Whether the low parts may overwrite the numbers of K, which is empty afterwards. K and its parts are then never in
         memory at the same time, which reduces the peak memory with a million unknowns by a tenth.
-    near : ScaledMatrix, optional
+    like : ScaledMatrix, optional
         Matrix whose unit is reused, and also its storage if the pattern is the same. By default, the unit is chosen such that
         the largest stiffness is about one.
 
@@ -175,22 +175,22 @@ class ScaledMatrix:
     shape, blocksize : (int, int)
     """
 
-    def __init__(self, K: bsr_array, precision: str, release: bool = False, near: ScaledMatrix | None = None) -> None:
+    def __init__(self, K: bsr_array, precision: str, release: bool = False, like: ScaledMatrix | None = None) -> None:
         self.shape, self.blocksize = K.shape, K.blocksize
-        self._store(K, precision, release, near)
+        self._store(K, precision, release, like)
 
-    def _store(self, K: bsr_array, precision: str, release: bool, near: ScaledMatrix | None = None) -> None:
+    def _store(self, K: bsr_array, precision: str, release: bool, like: ScaledMatrix | None = None) -> None:
         self.unit = 1.0
         if precision == "double":
             self.scaled = block_matrix(K)
             return
-        if near is None:
+        if like is None:
             size = range(K.blocksize[0])
             largest = block_matrix(K).diagonal_blocks()[:, size, size].max()
             self.unit = float(0.5 ** np.round(np.log2(largest)))
         else:
-            self.unit = near.unit
-        self.scaled = _split_matrix(K, self.unit, release, None if near is None else near.scaled)
+            self.unit = like.unit
+        self.scaled = _split_matrix(K, self.unit, release, None if like is None else like.scaled)
 
     def change(self, precision: str) -> None:
         """Store the numbers for a cycle in another precision."""
@@ -225,10 +225,10 @@ class ScaledMatrix:
         return self.scaled.absolute_product(u) / self.unit
 
 
-def _split_matrix(K: bsr_array, unit: float, release: bool, near: BlockMatrix | None) -> BlockMatrix:
+def _split_matrix(K: bsr_array, unit: float, release: bool, like: BlockMatrix | None) -> BlockMatrix:
     """Return ``unit K``, split into high and low parts; see `ScaledMatrix` for `release`.
 
-    The storage of the matrix `near` is used if it has the same pattern.
+    The storage of the matrix `like` is used if it has the same pattern.
     """
     indptr, indices = (array.astype(np.int32, copy=False) for array in (K.indptr, K.indices))
     size, numbers = K.blocksize[0], K.data if K.data.base is None else K.data.base
@@ -237,8 +237,8 @@ def _split_matrix(K: bsr_array, unit: float, release: bool, near: BlockMatrix | 
         K.indptr, K.indices, K.data = np.zeros_like(indptr), indices[:0], np.empty((0, *K.blocksize))
     else:
         numbers = K.data.copy()
-    storage = ALL_BLOCKS if near is None else near.storage
-    if near is None or not (np.array_equal(indptr, near.indptr) and np.array_equal(indices, near.indices)):
+    storage = ALL_BLOCKS if like is None else like.storage
+    if like is None or not (np.array_equal(indptr, like.indptr) and np.array_equal(indices, like.indices)):
         storage = symmetric_storage(indptr, indices)
     n = numbers.size if storage is ALL_BLOCKS else len(storage[2]) * size * size
     high = np.empty(n, np.float32)

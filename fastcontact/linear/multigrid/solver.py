@@ -44,7 +44,7 @@ MOST_COLUMNS = 300
 MONITOR_INTERVAL = 2
 # Number of iterations before the first call of a monitor if `_contrast` is large, because the errors of soft parts are not
 # known earlier. The benchmark "nu 0.499" takes 123 iterations, and 132 with the first call after two iterations.
-FIRST_MONITOR_CONTRAST = 6
+FIRST_MONITOR_WITH_CONTRAST = 6
 # Largest admissible ratio of the estimated relative error of the displacements to the tolerance of the residual. It is
 # exceeded only if bodies differ in stiffness: forces in the stiff body then dominate the residual, and the soft body
 # converges later.
@@ -127,13 +127,13 @@ class Multigrid:
 
     def build(self, K: bsr_array, rigid_modes: Array, release: bool = False) -> None:
         """Build the hierarchy of K (n, n); see `LinearSolver.prepare`."""
-        n, near = K.shape[0], self._earlier_hierarchy
-        self.K = ScaledMatrix(K, self.precision, release, None if near is None else self.K)
+        n, earlier = K.shape[0], self._earlier_hierarchy
+        self.K = ScaledMatrix(K, self.precision, release, None if earlier is None else self.K)
         self._modes = rigid_modes.astype(np.float32)  # for `build_in`; single precision suffices
         self._cg = ConjugateGradients(n)
         self._residuals: ConjugateResiduals | None = None
         self._diagonal: Array | None = None
-        self._build(rigid_modes, near)
+        self._build(rigid_modes, earlier)
         self.columns = InverseColumns(n, self._inverse_entries, MOST_COLUMNS)
 
     def near(self) -> Self:
@@ -145,9 +145,9 @@ class Multigrid:
         new._earlier_hierarchy = self.hierarchy if self._reuses_levels[0] else None
         return new
 
-    def _build(self, rigid_modes: Array, near: Hierarchy | None = None) -> None:
-        """Build the hierarchy of the stored matrix, if possible with the coarser levels of the hierarchy `near`."""
-        renewed, self._earlier_hierarchy = None if near is None else near.renewed(self.K.scaled), None
+    def _build(self, rigid_modes: Array, earlier: Hierarchy | None = None) -> None:
+        """Build the hierarchy of the stored matrix, if possible with the coarser levels of an `earlier` hierarchy."""
+        renewed, self._earlier_hierarchy = None if earlier is None else earlier.renewed(self.K.scaled), None
         self._reuses_coarse_levels = renewed is not None
         self.hierarchy = Hierarchy(self.K.scaled, rigid_modes) if renewed is None else renewed
         self._constrained = ConstrainedHierarchy(self.hierarchy, self.K.scaled)
@@ -230,7 +230,7 @@ class Multigrid:
         self._begin(cg, f)
         limit = self._stopping_residual(tolerance or 0.0)
         count, attempts = 0, 0
-        first_monitor = MONITOR_INTERVAL if self._contrast <= MILD_CONTRAST else FIRST_MONITOR_CONTRAST
+        first_monitor = MONITOR_INTERVAL if self._contrast <= MILD_CONTRAST else FIRST_MONITOR_WITH_CONTRAST
         while not self._done(cg, limit, scale):
             if self._reuses_coarse_levels and count >= COST_OF_CHANGE:
                 self._build_anew()
