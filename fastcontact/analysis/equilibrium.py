@@ -25,7 +25,7 @@ from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, largest
-from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies
+from fastcontact.elasticity.nonlinear_bodies import COMPLETE, DeformedBodies
 from fastcontact.elasticity.springs import Springs, ground_force, spring_force, spring_stiffness
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
@@ -86,9 +86,9 @@ class Bodies(Term):
         force[: bodies.force.size] = bodies.force.ravel()
         return force, (bodies.energy, bodies.plastic_work)
 
-    def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
+    def tangent(self, u: Array, geometric: int = COMPLETE) -> bsr_array:
         """See `Term`; `geometric` selects how much of the geometric stiffness is included, see `NonlinearBodies.at`."""
-        if geometric < WHOLE or u is self._tangent_passed_at:
+        if geometric < COMPLETE or u is self._tangent_passed_at:
             return self._problem.deformed(u, self._start, self._rise, geometric=geometric).K
         self._tangent_passed_at = u
         return self.at(u).K
@@ -181,7 +181,7 @@ class Terms:
             force, energy = force + added, (energy[0] + stored[0], energy[1] + stored[1])
         return force, energy
 
-    def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
+    def tangent(self, u: Array, geometric: int = COMPLETE) -> bsr_array:
         """Return the sum of the tangents, see `Term`, of nonlinear bodies and all other terms."""
         K = self.bodies.tangent(u, geometric)
         for term in self._terms:

@@ -32,9 +32,9 @@ from fastcontact.analysis.inequalities import Iterate, StepContext
 from fastcontact.analysis.problem import Problem, StepLoad, linearised
 from fastcontact.analysis.tolerances import DECLINE, WINDOW
 from fastcontact.arrays import Array, largest
-from fastcontact.elasticity.nonlinear_bodies import WHOLE
+from fastcontact.elasticity.nonlinear_bodies import COMPLETE
 from fastcontact.errors import ConvergenceError, ModelError
-from fastcontact.linear.choice import LOOSEST
+from fastcontact.linear.choice import MAX_TOLERANCE
 from fastcontact.linear.protocol import TOLERANCE, Loaded
 from fastcontact.round_off import SINGLE_PRECISION
 
@@ -132,7 +132,7 @@ class Regularisation:
         Whether the springs along closed gaps replace those of floating bodies, provided that they resist all free motions.
     """
 
-    geometric: int = WHOLE
+    geometric: int = COMPLETE
     gap_stiffness: float = 0.0
     stiff: bool = False
     replaces: bool = False
@@ -140,7 +140,7 @@ class Regularisation:
     @property
     def linear(self) -> bool:
         """Whether iterations with this tangent converge linearly only."""
-        return self.geometric < WHOLE or self.gap_stiffness > 0.0
+        return self.geometric < COMPLETE or self.gap_stiffness > 0.0
 
 
 class _Newton:
@@ -299,7 +299,7 @@ class _Newton:
         if self._regularisation in with_springs:
             unmodified = []  # the unmodified tangent failed before
         geometric = self._regularisation.geometric
-        parts = range(min(geometric + 1, WHOLE))[::-1]
+        parts = range(min(geometric + 1, COMPLETE))[::-1]
         return [*unmodified, *with_springs, *(Regularisation(part, stiff=floats) for part in parts)]
 
     def _linearised_contact(
@@ -317,7 +317,7 @@ class _Newton:
             problem = replace(self._problem, linearised_at=u if bodies and bodies.finite else None)
         else:
             K = terms.tangent(u, regularisation.geometric)
-            contact = self._stiffness_of_contact(K, u, regularisation) if regularisation.geometric == WHOLE else None
+            contact = self._stiffness_of_contact(K, u, regularisation) if regularisation.geometric == COMPLETE else None
             problem = linearised(self._problem, K, u, contact, regularisation.stiff, regularisation.replaces)
         unbalanced, floating = self._load.force - terms.residual(u)[0], problem.floating_bodies
         # Under load, the tangent resists rigid-body rotations, which the unknowns of floating bodies do not include.
@@ -326,7 +326,7 @@ class _Newton:
         iterate.u, iterate.history = u.copy(), []
         self._linear_tolerance = self._forcing(problem, load, u, unbalanced)
         # The contact geometry is iterated no further than the linearisation of the bodies is accurate.
-        tolerance = min(max(problem.criteria.geometry, LOOSEST * changes[-1]), NOTABLE)
+        tolerance = min(max(problem.criteria.geometry, MAX_TOLERANCE * changes[-1]), NOTABLE)
         inner_problem = replace(problem, criteria=replace(problem.criteria, geometry=tolerance))
         loaded, step = (
             with_loads(problem, load),
@@ -336,7 +336,7 @@ class _Newton:
         settled = _contact(step, load, loaded, iterate, paired)
         solution = solve_displacements(problem, load, loaded, settled, u, self._linear_tolerance)
         self._settled = settled
-        self._reusable = problem if regularisation.geometric == WHOLE else None
+        self._reusable = problem if regularisation.geometric == COMPLETE else None
         return solution
 
     def _is_at_rest(self, u: Array) -> bool:
@@ -356,7 +356,7 @@ class _Newton:
             return None
         missing = largest(system.displacement(system.unknowns(u, lift), lift) - u)  # prescribed displacements
         ratio = max(largest(system.reduced(unbalanced)) / scale, missing and missing / max(largest(u), largest(lift)))
-        return LOOSEST * ratio if ratio**2 > self._tolerance else None
+        return MAX_TOLERANCE * ratio if ratio**2 > self._tolerance else None
 
     def _stiffness_of_contact(self, K: bsr_array, u: Array, regularisation: Regularisation) -> csr_array | None:
         """Return the stiffness that the last contact adds to a tangent at displacements u (n_dofs,) [force / length].

@@ -31,8 +31,8 @@ from fastcontact.elasticity.loads import Load
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
-from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies, NonlinearBodies
-from fastcontact.elasticity.springs import stiffened, too_stiff
+from fastcontact.elasticity.nonlinear_bodies import COMPLETE, DeformedBodies, NonlinearBodies
+from fastcontact.elasticity.springs import stiffness_warnings, with_springs
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ContactError
@@ -286,7 +286,7 @@ class Problem:
         )
 
     def deformed(
-        self, u: Array, start: State, rise: Array | None, *, geometric: int = WHOLE, tangent: bool = True
+        self, u: Array, start: State, rise: Array | None, *, geometric: int = COMPLETE, tangent: bool = True
     ) -> DeformedBodies:
         """Return the nonlinear bodies at displacements u (n_dofs,) [length], see `NonlinearBodies.at`.
 
@@ -335,15 +335,15 @@ def prepare(
             )
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,
-        tolerance=choice.tight_enough(linear_tolerance, criteria.relative),
+        tolerance=choice.limited_tolerance(linear_tolerance, criteria.relative),
         columns=not all(pair.eliminable for pair in pairs.values()), quadratic=linear_with_quadratic_cells(model),
     )  # fmt: skip
     field = model.material_field()
     solver.contrast = field.contrast
     sides = material_sides(mesh, field.distinct)
     K = stiffness(mesh, model.kinematics, field.moduli, field.moduli_rows, None, field.treatment)
-    warnings = too_stiff(K, model.springs)
-    K = stiffened(K, model.springs)
+    warnings = stiffness_warnings(K, model.springs)
+    K = with_springs(K, model.springs)
     system = System(
         driven.stiffness(K),
         driven.supported(supported).ravel(),
