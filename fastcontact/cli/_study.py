@@ -138,7 +138,7 @@ def run_interruptibly(options: Namespace, study: Callable[..., Any]) -> Any:
 
 
 def report(options: Namespace, result: Any, hint: str, failures: Sequence[str] = (), also: Sequence[str] = ()) -> int:
-    """Write the files of the options, print the result and return the exit code.
+    """Write the requested files, print the result and return the exit code.
 
     The function prints the messages of failed runs (`failures`), the lines of the result and the names of the files. `also`
     contains the names of files that were written before, and `hint` is printed if no file was written.

@@ -32,7 +32,7 @@ ARGUMENTS = {
 
 
 def run(options: Namespace) -> int:
-    """Run the study, write the files of the options and print the results; return 2 if a run failed."""
+    """Run the study, write the requested files and print the results; return 2 if a run failed."""
     from fastcontact.studies.runs import convergence_study
 
     _study.check_targets(options, options.output)
@@ -48,7 +48,7 @@ def run(options: Namespace) -> int:
 
 
 def _adaptive(options: Namespace) -> int:
-    """Run an adaptive study, write the files of the options and print the table; return 2 if the tolerance is not met."""
+    """Run an adaptive study, write the requested files and print the table; return 2 if the tolerance is not met."""
     from fastcontact.studies.adaptive import adaptive_study
 
     with warnings_shown():

@@ -24,7 +24,7 @@ from fastcontact.round_off import ROUND_OFF, TINY
 
 Term = tuple[int, int, float]  # point, component, coefficient
 KINDS = ("rigid", "distributing")
-# Weights as functions of the ratio of distance and radius. All but the uniform one decrease from 1 to 0.
+# Weights as functions of the ratio of distance to radius. All but the uniform one decrease from 1 to 0.
 WEIGHTINGS: dict[str, Callable[[Array], Array]] = {
     "uniform": np.ones_like,
     "linear": lambda s: 1.0 - s,
@@ -54,7 +54,7 @@ class Spread:
     def check(self, name: str, dim: int) -> None:
         """Raise ModelError, with the `name` of the load, if the weighting is not admissible."""
         if len(self.place) != dim:
-            raise ModelError(f"{name}: the point {self.place} from which distances are taken needs {dim} coordinates")
+            raise ModelError(f"{name}: the point {self.place} of the distances needs {dim} coordinates")
         for number in self.place:
             check_number(f"a coordinate of the point of {name}", number)
         check_known("weighting", self.weighting, WEIGHTINGS, ModelError, f"{name}: ")
@@ -128,7 +128,7 @@ def forces_of_moment(weight: Array, positions: Array, moment: Array, caption: st
 
 @dataclass(frozen=True)
 class SpreadForce(Load):
-    """Components of a force [force], distributed over a group by the distance from its point of application."""
+    """Components of a force [force] that is distributed over a group by the distance from its point of application."""
 
     KIND = "the force"
     CONSTANT = True
@@ -262,7 +262,7 @@ def distributing_rows(
         Unit vectors of the components that are coupled [-].
     n_dofs : int
     caption : str
-        Beginning of the message of an error.
+        Beginning of error messages.
 
     Raises
     ------

@@ -61,7 +61,7 @@ class ForceDrivenObstacles:
         """Return the numbers (dim,) of the displacement components of an obstacle."""
         return (self.shape[0] + number) * self.shape[1] + np.arange(self.shape[1])
 
-    def positions(self, u: Array) -> dict[str, Array]:
+    def displacements(self, u: Array) -> dict[str, Array]:
         """Return the displacement (dim,) of each obstacle by name of its pair, from displacements u (n_dofs,) [length]."""
         return {pair.name: u[self.dofs(number)] for number, pair in enumerate(self.pairs)}
 

@@ -50,17 +50,17 @@ def directions_of(mesh: Mesh, group: str, component: str) -> list[tuple[Indices,
     return [(nodes, np.tile(np.eye(mesh.dim)["xyz".index(axis)], (len(nodes), 1))) for axis in component]
 
 
-def along(nodes: Indices, directions: Array, n_dofs: int) -> csr_array:
+def rows_along(nodes: Indices, directions: Array, n_dofs: int) -> csr_array:
     """Return the rows (m, n_dofs) of the displacement of each node (m,) along its unit vector (m, dim) [-]."""
     return nodal_rows(nodes[:, None], directions[:, None], n_dofs)
 
 
-def minus_first(rows: csr_array) -> csr_array:
+def relative_to_first(rows: csr_array) -> csr_array:
     """Return the rows (m - 1, n) that follow the first of the `rows` (m, n), minus the first row."""
     return csr_array(rows[1:] - csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr")))
 
 
-def matched(mesh: Mesh, first: NodeGroup, second: NodeGroup, translation: Sequence[float] | None) -> Indices:
+def matching_nodes(mesh: Mesh, first: NodeGroup, second: NodeGroup, translation: Sequence[float] | None) -> Indices:
     """Return, for each node of the first group, the index of the coincident node of the second group after a translation.
 
     The first group is moved by `translation` (dim,) [length], by default from the centre of its bounding box to that of the
@@ -120,7 +120,7 @@ def coincident(mesh: Mesh, first: NodeGroup, second: NodeGroup, turn: Array, shi
     candidate, row = pairs_within(target, x, np.full(len(x), tolerance))
     if len(row) > len(np.unique(row)):
         body = bodies(mesh)[1]
-        deviation = to_facets(mesh, nodes)[row] @ turn.T - to_facets(mesh, opposite)[candidate]
+        deviation = vectors_to_facets(mesh, nodes)[row] @ turn.T - vectors_to_facets(mesh, opposite)[candidate]
         other_body = body[nodes[row]] != body[opposite[candidate]]
         mismatch = np.linalg.norm(deviation, axis=1) + 4.0 * tolerance * other_body
         order = np.lexsort((mismatch, row))
@@ -137,7 +137,7 @@ def coincident(mesh: Mesh, first: NodeGroup, second: NodeGroup, turn: Array, shi
     return Coincident(rows, distance, tolerance)
 
 
-def to_facets(mesh: Mesh, nodes: Indices) -> Array:
+def vectors_to_facets(mesh: Mesh, nodes: Indices) -> Array:
     """Return the vectors (n, dim) from nodes (n,) to the mean centre of the outer facets around them [length].
 
     Only facets whose nodes are all among `nodes` are considered. The vectors are zero for nodes without such a facet.

@@ -19,7 +19,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
 def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
-    """Raise ContactError if two pairs share facets on both sides, in either role, or press the same facets on one obstacle.
+    """Raise ContactError if two pairs share facets on both sides, in either role, or the same facets and the same obstacle.
 
     A surface may face several other surfaces, because the opposite side of each pair then differs.
     """
@@ -27,7 +27,7 @@ def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
         _check_obstacles(mesh, pair, other)
     elif {pair.secondary, pair.primary} == {other.secondary, other.primary}:
         raise ContactError(
-            f"contact '{pair.name}' has the sides '{pair.secondary}' and '{pair.primary}', as contact '{other.name}' has: "
+            f"contact '{pair.name}' has the sides '{pair.secondary}' and '{pair.primary}', like contact '{other.name}': "
             "remove one of the two"
         )
     else:

@@ -265,7 +265,7 @@ def _null_space(A: Array) -> Array:
     return np.asarray(right[values < ZERO * max(values.max(initial=0.0), 1.0)].T)
 
 
-def resisting(constraints: Constraints, factor: float = 1.0) -> tuple[csr_array, Array]:
+def cone_rows(constraints: Constraints, factor: float = 1.0) -> tuple[csr_array, Array]:
     """Return the rows that span the cone of admissible contact forces, and the gaps of these rows at u = 0 [length].
 
     Without friction these are the rows of the gaps. With friction they are ``n + mu t`` and ``n - mu t`` in the plane, and in
@@ -279,7 +279,7 @@ def resisting(constraints: Constraints, factor: float = 1.0) -> tuple[csr_array,
 
 
 def _edges(constraints: Constraints, factor: float) -> tuple[csr_array, Array]:
-    """Return the rows and gaps of `resisting` with positive sign."""
+    """Return the rows and gaps of `cone_rows` with positive sign."""
     if not constraints.tangents:
         return constraints.B, constraints.gap0
     if len(constraints.tangents) == 1:
@@ -376,7 +376,7 @@ def needed_friction(
     low, high = NEARLY_SLIDING * inscribed, MOST_FRICTION
 
     def slide(factor: float) -> Array:
-        rows, gap0 = resisting(constraints, factor)
+        rows, gap0 = cone_rows(constraints, factor)
         stop = _farthest(rows @ motions.displacement, gap0 + rows @ u, work, size)
         return np.where(np.abs(stop) > 0.99 * FAR, stop, 0.0)
 

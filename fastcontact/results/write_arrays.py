@@ -243,7 +243,7 @@ def set_restart(file: OpenObjects, number: int, state: NDArray[np.uint8]) -> Non
 
 
 def _new_pair(parent: Any, name: str, dim: int, optional: Iterable[str]) -> dict[str, Any]:
-    pair = parent.create_group(None)  # the group gets a name when it is complete, so that interrupts do no harm
+    pair = parent.create_group(None)  # gets its name when it is complete, in case of an interrupt
     pair["name"] = as_json(name)
     growing_table(pair, "rows", layout.contact_row(dim, optional))
     growing_table(pair, "primary", layout.primary_row(dim))
@@ -269,7 +269,7 @@ def _append_contact(pair: dict[str, Any], number: int, contact: ContactResult | 
 def _append_material_stress(parent: Any, mesh: Mesh, number: int, sides: MaterialStress) -> None:
     """Append the stress of each material at interfaces; the first call creates the tables."""
     if "materials" not in parent:
-        group = parent.create_group(None)  # the group gets a name when it is complete, so that interrupts do no harm
+        group = parent.create_group(None)  # gets its name when it is complete, in case of an interrupt
         _write_constant(group, "cells", np.asarray(sides.cells, np.int32))
         growing_table(group, "rows", layout.material_row(mesh.dim))
         growing_table(group, "steps", layout.MATERIAL_STEP_ROW)

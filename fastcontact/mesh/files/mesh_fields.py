@@ -64,7 +64,8 @@ def read_field(
     Raises
     ------
     FileError, MeshError
-        If the file cannot be read, or has no such field or instant; if a cell or point has no value, or two.
+        If the file cannot be read, or has no such field or instant; if a cell or point has no value, or two different
+        values.
 
     Examples
     --------

@@ -21,7 +21,7 @@ from fastcontact.arrays import AnyArray, Numbers
 from fastcontact.errors import FileError, MeshError, unknown, warn
 from fastcontact.mesh import elements
 from fastcontact.mesh.files import abaqus, gmsh_versions
-from fastcontact.mesh.files.meshio_content import NODE_ORDER, UNFIT, VERTEX, Orders, mesh_of
+from fastcontact.mesh.files.meshio_content import INCONSISTENCY_ERRORS, NODE_ORDER, VERTEX, Orders, mesh_of
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, library, read_in_process
 from fastcontact.mesh.mesh import Mesh
 
@@ -144,7 +144,7 @@ def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
         mesh, dropped = mesh_of(content, file_format)
     except MeshError as error:
         raise MeshError(f"'{path}': {error}") from None
-    except UNFIT as error:
+    except INCONSISTENCY_ERRORS as error:
         raise FileError(f"the parts of '{path}' are inconsistent: check the file, or convert it to .med") from error
     return mesh, file_format, dropped
 

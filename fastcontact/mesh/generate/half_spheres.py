@@ -61,8 +61,9 @@ def half_spheres(
         Only for triangles: distance from the pole up to which edges have the length `contact_size`, at most R/2; by
         default 0 [length].
     arc_sizes : (float, float), optional
-        Only for quadrangles: lengths of the segments of the arc C-D at C and at D, in geometric progression between these
-        points; by default R/250 and R/25 [length]. A common factor reduces both to fill the arc.
+        Only for quadrangles: lengths of the segments of the arc C-D at C and at D, in geometric progression between
+        these points; by default R/250 and R/25 [length]. Both are reduced by a common factor such that the segments
+        fill the arc.
     segments : int, optional
         Only for quadrangles: number of segments on the side A-M of the inner square, on the arc D-B, and on the radial
         lines M-C, N-D and P-B; by default 15.

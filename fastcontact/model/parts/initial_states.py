@@ -146,7 +146,7 @@ class ModelInitialStates(ModelLoads):
             self.add_temperature(values[0], names, reference=reference, ramp=ramp)
             return
         if ramp is not None:
-            raise ModelError(f"field '{field}' has {len(values)} instants and thus no ramp: give times, or one instant")
+            raise ModelError(f"field '{field}' has {len(values)} instants and takes no ramp: give times or one instant")
         times_used = times if times_of_file is None or times is not None else times_of_file.tolist()
         if times_used is None:
             raise ModelError(f"field '{field}' has {len(values)} instants without times: give the load factor of each")

@@ -167,8 +167,8 @@ def label_axes(
 ) -> Any:  # fmt: skip
     """Add a colour bar, a title, a label for each direction and a legend to axes, and return the axes.
 
-    `artist` has the colour scale of `plot_field`. `points` (n, 2) are those of a plane body [length], and None for 3D
-    axes. `alone` states that the figure has no other axes.
+    `artist` has the colour scale of `plot_field`. `points` (n, 2) are those of a plane body [length]; None for 3D axes.
+    `alone` states whether the figure has no other axes.
     """
     caption, length, below = axis_label(plot_field.caption, units, plot_field.quantity), 0.6, -0.02
     if points is not None:

@@ -15,7 +15,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.layout import CONTACT_FIELDS, cells_by_element, contact_fields, cut_at_interfaces
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import AXES, STRESS_COMPONENTS
-from fastcontact.results.units import valued
+from fastcontact.results.units import value_text
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class Field:
     def extreme_label(self, value: float, units: Mapping[str, str], region: str = "") -> str:
         """Return a label for an extreme value of the field, or of a `region` such as ``" on the section"``."""
         kind = "maximum" if value >= 0.0 else "minimum"
-        return f"{kind}{region} {valued(float(value), units, self.quantity, 5)}"
+        return f"{kind}{region} {value_text(float(value), units, self.quantity, 5)}"
 
     @property
     def colours(self) -> str:

@@ -192,7 +192,7 @@ def test_steps_of_large_meshes_are_written_in_the_background(solved, tmp_path, c
     fill_the_disk_at_step_2(monkeypatch)
     assert main(["run", str(solved / "small.toml"), "-q", "-o", str(path)]) == 1
     told = capsys.readouterr().err.splitlines()[-1]
-    assert "cannot be written at step 2 (No space left on device), 1 steps are complete" in told
+    assert "cannot be written at step 2 (No space left on device); 1 steps are complete" in told
     assert len(fc.open_results(path)) == 1
 
 

@@ -22,7 +22,7 @@ def test_dir_shows_what_a_user_calls():
     assert all(hasattr(model, name) for name in shown)
     assert {*dir(fc.Model)} <= {*dir(model)}
     assert {"add_contact", "add_material", "fix", "prescribe", "check", "describe", "mesh", "contact"} <= {*shown}
-    assert not {"bind", "forces_by_ramp", "material_field", "holding_rows", "conducts"} & {*shown}
+    assert not {"bind", "forces_by_ramp", "material_field", "constraint_rows", "conducts"} & {*shown}
 
 
 @pytest.mark.parametrize("add", [fc.Model.add_contact, fc.Model.add_contacts, fc.Model.add_obstacle])

@@ -504,7 +504,9 @@ def test_what_ffmpeg_says_when_it_fails_is_told_in_one_line(reads, tmp_path, mon
     (folder / "ffmpeg").chmod(0o755)
     monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
     mesh = block((1.0, 1.0), (2, 2), "quad4")
-    with pytest.raises(FastcontactError, match=r"a.mp4' was not written, ffmpeg ended with code 3 \(no encoder\)"):
+    with pytest.raises(
+        FastcontactError, match=r"a.mp4' was not written, because ffmpeg ended with code 3 \(no encoder\)"
+    ):
         fc.plot.animate(mesh, [step_of(mesh)] * 3, target)
     assert [path.name for path in tmp_path.iterdir()] == ["bin"]
 
