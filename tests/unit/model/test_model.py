@@ -243,7 +243,7 @@ REFUSED = [
     (
         lambda: plate("plane_strain").add_cyclic_symmetry("LEFT", "BOTTOM", sectors=2.5),
         fc.ModelError,
-        "at least two sectors, a whole number",
+        r"at least two sectors \(a whole number\)",
     ),
     (lambda: fc.linear_ramp(10**400), fc.ModelError, "the argument steps of linear_ramp must be a whole number"),
     (lambda: fc.linear_ramp(2, 10**400), fc.ModelError, "must be a number"),
