@@ -238,13 +238,13 @@ def test_a_section_has_the_area_and_the_field_of_the_body(element, point, normal
 
 def test_a_section_is_refused_where_there_is_none():
     mesh = box((1.0, 1.0, 1.0), (1, 1, 1), "hex8")
-    with pytest.raises(FastcontactError, match=r"not meet the mesh, which lies between \(0, 0, 0\) and \(1, 1, 1\)"):
+    with pytest.raises(FastcontactError, match=r"not intersect the mesh, which lies between \(0, 0, 0\) and \(1, 1, 1\)"):
         fc.plot.section(mesh, step_of(mesh), (0, 0, 2), (0, 0, 1))
     for point, normal in (((0, 0), (0, 0, 1)), ((0, 0, 0), (0, 0, 0)), ((0, 0, float("nan")), (0, 0, 1))):
         with pytest.raises(FastcontactError, match="a point and a normal of 3 numbers"):
             fc.plot.section(mesh, step_of(mesh), point, normal)
     flat = block((1.0, 1.0), (1, 1), "quad4")
-    with pytest.raises(FastcontactError, match="three dimensions"):
+    with pytest.raises(FastcontactError, match="three-dimensional"):
         fc.plot.section(flat, step_of(flat), (0, 0, 0), (0, 0, 1))
 
 
