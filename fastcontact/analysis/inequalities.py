@@ -25,7 +25,7 @@ from fastcontact.contact.constraints import Constraints, StackedConstraints, sta
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
-from fastcontact.model.model import gaps_at_rest
+from fastcontact.model.model import gap_changes
 from fastcontact.model.pretension import loose_bolts_remark
 from fastcontact.model.rigid_motions import cone_rows, generalised, grouped, needed_friction, stopped_at
 from fastcontact.round_off import SINGLE_PRECISION
@@ -296,7 +296,7 @@ def _with_floating_bodies(
     springs, load = dofs.numbers(bodies.dofs), state.largest_rigid_force
     rigid = bodies.settle(solve_at, position_response, springs, start, load, relative_accuracy, state.gap_round_off)
     if rigid.state.settled and not rigid.slack:
-        gaps = gaps_at_rest(problem.model, bodies.motions)
+        gaps = gap_changes(problem.model, bodies.motions)
         raise failure(not_balanced(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))
     iterate.rigid = rigid
     solution, respond = rigid.state, rigid.state.response

@@ -26,7 +26,7 @@ from fastcontact.mesh.mesh import Mesh, facets_of_cells
 
 Result = TypeVar("Result")
 Arguments = ParamSpec("Arguments")
-OfMesh = Callable[Concatenate[Mesh, Arguments], Result]
+MeshFunction = Callable[Concatenate[Mesh, Arguments], Result]
 # Distance, relative to the size of the mesh, below which nodes are regarded as coincident or collinear.
 COLLINEAR = 1e-6
 
@@ -95,7 +95,7 @@ def _oriented_keys(facets: Indices) -> Indices:
     return np.column_stack([facets[rows, first], following, preceding if count > 2 else first])
 
 
-def cached_by_mesh(function: OfMesh[Arguments, Result]) -> OfMesh[Arguments, Result]:
+def cached_by_mesh(function: MeshFunction[Arguments, Result]) -> MeshFunction[Arguments, Result]:
     """Decorate `function` such that its results are cached by mesh, which is immutable, and by the other arguments."""
     results: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Result]] = WeakKeyDictionary()
 

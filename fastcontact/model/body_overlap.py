@@ -20,7 +20,7 @@ ON_SURFACE = 1e-10
 
 
 def penetration(mesh: Mesh, kinematics: str, coordinates: Array) -> list[tuple[int, int, float, Array]]:
-    """Return (body, other, depth, position) for each pair of bodies of which the first has nodes inside the second.
+    """Return (body, other, depth, position) for each pair of bodies such that the first has nodes inside the second.
 
     `depth` is the largest penetration depth of these nodes, see `depths` [length], and `position` (dim,) is the
     position of the node with this depth [length].

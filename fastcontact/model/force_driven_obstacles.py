@@ -87,7 +87,7 @@ class ForceDrivenObstacles:
         return csr_array((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], self.n_dofs))
 
     def supported(self, fixed: Mask) -> Mask:
-        """Return the mask (n_points + n, dim) of supported components of points and obstacles, from that of points."""
+        """Return the mask (n_points + n, dim) of supported components, from the mask of the points."""
         prescribed = [[force is None for force in pair.force] for pair in self.pairs]
         return np.vstack([fixed, np.array(prescribed, bool).reshape(-1, self.shape[1])])
 

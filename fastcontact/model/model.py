@@ -223,11 +223,11 @@ class Model(ModelSupports, metaclass=_PublicNames):
             return
         generalised_forces = [generalised(motions, force.ravel()) for force in forces]
         # Whether friction suffices is checked in the load steps, whose errors state the coefficient that would suffice.
-        gaps = gaps_at_rest(self, motions, MOST_FRICTION)
+        gaps = gap_changes(self, motions, MOST_FRICTION)
         check_motions(self.mesh, motions.combined(mechanisms(gaps, np.reshape(generalised_forces, (-1, len(motions))))))
 
 
-def gaps_at_rest(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:
+def gap_changes(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:
     """Return the changes (m, k) of the m gaps of the undeformed bodies for each of k rigid-body motions.
 
     A constraint with friction is represented by the edges of its friction cone, see `cone_rows`; `factor` multiplies all

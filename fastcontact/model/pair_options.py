@@ -23,7 +23,7 @@ from fastcontact.model.ramp import History, table_of
 
 
 class FormulationOptions(TypedDict, total=False):
-    """Options that are arguments of formulations: the first five of every formulation, the others of some formulations."""
+    """Options that are arguments of formulations. Every formulation has the first five, only some have the others."""
 
     friction: float | None
     surface_smoothing: bool | None
@@ -64,8 +64,8 @@ class ContactOptions(FormulationOptions, SharedOptions, total=False):
 
 
 SHARED_OPTIONS = tuple(sorted(SharedOptions.__annotations__))
-# Names of the required and of the optional constants of a cohesive layer and of adhesion. The values of the constants in
-# CHOICES are strings, those of all others are positive numbers.
+# Names of the required and of the optional constants of a cohesive layer and of adhesion. The values of the constants
+# in CHOICES are strings; all other values are positive numbers.
 LAWS = {
     "cohesion": (
         ("strength", "energy"),

@@ -23,8 +23,8 @@ from fastcontact.model.ramp import Table
 from fastcontact.model.relation_rows import coincident, matching_nodes, relative_to_first, vectors_to_facets
 from fastcontact.round_off import ROUND_OFF
 
-# Largest distance, relative to facet size, by which a rotated node of one end may lie off the facets of the other end or
-# outside their edges. Facets of curved ends with different meshes deviate from each other by less.
+# Largest distance, relative to facet size, by which a rotated node of one end may deviate from the facets of the other
+# end, or lie outside their edges. Facets of curved ends with different meshes deviate from each other by less.
 LARGEST_DISTANCE = 0.02
 
 

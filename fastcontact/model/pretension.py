@@ -201,7 +201,7 @@ def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | Non
 
 
 def _outward(mesh: Mesh, name: str, section: str, direction: Array) -> Array:
-    """Return `direction` or its opposite (dim,), whichever points out of the body at the section, to the other side.
+    """Return `direction` or its opposite (dim,), whichever points out of the body at the section, towards the other side.
 
     Sections that are not groups of facets keep the direction.
     """

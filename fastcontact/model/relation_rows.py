@@ -27,7 +27,7 @@ NodeGroup = tuple[str, Indices]  # name, nodes
 def normals_of(mesh: Mesh, group: str) -> tuple[Indices, Array]:
     """Return the nodes (m,) of a group of outer facets, and their unit normals (m, dim), averaged over adjacent facets.
 
-    Raises the same errors as a pressure on the group.
+    Raises an error under the same conditions as a pressure that acts on the group.
     """
     facets = {name: outward(mesh, group, name, block) for name, block in facets_of(mesh, group).items()}
     points = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
@@ -96,7 +96,7 @@ class Coincident(NamedTuple):
     """For each of n moved nodes, the row of the coincident, or the nearest, node of the other group."""
 
     rows: Indices  # (n,)
-    distance: Array  # (n,): distance to it [length]
+    distance: Array  # (n,): distance to this node [length]
     tolerance: float  # largest distance of coincident nodes [length]
 
 

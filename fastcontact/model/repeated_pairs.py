@@ -79,10 +79,10 @@ def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
 def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Iterator[str]:
     """Yield a warning for every two contact pairs whose sides adjoin each other at common nodes, on both bodies.
 
-    Each pair has a separate pressure at such a node, but the gap determines only the sum of the two pressures. Their ratio,
-    and with it the pressure at neighbouring nodes, is arbitrary. Node-to-segment contact divides the force of a node in the
-    ratio of the areas, which is correct if both pairs have the same primary side. If the primary side is divided as well,
-    each pair faces only a part of it.
+    Each pair has a separate pressure at such a node, but the gap determines only the sum of the two pressures. Their
+    ratio, and with it the pressure at neighbouring nodes, is arbitrary. Node-to-segment contact divides the force of a
+    node in the ratio of the areas, which is correct if both pairs have the same primary side. If the primary side is
+    divided as well, each pair faces only a part of this side.
     """
     for (pair, sides), (other, other_sides) in combinations(pairs, 2):
         if not isinstance(sides.primary, Surface) or not isinstance(other_sides.primary, Surface):

@@ -147,7 +147,8 @@ def _vector_text(values: Array) -> str:
 def body_name(mesh: Mesh, body: AnyArray, number: int) -> str:
     """Return the name of body `number` for messages, from the `body` (n_points,) of each point.
 
-    It is the name of a cell group that has exactly the nodes of the body, otherwise its number and its centre.
+    If a cell group has exactly the nodes of the body, its name is returned, otherwise the number and the centre of the
+    body.
     """
     members = np.flatnonzero(body == number)
     return _group_of(mesh, members) or f"number {number + 1} (around {mesh.points[members].mean(axis=0)})"

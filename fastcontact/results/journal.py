@@ -20,7 +20,7 @@ from fastcontact.errors import FileError
 Write = tuple[int, bytes]
 MAGIC = b"fastcontact journal\n"
 FOOTER = struct.Struct(f"<Q32s{len(MAGIC)}s")  # length and SHA-256 of the writes
-# Offset and length of a write, and whether it is new data, of which only the checksum follows.
+# Offset and length of a write, and whether its data are new. Of new data, only the checksum follows.
 HEADER = struct.Struct("<QQ?")
 DIGEST = hashlib.sha256().digest_size
 # Size of the pieces in which data are read for a checksum [bytes].

@@ -29,9 +29,9 @@ def write_geometry(
 ) -> None:
     """Write the group /VTKHDF with the solid cells, the constant arrays and empty tables for the steps.
 
-    `growing` contains the names of the cell fields of steps, and `optional` those of their `layout.OPTIONAL_FIELDS`.
-    `material` (n_solids,) contains the material number of each cell, if the model has material interfaces. The steps of such
-    a model also have the `layout.MATERIAL_FIELDS`.
+    `growing` contains the names of the cell fields of steps, and `optional` the names of the `layout.OPTIONAL_FIELDS`
+    that steps have. `material` (n_solids,) contains the material number of each cell, if the model has material
+    interfaces. The steps of such a model also have the `layout.MATERIAL_FIELDS`.
     """
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 0], np.int64)

@@ -59,7 +59,7 @@ class ResultWriter:
         A mesh or a ``Model``. Any object with the attributes `mesh` and `kinematics`, and optionally `case_text`, can
         replace the model.
     kinematics : str
-        Kinematics, if `mesh` is a mesh; a model has its own kinematics.
+        Kinematics if `mesh` is a mesh; otherwise those of the model are used.
     case_text : str
         Text of the case file, which the result file stores.
     overwrite : bool
@@ -146,7 +146,7 @@ class ResultWriter:
         self._last: tuple[int, Any] = (0, None)  # index and case of the last step
         self._notes: dict[str, str] = {}  # the text of the case file, if it differs from that of the resumed run
         self._resumed_state: tuple[int, ...] | None = None
-        with self._explained("begun"):
+        with self._as_file_errors("begun"):
             self._lock = PathLock(self.path)
             try:
                 if resume:
@@ -226,7 +226,7 @@ class ResultWriter:
                     writing.result()
 
     def _append(self, step: StepResult) -> None:
-        with self._explained(f"written at step {step.index}"):
+        with self._as_file_errors(f"written at step {step.index}"):
             self._open()
             self._check_in_place()
             by_default = time.monotonic() - self._started > SYNCHRONISED_FROM
@@ -279,7 +279,7 @@ class ResultWriter:
             if self._closed or (self._file is None and self._ended and "error" not in run):
                 return  # closed, or a complete file to which no step was added
             self._release_done()
-            closing.enter_context(self._explained("closed"))
+            closing.enter_context(self._as_file_errors("closed"))
             self._open()
             closing.callback(self._committed.close)
             closing.callback(self._file.close)
@@ -349,7 +349,7 @@ class ResultWriter:
         self._committed.check()
 
     @contextlib.contextmanager
-    def _explained(self, action: str) -> Iterator[None]:
+    def _as_file_errors(self, action: str) -> Iterator[None]:
         """Convert errors of HDF5 and of the operating system to a FileError with a remedy, and defer signals."""
         with uninterrupted():
             try:

@@ -86,7 +86,7 @@ def _format(path: Path, writing: bool) -> str:
         return str(names[0])
     if writing:
         return "gmsh22"
-    # Ansys uses the same suffix, and meshio's reader of its files does not terminate on a damaged one.
+    # Ansys uses the same suffix, and meshio's reader of Ansys files does not terminate on a damaged file.
     with open(path, "rb") as file:
         if file.read(1) != b"$":
             raise FileError(f"'{path}' is not a Gmsh file, which starts with $MeshFormat: convert it to .med")

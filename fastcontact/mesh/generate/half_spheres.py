@@ -17,7 +17,7 @@ from fastcontact.mesh.generate.quadratic import Circle, converted_to
 from fastcontact.mesh.generate.transform import merge_points, mirrored, union, with_points_at
 from fastcontact.mesh.mesh import Mesh
 
-# Group names of the upper body by those of the lower body; A1A2 is the axis of both.
+# Group names of the upper body, by the corresponding names of the lower body. A1A2 is the axis of both bodies.
 _UPPER = {"SPHBAS": "SPHHAU", "A1B1": "A2B2", "CONT1": "CONT2", "D1B1": "D2B2"}
 _UPPER |= {f"{letter}1": f"{letter}2" for letter in "ABCD"} | {f"{letter}1": letter for letter in "MNP"}
 

@@ -114,8 +114,8 @@ class ModelContact(ModelConnections):
             - ``conductance``: heat flux per unit temperature difference [power / (area temperature)]: a number, which
               applies at closed points; a function of pressures and gaps (m,); pairs (pressure, conductance); or a mapping
               of ``"pressure"`` and ``"gap"`` to pairs. By default the contact is insulated.
-            - ``friction_heat``: fraction of the frictional work that becomes heat, of which one half flows into each side
-              [-]. The heating power is computed with the load factor as time.
+            - ``friction_heat``: fraction of the frictional work that becomes heat [-]. Half of this heat flows into
+              each side. The heating power is computed with the load factor as time.
             - ``obstacle_temperature``: temperature of a rigid obstacle [temperature].
             - ``search_distance``: largest distance, and largest penetration, at which a point is paired with an
               opposite point, either in the current configuration or at the beginning of the load step [length].

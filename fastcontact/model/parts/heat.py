@@ -180,7 +180,7 @@ class ModelHeat(ModelBase):
         return Conduction(self.mesh, self.kinematics, [m for m, _ in self.materials], self.material_of_cells())
 
     def same_temperature(self) -> Indices:
-        """Return for each node (n_points,) the first node that has the same temperature.
+        """Return for each node (n_points,) the first of the nodes that share its temperature.
 
         Nodes share their temperature at the ends of a period or sector and on the two sides of a pretension section.
         """

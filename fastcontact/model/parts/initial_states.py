@@ -240,7 +240,7 @@ class ModelInitialStates(ModelLoads):
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:
         """Return the sum of the temperature rises (n_points,) [temperature], or None if there are none.
 
-        `factors` contains the multiplier of each temperature; those of a step result are
+        `factors` contains the multiplier of each temperature. In a step result, the multipliers are
         ``step.iterations["temperature_factors"]``.
         """
         if not self.temperatures or not len(factors):

@@ -313,7 +313,7 @@ def _axis(step: StepResult, pair: str) -> tuple[Array, Array]:
 
 
 def _rotated(stress: Array, direction: Array) -> Array:
-    """Return the stress (n, 4) in rotated axes, of which x is normal to and y along a direction (2,) [pressure]."""
+    """Return the stress (n, 4) in rotated axes, y along the `direction` (2,) and x normal to it [pressure]."""
     x, y = np.array([direction[1], -direction[0]]), direction
     tensor = stress[:, [0, 3, 3, 1]].reshape(-1, 2, 2)
     xx, yy, xy = (np.einsum("i,nij,j->n", a, tensor, b) for a, b in ((x, x), (y, y), (x, y)))

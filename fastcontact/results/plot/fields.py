@@ -75,7 +75,7 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     fluxes = [flux for key, flux in step.cell_fields.items() if key.startswith("heat_flux_")]
     heat = [*["temperature"] * (step.temperature is not None), *["heat_flux"] * bool(fluxes)]
     contact = contact_fields(mesh, step)
-    check_known("field", name, [*names(mesh), *contact, *step.cell_fields, *heat], FastcontactError)
+    check_known("field", name, [*field_names(mesh), *contact, *step.cell_fields, *heat], FastcontactError)
     if name in STRESS_FIELDS and name not in step.cell_fields:
         separate_mesh, node, stress = cut_at_interfaces(mesh, step)
         caption, stress_measure = STRESS_FIELDS[name]
@@ -98,7 +98,7 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     return Field(mesh, np.arange(mesh.n_points, dtype=np.int32), values, caption, quantity)
 
 
-def names(mesh: Mesh) -> list[str]:
+def field_names(mesh: Mesh) -> list[str]:
     """Return the names of the fields of bodies that each step on a mesh has."""
     missing = ("stress.yz", "stress.xz", "displacement.z") if mesh.dim == 2 else ()
     return [name for name in (*STRESS_FIELDS, *DISPLACEMENTS) if name not in missing]
