@@ -1,4 +1,4 @@
-"""Hanging nodes, which lie on facets of their own body without belonging to them.
+"""Hanging nodes, which lie on facets of their own body but are not nodes of these facets.
 
 Where a coarse and a fine mesh meet, only their common nodes are connected. Under load, gaps or overlaps form at the other
 nodes.

@@ -81,7 +81,7 @@ def _split_sides(model: Model, pairs: Pairs) -> Iterator[str]:
 
 def _sector_ends(model: Model) -> Iterator[str]:
     """Yield a warning for each contact with nodes at one end of a sector that coincide with no node of the other end."""
-    for (name, nodes), pair in itertools.product(model.interpolated.items(), model.contact):
+    for (name, nodes), pair in itertools.product(model.nodes_on_facets.items(), model.contact):
         n = len(np.intersect1d(nodes, model.mesh.points_of(pair.secondary)))
         if n:
             yield (
@@ -247,7 +247,7 @@ def _penetration(model: Model, pairs: Pairs, prescribed: Array) -> Iterator[str]
 def _missing_ramps(model: Model, ramp: Ramp) -> Iterator[str]:
     """Yield a warning if some items have separate ramps, and the common ramp multiplies the others by more than 1.
 
-    A common ramp of more than two points is assumed to be intended for these items.
+    If the common ramp has more than two points, it is assumed to be intended for these items.
     """
     peak = max(ramp.value(instant) for instant in ramp.instants)
     if peak <= 1.0 or len(ramp.table) > 2:

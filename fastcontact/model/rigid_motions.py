@@ -36,7 +36,7 @@ FAR = 1e3
 EDGES = 8
 # Fraction of the frictional capacity above which floating bodies are reported as about to slide.
 NEARLY_SLIDING = 0.9
-# Largest factor on the coefficients of friction with which friction is assumed to hold a body.
+# Largest factor by which the coefficients of friction are multiplied to test whether friction can hold a body.
 MOST_FRICTION = 100.0
 # Largest number of motions of parts between hinges. A mesh with more motions is defective.
 MOST_MOTIONS = 1500
@@ -328,7 +328,7 @@ def mechanisms(gaps: Array, works: Array) -> Array:
 
 
 def least_held(motions: FreeMotions, gaps: Array) -> tuple[list[str], float]:
-    """Return the name of the motion that changes the gaps least, and the ratio of its change to the largest one [-].
+    """Return the name of the motion that changes the gaps least, and the ratio of this change to the largest change [-].
 
     `gaps` (m, k) are the changes of m gaps for each of the k motions.
     """
@@ -337,7 +337,7 @@ def least_held(motions: FreeMotions, gaps: Array) -> tuple[list[str], float]:
 
 
 def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | None:
-    """Return the amplitudes (k,) of the motions at which contact stops rigid bodies under the loads; None if it does not.
+    """Return the amplitudes (k,) of the motions at which contact stops rigid bodies under the loads; None if they do not.
 
     Parameters
     ----------
@@ -366,7 +366,7 @@ def _farthest(gaps: Array, gap: Array, work: Array, size: float) -> Array:
 def needed_friction(
     constraints: Constraints, motions: FreeMotions, u: Array, work: Array, size: float
 ) -> tuple[float, list[str]] | None:
-    """Return the smallest factor on the coefficients of friction with which rigid bodies stop [-], and the moving bodies.
+    """Return the smallest multiplier of the coefficients of friction for which rigid bodies stop [-], and the sliding bodies.
 
     Returns None if a factor of NEARLY_SLIDING suffices even with the pyramid inscribed in Coulomb's cone, or if no factor up
     to MOST_FRICTION suffices. `u` (n_dofs,) are the displacements [length]; `work` and `size` are as in `stopped_at`.

@@ -137,7 +137,7 @@ def _cells_beyond(mesh: Mesh, group: str, sides: _Sides, marked: Mask, direction
             f"{mesh.points[nodes[nodes >= 0]].mean(axis=0)}); extend the group to the surface of the body, with a normal "
             f"across it (now {direction})"
         )
-    # A part without a facet in the section touches it only at edges or nodes.
+    # A part that has no facet in the section touches the section only at edges or nodes.
     beyond_cut = np.isin(part, beyond) | (~np.isin(part, below) & (above > 0.0))
     outer = sides.is_facet & np.isin(sides.row, row[beyond_cut[solid]]) & ~np.isin(sides.row, section)
     beyond_cut[sides.cell[outer]] = True

@@ -147,7 +147,7 @@ class ModelBase(Suggesting):
         self.related_supports: list[tuple[str, MultiPointConstraint]] = []  # (group, constraint)
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
-        self.interpolated: dict[str, Indices] = {}  # nodes on cyclic interfaces that are tied to facets
+        self.nodes_on_facets: dict[str, Indices] = {}  # nodes on cyclic interfaces that are tied to facets
         self.periodic_interfaces: list[PeriodicInterface] = []  # coincident nodes of periodic parts
         self.contact: list[ContactPair] = []
 

@@ -253,9 +253,9 @@ class ModelConnections(ModelInitialStates):
     ) -> None:
         """Model one of several identical sectors of a ring, whose two ends have equal cylindrical displacement components.
 
-        Loads are the same on all sectors, and resultant forces are those of the modelled sector. Rotation about the axis
-        and, in 3D, translation along it remain possible and must be prevented by supports. The ends may be curved and may
-        meet on the axis. The remark on contact at the ends in `add_periodicity` also applies here.
+        Loads are the same on all sectors, and resultant forces are those of the modelled sector. Rotation about the
+        axis and, in 3D, translation along it remain possible and must be prevented by supports. The ends may be curved
+        and may meet on the axis. The remark on contact at the ends, see `add_periodicity`, applies here as well.
 
         Parameters
         ----------
@@ -301,7 +301,7 @@ class ModelConnections(ModelInitialStates):
             self.periodic_interfaces.append(interface)
         if interface.relation is None:
             nodes = np.union1d(*(self.mesh.points_of(end) for end in (first, second)))
-            self.interpolated[name] = np.setdiff1d(nodes, interface[:2])
+            self.nodes_on_facets[name] = np.setdiff1d(nodes, interface[:2])
 
     def relate(
         self, terms: Iterable[tuple[str | int, str, float]], value: float = 0.0, *, ramp: History = None

@@ -225,9 +225,9 @@ class ModelHeat(ModelBase):
             return
         if self.temperatures:
             raise ModelError("temperatures are both given by add_temperature and computed: use fix_temperature")
-        if self.interpolated:
+        if self.nodes_on_facets:
             raise ModelError(
-                f"{next(iter(self.interpolated))} connects different meshes and conducts no heat: use matching meshes"
+                f"{next(iter(self.nodes_on_facets))} connects different meshes and conducts no heat: use matching meshes"
             )
         self.conduction().check()
         without_expansion = [material for material, _ in self.materials if material.expansion is None]

@@ -222,8 +222,8 @@ class ModelLoads(ModelHeat):
             for a group of points.
         at : sequence of float (dim,), optional
             Point through which the resultant acts [length]. The force on each node of the group is proportional to its
-            tributary area and to the weight of its distance from this point (see `weighting`). Additional forces that are
-            linear in the position make the moment about the point zero.
+            tributary area and to the weight of its distance from this point (see `weighting`). Additional forces, which
+            are linear in the position, make the moment about this point vanish.
         weighting : str
             Weight as a function of the distance from `at`: ``"uniform"``, or ``"linear"``, ``"quadratic"`` or ``"cubic"``,
             which decrease to zero at `radius`.
