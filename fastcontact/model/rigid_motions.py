@@ -147,8 +147,7 @@ def _vector_text(values: Array) -> str:
 def body_name(mesh: Mesh, body: AnyArray, number: int) -> str:
     """Return the name of body `number` for messages, from the `body` (n_points,) of each point.
 
-    If a cell group has exactly the nodes of the body, its name is returned, otherwise the number and the centre of the
-    body.
+    It is the name of a cell group that has exactly the nodes of the body, otherwise its number and its centre.
     """
     members = np.flatnonzero(body == number)
     return _group_of(mesh, members) or f"number {number + 1} (around {mesh.points[members].mean(axis=0)})"
@@ -328,7 +327,7 @@ def mechanisms(gaps: Array, works: Array) -> Array:
 
 
 def least_held(motions: FreeMotions, gaps: Array) -> tuple[list[str], float]:
-    """Return the name of the motion that changes the gaps least, and the ratio of this change to the largest change [-].
+    """Return the name of the motion that changes the gaps least, and the ratio of its change to the largest one [-].
 
     `gaps` (m, k) are the changes of m gaps for each of the k motions.
     """
