@@ -1,4 +1,4 @@
-"""Contact nodes whose prescribed displacements cause penetration or, in tied pairs, relative displacements.
+"""Contact nodes whose prescribed displacements cause penetration or, in tied pairs, relative displacements of the sides.
 
 Contact forces cannot change prescribed displacements.
 """

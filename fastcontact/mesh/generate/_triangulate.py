@@ -83,7 +83,10 @@ def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
 
 
 def _midpoints_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> Array:
-    """Return the midpoints (m, 2) of too long edges. At both ends, no other edge is longer relative to the spacing."""
+    """Return the midpoints (m, 2) of edges that are too long.
+
+    Relative to the spacing, each is the longest of all edges at its two ends.
+    """
     edges = edges_of(delaunay(points))
     # Sides of the outline are excluded, but not chords that cut off a corner.
     side = np.isin(edges[:, 1] - edges[:, 0], (1, n_fixed - 1)) & (edges[:, 1] < n_fixed)
