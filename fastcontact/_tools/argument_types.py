@@ -56,7 +56,7 @@ def unchecked(call: F) -> F:
 
 
 def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError]) -> Callable[..., Any]:
-    """Return a function that calls `call` after a check of the arguments; errors call it `name`."""
+    """Return a function that checks its arguments and then calls `call`; error messages call it `name`."""
 
     @functools.wraps(call)
     def wrapper(*args: Any, **kwargs: Any) -> Any:
@@ -195,7 +195,7 @@ def check_type(name_shown: str, value: Any, annotation: Any, error: type[Fastcon
         remedy = f": write {value.strip()} without quotation marks"
     elif isinstance(value, list | tuple) and value and name_shown.startswith(VECTORS) and fits({}, annotation):
         remedy = f": write {dict(zip('xyz', value, strict=False))}"
-    raise error(f"{name_shown} must be {words(annotation)}, not {description}{remedy}")
+    raise error(f"{name_shown} must be {type_name(annotation)}, not {description}{remedy}")
 
 
 def _is_number(text: str) -> bool:
@@ -234,7 +234,7 @@ def fits(value: Any, annotation: Any) -> bool:
     return kind_of(annotation).fits(value)
 
 
-def words(annotation: Any) -> str:
+def type_name(annotation: Any) -> str:
     """Return the name of an annotated type in messages, such as "a number or a function"."""
     return kind_of(annotation).words
 

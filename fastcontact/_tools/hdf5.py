@@ -26,7 +26,7 @@ PLAUSIBLE_EXPANSION = 20
 # Limits of the total size of all data sets, in which a data set is counted once for each link to it.
 PLAUSIBLE_IN_ALL = 1 << 30
 PLAUSIBLE_EXPANSION_IN_ALL = 100
-# Number of strings or references that a data set may have in a file of any size.
+# Number of strings or references that a data set may contain regardless of the size of its file.
 FEW_OBJECTS = 1000
 # Largest depth of nested groups. HDF5 visits them by recursion, and deep nesting would overflow its stack.
 DEEPEST = 64
@@ -49,7 +49,7 @@ def open_hdf5(path: PathLike) -> Iterator[Any]:
     except (FastcontactError, Warning):
         raise
     except Exception as error:  # damage can cause any exception
-        raise FileError(f"cannot read '{path}', it is damaged or incomplete: write it again") from error
+        raise FileError(f"cannot read '{path}', which is damaged or incomplete: write it again") from error
 
 
 def check_contents(file: Any, path: PathLike) -> None:
@@ -115,7 +115,7 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
         if not set(filters) <= set(built_in):
             raise FileError(f"{where} is compressed with the filter {filters[0]}, which HDF5 may lack: use gzip")
         if dataset.get_storage_size() > 2 * (size + chunk) + PLAUSIBLE_BYTES:
-            raise FileError(f"{where} is larger compressed than uncompressed: the file is damaged, write it again")
+            raise FileError(f"{where} is larger compressed than uncompressed: the file is damaged; write it again")
         size = max(size, chunk)
     if size > limit:
         raise FileError(f"{where} declares {size:.3g} bytes, which a file of its size cannot hold: write it again")
@@ -135,10 +135,10 @@ def values(group: Any, name: str) -> AnyArray:
 
     where = f"'{group.name}/{name}' of '{group.file.filename}'"
     if name not in group:
-        raise FileError(f"{where} is missing: the file is incomplete, write it again")
+        raise FileError(f"{where} is missing: the file is incomplete; write it again")
     dataset = group[name]
     if not isinstance(dataset, h5py.Dataset) or dataset.dtype.base.kind not in PLAIN_KINDS:
-        raise FileError(f"{where} contains no plain numbers: the file is damaged, write it again")
+        raise FileError(f"{where} contains no plain numbers: the file is damaged; write it again")
     return np.asarray(dataset[()])
 
 
@@ -244,7 +244,7 @@ class DriverFile:
         """Do nothing: all writes have gone to the operating system."""
 
     def close(self) -> None:
-        """Close the file; a second call does nothing."""
+        """Close the file; further calls have no effect."""
         self._file.close()
 
 

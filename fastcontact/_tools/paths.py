@@ -136,7 +136,7 @@ def _send(file: Path, stream: PathLike) -> None:
 
 
 def _synchronise(path: Path) -> None:
-    """Synchronise a file or the entries of a folder to disk. On Windows, where folders cannot be opened, they are ignored."""
+    """Synchronise a file or the entries of a folder to disk. Folders are ignored on Windows, which cannot open them."""
     if path.is_dir() and os.name == "nt":
         return
     descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)

@@ -25,9 +25,9 @@ from fastcontact.contact.constraints import Constraints, StackedConstraints, sta
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
-from fastcontact.model.model import gaps_at_rest
-from fastcontact.model.pretension import loose_bolts
-from fastcontact.model.rigid_motions import generalised, grouped, needed_friction, resisting, stopped_at
+from fastcontact.model.model import gap_changes
+from fastcontact.model.pretension import loose_bolts_remark
+from fastcontact.model.rigid_motions import cone_rows, generalised, grouped, needed_friction, stopped_at
 from fastcontact.round_off import SINGLE_PRECISION
 
 # Number of times that contact displaces fluid from a node in a load step after which the node stays dry. At the front of the
@@ -271,7 +271,7 @@ def _with_floating_bodies(
     def failure(text: str, **options: bool) -> ConvergenceError:
         needed = needed_friction(constraints, bodies.motions, iterate.u, *loads)
         text = text if needed is None else friction_exceeded(*needed, constraints.friction)
-        text += loose_bolts(problem.model.pretensions, modes, step.load.force.reshape(problem.shape))
+        text += loose_bolts_remark(problem.model.pretensions, modes, step.load.force.reshape(problem.shape))
         return ConvergenceError(text, iterate.history, **options)
 
     start, modes = iterate.u[bodies.dofs], bodies.motions.displacement
@@ -282,7 +282,7 @@ def _with_floating_bodies(
     # Work of the loads in each free rigid-body motion, and the size of the model.
     loads = generalised(bodies.motions, force, state.largest_rigid_force), model_size
     if not iterate.history:
-        rows, gap0 = resisting(constraints)
+        rows, gap0 = cone_rows(constraints)
         shift = stopped_at(rows @ modes, gap0 + rows @ iterate.u, *loads)
         if shift is None:
             names = grouped(bodies.names)
@@ -299,7 +299,7 @@ def _with_floating_bodies(
     springs, load = dofs.numbers(bodies.dofs), state.largest_rigid_force
     rigid = bodies.settle(solve_at, position_response, springs, start, load, relative_accuracy, state.gap_round_off)
     if rigid.state.settled and not rigid.slack:
-        gaps = gaps_at_rest(problem.model, bodies.motions)
+        gaps = gap_changes(problem.model, bodies.motions)
         raise failure(not_balanced(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))
     iterate.rigid = rigid
     solution, respond = rigid.state, rigid.state.response

@@ -251,7 +251,7 @@ class Problem:
 
         Prescribed displacements are those of `load`. Displacements of force-driven obstacles are taken from u (n_dofs,).
         """
-        return {**load.obstacles, **self.force_driven.positions(u)} if self.force_driven.pairs else dict(load.obstacles)
+        return {**load.obstacles, **self.force_driven.displacements(u)}
 
     def configuration(self, name: str, state: State, load: StepLoad, displacement: Array, u: Array) -> Configuration:
         """Return the configuration of a contact pair.
@@ -415,7 +415,7 @@ def _floating_motions(model: Model, supported: Mask, displacement: Array | float
     are the components that supports hold.
     """
     deformed = model.mesh.replace(points=model.mesh.points + displacement)
-    motions = free_motions(deformed, model.kinematics, supported, model.holding_rows())
+    motions = free_motions(deformed, model.kinematics, supported, model.constraint_rows())
     return model.force_driven.motions(motions)
 
 

@@ -19,7 +19,7 @@ from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
-from fastcontact.model.fingerprint import different, fingerprint, formulation_behind
+from fastcontact.model.fingerprint import differing_parts, fingerprint, formulation_of_digest
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult
@@ -46,7 +46,7 @@ def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
         )
     with _damage_reported(step):
         saved, end = state["case"], step.load_factor
-        changed = different(saved["parts"], case["parts"])
+        changed = differing_parts(saved["parts"], case["parts"])
         if _history(saved["table"], end, case["table"]) != _history(case["table"], end, saved["table"]):
             changed.append(f"the load history up to {end:g}")
     if changed:
@@ -59,7 +59,7 @@ def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
 def _formulations(saved: dict[str, str], current: dict[str, str], model: Model) -> str:
     """Return the end of a message, which names the saved formulations of the pairs that differ only in the formulation."""
     changed = [pair.name for pair in model.contact if saved.get(key := f"contact '{pair.name}'") != current[key]]
-    formulations = {name: formulation_behind(model, name, saved.get(f"contact '{name}'")) for name in changed}
+    formulations = {name: formulation_of_digest(model, name, saved.get(f"contact '{name}'")) for name in changed}
     named = [f"contact '{name}' had {text}" for name, text in formulations.items() if text]
     return f" ({'; '.join(named)}: specify this formulation)" if named else ""
 

@@ -5,8 +5,9 @@ them. `THEORIES` contains the functions that case files can name. Most normal co
 problems), `force`, `pressure_max` and `pressure(distance)`. Units are those of the caller; forces of plane problems are per
 unit length.
 
-Positions are numbers or arrays of any shape (...), and results have the same shape, followed by the components of vectors and
-tensors. ModelError is raised for a number out of range, and unless exactly one load is given where one is needed.
+Positions are numbers or arrays of any shape (...), and results have the same shape, followed by the components of
+vectors and tensors. ModelError is raised if a number is out of range, or if not exactly one load is given where one is
+required.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ class _PartialSlip:
         return of_first_load(self.tangential_force_peak) - 2.0 * of_first_load(self._reversal)
 
     def _traction(self, name: str, position: ArrayLike) -> Array:
-        """Return the shear traction [pressure] at the current force; errors call the position `name`.
+        """Return the shear traction [pressure] at the current force; error messages call the position `name`.
 
         Under a first load it is f p0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)] with the stick radius c, where the root of
         a negative number is replaced by zero.

@@ -76,10 +76,10 @@ def _table() -> Array:
 def _interpolated(table: Array, x: float) -> tuple[float, float, float]:
     """Return force, pressure and radius at approach/R = x for E = R = 1.
 
-    The interpolated quantities are smooth down to small loads. With s = sqrt(x), the ratios of force and pressure to those
-    of Hertz's theory at equal approach behave like 1 + s (A + B ln s); hence (ratio - 1)/s is interpolated as a function of
-    ln s. The ratio of the radius to that of Hertz's theory at equal force tends to 1 for small loads, which adds a point
-    to its table.
+    The interpolated quantities are smooth down to small loads. With s = sqrt(x), the ratios of force and pressure to
+    those of Hertz's theory at equal approach behave like 1 + s (A + B ln s). Therefore, (ratio - 1)/s is interpolated
+    as a function of ln s. The ratio of the radius to that of Hertz's theory at equal force tends to 1 for small loads,
+    which adds a point to its table.
     """
     s = np.sqrt(table[:, 0])
     hertz = [_hertz(1.0, 1.0, approach) for approach in table[:, 0]]
@@ -89,13 +89,13 @@ def _interpolated(table: Array, x: float) -> tuple[float, float, float]:
     valid = np.isfinite(radius_excess)
 
     at_approach, root = _hertz(1.0, 1.0, x), np.sqrt(x)
-    force = at_approach.force * (1.0 + root * _at(np.log(root), np.log(s), force_excess))
-    pressure = at_approach.pressure_max * (1.0 + root * _at(np.log(root), np.log(s), pressure_excess))
-    excess = _at(root, np.append(0.0, s[valid]), np.append(0.0, radius_excess[valid]))
+    force = at_approach.force * (1.0 + root * _local_cubic(np.log(root), np.log(s), force_excess))
+    pressure = at_approach.pressure_max * (1.0 + root * _local_cubic(np.log(root), np.log(s), pressure_excess))
+    excess = _local_cubic(root, np.append(0.0, s[valid]), np.append(0.0, radius_excess[valid]))
     return float(force), float(pressure), float(at_approach.at_force(float(force)).radius * (1.0 + excess))
 
 
-def _at(x: float, points: Array, values: Array) -> float:
+def _local_cubic(x: float, points: Array, values: Array) -> float:
     """Return the value at x of the cubic polynomial through the four points around x."""
     first = np.clip(np.searchsorted(points, x) - 2, 0, len(points) - 4)
     around = slice(first, first + 4)

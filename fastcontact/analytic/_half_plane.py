@@ -1,9 +1,10 @@
 """Elastic half-plane under Hertz's pressure: closed-form stress and displacement.
 
 The half-plane is y <= 0 and carries the pressure p0 sqrt(1 - x^2/b^2) on |x| <= b. With k = |y| + i x and the root w =
-sqrt(b^2 + k^2), Re w >= 0, the harmonic function that equals the pressure on the surface is p0/b Re(w - k) (McEwen 1949;
-Johnson 1985, eq. 4.49). Displacements are relative to the point (0, 0), since the displacement of a half-plane is unbounded
-at infinity. The displacements in plane stress follow with nu/(1 + nu) instead of nu and the same shear modulus.
+sqrt(b^2 + k^2), Re w >= 0, the harmonic function that equals the pressure on the surface is p0/b Re(w - k) (McEwen
+1949; Johnson 1985, eq. 4.49). Displacements are relative to the point (0, 0), since the displacement of a half-plane is
+unbounded at infinity. The displacements in plane stress are obtained by replacing nu by nu/(1 + nu), with the same
+shear modulus.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ _FAR = 4.0
 
 
 def below_surface(z: ArrayLike, a: float) -> Array:
-    """Return the depth -z (...) [length] of `z` (...) [length]; points above the surface by round-off are moved to it.
+    """Return the depth -z (...) [length] of `z` (...) [length]; points above it due to round-off are moved onto it.
 
     Raises ModelError if a point lies above the surface by more than round-off.
     """

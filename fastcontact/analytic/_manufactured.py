@@ -33,7 +33,7 @@ class HertzBox:
 
     The object is also the rigid obstacle on top of the box (see `distance`), for a model that is solved with
     ``Criteria(geometry_updates=0)``. Choose a contact radius that does not coincide with a node of the mesh, to avoid
-    accidental superconvergence. ModelError if a point lies above the top.
+    accidental superconvergence. Methods raise ModelError if a point lies above the top.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class HertzBox:
 
     @property
     def force(self) -> float:
-        """Exact force of the whole contact [force], in the plane per unit length [force/length].
+        """Exact force of the entire contact [force], in the plane per unit length [force/length].
 
         A plane model of x >= 0 carries half of it, and an axisymmetric model the force of the full circle.
         """

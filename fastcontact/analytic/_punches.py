@@ -313,7 +313,7 @@ def paraboloid_punch(
     approach: float | None = None,
     radius: float | None = None,
 ) -> PowerLawPunch:
-    """Return the contact of a rigid paraboloid of profile r^2/(2 R) with a half-space, which is Hertz's (Sneddon 1965).
+    """Return the contact of a rigid paraboloid of profile r^2/(2 R) with a half-space, as in Hertz's theory (Sneddon 1965).
 
     Parameters
     ----------

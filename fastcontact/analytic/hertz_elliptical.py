@@ -63,7 +63,7 @@ class HertzElliptical:
     def pressure(self, x: ArrayLike, y: ArrayLike = 0.0) -> Array:
         """Return the contact pressure (...) [pressure] at positions `x` (...) [length], `y` (...) [length], zero outside.
 
-        Johnson (1985), eq. 3.58.
+        The formula is eq. 3.58 of Johnson (1985).
         """
         x, y = array("x", x) / self.radius_x, array("y", y) / self.radius_y
         return self.pressure_max * np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))

@@ -14,7 +14,7 @@ from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.errors import ModelError
 from fastcontact.model.rigid_motions import grouped
 from fastcontact.results.step import ContactResult, StepResult, force_text
-from fastcontact.results.units import units_of_results, valued, with_unit
+from fastcontact.results.units import units_of_results, value_text, with_unit
 
 if TYPE_CHECKING:
     from fastcontact.analysis.modal.shapes import Modes
@@ -216,13 +216,13 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         rows += _contact_lines(name, contact, unit)
     for name, section in steps[-1].get("pretension", {}).items():
         rows.append(
-            f"  pretension '{name}': force {valued(section['force'], unit, 'force', 6)}, shortened by "
-            + valued(section["shortening"], unit, "length", 6)
+            f"  pretension '{name}': force {value_text(section['force'], unit, 'force', 6)}, shortened by "
+            + value_text(section["shortening"], unit, "length", 6)
         )
     if loaded:
         position = ", ".join(f"{x:.4g}" for x in peak["at"])
         rows.append(
-            f"  largest von Mises stress {valued(peak['value'], unit, 'pressure', 6)} at "
+            f"  largest von Mises stress {value_text(peak['value'], unit, 'pressure', 6)} at "
             + with_unit(f"({position})", unit, "length")
         )
     for name, (low, high) in summary.get("cell_fields", {}).items():
@@ -236,7 +236,7 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     if report := summary["regularised"]:
         rows.append(
             f"  held by contact alone: {grouped(report['motions'])}. Regularised by springs of "
-            f"{valued(report['spring_stiffness'], unit, 'stiffness', 3)}, which carry {report['relative_to_load']:.1e} "
+            f"{value_text(report['spring_stiffness'], unit, 'stiffness', 3)}, which carry {report['relative_to_load']:.1e} "
             "of the load at the end"
         )
     for name, theory in summary["theory"].items():
@@ -273,7 +273,7 @@ def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str
     force = force_text(contact["force_vector"], contact["force_parts"], contact["normal_force"], unit)
     yield (
         f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {force}, largest pressure "
-        f"{valued(contact['pressure_max'], unit, 'pressure', 6)}, {_extent_text(contact['extent'], lower, upper, unit)}"
+        f"{value_text(contact['pressure_max'], unit, 'pressure', 6)}, {_extent_text(contact['extent'], lower, upper, unit)}"
     )
     if any(contact["obstacle_displacement"] or ()):
         components = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])
@@ -281,14 +281,14 @@ def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str
     if "torque" in contact:
         yield (
             f"  obstacle '{name}' has turned by {contact['obstacle_angle']:.6g} radian, with a torque of "
-            + valued(contact["torque"], unit, "moment", 6)
+            + value_text(contact["torque"], unit, "moment", 6)
         )
     if "wear_max" in contact:
-        yield f"  contact '{name}' is worn by up to {valued(contact['wear_max'], unit, 'length')}"
+        yield f"  contact '{name}' is worn by up to {value_text(contact['wear_max'], unit, 'length')}"
     if contact["penalty"] is not None:
         yield (
-            f"  contact '{name}' penetrates by up to {valued(contact['penetration'], unit, 'length')}, with a penalty of "
-            + (valued(contact["penalty"], unit, "penalty") if isinstance(contact["penalty"], float) else "its law")
+            f"  contact '{name}' penetrates by up to {value_text(contact['penetration'], unit, 'length')}, with a penalty of "
+            + (value_text(contact["penalty"], unit, "penalty") if isinstance(contact["penalty"], float) else "its law")
         )
 
 
@@ -300,8 +300,8 @@ def _extent_text(extent: str, lower: float | None, upper: float | None, unit: Ma
     if lower is None:
         return "open"
     if upper is None:
-        return f"{extent} {valued(lower, unit, 'length')}, to the end of the surface"
-    return f"{extent} {lower:.4g} to {valued(upper, unit, 'length')}"
+        return f"{extent} {value_text(lower, unit, 'length')}, to the end of the surface"
+    return f"{extent} {lower:.4g} to {value_text(upper, unit, 'length')}"
 
 
 def _theory_lines(pair: str, theory: Mapping[str, Any], extent: str) -> list[str]:
@@ -334,7 +334,7 @@ def _check_lines(check: Mapping[str, Any], unit: Mapping[str, str]) -> Iterator[
     """Yield the result of a check, and an explanation if the theory rather than the mesh causes its failure."""
     verdict = "within" if check["passed"] else "NOT within"
     origin = "the theory's" if check["of"] else "the documented"
-    measured = valued(check["value"], unit, check["unit"], 6)
+    measured = value_text(check["value"], unit, check["unit"], 6)
     text = (
         f"  check {check['name']}: {measured} is {abs(check['deviation']):.3%} from {origin} "
         f"{check['target']:.6g}, {verdict} {check['tolerance']:.3g}"

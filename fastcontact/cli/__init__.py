@@ -29,7 +29,7 @@ def entry_point() -> None:
     _open_standard_files()
     # Almost all objects exist until the end of a command. Searching them for garbage would take a sixth of a short run.
     gc.set_threshold(50_000)
-    # Further threads of BLAS would spin between many small products. Compiled loops have threads of their own.
+    # Further BLAS threads would spin idly between many small products. Compiled loops use separate threads.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         code = main()

@@ -34,7 +34,7 @@ COMMAND_LINE = "fastcontact.cli._main"
 
 @contextlib.contextmanager
 def interruptible(received_signals: list[int] | None = None) -> Iterator[None]:
-    """Let Ctrl-C, SIGTERM and SIGHUP interrupt a ``with`` block by KeyboardInterrupt, raised again if Python discards it.
+    """Let Ctrl-C, SIGTERM and SIGHUP interrupt a ``with`` block by KeyboardInterrupt, even if Python discards it at first.
 
     The numbers of the signals are appended to the list `received_signals`. Signals with a handler other than the default one
     keep it.

@@ -200,7 +200,7 @@ def history_lines(history: Sequence[Mapping[str, Any]], shown: int = 10) -> list
     if not history:
         return []
     first = max(len(history) - shown, 0)
-    lines = [f"  iterations {first + 1} to {len(history)}: change of the displacement, constraints active, residual"]
+    lines = [f"  iterations {first + 1} to {len(history)}: change of the displacement, active constraints, residual"]
     for number, entry in enumerate(history[first:], start=first + 1):
         residual = f"{entry['residual']:.3e}" if "residual" in entry else "-"
         lines.append(f"  {number:4d}  {entry['displacement_change']:.3e}  {entry['active']:6d}  {residual}")

@@ -105,14 +105,14 @@ ARGUMENTS = {
 }
 
 
-def check_targets(options: Namespace, *also: str | None) -> None:
-    """Check before a study that its output files and those in `also` can be written; errors as for `check_outputs`."""
+def check_targets(options: Namespace, *paths: str | None) -> None:
+    """Check before a study that its output files and those in `paths` can be written; errors as for `check_outputs`."""
     from fastcontact.cases.case import files_of_case
 
-    check_outputs(files_of_case(options.case), [options.json, options.csv, options.html, *also], [options.png])
+    check_outputs(files_of_case(options.case), [options.json, options.csv, options.html, *paths], [options.png])
 
 
-def names(text: str | None) -> list[str] | None:
+def split(text: str | None) -> list[str] | None:
     """Return the names in a comma-separated text, or None if there is no text."""
     return [name.strip() for name in text.split(",") if name.strip()] if text else None
 
@@ -137,11 +137,11 @@ def run_interruptibly(options: Namespace, study: Callable[..., Any]) -> Any:
         progress.close()
 
 
-def report(options: Namespace, result: Any, hint: str, failures: Sequence[str] = (), also: Sequence[str] = ()) -> int:
-    """Write the files of the options, print the result and return the exit code.
+def report(options: Namespace, result: Any, hint: str, failures: Sequence[str] = (), paths: Sequence[str] = ()) -> int:
+    """Write the requested files, print the result and return the exit code.
 
-    The function prints the messages of failed runs (`failures`), the lines of the result and the names of the files. `also`
-    contains the names of files that were written before, and `hint` is printed if no file was written.
+    The function prints the messages of failed runs (`failures`), the lines of the result and the names of the files.
+    `paths` contains the names of files that were written before, and `hint` is printed if no file was written.
     """
     if options.json:
         write_json(options.json, result.as_dict())
@@ -157,6 +157,6 @@ def report(options: Namespace, result: Any, hint: str, failures: Sequence[str] =
         say(f"warning: {text}", error=True)
     if not options.quiet:
         say("\n".join(result.lines()))
-        written = [path for path in (options.json, options.csv, options.png, options.html, *also) if path]
+        written = [path for path in (options.json, options.csv, options.png, options.html, *paths) if path]
         say(f"wrote {', '.join(written)}" if written else f"nothing written: {hint}")
     return 2 if failures else 0

@@ -49,8 +49,8 @@ def flush_output(code: int) -> int:
         if sys.stdout is not None:
             sys.stdout.flush()
     except OSError as failure:
-        # At exit Python flushes again and would print another message. Redirecting the output to the null device prevents
-        # this.
+        # At exit Python flushes again and would print another message. Redirecting the output to the null device
+        # prevents this message.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if not code and not isinstance(failure, BrokenPipeError):
             say(f"error: {_write_error_message(failure)}", error=True)

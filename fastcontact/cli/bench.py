@@ -16,11 +16,11 @@ ARGUMENTS = {
     "--smallest": "run the smallest size of each benchmark once, as a check",
     "--sizes N": ({"type": int, "nargs": "+"}, "approximate numbers of unknowns"),
     "--json FILE": "write results and environment",
-    "--png FOLDER": "plot time and memory over the number of unknowns, for each benchmark",
+    "--png FOLDER": "plot time and memory against the number of unknowns, for each benchmark",
     "--compare FILE": "compare with a run stored by --json",
     "--problem NAME": "solve one contact problem in detail: sphere-on-block, forma04c ...",
     "--dofs N": (int, "with --problem: approximate number of unknowns"),
-    "--linear SOLVER": "with --problem: linear solver (default: the problem's)",
+    "--linear SOLVER": "with --problem: linear solver (default: that of the problem)",
     "--tolerance T": (float, "with --problem: tolerance of solver and geometry (1e-8)"),
 }
 
@@ -38,5 +38,5 @@ def suite(name: str) -> Any:
 
 
 def run(options: Namespace) -> int:
-    """Run the benchmarks, print the table, and write the files of the options."""
+    """Run the benchmarks, print the table, and write the requested files."""
     return int(suite("command").run(options))

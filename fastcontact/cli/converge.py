@@ -32,13 +32,13 @@ ARGUMENTS = {
 
 
 def run(options: Namespace) -> int:
-    """Run the study, write the files of the options and print the results; return 2 if a run failed."""
+    """Run the study, write the requested files and print the results; return 2 if a run failed."""
     from fastcontact.studies.runs import convergence_study
 
     _study.check_targets(options, options.output)
     if options.adaptive:
         return _adaptive(options)
-    elements, formulations, quantities = map(_study.names, (options.elements, options.formulations, options.quantities))
+    elements, formulations, quantities = map(_study.split, (options.elements, options.formulations, options.quantities))
     study = _study.run_interruptibly(
         options,
         partial(convergence_study, options.case, options.levels, elements, formulations, quantities=quantities or ()),
@@ -48,7 +48,7 @@ def run(options: Namespace) -> int:
 
 
 def _adaptive(options: Namespace) -> int:
-    """Run an adaptive study, write the files of the options and print the table; return 2 if the tolerance is not met."""
+    """Run an adaptive study, write the requested files and print the table; return 2 if the tolerance is not met."""
     from fastcontact.studies.adaptive import adaptive_study
 
     with warnings_shown():
@@ -66,13 +66,13 @@ def _adaptive(options: Namespace) -> int:
 
         with ResultWriter(options.output, study.case.model, case_text=study.text, cell_fields=("error",)) as out:
             out.write(dataclasses.replace(study.last, cell_fields={"error": study.error.cells}))
-    _study.report(options, study, HINT, also=[options.output])
+    _study.report(options, study, HINT, paths=[options.output])
     return 0 if study.reached else 2
 
 
 def _only(text: str | None, option: str) -> str | None:
     """Return the name in a text, or None if there is no text; CaseError for several names."""
-    names = _study.names(text) or []
+    names = _study.split(text) or []
     if len(names) > 1:
         raise CaseError(f"adaptive refinement takes one {option}, not {len(names)}: {text}")
     return names[0] if names else None

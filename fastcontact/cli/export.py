@@ -16,7 +16,7 @@ ARGUMENTS = {
 
 
 def run(options: Namespace) -> int:
-    """Write the files of the options."""
+    """Write the requested files."""
     if not (options.med or options.xdmf):
         raise CaseError("nothing to export: give --med FILE or --xdmf FILE")
     check_outputs([options.file], [options.med, options.xdmf])

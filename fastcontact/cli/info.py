@@ -13,7 +13,7 @@ from fastcontact.cli._terminal import say
 HELP = "show the content of a mesh, case, deck or result file: groups, sizes, steps, iterations, versions"
 ARGUMENTS = {
     "file": "mesh file, case file (.toml), ready-made case, deck (.inp) or result file (.vtkhdf)",
-    "--contacts": "show the surfaces of bodies that face each other instead",
+    "--contacts": "show the surfaces of bodies that face each other, instead of the content",
     "--distance LENGTH": (float, "largest gap for --contacts (default: the size of facets)"),
     "--angle DEGREES": (45.0, "largest deviation of normals from opposite directions (45)"),
     "--png FILE": "write a picture of the contacts",

@@ -33,7 +33,7 @@ ARGUMENTS = {
     "--mirrored": "draw the mirror image about the axis as well",
     "--scale SCALE": (
         float,
-        "factor on the displacements (default 1; mode shapes are scaled to a tenth of the mesh size)",
+        "factor by which displacements are multiplied (default 1; mode shapes are scaled to a tenth of the mesh size)",
     ),
 }
 
@@ -98,32 +98,32 @@ def _body_plot(
     section = f"section {options.section}, " if plane else ""
     scale = scale_of(options.scale, results.mesh, [step])
     title = f"{case['title']}\n{section}{step.instant}, displacements x {scale:g}".strip()
-    labels = {"field": options.field, "scale": scale, "zoom": options.zoom, "title": title}
+    keywords = {"field": options.field, "scale": scale, "zoom": options.zoom, "title": title}
     if plane is None:
-        return plot.deformed_shape(results.mesh, step, mirrored=options.mirrored, **labels)
+        return plot.deformed_shape(results.mesh, step, mirrored=options.mirrored, **keywords)
     point, normal = [0.0] * 3, [0.0] * 3
     point[plane[0]], normal[plane[0]] = plane[1], 1.0
-    return plot.section(results.mesh, step, point, normal, **labels)
+    return plot.section(results.mesh, step, point, normal, **keywords)
 
 
 def _contact_plot(options: Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
     """Return a plot of the map, the zones or the history of a contact pair, or of the stresses on the axis below it."""
     from fastcontact.results import plot
 
-    labels = {"title": case["title"]}
+    keywords = {"title": case["title"]}
     name = _results.select_contact(options, step)
     theories = case["theories"].get(name, {})
     if options.map:
-        labels["title"] = f"{case['title']}\ncontact '{name}', {step.instant}".strip()
+        keywords["title"] = f"{case['title']}\ncontact '{name}', {step.instant}".strip()
         field = options.field.removeprefix("contact_") if options.field.startswith("contact_") else "shear"
-        return plot.contact_map(results.mesh, step.contact[name], beside=field, **labels)[0]
+        return plot.contact_map(results.mesh, step.contact[name], beside=field, **keywords)[0]
     if options.zones:
-        return plot.contact_zones(list(results), name, **labels)
+        return plot.contact_zones(list(results), name, **keywords)
     if options.history:
         reference = {"approach": case["approach"].get(name), "share": theories.get("share", 1.0)}
-        return plot.history(list(results), name, law=_results.approach_law(theories), **reference, **labels)[0]
-    labels["title"] = f"{case['title']}\nstresses on the axis, {step.instant}".strip()
-    return plot.axis_stress(results.mesh, step, name, _axis_curves(theories, step, name, case), **labels)
+        return plot.history(list(results), name, law=_results.approach_law(theories), **reference, **keywords)[0]
+    keywords["title"] = f"{case['title']}\nstresses on the axis, {step.instant}".strip()
+    return plot.axis_stress(results.mesh, step, name, _axis_curves(theories, step, name, case), **keywords)
 
 
 def _axis_curves(theories: dict[str, Any], step: Any, name: str, case: dict[str, Any]) -> dict[str, Any]:

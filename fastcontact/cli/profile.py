@@ -62,7 +62,7 @@ def _print(table: Any) -> None:
         say("  ".join(f"{row[name]:>14.6g}" for name in names))
 
 
-def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, PressureCurve]) -> None:
+def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theory: dict[str, PressureCurve]) -> None:
     """Write an XMGRACE project with the computed pressure and the theoretical pressures, given by label."""
     from fastcontact.results.units import axis_label
     from fastcontact.results.xmgrace import Curve, write_agr
@@ -71,7 +71,7 @@ def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theorie
     position = contact.place[order]
     style = "line+symbols" if contact.coordinates.shape[1] == 2 else "symbols"
     curves = [Curve(position, contact.pressure[order], "computed", style=style)]
-    for label, curve in theories.items():
+    for label, curve in theory.items():
         end = min(curve.radius, float(np.abs(position).max()))
         x = np.unique(np.concatenate([position[[0, -1]], np.linspace(max(-end, min(position[0], 0.0)), end, 200)]))
         curves.append(Curve(x, curve.pressure(np.abs(x)), label))

@@ -24,17 +24,17 @@ HELP = "solve a case file or an input deck (.inp) and write the results of all s
 # Name of the cell field with the estimated error.
 ERROR_FIELD = "error"
 # Smallest number of mesh points for which a step is written in the background while the next one is solved.
-LARGE = 30_000
+LARGE_MESH = 30_000
 ARGUMENTS = {
     "case": "case file (TOML), the name of a ready-made case (see 'fastcontact cases'), or a deck (.inp)",
-    "-o --output OUTPUT": "result file (default: the case's name with .vtkhdf, here)",
+    "-o --output OUTPUT": "result file (default: the name of the case with the suffix .vtkhdf, in this folder)",
     "--resume": "continue after the last complete step of the result file, if there is one",
-    "--json FILE": "write a summary of the last step and the iterations, or why the run failed",
+    "--json FILE": "write a summary of the last step and the iterations, or the reason why the run failed",
     "--plot PNG": "plot the contact pressure of the last step, compared with theory",
     "--modes FILE": "write the natural modes of the state of the last step (.vtkhdf)",
     "--nodal-diameters N[,N...]": "nodal diameters of the modes of a cyclic sector, such as 0,1,2, or all; mode shapes are "
     "those of the full ring",
-    "--linear SOLVER": "auto, direct, amg, cholmod or pyamg (default: the case's)",
+    "--linear SOLVER": "auto, direct, amg, cholmod or pyamg (default: that of the case)",
     "--estimate-error": "estimate the error of each cell and write it to the result file",
     "--strict": "exit with code 3 if a check of the case fails",
     "--threads N": (int, "number of threads of parallel kernels"),
@@ -42,7 +42,7 @@ ARGUMENTS = {
 
 
 def run(options: Namespace) -> int:
-    """Solve the case, write the files of the options and print the summary."""
+    """Solve the case, write the requested files and print the summary."""
     from fastcontact._jit import decorators
     from fastcontact.cases import summary
     from fastcontact.cases.case import case_path, files_of_case, read_case
@@ -141,9 +141,9 @@ def _write_steps(
     if options.estimate_error:
         from fastcontact.studies.error_norms import estimate_error
     fields = (ERROR_FIELD,) if options.estimate_error else ()
-    settings = {"cell_fields": fields, "resume": options.resume, "background": case.model.mesh.n_points >= LARGE}
+    settings = {"cell_fields": fields, "resume": options.resume, "background": case.model.mesh.n_points >= LARGE_MESH}
     with ResultWriter(output, case.model, case_text=case.text, **settings) as writer:
-        _check_same(case, writer.done, output)
+        _check_same_case(case, writer.done, output)
         last = writer.done[-1] if writer.done else None
         done = [(of_step(step), step.warnings) for step in writer.done]  # reads each step only once
         steps = [summary for summary, _ in done]
@@ -179,8 +179,8 @@ def _add_note(error: BaseException, writer: ResultWriter, output: Path, summary:
         write_json(summary, {"failed": str(error) or "interrupted from the keyboard", "complete_steps": writer.n_steps})
 
 
-def _check_same(case: Any, done: Sequence[Any], output: Path) -> None:
-    """Raise ModelError if the steps to resume from belong to another case."""
+def _check_same_case(case: Any, done: Sequence[Any], output: Path) -> None:
+    """Raise ModelError if the steps from which a run is resumed belong to another case."""
     from fastcontact.analysis import restart
 
     if done:
@@ -196,15 +196,15 @@ def _warn_of_steps_outside_ramp(case: Case, done: Sequence[float], output: Path)
     others = [factor for factor in done if not any(math.isclose(factor, t, rel_tol=1e-9) for t in instants)]
     if others:
         warn(
-            f"'{output}' contains {len(done)} steps, the case now has {len(instants)}: those in the file are kept, including "
-            f"that at load factor {others[0]:g}, which is not in the case; without --resume all steps are solved again"
+            f"'{output}' contains {len(done)} steps, but the case now has {len(instants)}: those in the file are kept, "
+            f"including that at load factor {others[0]:g}, which the case lacks; without --resume all steps are solved again"
         )
 
 
 def _files_message(output: Path, done: int, total: int, others: list[str]) -> str:
     """Return a message on the files written, with the number of steps `done` before the run."""
     if done == total:
-        message = f"{output} was complete with {total} steps, no step remained to be solved"
+        message = f"{output} was complete with {total} steps, so that no step was solved"
         return "; wrote ".join([message, ", ".join(others)] if others else [message])
     resumed = f" (resumed after step {done})" if done else ""
     return f"wrote {', '.join([f'{output}{resumed}', *others])}"

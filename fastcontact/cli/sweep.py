@@ -28,7 +28,7 @@ ARGUMENTS = {
 
 
 def run(options: Namespace) -> int:
-    """Run the sweep, write the files of the options and print the table; return 2 if a run failed."""
+    """Run the sweep, write the requested files and print the table; return 2 if a run failed."""
     from fastcontact.studies.runs import parameter_sweep
 
     _study.check_targets(options)

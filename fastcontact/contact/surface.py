@@ -14,7 +14,7 @@ from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.errors import ContactError, MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import ordered_line, outer_facets, remembered, same_facets
+from fastcontact.mesh.topology import cached_by_mesh, ordered_line, outer_facets, same_facets
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +218,7 @@ def _line_neighbours(local: Indices) -> Indices:
     return np.column_stack([ends[local[:, 0]], begins[local[:, 1]]])
 
 
-@remembered
+@cached_by_mesh
 def surface(mesh: Mesh, group: str) -> Surface:
     """Return the facets of `group`, oriented such that normals point out of the body, as ORIE_PEAU of code_aster does.
 

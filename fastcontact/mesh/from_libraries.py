@@ -14,7 +14,7 @@ from fastcontact.arrays import REFUSAL, is_masked
 from fastcontact.errors import FileError, MeshError, warn
 from fastcontact.mesh import elements, topology
 from fastcontact.mesh.files.mesh_files import read_mesh
-from fastcontact.mesh.files.meshio_content import UNFIT, VERTEX, mesh_of
+from fastcontact.mesh.files.meshio_content import INCONSISTENCY_ERRORS, VERTEX, mesh_of
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS, plain_parts
 from fastcontact.mesh.mesh import Mesh
 
@@ -201,6 +201,6 @@ def _mesh_of(content: dict[str, Any], file_format: str, library: str) -> Mesh:
         mesh, _ = mesh_of(content, file_format)
     except MeshError as error:
         raise MeshError(f"{library}: {error}") from None
-    except UNFIT as error:
+    except INCONSISTENCY_ERRORS as error:
         raise MeshError(f"the arrays of {library} do not fit together: {error}") from error
     return topology.oriented(mesh)[0]

@@ -41,7 +41,7 @@ def _numbers(name: str, values: ArrayLike) -> AnyArray:
         raise MeshError(f"{name} must be whole numbers, counted from 0, not {array.dtype} values")
     if array.min() < -(2**31) or array.max() >= 2**31:
         raise MeshError(
-            f"{name} contain the number {max(array.flat, key=abs)}: the largest that a mesh can hold is 2147483647"
+            f"{name} contain the number {max(array.flat, key=abs)}: the largest possible number is 2147483647"
         )
     return array
 
@@ -56,9 +56,9 @@ def starts_of(blocks: Mapping[str, Sized]) -> dict[str, int]:
 class Mesh(Suggesting):
     """Points, cells and named groups.
 
-    A mesh contains solid cells, and facets (lines in 2D) for groups of the boundary. Cells are numbered from 0,
-    consecutively over all element types in the order of `cells`; a cell group is a sorted array of these numbers. Points
-    are numbered from 0.
+    A mesh contains solid cells, and facets (lines in 2D) that form groups on the boundary. Cells are numbered from 0,
+    consecutively over all element types in the order of `cells`; a cell group is a sorted array of these numbers.
+    Points are numbered from 0.
 
     Parameters
     ----------
@@ -283,8 +283,8 @@ class Mesh(Suggesting):
         between : bool
             Select facets between two solid cells, such as a section through a body, instead of facets on the surface.
         of : str, optional
-            Group of the solid cells to which the facets belong; by default all solid cells. With this group the facets of
-            one of two coincident faces can be selected.
+            Group of the solid cells to which the facets belong; by default all solid cells. This option selects the
+            facets of one of two coincident faces.
 
         Raises
         ------
@@ -354,7 +354,8 @@ class Mesh(Suggesting):
 def facets_of_cells(mesh: Mesh) -> Iterator[tuple[str, AnyArray, AnyArray]]:
     """Yield the element type and the nodes (n_cells, n_nodes) of facets of solid cells, and the numbers of the cells.
 
-    Each item contains the facets with one local number in all cells of an element type. Their normals point out of the cells.
+    Each item contains the facets that have the same local number in all cells of an element type. Their normals point
+    out of the cells.
     """
     for name, block in mesh.solids.items():
         element, numbers = elements.get(name), mesh.offsets[name] + np.arange(len(block), dtype=np.int32)

@@ -164,7 +164,7 @@ def _check_nodes(mesh: Mesh, name: str) -> None:
 
 
 def _check_duplicates(mesh: Mesh, name: str) -> None:
-    """Raise MeshError if two cells of one element type have the same nodes, because their stiffness is counted twice."""
+    """Raise MeshError if two cells of one element type have the same nodes, so that their stiffness counts twice."""
     nodes = mesh.cells[name].astype(np.int64)
     # Most cells are distinguished by sums over their nodes. Only cells with equal sums are compared node by node.
     key = nodes.sum(axis=1) * mesh.n_points + (nodes * nodes % 1_000_003).sum(axis=1)

@@ -26,7 +26,7 @@ from fastcontact.mesh.mesh import Mesh, facets_of_cells
 
 Result = TypeVar("Result")
 Arguments = ParamSpec("Arguments")
-OfMesh = Callable[Concatenate[Mesh, Arguments], Result]
+MeshFunction = Callable[Concatenate[Mesh, Arguments], Result]
 # Distance, relative to the size of the mesh, below which nodes are regarded as coincident or collinear.
 COLLINEAR = 1e-6
 
@@ -95,22 +95,22 @@ def _oriented_keys(facets: Indices) -> Indices:
     return np.column_stack([facets[rows, first], following, preceding if count > 2 else first])
 
 
-def remembered(function: OfMesh[Arguments, Result]) -> OfMesh[Arguments, Result]:
+def cached_by_mesh(function: MeshFunction[Arguments, Result]) -> MeshFunction[Arguments, Result]:
     """Decorate `function` such that its results are cached by mesh, which is immutable, and by the other arguments."""
     results: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Result]] = WeakKeyDictionary()
 
     @wraps(function)
-    def remembered(mesh: Mesh, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+    def cached_by_mesh(mesh: Mesh, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
         results_of_mesh, key = results.setdefault(mesh, {}), (*args, *kwargs.items())
         if key not in results_of_mesh:
             results_of_mesh[key] = function(mesh, *args, **kwargs)
         return results_of_mesh[key]
 
-    return remembered
+    return cached_by_mesh
 
 
 @typed(MeshError)
-@remembered
+@cached_by_mesh
 def bodies(mesh: Mesh) -> tuple[int, Numbers]:
     """Return the number of bodies and the body (n_points,) to which each point belongs, -1 for points without a solid cell.
 
@@ -151,7 +151,7 @@ def cells_of_outer_facets(mesh: Mesh) -> Mapping[str, Numbers]:
     return _facets(mesh)[2]
 
 
-@remembered
+@cached_by_mesh
 def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Numbers]]:
     """Return `outer_facets`, `cells_joined_by_facets` and `cells_of_outer_facets`."""
     by_kind: dict[str, list[tuple[Numbers, Numbers]]] = {}
@@ -298,7 +298,7 @@ class RigidParts:
         return np.union1d(nodes, hinges) if len(hinges) else nodes
 
 
-@remembered
+@cached_by_mesh
 def rigid_parts(mesh: Mesh) -> RigidParts:
     """Return the rigid parts of the bodies of a mesh."""
     count, body = bodies(mesh)

@@ -15,15 +15,15 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies, outer_facets
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Points whose distance from a surface, relative to the largest coordinate of the surface, is below this lie on it [-].
+# A point lies on a surface if its distance, relative to the largest coordinate of the surface, is below this [-].
 ON_SURFACE = 1e-10
 
 
 def penetration(mesh: Mesh, kinematics: str, coordinates: Array) -> list[tuple[int, int, float, Array]]:
-    """Return (body, other, depth, position) for each pair of bodies of which the first has nodes inside the second.
+    """Return (body, other, depth, position) for each pair of bodies such that the first has nodes inside the second.
 
-    `depth` is the largest penetration depth of these nodes, see `depths` [length], and `position` (dim,) that of the node
-    with this depth [length].
+    `depth` is the largest penetration depth of these nodes, see `depths` [length], and `position` (dim,) is the
+    position of the node with this depth [length].
     """
     overlaps = []
     for body, other, points, depth in depths(mesh, kinematics, coordinates):
@@ -36,11 +36,11 @@ def penetration(mesh: Mesh, kinematics: str, coordinates: Array) -> list[tuple[i
 def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[int, int, Indices, Array]]:
     """Yield (body, other, points (n,), depth (n,)) for each ordered pair of bodies with overlapping bounding boxes.
 
-    `points` are those outer nodes of the first body that lie in the bounding box of the second. Depths are their distances to
-    the outer surface of the second body, and zero for points outside that body [length]. The axis of an axisymmetric body is
-    not part of its surface. Facets are treated as curved. Facets of second order deviate from a smooth curved surface by
-    less than r^2 / h, where r is the rise of a facet and h its length. Smaller depths than the sum of these bounds of both
-    bodies are set to zero.
+    `points` are those outer nodes of the first body that lie in the bounding box of the second. Depths are their
+    distances to the outer surface of the second body, and zero for points outside that body [length]. The axis of an
+    axisymmetric body is not part of its surface. Facets are treated as curved. Facets of second order deviate from a
+    smooth curved surface by less than r^2 / h, where r is the rise of a facet and h its length. Depths below the sum of
+    these bounds for the two bodies are set to zero.
     """
     count, body_of = bodies(mesh)
     if count < 2:

@@ -54,7 +54,7 @@ def check_ramps(ramped: Iterable[tuple[str, Table | None]], instants: Iterable[f
 def check_forces(mesh: Mesh, forces: Array, related: Mask, name: str) -> None:
     """Raise ModelError if `forces` (n_points, dim) [force] of load `name` act on points that belong to no solid cell.
 
-    Points with multi-point constraints, `related` (n_points,) of bool, are exempt.
+    Points with multi-point constraints or springs, which the mask `related` (n_points,) marks, are exempt.
     """
     isolated = np.flatnonzero(forces.any(axis=1) & ~_connected_points(mesh, related))
     if len(isolated):
@@ -75,7 +75,7 @@ def _connected_points(mesh: Mesh, related: Mask) -> Mask:
 def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: Mask) -> None:
     """Raise ModelError if no point of one of the supports (name, group) belongs to a solid cell.
 
-    Points with multi-point constraints, `related` (n_points,) of bool, are exempt.
+    Points with multi-point constraints or springs, which the mask `related` (n_points,) marks, are exempt.
     """
     connected = _connected_points(mesh, related)
     for name, group in supports:

@@ -16,14 +16,15 @@ from fastcontact.errors import ModelError, check_known
 from fastcontact.model.ramp import Ramp, Table, multiplier, table_of
 
 # Components of the force on an obstacle [force]; None for components that are prescribed. Empty if no force is given.
-Driving = tuple[float | None, ...]
+DrivingForce = tuple[float | None, ...]
 
 
 @dataclass(frozen=True)
 class FluidPressure:
     """Fluid that enters a contact from the group `source`.
 
-    `pressure` is that at multiplier 1 [pressure], and `ramp` its history, or None for the history of the analysis.
+    `pressure` is the fluid pressure at multiplier 1 [pressure], and `ramp` is its history; None means the history of
+    the analysis.
     """
 
     pressure: float
@@ -35,10 +36,11 @@ class FluidPressure:
 class ContactPair:
     """Two groups of facets that may touch, or a group and a rigid obstacle, with a formulation and its options.
 
-    With an `obstacle`, `primary` is empty. The obstacle has the displacement `motion` at multiplier 1 [length], with the
-    history `ramp`, or that of the analysis if None. Components in which `force` is not None are driven by this force at
-    multiplier 1 [force] instead. The obstacle rotates by `rotation` with the history `rotation_ramp`, by default `ramp`. For
-    automatically detected pairs, `found_gap` is the smallest gap at detection [length].
+    If there is an `obstacle`, `primary` is empty. The displacement of the obstacle at multiplier 1 is `motion`
+    [length], and its history is `ramp`; None means the history of the analysis. Components in which `force` is not None
+    are driven by this force instead, which is given at multiplier 1 [force]. The obstacle rotates by `rotation` with
+    the history `rotation_ramp`, by default `ramp`. For automatically detected pairs, `found_gap` is the smallest gap at
+    detection [length].
     """
 
     name: str
@@ -49,7 +51,7 @@ class ContactPair:
     obstacle: Obstacle | None = None
     motion: tuple[float, ...] = ()
     ramp: Table | None = None
-    force: Driving = ()
+    force: DrivingForce = ()
     rotation: Rotation | None = None
     rotation_ramp: Table | None = None
     fluid: FluidPressure | None = None
@@ -81,9 +83,9 @@ def method(formulation: str, options: Mapping[str, Any]) -> str:
     return f"{formulation} with {options['multipliers']} multipliers" if "multipliers" in options else formulation
 
 
-KEYS = ("angle", "centre", "axis", "ramp")
+ROTATION_KEYS = ("angle", "centre", "axis", "ramp")
 # Largest rotation of an obstacle with friction in a load step [radian].
-LARGEST_TURN = 1.0
+LARGEST_ROTATION = 1.0
 
 
 def rotation_of(caption: str, spec: Mapping[str, Any] | None, kinematics: str) -> tuple[Rotation | None, Table | None]:
@@ -94,7 +96,7 @@ def rotation_of(caption: str, spec: Mapping[str, Any] | None, kinematics: str) -
     if spec is None:
         return None, None
     for key in spec:
-        check_known(f"key of {caption}", key, KEYS, ModelError)
+        check_known(f"key of {caption}", key, ROTATION_KEYS, ModelError)
     if kinematics == "axisymmetric":
         raise ModelError(
             f"{caption}: an axisymmetric model has no displacement around its axis, and tilting is not axisymmetric: use a "
@@ -130,10 +132,10 @@ def angle_at(pair: ContactPair, ramp: Ramp, instant: float) -> float:
     return multiplier(ramp_of_rotation, ramp, instant) * pair.rotation.angle
 
 
-def check_turns(pairs: Iterable[ContactPair], ramp: Ramp) -> None:
-    """Raise ModelError if an obstacle with friction rotates by more than LARGEST_TURN in a load step.
+def check_rotations(pairs: Iterable[ContactPair], ramp: Ramp) -> None:
+    """Raise ModelError if an obstacle with friction rotates by more than LARGEST_ROTATION in a load step.
 
-    The slip of a step is computed from its end points, and does not follow longer arcs.
+    The slip in a step is computed from the end points of the motion, which is inaccurate for longer arcs.
     """
     for pair in pairs:
         if pair.rotation is None or not pair.options.get("friction"):
@@ -142,9 +144,9 @@ def check_turns(pairs: Iterable[ContactPair], ramp: Ramp) -> None:
         for instant in ramp.instants:
             angle = angle_at(pair, ramp, instant)
             change = abs(angle - previous)
-            if change > LARGEST_TURN:
+            if change > LARGEST_ROTATION:
                 raise ModelError(
                     f"obstacle '{pair.name}' turns by {change:.3g} radian in the step to {instant:g}, more than "
-                    f"{LARGEST_TURN:g}: with friction use at least {math.ceil(change / LARGEST_TURN)} steps instead"
+                    f"{LARGEST_ROTATION:g}: with friction use at least {math.ceil(change / LARGEST_ROTATION)} steps instead"
                 )
             previous = angle

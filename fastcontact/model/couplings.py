@@ -24,7 +24,7 @@ from fastcontact.round_off import ROUND_OFF, TINY
 
 Term = tuple[int, int, float]  # point, component, coefficient
 KINDS = ("rigid", "distributing")
-# Weights as functions of the ratio of distance and radius. All but the uniform one decrease from 1 to 0.
+# Weights as functions of the ratio of distance to radius. All but the uniform one decrease from 1 to 0.
 WEIGHTINGS: dict[str, Callable[[Array], Array]] = {
     "uniform": np.ones_like,
     "linear": lambda s: 1.0 - s,
@@ -54,7 +54,7 @@ class Spread:
     def check(self, name: str, dim: int) -> None:
         """Raise ModelError, with the `name` of the load, if the weighting is not admissible."""
         if len(self.place) != dim:
-            raise ModelError(f"{name}: the point {self.place} from which distances are taken needs {dim} coordinates")
+            raise ModelError(f"{name}: the point {self.place} of the distances needs {dim} coordinates")
         for number in self.place:
             check_number(f"a coordinate of the point of {name}", number)
         check_known("weighting", self.weighting, WEIGHTINGS, ModelError, f"{name}: ")
@@ -101,7 +101,7 @@ def mean_rotation(weight: Array, arms: Array, caption: str = "") -> Array:
     times a moment yields forces at the points that have this moment and a zero resultant. Raises ModelError, with a message
     that begins with `caption`, if the points coincide or, in 3D, are collinear.
     """
-    motion = by_rotation(arms)
+    motion = rotation_displacement(arms)
     inertia = np.einsum("n,ndk,ndl->kl", weight, motion, motion)
     if np.linalg.matrix_rank(inertia, tol=ROUND_OFF * np.abs(inertia).max(initial=TINY)) < len(inertia):
         raise ModelError(
@@ -111,7 +111,7 @@ def mean_rotation(weight: Array, arms: Array, caption: str = "") -> Array:
     return np.einsum("kl,ndl,n->knd", np.linalg.inv(inertia), motion, weight)
 
 
-def by_rotation(arms: Array) -> Array:
+def rotation_displacement(arms: Array) -> Array:
     """Return the displacement (..., dim, n_rotations) of the ends of `arms` (..., dim) due to unit rotations [length]."""
     if arms.shape[-1] == 2:
         return np.asarray((np.array([-1.0, 1.0]) * arms[..., ::-1])[..., None])
@@ -128,7 +128,7 @@ def forces_of_moment(weight: Array, positions: Array, moment: Array, caption: st
 
 @dataclass(frozen=True)
 class SpreadForce(Load):
-    """Components of a force [force], distributed over a group by the distance from its point of application."""
+    """Components of a force [force] that is distributed over a group by the distance from its point of application."""
 
     KIND = "the force"
     CONSTANT = True
@@ -150,7 +150,7 @@ class SpreadForce(Load):
         positions = mesh.points[points]
         nodal = weight[:, None] * force
         arm = np.array(self.spread.place) - weight @ positions
-        moment = force @ by_rotation(arm)
+        moment = force @ rotation_displacement(arm)
         size = float(np.ptp(mesh.points, axis=0).max())
         if np.abs(moment).max() > ROUND_OFF * np.abs(force).max() * size:
             nodal = nodal + forces_of_moment(weight, positions, moment, f"{self.name}: ")
@@ -235,7 +235,7 @@ def rigid_rows(
     """
     n, k, dim = directions.shape
     nodes = np.column_stack([points, np.tile([reference.point, reference.rotation], (n, 1))])
-    arms = directions @ by_rotation(positions - np.array(reference.place))
+    arms = directions @ rotation_displacement(positions - np.array(reference.place))
     arms = np.pad(arms, ((0, 0), (0, 0), (0, dim - arms.shape[2])))
     values = np.stack([directions, -directions, -arms], axis=2)
     return nodal_rows(np.repeat(nodes, k, axis=0), values.reshape(n * k, 3, dim), n_dofs)
@@ -262,7 +262,7 @@ def distributing_rows(
         Unit vectors of the components that are coupled [-].
     n_dofs : int
     caption : str
-        Beginning of the message of an error.
+        Beginning of error messages.
 
     Raises
     ------
@@ -271,7 +271,7 @@ def distributing_rows(
     """
     centroid, dim = weight @ positions, positions.shape[1]
     rotation = mean_rotation(weight, positions - centroid, caption)
-    arms = directions @ by_rotation(np.array(reference.place) - centroid)
+    arms = directions @ rotation_displacement(np.array(reference.place) - centroid)
     # The coefficients of the translation and of the rotation of the reference point.
     reference_rows = np.zeros((len(rotation) + len(directions), 2, dim))
     reference_rows[: len(rotation), 1] = np.eye(len(rotation), dim)

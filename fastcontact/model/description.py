@@ -30,8 +30,8 @@ def sentences(model: Any) -> Iterator[str]:
     yield f"{article} {KINDS[model.kinematics]} of {mesh.n_points} points, {cells}: {model.n_dofs} degrees of freedom."
     if unit_names := [f"{kind} in {unit}" for kind, unit in model.units.items() if unit not in ("", "-")]:
         yield f"Units: {', '.join(unit_names)}."
-    for (material, groups), modes in zip(model.materials, model.bending(), strict=True):
-        locking = ", with a mean dilatation against locking" if material.averaged and not modes else ""
+    for (material, groups), modes in zip(model.materials, model.uses_incompatible_modes(), strict=True):
+        locking = ", with the mean-dilatation method" if material.averaged and not modes else ""
         locking += ", with incompatible modes" if modes else ""
         yield f"Material: {material.described} in {listed(groups)}{locking}."
     if not model.materials:

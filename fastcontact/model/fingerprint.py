@@ -22,7 +22,7 @@ from fastcontact.elasticity.temperature import Temperature
 from fastcontact.elasticity.varying_constants import Varying
 from fastcontact.heat.loads import TemporaryHeat
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import remembered
+from fastcontact.mesh.topology import cached_by_mesh
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
 from fastcontact.model.parts.base import Support
@@ -38,7 +38,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
     Keys are the names of the parts in messages: "the mesh", "the materials", "contact 'hertz'", ...
     """
     mesh = model.mesh
-    modes = model.bending()
+    modes = model.uses_incompatible_modes()
     inputs: dict[str, Any] = {
         "the kinematics": model.kinematics,
         **({"the strain": model.strain} if model.strain != "small" else {}),
@@ -61,12 +61,12 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
     return {"the mesh": digest_of_mesh(mesh), **{name: _digest(entry, mesh) for name, entry in inputs.items()}}
 
 
-def different(first: Mapping[str, str], second: Mapping[str, str]) -> list[str]:
+def differing_parts(first: Mapping[str, str], second: Mapping[str, str]) -> list[str]:
     """Return the names of the parts in which two fingerprints differ."""
     return [name for name in {**first, **second} if first.get(name) != second.get(name)]
 
 
-def formulation_behind(model: Model, name: str, digest: str | None) -> str | None:
+def formulation_of_digest(model: Model, name: str, digest: str | None) -> str | None:
     """Return the formulation and its options with which pair `name` has the given `digest`; None if there are none.
 
     Earlier versions chose other default formulations for pairs whose formulation is not given.
@@ -92,7 +92,7 @@ def _unordered(items: Iterable[Any], mesh: Mesh) -> list[str]:
     return sorted(_digest(item, mesh) for item in items)
 
 
-@remembered
+@cached_by_mesh
 def digest_of_mesh(mesh: Mesh) -> str:
     """Return the digest of points, cells and groups."""
     return _digest(mesh, mesh)

@@ -61,7 +61,7 @@ class ForceDrivenObstacles:
         """Return the numbers (dim,) of the displacement components of an obstacle."""
         return (self.shape[0] + number) * self.shape[1] + np.arange(self.shape[1])
 
-    def positions(self, u: Array) -> dict[str, Array]:
+    def displacements(self, u: Array) -> dict[str, Array]:
         """Return the displacement (dim,) of each obstacle by name of its pair, from displacements u (n_dofs,) [length]."""
         return {pair.name: u[self.dofs(number)] for number, pair in enumerate(self.pairs)}
 
@@ -87,7 +87,7 @@ class ForceDrivenObstacles:
         return csr_array((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], self.n_dofs))
 
     def supported(self, fixed: Mask) -> Mask:
-        """Return the mask (n_points + n, dim) of supported components of points and obstacles, from that of points."""
+        """Return the mask (n_points + n, dim) of supported components, from the mask of the points."""
         prescribed = [[force is None for force in pair.force] for pair in self.pairs]
         return np.vstack([fixed, np.array(prescribed, bool).reshape(-1, self.shape[1])])
 

@@ -1,4 +1,4 @@
-"""Hanging nodes, which lie on facets of their own body without belonging to them.
+"""Hanging nodes, which lie on facets of their own body but are not nodes of these facets.
 
 Where a coarse and a fine mesh meet, only their common nodes are connected. Under load, gaps or overlaps form at the other
 nodes.
@@ -24,9 +24,10 @@ from fastcontact.model.rigid_motions import node_at
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
 
-# Distances relative to the size of a facet [-]. A node closer than NEAR lies on the facet, and it coincides with a node of
-# the facet that is closer than NEAR. On arcs, nodes of fine facets may be at a distance up to ON_ARC from a coarse facet.
-# They are distinguished from slits by the condition that each corner of the coarse facet has a facet of opposite normal.
+# Distances relative to the size of a facet [-]. A node lies on a facet if it is closer to it than NEAR, and it
+# coincides with a node of the facet if it is closer to that node than NEAR. On arcs, the distance of nodes of fine
+# facets from a coarse facet may be up to ON_ARC. Such nodes are distinguished from slits by the condition that each
+# corner of the coarse facet has a facet of opposite normal.
 NEAR, ON_ARC = 0.02, 0.1
 
 

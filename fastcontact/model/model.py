@@ -17,13 +17,13 @@ from fastcontact.elasticity.multipoint_constraints import TemporaryConstraint
 from fastcontact.errors import ModelError
 from fastcontact.heat.loads import TemporaryHeat
 from fastcontact.model.checks import check_motions, check_overlap, check_penetration, check_ramps, check_supports
-from fastcontact.model.contact_pair import check_turns
+from fastcontact.model.contact_pair import check_rotations
 from fastcontact.model.description import sentences
 from fastcontact.model.parts.supports import ModelSupports
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
 from fastcontact.model.pretension import check_locks
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
-from fastcontact.model.rigid_motions import MOST_FRICTION, FreeMotions, free_motions, generalised, mechanisms, resisting
+from fastcontact.model.rigid_motions import MOST_FRICTION, FreeMotions, cone_rows, free_motions, generalised, mechanisms
 
 # Types of items that may act in only some of the load steps.
 TEMPORARY = (TemporaryConstraint, TemporaryHeat)
@@ -39,7 +39,7 @@ def _public(names: Iterable[str]) -> list[str]:
 
 
 class _PublicNames(type):
-    """Class whose `dir` lists the public names only, as that of its instances."""
+    """Class whose `dir` lists the public names only, as does the `dir` of its instances."""
 
     def __dir__(cls) -> list[str]:
         return _public(super().__dir__())
@@ -164,7 +164,7 @@ class Model(ModelSupports, metaclass=_PublicNames):
             ramps += [(f"the rotation of '{s.group}'", s.rotation_ramp) for s in self.supports]
             ramps += [(f"the rotation of obstacle '{p.name}'", p.rotation_ramp) for p in self.contact]
             check_ramps(ramps, ramp.instants)
-            check_turns(self.contact, ramp)
+            check_rotations(self.contact, ramp)
             check_locks(self.pretensions, ramp.instants)
         self._check_relations(fixed, prescribed, ramp or Ramp((1.0,)))
         check_supports(self.mesh, [(s.name, s.group) for s in self.supports], self.related_points())
@@ -218,22 +218,22 @@ class Model(ModelSupports, metaclass=_PublicNames):
         Supports, constraints and springs prevent rigid-body motions. Contact prevents motions that close a gap. A motion
         that opens a gap is also accepted if a load does work on it, since this load may press the body against the contact.
         """
-        motions = self.force_driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))
+        motions = self.force_driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.constraint_rows()))
         if not len(motions):
             return
         generalised_forces = [generalised(motions, force.ravel()) for force in forces]
         # Whether friction suffices is checked in the load steps, whose errors state the coefficient that would suffice.
-        gaps = gaps_at_rest(self, motions, MOST_FRICTION)
+        gaps = gap_changes(self, motions, MOST_FRICTION)
         check_motions(self.mesh, motions.combined(mechanisms(gaps, np.reshape(generalised_forces, (-1, len(motions))))))
 
 
-def gaps_at_rest(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:
+def gap_changes(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:
     """Return the changes (m, k) of the m gaps of the undeformed bodies for each of k rigid-body motions.
 
-    A constraint with friction is represented by the edges of its friction cone, see `resisting`; `factor` multiplies all
+    A constraint with friction is represented by the edges of its friction cone, see `cone_rows`; `factor` multiplies all
     coefficients of friction.
     """
     obstacles, initial, zero = model.force_driven, Configuration.undeformed(model.mesh.points), np.zeros(model.mesh.dim)
     contact = [obstacles.constraints(pair.name, model.bind(pair).constraints(initial), zero) for pair in model.contact]
-    rows = [resisting(constraints, factor)[0] @ motions.displacement for constraints in contact]
+    rows = [cone_rows(constraints, factor)[0] @ motions.displacement for constraints in contact]
     return np.vstack([*rows, np.empty((0, len(motions)))])

@@ -21,7 +21,7 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import poorest_cell
-from fastcontact.mesh.topology import outer_facets, remembered
+from fastcontact.mesh.topology import cached_by_mesh, outer_facets
 from fastcontact.model.checks import facet_lengths, initial_gaps
 from fastcontact.model.hanging_nodes import hanging_nodes_warning
 from fastcontact.model.prescribed_overlap import Pairs, Supports, prescribed_overlap_warnings
@@ -81,13 +81,13 @@ def _split_sides(model: Model, pairs: Pairs) -> Iterator[str]:
 
 def _sector_ends(model: Model) -> Iterator[str]:
     """Yield a warning for each contact with nodes at one end of a sector that coincide with no node of the other end."""
-    for (name, nodes), pair in itertools.product(model.interpolated.items(), model.contact):
+    for (name, nodes), pair in itertools.product(model.nodes_on_facets.items(), model.contact):
         n = len(np.intersect1d(nodes, model.mesh.points_of(pair.secondary)))
         if n:
             yield (
                 f"at the ends of {name}, {n} node{'s' * (n > 1)} of contact '{pair.name}' have no counterpart at the other "
-                "end: pressures near them may be wrong by as much as their mean. Use equal meshes where contact meets the "
-                "ends"
+                "end: pressures near them may be wrong by as much as the mean pressure. Use matching meshes where contact "
+                "meets the ends"
             )
 
 
@@ -116,7 +116,7 @@ def _moduli(model: Model) -> Iterator[str]:
 
 
 def _units(model: Model) -> Iterator[str]:
-    """Yield warnings about named units: if they are inconsistent, and for each modulus unlike those of solids."""
+    """Yield warnings if the named units are inconsistent, or if a modulus is implausible for a solid in these units."""
     units = model.units
     yield inconsistency_message(units)
     pascal = in_si(units, "pressure")
@@ -213,7 +213,7 @@ def _shared_fluids(model: Model) -> list[str]:
 def _friction(model: Model) -> list[str]:
     """Return a warning for each implausible coefficient of friction."""
     return [
-        f"the friction of contact '{pair.name}' is {friction:g}, but surfaces have at most "
+        f"the friction of contact '{pair.name}' is {friction:g}, but plausible values are at most "
         f"{LARGEST_FRICTION:g}: is it in percent? To exclude sliding, use kind='tied'"
         for pair in model.contact
         if (friction := pair.options.get("friction") or 0.0) > LARGEST_FRICTION
@@ -247,7 +247,7 @@ def _penetration(model: Model, pairs: Pairs, prescribed: Array) -> Iterator[str]
 def _missing_ramps(model: Model, ramp: Ramp) -> Iterator[str]:
     """Yield a warning if some items have separate ramps, and the common ramp multiplies the others by more than 1.
 
-    A common ramp of more than two points is assumed to be meant for them.
+    If the common ramp has more than two points, it is assumed to be intended for these items.
     """
     peak = max(ramp.value(instant) for instant in ramp.instants)
     if peak <= 1.0 or len(ramp.table) > 2:
@@ -267,7 +267,7 @@ def _missing_ramps(model: Model, ramp: Ramp) -> Iterator[str]:
         )
 
 
-@remembered
+@cached_by_mesh
 def _stiffness(mesh: Mesh) -> str:
     """Return a warning if the quadrature of the stiffness is inexact on curved or distorted cells.
 

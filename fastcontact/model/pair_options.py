@@ -23,7 +23,7 @@ from fastcontact.model.ramp import History, table_of
 
 
 class FormulationOptions(TypedDict, total=False):
-    """Options that are arguments of formulations: the first five of every formulation, the others of some formulations."""
+    """Options that are arguments of formulations. Every formulation has the first five, only some have the others."""
 
     friction: float | None
     surface_smoothing: bool | None
@@ -64,8 +64,8 @@ class ContactOptions(FormulationOptions, SharedOptions, total=False):
 
 
 SHARED_OPTIONS = tuple(sorted(SharedOptions.__annotations__))
-# Names of the required and of the optional constants of a cohesive layer and of adhesion. The values of the constants in
-# CHOICES are strings, those of all others are positive numbers.
+# Names of the required and of the optional constants of a cohesive layer and of adhesion. The values of the constants
+# in CHOICES are strings; all other values are positive numbers.
 LAWS = {
     "cohesion": (
         ("strength", "energy"),
@@ -94,8 +94,8 @@ def pair_options(
     return PairOptions(
         _function(f"the clearance of contact '{name}'", options.get("clearance")),
         _function(f"the clearance_primary of contact '{name}'", options.get("clearance_primary")),
-        excluded=_nodes(name, "excluded", options, mesh, side),
-        frictionless=_nodes(name, "frictionless", options, mesh, side),
+        excluded=_group_mask(name, "excluded", options, mesh, side),
+        frictionless=_group_mask(name, "frictionless", options, mesh, side),
         frictionless_along=_vector(name, "frictionless_along", options, mesh.dim),
         kind=_kind(name, options, against_obstacle),
         penalty=_penalty(name, options),
@@ -262,7 +262,7 @@ def _check_friction_ramp(name: str, options: Mapping[str, Any]) -> None:
         raise ContactError(f"{caption} has negative multipliers: coefficients are 0 or more")
 
 
-def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side: Surface) -> Mask | None:
+def _group_mask(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side: Surface) -> Mask | None:
     """Return a mask (n_points,) of the nodes of the groups named by an option, or None if it names no group."""
     groups = options.get(option)
     if groups is None:

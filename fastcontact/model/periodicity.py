@@ -20,11 +20,11 @@ from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows, shapes_at
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table
-from fastcontact.model.relation_rows import coincident, matched, minus_first, to_facets
+from fastcontact.model.relation_rows import coincident, matching_nodes, relative_to_first, vectors_to_facets
 from fastcontact.round_off import ROUND_OFF
 
-# Largest distance, relative to facet size, by which a rotated node of one end may lie off the facets of the other end or
-# outside their edges. Facets of curved ends with different meshes deviate from each other by less.
+# Largest distance, relative to facet size, by which a rotated node of one end may deviate from the facets of the other
+# end, or lie outside their edges. Facets of curved ends with different meshes deviate from each other by less.
 LARGEST_DISTANCE = 0.02
 
 
@@ -86,7 +86,7 @@ def periodic(
     first, second = (mesh.points_of(end).astype(np.intp) for end in ends)
     if not len(first):
         raise ModelError(f"{name}: group '{ends[0]}' is empty")
-    match = matched(mesh, (ends[0], first), (ends[1], second), translation)
+    match = matching_nodes(mesh, (ends[0], first), (ends[1], second), translation)
     interface = PeriodicInterface(first, second[match])
     if (common := interface.first[interface.first == interface.second]).size:
         raise ModelError(f"{name}: both groups contain point {common[0]}: a period has two ends")
@@ -95,7 +95,7 @@ def periodic(
         unit = np.eye(mesh.dim)[axis]
         rows = _rows(interface, unit, -unit, mesh)
         if axis in free:
-            rows = minus_first(rows)
+            rows = relative_to_first(rows)
         if rows.shape[0]:
             relations.append(MultiPointConstraint(name, rows, float(jump.get(axis, 0.0)), ramp))
     return relations, interface
@@ -167,7 +167,7 @@ def _rows_to_facets(mesh: Mesh, dependent: str, facets: str, rotation: Rotation,
     other, nodes = surface(mesh, facets), mesh.points_of(dependent).astype(np.intp)
     turn, shift = _motion(rotation, sign)
     corners = other.corners(mesh.points)
-    near = _closest(mesh.points[nodes] @ turn.T + shift, to_facets(mesh, nodes) @ turn.T, other, corners)
+    near = _closest(mesh.points[nodes] @ turn.T + shift, vectors_to_facets(mesh, nodes) @ turn.T, other, corners)
     sizes = np.concatenate([np.ptp(block, axis=1).max(axis=1) for block in corners])
     if (near.distance > LARGEST_DISTANCE * sizes[near.facet]).any() or (near.overhang > LARGEST_DISTANCE).any():
         return None

@@ -1,4 +1,4 @@
-"""Contact nodes whose prescribed displacements cause penetration or, in tied pairs, relative displacements.
+"""Contact nodes whose prescribed displacements cause penetration or, in tied pairs, relative displacements of the sides.
 
 Contact forces cannot change prescribed displacements.
 """
@@ -139,8 +139,8 @@ def _depths(
 ) -> tuple[Array, Mask]:
     """Return the penetration depths (m,) of nodes due to supports [length], and the mask (m,) of paired nodes.
 
-    Depths are zero where the gap depends on unsupported components. Initial penetration, given by the gaps `gap0` (m,), is
-    subtracted. In contact that is always closed the depth is the change of the size of the gap.
+    Depths are zero where the gap depends on unsupported components. Initial penetration, given by the gaps `gap0` (m,),
+    is subtracted. In contact that is always closed, the depth is the change in the magnitude of the gap.
     """
     gap, rows, paired = _gaps(formulation, candidates, configuration)
     if formulation.options.kind in ALWAYS_CLOSED:

@@ -14,11 +14,11 @@ from fastcontact.elasticity.loads import Load, Table, check_number
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import OPPOSITE, Mesh
-from fastcontact.model.relation_rows import along, matched, minus_first, normals_of
+from fastcontact.model.relation_rows import matching_nodes, normals_of, relative_to_first, rows_along
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
 # Smallest cosine of the angle between the direction of a bolt and the normal of its section [-].
-ALONG = 0.7
+SMALLEST_COSINE = 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class Pretension:
         return f"pretension '{self.label}'"
 
     @property
-    def prescribed(self) -> str:
+    def constraint_name(self) -> str:
         """Name of the constraint that prescribes the shortening."""
         return f"the shortening of {self.name}"
 
@@ -70,7 +70,7 @@ class Pretension:
     def _approach(self, direction: Array, n_dofs: int) -> csr_array:
         """Return rows (m, n_dofs) of the approach of each node to the opposite one along a unit vector (dim,) [-]."""
         directions = np.tile(direction, (len(self.nodes), 1))
-        return csr_array(along(self.nodes, directions, n_dofs) - along(self.opposite, directions, n_dofs))
+        return csr_array(rows_along(self.nodes, directions, n_dofs) - rows_along(self.opposite, directions, n_dofs))
 
     def relations(self, n_dofs: int) -> list[MultiPointConstraint]:
         """Return the constraints.
@@ -81,18 +81,18 @@ class Pretension:
         rows = [self._approach(direction, n_dofs) for direction in _tangents(self.normal)]
         approach = self._approach(self.normal, n_dofs)
         if len(self.nodes) > 1:
-            rows.append(minus_first(approach))
+            rows.append(relative_to_first(approach))
         matrix = csr_array(vstack(rows, format="csr"))
         matrix.eliminate_zeros()
         constraints = [MultiPointConstraint(f"the sides of {self.name}", matrix)]
         if self.shortening is not None:
-            constraints.append(MultiPointConstraint(self.prescribed, self.row(n_dofs), self.shortening, self.ramp))
+            constraints.append(MultiPointConstraint(self.constraint_name, self.row(n_dofs), self.shortening, self.ramp))
         if self.locked_from is not None:
             name = f"the locked length of {self.name}"
             constraints.append(TemporaryConstraint(name, self.row(n_dofs), begins=self.locked_from, keeps=True))
         return constraints
 
-    def shortened(self, displacement: Array) -> float:
+    def shortening_at(self, displacement: Array) -> float:
         """Return the approach of the sides at displacements (n_points, dim) [length]."""
         return float((self.row(displacement.size) @ displacement.ravel())[0])
 
@@ -181,7 +181,7 @@ def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[I
     shared = np.intersect1d(nodes, opposite_nodes)
     if len(shared):
         raise ModelError(f"{name}: '{section}' and '{other}' share point {shared[0]}: the sides need separate nodes")
-    match = matched(mesh, (section, nodes), (other, opposite_nodes), [0.0] * mesh.dim)
+    match = matching_nodes(mesh, (section, nodes), (other, opposite_nodes), [0.0] * mesh.dim)
     return nodes, opposite_nodes[match]
 
 
@@ -201,7 +201,7 @@ def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | Non
 
 
 def _outward(mesh: Mesh, name: str, section: str, direction: Array) -> Array:
-    """Return `direction` or its opposite (dim,), whichever points out of the body at the section, to the other side.
+    """Return `direction` or its opposite (dim,), whichever points out of the body at the section, towards the other side.
 
     Sections that are not groups of facets keep the direction.
     """
@@ -209,7 +209,7 @@ def _outward(mesh: Mesh, name: str, section: str, direction: Array) -> Array:
         return direction
     mean_normal = normals_of(mesh, section)[1].mean(axis=0)
     cosine = float(direction @ mean_normal / np.linalg.norm(mean_normal))
-    if abs(cosine) < ALONG:
+    if abs(cosine) < SMALLEST_COSINE:
         angle = np.degrees(np.arccos(min(abs(cosine), 1.0)))
         raise ModelError(
             f"the normal of {name} deviates by {angle:.0f} degrees from that of '{section}': omit it, or cut the bolt "
@@ -226,8 +226,8 @@ def _tangents(normal: Array) -> Array:
     return np.asarray(np.where(np.abs(basis) < ROUND_OFF, 0.0, basis))
 
 
-def loose_bolts(sections: Sequence[Pretension], modes: Array, force: Array) -> str:
-    """Return a remark, to be appended to a message, about unloaded sections whose sides rigid-body motions move apart.
+def loose_bolts_remark(sections: Sequence[Pretension], modes: Array, force: Array) -> str:
+    """Return a remark, to be appended to a message, about unloaded sections that rigid-body motions open.
 
     `modes` (n_dofs, k) are the displacements in these motions, and `force` (n_points, dim) are the loads [force].
     """
@@ -272,5 +272,5 @@ def section_results(
     results = {}
     for section, factor in zip(sections, factors, strict=True):
         force = float(reaction[section.nodes].sum(axis=0) @ section.normal) + factor * section.force
-        results[section.label] = {"force": force, "shortening": section.shortened(displacement)}
+        results[section.label] = {"force": force, "shortening": section.shortening_at(displacement)}
     return results

@@ -54,8 +54,8 @@ MOST_STEPS = 1_000_000
 def checked_table(rows: Iterable[Iterable[float]], caption: str = "the ramp") -> Table:
     """Return the points (instant, multiplier) of a piecewise linear function, called `caption` in messages.
 
-    Raises ModelError if there are fewer than two points, their instants do not ascend, or a number is not finite or exceeds
-    LARGEST in size.
+    Raises ModelError if there are fewer than two points, their instants do not ascend, or a number is not finite or
+    exceeds LARGEST in magnitude.
     """
     try:
         table = tuple((float(time), float(value)) for time, value in rows)
@@ -67,7 +67,7 @@ def checked_table(rows: Iterable[Iterable[float]], caption: str = "the ramp") ->
     if not np.isfinite(table).all():
         raise ModelError(f"the table of {caption} contains a number that is not finite: {table}")
     if np.abs(table).max() > LARGEST:
-        raise ModelError(f"the table of {caption} is out of range: the size of its numbers must be at most {LARGEST:g}")
+        raise ModelError(f"the table of {caption} is out of range: magnitudes must be at most {LARGEST:g}")
     return table
 
 

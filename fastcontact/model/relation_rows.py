@@ -27,7 +27,7 @@ NodeGroup = tuple[str, Indices]  # name, nodes
 def normals_of(mesh: Mesh, group: str) -> tuple[Indices, Array]:
     """Return the nodes (m,) of a group of outer facets, and their unit normals (m, dim), averaged over adjacent facets.
 
-    Raises the same errors as a pressure on the group.
+    Raises an error under the same conditions as a pressure that acts on the group.
     """
     facets = {name: outward(mesh, group, name, block) for name, block in facets_of(mesh, group).items()}
     points = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
@@ -50,17 +50,17 @@ def directions_of(mesh: Mesh, group: str, component: str) -> list[tuple[Indices,
     return [(nodes, np.tile(np.eye(mesh.dim)["xyz".index(axis)], (len(nodes), 1))) for axis in component]
 
 
-def along(nodes: Indices, directions: Array, n_dofs: int) -> csr_array:
+def rows_along(nodes: Indices, directions: Array, n_dofs: int) -> csr_array:
     """Return the rows (m, n_dofs) of the displacement of each node (m,) along its unit vector (m, dim) [-]."""
     return nodal_rows(nodes[:, None], directions[:, None], n_dofs)
 
 
-def minus_first(rows: csr_array) -> csr_array:
+def relative_to_first(rows: csr_array) -> csr_array:
     """Return the rows (m - 1, n) that follow the first of the `rows` (m, n), minus the first row."""
     return csr_array(rows[1:] - csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr")))
 
 
-def matched(mesh: Mesh, first: NodeGroup, second: NodeGroup, translation: Sequence[float] | None) -> Indices:
+def matching_nodes(mesh: Mesh, first: NodeGroup, second: NodeGroup, translation: Sequence[float] | None) -> Indices:
     """Return, for each node of the first group, the index of the coincident node of the second group after a translation.
 
     The first group is moved by `translation` (dim,) [length], by default from the centre of its bounding box to that of the
@@ -96,7 +96,7 @@ class Coincident(NamedTuple):
     """For each of n moved nodes, the row of the coincident, or the nearest, node of the other group."""
 
     rows: Indices  # (n,)
-    distance: Array  # (n,): distance to it [length]
+    distance: Array  # (n,): distance to this node [length]
     tolerance: float  # largest distance of coincident nodes [length]
 
 
@@ -120,7 +120,7 @@ def coincident(mesh: Mesh, first: NodeGroup, second: NodeGroup, turn: Array, shi
     candidate, row = pairs_within(target, x, np.full(len(x), tolerance))
     if len(row) > len(np.unique(row)):
         body = bodies(mesh)[1]
-        deviation = to_facets(mesh, nodes)[row] @ turn.T - to_facets(mesh, opposite)[candidate]
+        deviation = vectors_to_facets(mesh, nodes)[row] @ turn.T - vectors_to_facets(mesh, opposite)[candidate]
         other_body = body[nodes[row]] != body[opposite[candidate]]
         mismatch = np.linalg.norm(deviation, axis=1) + 4.0 * tolerance * other_body
         order = np.lexsort((mismatch, row))
@@ -137,7 +137,7 @@ def coincident(mesh: Mesh, first: NodeGroup, second: NodeGroup, turn: Array, shi
     return Coincident(rows, distance, tolerance)
 
 
-def to_facets(mesh: Mesh, nodes: Indices) -> Array:
+def vectors_to_facets(mesh: Mesh, nodes: Indices) -> Array:
     """Return the vectors (n, dim) from nodes (n,) to the mean centre of the outer facets around them [length].
 
     Only facets whose nodes are all among `nodes` are considered. The vectors are zero for nodes without such a facet.

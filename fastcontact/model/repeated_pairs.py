@@ -19,7 +19,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
 def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
-    """Raise ContactError if two pairs share facets on both sides, in either role, or press the same facets on one obstacle.
+    """Raise ContactError if two pairs share facets on both sides, in either role, or the same facets and the same obstacle.
 
     A surface may face several other surfaces, because the opposite side of each pair then differs.
     """
@@ -27,7 +27,7 @@ def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
         _check_obstacles(mesh, pair, other)
     elif {pair.secondary, pair.primary} == {other.secondary, other.primary}:
         raise ContactError(
-            f"contact '{pair.name}' has the sides '{pair.secondary}' and '{pair.primary}', as contact '{other.name}' has: "
+            f"contact '{pair.name}' has the sides '{pair.secondary}' and '{pair.primary}', like contact '{other.name}': "
             "remove one of the two"
         )
     else:
@@ -79,10 +79,10 @@ def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
 def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Iterator[str]:
     """Yield a warning for every two contact pairs whose sides adjoin each other at common nodes, on both bodies.
 
-    Each pair has a separate pressure at such a node, but the gap determines only the sum of the two pressures. Their ratio,
-    and with it the pressure at neighbouring nodes, is arbitrary. Node-to-segment contact divides the force of a node in the
-    ratio of the areas, which is correct if both pairs have the same primary side. If the primary side is divided as well,
-    each pair faces only a part of it.
+    Each pair has a separate pressure at such a node, but the gap determines only the sum of the two pressures. Their
+    ratio, and with it the pressure at neighbouring nodes, is arbitrary. Node-to-segment contact divides the force of a
+    node in the ratio of the areas, which is correct if both pairs have the same primary side. If the primary side is
+    divided as well, each pair faces only a part of this side.
     """
     for (pair, sides), (other, other_sides) in combinations(pairs, 2):
         if not isinstance(sides.primary, Surface) or not isinstance(other_sides.primary, Surface):

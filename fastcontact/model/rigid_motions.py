@@ -36,7 +36,7 @@ FAR = 1e3
 EDGES = 8
 # Fraction of the frictional capacity above which floating bodies are reported as about to slide.
 NEARLY_SLIDING = 0.9
-# Largest factor on the coefficients of friction with which friction is assumed to hold a body.
+# Largest factor by which the coefficients of friction are multiplied to test whether friction can hold a body.
 MOST_FRICTION = 100.0
 # Largest number of motions of parts between hinges. A mesh with more motions is defective.
 MOST_MOTIONS = 1500
@@ -265,7 +265,7 @@ def _null_space(A: Array) -> Array:
     return np.asarray(right[values < ZERO * max(values.max(initial=0.0), 1.0)].T)
 
 
-def resisting(constraints: Constraints, factor: float = 1.0) -> tuple[csr_array, Array]:
+def cone_rows(constraints: Constraints, factor: float = 1.0) -> tuple[csr_array, Array]:
     """Return the rows that span the cone of admissible contact forces, and the gaps of these rows at u = 0 [length].
 
     Without friction these are the rows of the gaps. With friction they are ``n + mu t`` and ``n - mu t`` in the plane, and in
@@ -279,7 +279,7 @@ def resisting(constraints: Constraints, factor: float = 1.0) -> tuple[csr_array,
 
 
 def _edges(constraints: Constraints, factor: float) -> tuple[csr_array, Array]:
-    """Return the rows and gaps of `resisting` with positive sign."""
+    """Return the rows and gaps of `cone_rows` with positive sign."""
     if not constraints.tangents:
         return constraints.B, constraints.gap0
     if len(constraints.tangents) == 1:
@@ -336,7 +336,7 @@ def least_held(motions: FreeMotions, gaps: Array) -> tuple[list[str], float]:
 
 
 def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | None:
-    """Return the amplitudes (k,) of the motions at which contact stops rigid bodies under the loads; None if it does not.
+    """Return the amplitudes (k,) of the motions at which contact stops rigid bodies under the loads; None if they do not.
 
     Parameters
     ----------
@@ -365,7 +365,7 @@ def _farthest(gaps: Array, gap: Array, work: Array, size: float) -> Array:
 def needed_friction(
     constraints: Constraints, motions: FreeMotions, u: Array, work: Array, size: float
 ) -> tuple[float, list[str]] | None:
-    """Return the smallest factor on the coefficients of friction with which rigid bodies stop [-], and the moving bodies.
+    """Return the smallest multiplier of the coefficients of friction for which rigid bodies stop [-], and the sliding bodies.
 
     Returns None if a factor of NEARLY_SLIDING suffices even with the pyramid inscribed in Coulomb's cone, or if no factor up
     to MOST_FRICTION suffices. `u` (n_dofs,) are the displacements [length]; `work` and `size` are as in `stopped_at`.
@@ -376,7 +376,7 @@ def needed_friction(
     low, high = NEARLY_SLIDING * inscribed, MOST_FRICTION
 
     def slide(factor: float) -> Array:
-        rows, gap0 = resisting(constraints, factor)
+        rows, gap0 = cone_rows(constraints, factor)
         stop = _farthest(rows @ motions.displacement, gap0 + rows @ u, work, size)
         return np.where(np.abs(stop) > 0.99 * FAR, stop, 0.0)
 

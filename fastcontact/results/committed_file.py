@@ -14,8 +14,8 @@ Format Specification 3.0, sections II.A and III.A):
 HDF5 writes entire nodes of indices and parts of tables, although a step changes only a few of their bytes. The class writes
 only the range from the first to the last changed byte.
 
-The order protects the file if the process is killed, but not at a power loss, since disks reorder writes. If the file is
-`synchronised`, changes in place are therefore first written to a journal.
+The order protects the file if the process is killed, but not in the event of a power loss, since disks reorder writes.
+If the file is `synchronised`, changes in place are therefore first written to a journal.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ SIGNALS = tuple(map(int, signal.valid_signals()))
 class CommittedFile(DriverFile):
     """An existing HDF5 file whose writes are deferred to `flush`, with the methods that `h5py.File` calls.
 
-    Nothing is written after an error, so that the file remains as it was after the last successful write. Nothing is written,
-    either, after another program has written to the file.
+    Nothing is written after an error, so that the file remains as it was after the last successful write, or after
+    another program has written to the file.
 
     Attributes
     ----------

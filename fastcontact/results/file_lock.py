@@ -98,7 +98,7 @@ def _open_lock_file(path: Path) -> IO[Any]:
         or (hasattr(os, "getuid") and status.st_uid != os.getuid())
     ):
         os.close(descriptor)
-        raise FileError(f"'{path}' locks the result file, and must be a regular file of yours: remove it")
+        raise FileError(f"'{path}' is a lock file, which must be a regular file that you own: remove it")
     return os.fdopen(descriptor, "r+b", buffering=0)
 
 

@@ -20,7 +20,7 @@ from fastcontact.errors import FileError
 Write = tuple[int, bytes]
 MAGIC = b"fastcontact journal\n"
 FOOTER = struct.Struct(f"<Q32s{len(MAGIC)}s")  # length and SHA-256 of the writes
-# Offset and length of a write, and whether it is new data, of which only the checksum follows.
+# Offset and length of a write, and whether its data are new. Of new data, only the checksum follows.
 HEADER = struct.Struct("<QQ?")
 DIGEST = hashlib.sha256().digest_size
 # Size of the pieces in which data are read for a checksum [bytes].
@@ -39,7 +39,7 @@ def pack(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
 
 
 def pending(file: IO[bytes]) -> list[Write]:
-    """Return the changes in the journal of a file, which an interruption may have prevented.
+    """Return the changes in the journal of a file, whose execution may have been interrupted.
 
     The list is empty if there is no journal, or if the journal or the new data are incomplete. Raises FileError for a journal
     with a valid checksum but invalid lengths or offsets; these are checked before the new data are read. A journal is not
@@ -63,7 +63,7 @@ def pending(file: IO[bytes]) -> list[Write]:
     if sum(count for _, count, _ in new) > end:
         raise _damage_error(file, "counts data twice")
     if any(count and offset + count > end for offset, count, _, _ in records):
-        raise _damage_error(file, "leads beyond the contents")
+        raise _damage_error(file, "refers to data beyond the contents")
     if any(_digest(file, offset, count) != checksum for offset, count, checksum in new):
         return []
     return [(offset, data) for offset, _, is_new, data in records if not is_new]
@@ -96,7 +96,7 @@ def _digest(file: IO[bytes], offset: int, count: int) -> bytes:
 def _damage_error(file: IO[bytes], reason: str) -> FileError:
     """Return the error for an invalid journal."""
     name = getattr(file, "name", "the file")
-    return FileError(f"the journal at the end of '{name}' {reason}: it is damaged, compute the file again")
+    return FileError(f"the journal at the end of '{name}' {reason}: it is damaged; compute the file again")
 
 
 class JournalView:

@@ -19,10 +19,10 @@ The second group contains the data that VTKHDF does not support:
     fastcontact/runs                                a row for each run (RUN_ROW) with the position of its record in the notes
     fastcontact/restart0, restart1                  packed restart data of the last two steps
 
-A new nodal array needs an attribute of `step.StepResult`, its value in `analysis.load_step`, its name in POINT_FIELDS, a
-check in `check_step`, and code in `reader`. A new array of contact pairs needs an attribute of `step.ContactResult`, its
-value in `analysis.contact_result`, and a column in `contact_row` or `contact_step`. To be shown on the mesh, it also needs
-its names in POINT_FIELDS and CONTACT_FIELDS.
+A new nodal array requires an attribute of `step.StepResult`, its value in `analysis.load_step`, its name in
+POINT_FIELDS, a check in `check_step`, and code in `reader`. A new array of contact pairs requires an attribute of
+`step.ContactResult`, its value in `analysis.contact_result`, and a column in `contact_row` or `contact_step`. To be
+shown on the mesh, it also needs its names in POINT_FIELDS and CONTACT_FIELDS.
 """
 
 from __future__ import annotations

@@ -40,8 +40,10 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
       over one radian.
     - PRES_CONT (PRES): contact pressure, zero at nodes outside the contact surfaces [pressure].
     - USUR_CONT (USUR), in models with wear: wear depth, zero at nodes outside the contact surfaces [length].
-    - ENDO_CONT (ENDO), in models with cohesive layers or adhesion: damage, zero at the same nodes [-].
-    - PRES_FLUI (PRES), in models with fluid pressures: fluid pressure, zero at the same nodes [pressure].
+    - ENDO_CONT (ENDO), in models with cohesive layers or adhesion: damage, zero at nodes outside the contact surfaces
+      [-].
+    - PRES_FLUI (PRES), in models with fluid pressures: fluid pressure, zero at nodes outside the contact surfaces
+      [pressure].
     - TEMP (TEMP), with heat conduction: temperature [temperature].
 
     Parameters

@@ -149,9 +149,9 @@ class Results(StepSequence):
     def __init__(self, path: PathLike, *, repeat: bool | None = None) -> None:
         """Open the file.
 
-        Changes in the journal, which a power loss may have interrupted, are applied to the data that are read, but not to the
-        file. They are ignored while another program writes to the file. With `repeat`, the caller states that no other
-        program does, and they are always applied.
+        Changes in the journal, which a power loss may have interrupted, are applied to the data that are read, but not
+        to the file. They are ignored while another program writes to the file, unless `repeat` is true: the caller then
+        guarantees that no other program writes to it, and they are always applied.
         """
         import h5py
 
@@ -184,7 +184,7 @@ class Results(StepSequence):
         self.schema = _integer(self._file["fastcontact"], "schema")
         if self.schema > layout.SCHEMA:
             raise FileError(
-                f"'{self.path}' has schema {self.schema}, this fastcontact reads up to {layout.SCHEMA}: update fastcontact"
+                f"'{self.path}' has schema {self.schema}, but this version reads schemas up to {layout.SCHEMA}: update it"
             )
         return self._file["fastcontact"]
 

@@ -14,7 +14,7 @@ from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.material_sides import MaterialSides
 from fastcontact.errors import FastcontactError, ModelError, Suggesting, unknown
-from fastcontact.results.units import valued, with_unit
+from fastcontact.results.units import value_text, with_unit
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
@@ -100,7 +100,7 @@ def force_text(force: Sequence[float], parts: Sequence[float], normal_force: flo
     model, one of them is the component normal to the plane of symmetry, which the other half balances. If the nodal normal
     forces balance each other, their sum `normal_force` [force] is appended instead.
     """
-    total, normal, tangential, normal_sum = (valued(part, units, "force", 6) for part in (*parts, normal_force))
+    total, normal, tangential, normal_sum = (value_text(part, units, "force", 6) for part in (*parts, normal_force))
     if parts[0] < NEGLIGIBLE * normal_force:
         return f"{total}, sum of normal forces {normal_sum}"
     if parts[2] > LENGTH_ROUND_OFF * parts[0]:
@@ -605,7 +605,7 @@ MAX_SHOWN = 30
 
 
 class _Steps(Suggesting):
-    """Base class of lists of steps, whose AttributeError says that each step has an attribute."""
+    """Base class of lists of steps, whose AttributeError states that an attribute belongs to each step."""
 
     if not TYPE_CHECKING:
 

@@ -49,8 +49,8 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
         - ``radius``: distance from the middle of the contact, the magnitude of ``place`` [length];
         - ``pressure`` and ``multiplier`` [pressure];
         - ``force_x`` etc. [force], ``shear_x`` etc. [pressure], ``slip_x`` and ``slip_total_x`` etc. [length];
-        - those of ``wear``, ``heat_flux``, ``damage``, ``fluid_pressure`` and ``sliding_load`` that the pair has, described
-          for `ContactResult`;
+        - ``wear``, ``heat_flux``, ``damage``, ``fluid_pressure`` and ``sliding_load``, if the pair has these quantities,
+          described for `ContactResult`;
         - ``active`` and ``sticking``: booleans.
 
         With `step` there are also ``displacement_x`` etc. [length] and ``stress_xx`` etc., ``normal_stress``,

@@ -13,7 +13,7 @@ COLUMNS = {
 
 
 def known_units(units: Mapping[str, str]) -> dict[str, str]:
-    """Return the names of units, always including those of length, force and pressure. Unknown units and dashes are empty.
+    """Return the names of units, always including length, force and pressure. Missing names and dashes become empty strings.
 
     Examples
     --------
@@ -69,14 +69,14 @@ def axis_label(text: str, units: Mapping[str, str], quantity: str) -> str:
     return f"{text} [{unit}]" if unit and unit != "-" else text
 
 
-def valued(value: float, units: Mapping[str, str], quantity: str, digits: int = 4) -> str:
+def value_text(value: float, units: Mapping[str, str], quantity: str, digits: int = 4) -> str:
     """Return a value as text, with its unit if the unit is known.
 
     The text has `digits` significant digits, but values from ``10**digits`` to a million are rounded to integers.
 
     Examples
     --------
-    >>> valued(10541.9, {"pressure": "MPa"}, "pressure"), valued(2.5e-7, {}, "length")
+    >>> value_text(10541.9, {"pressure": "MPa"}, "pressure"), value_text(2.5e-7, {}, "length")
     ('10542 MPa', '2.5e-07')
     """
     as_integer = 10.0**digits - 0.5 <= abs(value) < 1e6

@@ -29,9 +29,9 @@ def write_geometry(
 ) -> None:
     """Write the group /VTKHDF with the solid cells, the constant arrays and empty tables for the steps.
 
-    `growing` contains the names of the cell fields of steps, and `optional` those of their `layout.OPTIONAL_FIELDS`.
-    `material` (n_solids,) contains the material number of each cell, if the model has material interfaces. The steps of such
-    a model also have the `layout.MATERIAL_FIELDS`.
+    `growing` contains the names of the cell fields of steps, and `optional` the names of the `layout.OPTIONAL_FIELDS`
+    that steps have. `material` (n_solids,) contains the material number of each cell, if the model has material
+    interfaces. The steps of such a model also have the `layout.MATERIAL_FIELDS`.
     """
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 0], np.int64)
@@ -243,7 +243,7 @@ def set_restart(file: OpenObjects, number: int, state: NDArray[np.uint8]) -> Non
 
 
 def _new_pair(parent: Any, name: str, dim: int, optional: Iterable[str]) -> dict[str, Any]:
-    pair = parent.create_group(None)  # the group gets a name when it is complete, so that interrupts do no harm
+    pair = parent.create_group(None)  # gets its name when it is complete, in case of an interrupt
     pair["name"] = as_json(name)
     growing_table(pair, "rows", layout.contact_row(dim, optional))
     growing_table(pair, "primary", layout.primary_row(dim))
@@ -269,7 +269,7 @@ def _append_contact(pair: dict[str, Any], number: int, contact: ContactResult | 
 def _append_material_stress(parent: Any, mesh: Mesh, number: int, sides: MaterialStress) -> None:
     """Append the stress of each material at interfaces; the first call creates the tables."""
     if "materials" not in parent:
-        group = parent.create_group(None)  # the group gets a name when it is complete, so that interrupts do no harm
+        group = parent.create_group(None)  # gets its name when it is complete, in case of an interrupt
         _write_constant(group, "cells", np.asarray(sides.cells, np.int32))
         growing_table(group, "rows", layout.material_row(mesh.dim))
         growing_table(group, "steps", layout.MATERIAL_STEP_ROW)

@@ -1,8 +1,9 @@
 """Writing of result files, in which a crash does not damage completed steps.
 
-The fields and tables of a step are written and flushed before the number of steps, beyond which nothing is read. Data of
-completed steps are never moved: uncompressed tables and small fields grow in place, and larger fields have a separate chunk
-for each step. On a full disk, the new blocks cannot be written, to which nothing refers yet, and the file remains as it was.
+The fields and tables of a step are written and flushed before the number of steps, beyond which nothing is read. Data
+of completed steps are never moved: uncompressed tables and small fields grow in place, and larger fields have a
+separate chunk for each step. If the disk is full, the new blocks cannot be written. Since no other data refer to them
+yet, the file remains as it was.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ from fastcontact.results.file_lock import PathLock, file_state
 from fastcontact.results.reader import Results, StoredSteps, read_text
 from fastcontact.results.step import StepResult
 
-# Age of a file [s] from which each step is synchronised to the disk. A run that is lost before takes less time to repeat.
+# Age of a file [s] from which each step is synchronised to the disk. A run that is lost earlier can be repeated in less
+# time than this.
 SYNCHRONISED_FROM = 10.0
 # Size in the file of the indices that HDF5 caches in memory [bytes].
 CACHED_INDICES = 1 << 18
@@ -57,7 +59,7 @@ class ResultWriter:
         A mesh or a ``Model``. Any object with the attributes `mesh` and `kinematics`, and optionally `case_text`, can
         replace the model.
     kinematics : str
-        Kinematics, if `mesh` is a mesh; a model has its own kinematics.
+        Kinematics if `mesh` is a mesh; otherwise those of the model are used.
     case_text : str
         Text of the case file, which the result file stores.
     overwrite : bool
@@ -144,7 +146,7 @@ class ResultWriter:
         self._last: tuple[int, Any] = (0, None)  # index and case of the last step
         self._notes: dict[str, str] = {}  # the text of the case file, if it differs from that of the resumed run
         self._resumed_state: tuple[int, ...] | None = None
-        with self._explained("begun"):
+        with self._as_file_errors("begun"):
             self._lock = PathLock(self.path)
             try:
                 if resume:
@@ -224,7 +226,7 @@ class ResultWriter:
                     writing.result()
 
     def _append(self, step: StepResult) -> None:
-        with self._explained(f"written at step {step.index}"):
+        with self._as_file_errors(f"written at step {step.index}"):
             self._open()
             self._check_in_place()
             by_default = time.monotonic() - self._started > SYNCHRONISED_FROM
@@ -277,7 +279,7 @@ class ResultWriter:
             if self._closed or (self._file is None and self._ended and "error" not in run):
                 return  # closed, or a complete file to which no step was added
             self._release_done()
-            closing.enter_context(self._explained("closed"))
+            closing.enter_context(self._as_file_errors("closed"))
             self._open()
             closing.callback(self._committed.close)
             closing.callback(self._file.close)
@@ -332,7 +334,7 @@ class ResultWriter:
         """Raise FileError if another program has changed the file."""
         if not self._committed.is_intact():
             raise FileError(
-                f"'{self.path}' was changed by another program after {self.n_steps} steps, its contents are left "
+                f"'{self.path}' was changed by another program after {self.n_steps} steps, and its contents are left "
                 "unchanged: let no other program write to it, name another file and start again"
             )
 
@@ -347,7 +349,7 @@ class ResultWriter:
         self._committed.check()
 
     @contextlib.contextmanager
-    def _explained(self, action: str) -> Iterator[None]:
+    def _as_file_errors(self, action: str) -> Iterator[None]:
         """Convert errors of HDF5 and of the operating system to a FileError with a remedy, and defer signals."""
         with uninterrupted():
             try:
@@ -364,7 +366,7 @@ class ResultWriter:
                 if not isinstance(cause, (OSError, RuntimeError)):
                     remedy = "its tables are damaged: name another file, or start anew without resuming"
                 raise FileError(
-                    f"'{self.path}' cannot be {action} ({reason}), {self.n_steps} steps are complete: {remedy}"
+                    f"'{self.path}' cannot be {action} ({reason}); {self.n_steps} steps are complete: {remedy}"
                 ) from error
 
     def _begin(self, kinematics: str, case_text: str) -> None:
@@ -406,7 +408,7 @@ def _steps_to_resume(
                 f"{start_anew}"
             )
         if missing := old.missing_paths(layout.NEEDED_TO_RESUME):
-            raise FileError(f"'{path}' is damaged, it lacks '{missing[0]}': restore a copy, {start_anew}")
+            raise FileError(f"'{path}' is damaged, since it lacks '{missing[0]}': restore a copy, {start_anew}")
         if not _same_mesh(old.mesh, mesh) or old.kinematics != kinematics:
             difference = "kinematics" if _same_mesh(old.mesh, mesh) else "mesh"
             raise FileError(f"'{path}' belongs to another {difference}: resume the case of the file, {start_anew}")

@@ -20,7 +20,7 @@ STYLES = ("line", "symbols", "line+symbols")
 # Numbers of colours (after white, the colour 0), symbols and line styles of Grace through which curves cycle.
 N_COLOURS, N_SYMBOLS, N_LINE_STYLES = 14, 6, 5
 
-# Grace uses Latin-1. Each Greek letter without accents has a counterpart in the Symbol font.
+# Grace uses Latin-1. Each Greek letter without accents has a counterpart in Grace's font Symbol.
 _GREEK = dict(zip("αβγδεζηθικλμνξοπρςστυφχψω", "abgdezhqiklmnxoprVstufcyw"))
 _GREEK |= dict(zip("ΑΒΓΔΕΖΗΘΙΚΛΜΝΞΟΠΡΣΤΥΦΧΨΩ", "ABGDEZHQIKLMNXOPRSTUFCYW"))
 _MARKUP = {letter: f"\\f{{Symbol}}{symbol}\\f{{}}" for letter, symbol in _GREEK.items()} | {"\\": "\\\\", '"': '\\"'}

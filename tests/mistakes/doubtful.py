@@ -264,7 +264,7 @@ DOUBTS = [
         fc.generate.block_on_block,
         of(STEEL, BLOCKS, PAIR, "friction = 30.0\n"),
         (
-            r"the friction of contact 'pair' is 30, but surfaces have at most 3: is it in percent\? To exclude sliding, use kind='tied'",
+            r"the friction of contact 'pair' is 30, but plausible values are at most 3: is it in percent\? To exclude sliding, use kind='tied'",
         ),
     ),
     Doubt(

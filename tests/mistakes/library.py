@@ -373,7 +373,7 @@ CONTACT = [
             r"the two sides of contact 'pair' share nodes \(number: 1, first: point \d+\): duplicate the nodes of the interface, one set for each side"),
     Mistake("the same pair twice", lambda: blocks().add_contact("again", secondary="CONT_LOWER", primary="CONT_UPPER"),
             fc.ContactError,
-            r"contact 'again' has the sides 'CONT_LOWER' and 'CONT_UPPER', as contact 'pair' has: remove one of the two"),
+            r"contact 'again' has the sides 'CONT_LOWER' and 'CONT_UPPER', like contact 'pair': remove one of the two"),
     Mistake("two pairs over the same facets", lambda: pairs_overlap(), fc.ContactError,
             r"contact 'some' pairs facets of 'SOME' and 'CONT_LOWER' that are also paired by contact 'pair': 'SOME' and 'CONT_UPPER' share facets with 2 nodes \(first: point \d+\), and 'CONT_LOWER' and 'CONT_LOWER' share facets, too\. Remove one of the two contacts, or separate their groups"),
     Mistake("one surface in two groups with a contact each", lambda: solved(split_in_two()), fc.FastcontactWarning,

@@ -175,7 +175,7 @@ CALLS = [
     ("coordinates in words", lambda: build_mesh([["a", "b"]], [], {}), fc.MeshError, r"its coordinates are not numbers: check that the file is complete"),
     ("an HDF5 file with groups in a circle", lambda folder: opened(folder, circle), fc.errors.FileError, r"spoilt\.h5' has cyclic or too deeply nested groups at '.*': write it again"),
     ("an HDF5 file with a strange filter", lambda folder: opened(folder, lzf), fc.errors.FileError, r"is compressed with the filter 32000, which HDF5 may lack: use gzip"),
-    ("an HDF5 file with texts for numbers", lambda folder: opened(folder, texts), fc.errors.FileError, r"contains no plain numbers: the file is damaged, write it again"),
+    ("an HDF5 file with texts for numbers", lambda folder: opened(folder, texts), fc.errors.FileError, r"contains no plain numbers: the file is damaged; write it again"),
     ("packed data without head", lambda: packing.unpack(np.zeros(300, np.uint8)), ValueError, r"no packed data"),
     ("packed data that were changed", packed_and_changed, ValueError, r"packed data are cut off or changed"),
     ("packed data of another kind", packed_of_another_kind, ValueError, r"an array of \|O8 is not a packed array"),
@@ -184,5 +184,5 @@ CALLS = [
     ("a result with a cell field cut off", lambda folder: resulting(folder, cell_field_cut_off), fc.errors.FileError, r"error of step 0 is truncated, or has the wrong shape or type"),
     ("a cell field with a name of two words", announced, fc.errors.FileError, r"'two words' cannot be the name of a cell field: it is reserved or not an identifier; choose another"),
     ("a cell field that never came", not_announced, fc.errors.FileError, r"step 1: the declared cell field 'error' has shape \(0,\), but \(4,\) is needed, a number for each solid cell"),
-    ("a result file that others change", changed_by_others, fc.errors.FileError, r"a\.vtkhdf' was changed by another program after 0 steps, its contents are left unchanged: let no other program write to it"),
+    ("a result file that others change", changed_by_others, fc.errors.FileError, r"a\.vtkhdf' was changed by another program after 0 steps, and its contents are left unchanged: let no other program write to it"),
 ]  # fmt: skip

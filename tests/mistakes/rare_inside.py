@@ -222,7 +222,7 @@ CALLS = [
     ("an element on other corners", not_makeable, fc.errors.CaseError, r"meshes of tri3 cannot be made from the case's quad4: give a generator"),
     ("a study without a level", no_level, fc.MeshError, r"no level could be solved; .*: the mesh is folded"),
     ("a sweep without a point", no_point, fc.MeshError, r"no point of the sweep could be solved; .*: the mesh is folded"),
-    ("packed data larger than unpacked", packed_beyond_its_size, fc.errors.FileError, r"is larger compressed than uncompressed: the file is damaged, write it again"),
+    ("packed data larger than unpacked", packed_beyond_its_size, fc.errors.FileError, r"is larger compressed than uncompressed: the file is damaged; write it again"),
     ("a file name beyond all limits", name_too_long, fc.errors.FileError, r"cannot be written \(File name too long\): name another file"),
     ("a table that a function cannot take", lambda: called("mesh", pair_of, {"size": 3}), fc.errors.CaseError, r"'mesh': size = 3 are invalid \(cannot unpack"),
     ("a table with a text for numbers", lambda: called("mesh", pair_of, {"size": "ab"}), fc.errors.CaseError, r"'mesh': size = 'ab' are invalid \(could not convert"),

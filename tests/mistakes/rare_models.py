@@ -127,7 +127,7 @@ MISTAKES = [
     Mistake("cells of broken numbers", lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 1.5]]}), fc.MeshError,
             r"must be whole numbers, counted from 0, not float64 values"),
     Mistake("cells of numbers beyond 32 bits", lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2**40]]}),
-            fc.MeshError, r"contain the number 1099511627776: the largest that a mesh can hold is 2147483647"),
+            fc.MeshError, r"contain the number 1099511627776: the largest possible number is 2147483647"),
     Mistake("an order of what is no line", no_lines, fc.MeshError,
             r"group 'BLOCK' contains no line cells, so its nodes have no order along a line"),
     Mistake("a line in two pieces", lambda: two_lines(), fc.MeshError,

@@ -8,7 +8,7 @@ from models import elastic_model
 from numpy.typing import ArrayLike, NDArray
 
 import fastcontact as fc
-from fastcontact._tools.argument_types import check_type, fits, typed, words
+from fastcontact._tools.argument_types import check_type, fits, type_name, typed
 
 WRONG = (None, "5", 5, [1, 2], {"a": 1}, object(), [None], 1j)
 
@@ -122,10 +122,10 @@ def test_what_fits_an_annotation(annotation, good, bad):
 
 
 def test_types_in_words():
-    assert words(float | None) == "a number or None"
-    assert words(tuple[float, float]) == "two numbers"
-    assert words(dict[str, float]) == "a dictionary of numbers by name"
-    assert words(fc.Mesh) == "a Mesh"
+    assert type_name(float | None) == "a number or None"
+    assert type_name(tuple[float, float]) == "two numbers"
+    assert type_name(dict[str, float]) == "a dictionary of numbers by name"
+    assert type_name(fc.Mesh) == "a Mesh"
 
 
 def test_what_is_no_wrong_type_stays_python_s():

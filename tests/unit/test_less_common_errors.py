@@ -14,7 +14,7 @@ from models import elastic_model, supported
 
 import fastcontact as fc
 from fastcontact._tools import paths
-from fastcontact._tools.argument_types import check_type, fits, words
+from fastcontact._tools.argument_types import check_type, fits, type_name
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cli import _outputs, main
 from fastcontact.cli._study import _failing_threads_interrupt
@@ -165,7 +165,7 @@ def test_annotations_of_words_and_of_arrays_with_others():
     mixed = ArrayLike | fc.Mesh
     assert fits(SQUARE, mixed)
     assert fits([1.0], mixed)
-    assert words(mixed) == "an array of numbers or a Mesh"
+    assert type_name(mixed) == "an array of numbers or a Mesh"
     with pytest.raises(fc.ModelError, match="it must be an array of numbers or a Mesh, not the string 'x'"):
         check_type("it", "x", mixed, fc.ModelError)
 

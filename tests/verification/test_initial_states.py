@@ -9,7 +9,7 @@ from two_bodies import rings
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
-from fastcontact.model.fingerprint import different, fingerprint
+from fastcontact.model.fingerprint import differing_parts, fingerprint
 
 pytestmark = pytest.mark.each_value
 
@@ -224,5 +224,5 @@ def test_it_counts_in_a_fingerprint():
             found.add_initial_stress(xx=value)
         return fingerprint(found)
 
-    assert different(model(), model(1.0)) == different(model(1.0), model(2.0)) == ["the initial states"]
+    assert differing_parts(model(), model(1.0)) == differing_parts(model(1.0), model(2.0)) == ["the initial states"]
     assert model(1.0) == model(1.0)

@@ -235,7 +235,7 @@ def test_fields_in_case_files(folder):
         ("file = 'heat.vtu'\nfield = 'TEMP'\ninstant = 30.0", "has no times: omit instant"),
         ("file = 'heat.med'\nfield = 'TEMP'\ntimes = [0, 1, 2]", "has 2 instants, but 3 times"),
         ("file = 'heat.med'\nfield = 'TEMP'\ntimes = [1, 0]", "must ascend"),
-        ("file = 'heat.med'\nfield = 'TEMP'\nramp = [[0, 0], [1, 1]]", "has 2 instants and thus no ramp"),
+        ("file = 'heat.med'\nfield = 'TEMP'\nramp = [[0, 0], [1, 1]]", "has 2 instants and takes no ramp"),
         ("file = 'heat.vtu'\nfield = 'TEMP'\ntimes = [0]", "has a single instant"),
         ("file = ['heat.vtu', 'heat.vtu']\nfield = 'TEMP'", "has 2 instants without times"),
         ("file = ['heat.med', 'heat.vtu']\nfield = 'TEMP'\ntimes = [0, 1, 2]", "has 2 instants: each of several files"),

@@ -31,7 +31,7 @@ from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, 
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
-from fastcontact.model.relation_rows import along
+from fastcontact.model.relation_rows import rows_along
 
 # Largest gap between the undeformed sides that counts as closed, relative to the size of the model.
 TOUCHING = 1e-6
@@ -238,7 +238,7 @@ class Building:
         """Return the constraint row (1, n_dofs) [-] of the displacement component that a support prescribes."""
         point, axis, local = name
         direction = (conditions.directions[point] if local else np.eye(3))[[axis], : self.assembly.dim]
-        return along(np.array([point]), direction, self.model.n_dofs)
+        return rows_along(np.array([point]), direction, self.model.n_dofs)
 
     def _springs(self) -> None:
         """Add the springs. Raises CaseError if an element of *SPRING is not a spring, or a spring has no stiffness."""

@@ -35,7 +35,7 @@ def readable(path: Path, folder: Path) -> Path:
 
 
 def _check_groups(path: Path) -> None:
-    """Raise FileError for a file of version 4.0 in which cells belong to several groups, of which meshio keeps one."""
+    """Raise FileError for a file of version 4.0 in which cells belong to several groups, because meshio keeps only one."""
     in_entities = False
     for line in path.read_text(encoding="ascii", errors="replace").splitlines():
         if line.startswith("$"):

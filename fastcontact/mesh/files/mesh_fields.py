@@ -64,7 +64,8 @@ def read_field(
     Raises
     ------
     FileError, MeshError
-        If the file cannot be read, or has no such field or instant; if a cell or point has no value, or two.
+        If the file cannot be read, or has no such field or instant; if a cell or point has no value, or two different
+        values.
 
     Examples
     --------
@@ -153,8 +154,8 @@ def _nearest(
 ) -> tuple[Indices, float]:
     """Return the rows (n,) of a field at positions (n, dim) in a mesh, and the tolerance of the distance [length].
 
-    `numbers` (n,) are those of the points or cells at the positions. The two `nouns` are used in messages: the word for such
-    an item, and the word for the items on which the field should be written.
+    `numbers` (n,) are the numbers of the points or cells at these positions. The two `nouns` appear in messages: the
+    name of such an item, and the name of the items on which the field should be written.
     """
     assert field.positions is not None
     tolerance = COINCIDENT * float(np.ptp(mesh.points, axis=0).max())

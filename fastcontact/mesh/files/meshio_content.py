@@ -25,7 +25,7 @@ NODE_ORDER: dict[str, Orders] = {
     **{key: {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)} for key in ("gmsh", "gmsh22")},
 }
 # Exceptions due to inconsistent arrays, which meshio reads without checks.
-UNFIT = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+INCONSISTENCY_ERRORS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 VERTEX = "vertex"
 # Largest number of unknown kinds of cells in a message, and of characters of each name.
 MOST_SHOWN = 12
@@ -45,7 +45,8 @@ def mesh_of(content: Mapping[str, Any], file_format: str = "") -> tuple[Mesh, di
     Raises
     ------
     MeshError
-        If there are no cells, or cells of an unknown kind. Inconsistent arrays raise one of the exceptions `UNFIT`.
+        If there are no cells, or cells of an unknown kind. Inconsistent arrays raise one of the
+        INCONSISTENCY_ERRORS.
     """
     # Version 2 of Gmsh's format repeats a cell for each of its groups.
     is_gmsh, blocks = file_format == "gmsh", _blocks(content, NODE_ORDER.get(file_format, {}))

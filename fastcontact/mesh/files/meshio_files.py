@@ -21,7 +21,7 @@ from fastcontact.arrays import AnyArray, Numbers
 from fastcontact.errors import FileError, MeshError, unknown, warn
 from fastcontact.mesh import elements
 from fastcontact.mesh.files import abaqus, gmsh_versions
-from fastcontact.mesh.files.meshio_content import NODE_ORDER, UNFIT, VERTEX, Orders, mesh_of
+from fastcontact.mesh.files.meshio_content import INCONSISTENCY_ERRORS, NODE_ORDER, VERTEX, Orders, mesh_of
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, library, read_in_process
 from fastcontact.mesh.mesh import Mesh
 
@@ -86,7 +86,7 @@ def _format(path: Path, writing: bool) -> str:
         return str(names[0])
     if writing:
         return "gmsh22"
-    # Ansys uses the same suffix, and meshio's reader of its files does not terminate on a damaged one.
+    # Ansys uses the same suffix, and meshio's reader of Ansys files does not terminate on a damaged file.
     with open(path, "rb") as file:
         if file.read(1) != b"$":
             raise FileError(f"'{path}' is not a Gmsh file, which starts with $MeshFormat: convert it to .med")
@@ -144,7 +144,7 @@ def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
         mesh, dropped = mesh_of(content, file_format)
     except MeshError as error:
         raise MeshError(f"'{path}': {error}") from None
-    except UNFIT as error:
+    except INCONSISTENCY_ERRORS as error:
         raise FileError(f"the parts of '{path}' are inconsistent: check the file, or convert it to .med") from error
     return mesh, file_format, dropped
 

@@ -102,9 +102,9 @@ def one_of(name: str, value: str, known: Sequence[str]) -> str:
     return value
 
 
-def unused(element: str, *instead: str, **arguments: Any) -> None:
-    """Raise MeshError if an argument without effect on `element` is not None. The message suggests those in `instead`."""
-    remedy = f"use {', '.join(instead)}" if instead else "omit it"
+def unused(element: str, *alternatives: str, **arguments: Any) -> None:
+    """Raise MeshError if an argument without effect on `element` is not None. The message suggests the `alternatives`."""
+    remedy = f"use {', '.join(alternatives)}" if alternatives else "omit it"
     for name, value in arguments.items():
         if value is not None:
             raise MeshError(f"{name} = {repr(value)} has no effect on {element} meshes: {remedy}")

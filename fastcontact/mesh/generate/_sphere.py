@@ -128,14 +128,14 @@ def sphere_octant(
     outward = 1.0 - graded((1.0 - INNER) * R, _depth_spacing(spacing))[::-1] / ((1.0 - INNER) * R)
     upward = np.linspace(0.0, eighth, count("segments", segments_for(R * eighth, spacing.far)) + 1)
 
-    def ball(outside: int) -> Map:
-        """Return the map of the inner block for ``outside = -1``, otherwise of the block at its face number `outside`."""
+    def map_of_block(face: int) -> Map:
+        """Return the map of the inner block for ``face = -1``, otherwise of the block at its face number `face`."""
 
         def place(*parameters: Array) -> Array:
             coordinates = np.column_stack(parameters)
-            depth = np.zeros(len(coordinates)) if outside < 0 else coordinates[:, outside].copy()
-            if outside >= 0:
-                coordinates[:, outside] = eighth
+            depth = np.zeros(len(coordinates)) if face < 0 else coordinates[:, face].copy()
+            if face >= 0:
+                coordinates[:, face] = eighth
             cube = np.tan(coordinates)
             length = np.linalg.norm(cube, axis=1, keepdims=True)
             direction = np.divide(cube, length, out=np.zeros_like(cube), where=length > 0)
@@ -147,15 +147,15 @@ def sphere_octant(
 
     names = {"SPHERE": "SPHERE", "XMIN": "SYMMETRY_X", "YMIN": "SYMMETRY_Z", "ZMIN": "SPHERE_TOP"}
     grids = {-1: {}, 0: {"XMAX": "SPHERE_SIDE"}, 1: {"YMAX": "SPHERE_SIDE"}, 2: {"ZMAX": "CONT_SPHERE"}}
-    cubes = []
-    for outside, outer in grids.items():
+    blocks = []
+    for face, outer in grids.items():
         grid = [angles, angles, upward]
         names_of_block = dict(names)
-        if outside >= 0:
-            grid[outside] = outward
-            del names_of_block[("XMIN", "YMIN", "ZMIN")[outside]]
-        cubes.append(_mapped_box(element, grid, ball(outside), "SPHERE", names_of_block | outer))
-    mesh = merge_points(union(*cubes), 1e-6 * R * float(np.diff(angles).min()))
+        if face >= 0:
+            grid[face] = outward
+            del names_of_block[("XMIN", "YMIN", "ZMIN")[face]]
+        blocks.append(_mapped_box(element, grid, map_of_block(face), "SPHERE", names_of_block | outer))
+    mesh = merge_points(union(*blocks), 1e-6 * R * float(np.diff(angles).min()))
     check_cells(mesh)
     return with_points_at(mesh, {"POLE_SPHERE": (0.0, 0.0, 0.0), "CENTRE": (0.0, R, 0.0)})
 

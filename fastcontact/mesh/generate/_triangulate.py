@@ -83,7 +83,10 @@ def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
 
 
 def _midpoints_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> Array:
-    """Return the midpoints (m, 2) of too long edges. At both ends, no other edge is longer relative to the spacing."""
+    """Return the midpoints (m, 2) of edges that are too long.
+
+    Relative to the spacing, each is the longest of all edges at its two ends.
+    """
     edges = edges_of(delaunay(points))
     # Sides of the outline are excluded, but not chords that cut off a corner.
     side = np.isin(edges[:, 1] - edges[:, 0], (1, n_fixed - 1)) & (edges[:, 1] < n_fixed)
@@ -235,9 +238,9 @@ def stars_of(triangles: Indices, n_points: int) -> Indices:
 def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
     """Return points (n, 2) [length] after relaxation by repulsive bars along the edges.
 
-    The bars of a truss push its nodes apart until their lengths follow the function `size` (n,) [length] of positions (P.-O.
-    Persson and G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Only those of
-    the `points` (n, 2) [length] with True in `movable` (n,) move, in `steps` steps.
+    The bars of a truss push its nodes apart until their lengths follow the function `size` (n,) [length] of positions
+    (P.-O. Persson and G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Only those
+    `points` (n, 2) [length] move that the mask `movable` (n,) selects, in `steps` steps.
     """
     points = points.copy()
     if not movable.any():
@@ -268,10 +271,10 @@ def _bar_forces(points: Array, edges: Indices, desired: Array) -> Array:
 def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
     """Return points (n, 2) [length] that are moved one by one to improve the worst triangle around each of them.
 
-    A trial move is accepted if it increases the smallest angle around the point, with a penalty on edges that are too long
-    (smart smoothing after L. Freitag and C. Ollivier-Gooch, Int. J. Numer. Meth. Engng 40, 1997). Points that move
-    simultaneously share no edge. Only those of the `points` (n, 2) [length] with True in `movable` (n,) move, in at most
-    `sweeps` sweeps. The function `limit` (n,) [length] of positions returns the longest admissible edge.
+    A trial move is accepted if it increases the smallest angle around the point, with a penalty on edges that are too
+    long (smart smoothing after L. Freitag and C. Ollivier-Gooch, Int. J. Numer. Meth. Engng 40, 1997). Points that move
+    simultaneously share no edge. Only those `points` (n, 2) [length] move that the mask `movable` (n,) selects, in
+    at most `sweeps` sweeps. The function `limit` (n,) [length] of positions returns the longest admissible edge.
     """
     points = points.copy()
     radius, moved = 0.1, True
@@ -319,7 +322,8 @@ def _star_quality(positions: Array, points: Array, stars: Indices, limit: Array)
     u, v, w = a - positions[:, :, None], b - positions[:, :, None], b - a
     twice_area = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
     uu, vv, ww = (u * u).sum(axis=-1), (v * v).sum(axis=-1), (w * w).sum(axis=-1)
-    # The smallest angle is opposite the shortest side. Its sine is twice the area over the product of the other sides.
+    # The smallest angle is opposite the shortest side. Its sine is twice the area divided by the product of the other
+    # sides.
     shortest = np.minimum(np.minimum(uu, vv), ww)
     sine = twice_area * np.sqrt(shortest / np.maximum(uu * vv * ww, 1e-300))
     excess = np.sqrt(np.maximum(uu, vv)) / limit[:, None, None] - 1.0

@@ -30,8 +30,8 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
         Group of facets between solid cells. They must divide a body completely, so that the edge of the cut lies on the
         surface of the body.
     normal : sequence of float (dim,), optional
-        Direction from the cut to the side whose cells get the new nodes [-]; by default the normal of the plane fitted to
-        the facets, oriented such that its largest component is positive.
+        Direction from the cut to the side whose cells receive the new nodes [-]; by default the normal of the plane
+        fitted to the facets, oriented such that its largest component is positive.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def _cells_beyond(mesh: Mesh, group: str, sides: _Sides, marked: Mask, direction
             f"{mesh.points[nodes[nodes >= 0]].mean(axis=0)}); extend the group to the surface of the body, with a normal "
             f"across it (now {direction})"
         )
-    # A part without a facet in the section touches it only at edges or nodes.
+    # A part that has no facet in the section touches the section only at edges or nodes.
     beyond_cut = np.isin(part, beyond) | (~np.isin(part, below) & (above > 0.0))
     outer = sides.is_facet & np.isin(sides.row, row[beyond_cut[solid]]) & ~np.isin(sides.row, section)
     beyond_cut[sides.cell[outer]] = True

@@ -17,7 +17,7 @@ from fastcontact.mesh.generate.quadratic import Circle, converted_to
 from fastcontact.mesh.generate.transform import merge_points, mirrored, union, with_points_at
 from fastcontact.mesh.mesh import Mesh
 
-# Group names of the upper body by those of the lower body; A1A2 is the axis of both.
+# Group names of the upper body, by the corresponding names of the lower body. A1A2 is the axis of both bodies.
 _UPPER = {"SPHBAS": "SPHHAU", "A1B1": "A2B2", "CONT1": "CONT2", "D1B1": "D2B2"}
 _UPPER |= {f"{letter}1": f"{letter}2" for letter in "ABCD"} | {f"{letter}1": letter for letter in "MNP"}
 
@@ -61,8 +61,9 @@ def half_spheres(
         Only for triangles: distance from the pole up to which edges have the length `contact_size`, at most R/2; by
         default 0 [length].
     arc_sizes : (float, float), optional
-        Only for quadrangles: lengths of the segments of the arc C-D at C and at D, in geometric progression between these
-        points; by default R/250 and R/25 [length]. A common factor reduces both to fill the arc.
+        Only for quadrangles: lengths of the segments of the arc C-D at C and at D, in geometric progression between
+        these points; by default R/250 and R/25 [length]. Both are reduced by a common factor such that the segments
+        fill the arc.
     segments : int, optional
         Only for quadrangles: number of segments on the side A-M of the inner square, on the arc D-B, and on the radial
         lines M-C, N-D and P-B; by default 15.

@@ -56,8 +56,8 @@ class Support:
     component : int
         Number of the component, from 0.
     value : float, callable or tuple of (float, float or callable)
-        Displacement at multiplier 1 [length], a number or a function of position; or pairs of a load factor and the
-        displacement at it, between which displacements are interpolated linearly.
+        Displacement at multiplier 1 [length]: a number, a function of position, or pairs of load factor and
+        displacement, between which displacements are interpolated linearly.
     ramp : Table, optional
         History of `value`; None means the history of the analysis.
     rotation : Rotation, optional
@@ -79,7 +79,7 @@ class Support:
         return displacement_name("xyz"[self.component], self.group)
 
     def by_history(self, points: Array) -> dict[PartHistory, Array]:
-        """Return the displacements (n,) [length] of the positions `points` (n, dim) at multiplier 1, by history."""
+        """Return the displacements (n,) [length] at the positions `points` (n, dim) at multiplier 1, by history."""
         if isinstance(self.value, tuple):
             instants, displacements = zip(*self.value, strict=True)
             tables = interpolation_tables(instants, self.name)
@@ -144,10 +144,10 @@ class ModelBase(Suggesting):
         self.heat_loads: list[FixedTemperature | Heating | Film] = []
         self.initial_states: list[InitialState] = []
         self.relations: list[MultiPointConstraint] = []
-        self.related_supports: list[tuple[str, MultiPointConstraint]] = []  # supports by group, as constraints
+        self.related_supports: list[tuple[str, MultiPointConstraint]] = []  # (group, constraint)
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
-        self.interpolated: dict[str, Indices] = {}  # nodes of cyclic interfaces without a counterpart, tied to facets
+        self.nodes_on_facets: dict[str, Indices] = {}  # nodes on cyclic interfaces that are tied to facets
         self.periodic_interfaces: list[PeriodicInterface] = []  # coincident nodes of periodic parts
         self.contact: list[ContactPair] = []
 
@@ -169,12 +169,12 @@ class ModelBase(Suggesting):
         """Return the solid cells of `groups`, or all solid cells if it is None."""
         return Cells(self.mesh, solid_rows(self.mesh, groups))
 
-    def _nodes(self, point: str | int) -> AnyArray:
+    def _nodes(self, point_or_group: str | int) -> AnyArray:
         """Return the numbers (n,) of the points of a group, or the number of a point as an array (1,)."""
-        if isinstance(point, str):
-            return self.mesh.points_of(point)
-        if point != int(point) or not 0 <= point < self.mesh.n_points:
-            raise ModelError(f"point {point} is not in the mesh of {self.mesh.n_points} points (numbered from 0)")
+        if isinstance(point_or_group, str):
+            return self.mesh.points_of(point_or_group)
+        if (point := point_or_group) != int(point) or not 0 <= point < self.mesh.n_points:
+            raise ModelError(f"point {point} is not in the mesh of {self.mesh.n_points} points, numbered from 0")
         return np.array([point])
 
     def _direction(
@@ -202,10 +202,10 @@ class ModelBase(Suggesting):
     def related_points(self) -> Mask:
         """Return the mask (n_points,) of the points on which a multi-point constraint or a spring acts."""
         related = np.zeros(self.mesh.n_points, bool)
-        related[self.holding_rows().indices // self.mesh.dim] = True
+        related[self.constraint_rows().indices // self.mesh.dim] = True
         return related
 
-    def holding_rows(self) -> csr_array:
+    def constraint_rows(self) -> csr_array:
         """Return the rows (m, n_dofs) [units of the items] of all multi-point constraints and springs.
 
         A rigid-body mode that neither constraints nor springs prevent is in the null space of these rows.
@@ -241,7 +241,7 @@ class ModelBase(Suggesting):
         """Names of the `StepResult.cell_fields` in steps of this model; empty for linear elasticity."""
         return field_names([material for material, _ in self.materials], self.strain)
 
-    def bending(self) -> list[bool]:
+    def uses_incompatible_modes(self) -> list[bool]:
         """Return for each material whether linear quadrangles and hexahedra of this material have incompatible modes."""
         possible = self.kinematics != "axisymmetric" and any(name in BENDING for name in self.mesh.solids)
         return [possible and material.incompatible_modes for material, _ in self.materials]
@@ -256,17 +256,18 @@ class ModelBase(Suggesting):
         return nonlinear_bodies(self.mesh, self.kinematics, self.strain, field)
 
     def refuse_nonlinear(self, feature: str) -> None:
-        """Raise ModelError if bodies are nonlinear. The message begins with `feature`, which needs linear elasticity."""
+        """Raise ModelError if bodies are nonlinear. The message begins with `feature`, which requires linear elasticity."""
         nonlinear = [type(law).__name__ for law, _ in self.materials if isinstance(law, NonlinearElastic)]
         if self.nonlinear:
             cause = nonlinear[0] if nonlinear else f"strain='{self.strain}'"
             raise ModelError(f"{feature} available for linear elasticity only, not with {cause}")
 
     def material_numbers(self) -> tuple[Array, dict[str, Numbers]]:
-        """Return the matrices of moduli, and by element type the number of the matrix of each solid cell.
+        """Return the matrices of moduli and, by element type, the index of the matrix of each solid cell.
 
-        Moduli have the shape (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure]. The first matrices belong to the
-        materials, in their order; materials that vary have a further matrix for the centre of each of their cells.
+        Moduli have the shape (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure]. The first matrices are those of the
+        materials, in the order of `materials`. Each cell of a material with varying constants has a further matrix, for
+        the centre of the cell.
         """
         field = self.material_field()
         return field.moduli, field.rows
@@ -307,7 +308,7 @@ class ModelBase(Suggesting):
                 )
 
     def _check_all_have_material(self, numbers: dict[str, Numbers]) -> None:
-        """Raise ModelError if a solid cell has no material, which the number -1 denotes."""
+        """Raise ModelError if a solid cell has no material, which is denoted by the number -1."""
         missing = {name: np.flatnonzero(values < 0) for name, values in numbers.items()}
         total = sum(map(len, missing.values()))
         if not total:

@@ -18,7 +18,7 @@ from fastcontact.model.parts.initial_states import ModelInitialStates
 from fastcontact.model.periodicity import cyclic, periodic
 from fastcontact.model.pretension import PretensionForce, pretension
 from fastcontact.model.ramp import History, table_of
-from fastcontact.model.relation_rows import NORMAL, along, directions_of, matched, minus_first
+from fastcontact.model.relation_rows import NORMAL, directions_of, matching_nodes, relative_to_first, rows_along
 
 
 @typed(ModelError)
@@ -39,8 +39,8 @@ class ModelConnections(ModelInitialStates):
     ) -> None:
         """Tighten a bolt by a pretension section.
 
-        At the section the bolt is cut. The two sides of the cut are displaced uniformly towards each other along the bolt,
-        without relative displacement normal to it. `fastcontact.generate.cut` cuts the mesh. The results are in
+        The bolt is cut at the section. The two sides of the cut are displaced uniformly towards each other along the
+        bolt, without relative displacement normal to it. `fastcontact.generate.cut` cuts the mesh. The results are in
         ``step.pretension[name]``.
 
         Parameters
@@ -90,7 +90,7 @@ class ModelConnections(ModelInitialStates):
         bolt = pretension(self.mesh, name, section, opposite, normal, (force, shortening, locked_from), table)
         for other in self.pretensions:
             if np.isin(bolt.nodes, [other.nodes, other.opposite]).any():
-                raise ModelError(f"{bolt.name} and {other.name} act on the same section, which has one force")
+                raise ModelError(f"{bolt.name} and {other.name} act on the same section, which can have one force only")
         self.pretensions.append(bolt)
         self.relations.extend(bolt.relations(self.n_dofs))
         if force is not None:
@@ -120,7 +120,7 @@ class ModelConnections(ModelInitialStates):
             axes_of(f"couple('{group}')", dict.fromkeys(component, 1.0), self.mesh.dim)
         for name in directions:
             ((nodes, vectors),) = directions_of(self.mesh, group, name)
-            rows = minus_first(along(nodes, vectors, self.n_dofs))
+            rows = relative_to_first(rows_along(nodes, vectors, self.n_dofs))
             self.relations.append(MultiPointConstraint(f"couple('{group}', '{name}')", rows))
 
     def relate_groups(
@@ -134,7 +134,7 @@ class ModelConnections(ModelInitialStates):
         translation: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Constrain the displacement of each node of a group by that of the corresponding node of another group.
+        """Couple the displacement of each node of a group linearly to that of the corresponding node of another group.
 
         The constraint is ``coefficients[0] * u_first + coefficients[1] * u_second = value``, where ``u_first`` and
         ``u_second`` are displacement components of the two nodes. With the default coefficients and value they are equal,
@@ -177,10 +177,10 @@ class ModelConnections(ModelInitialStates):
             axes_of(name, dict.fromkeys(component, 1.0), self.mesh.dim)
         table = table_of(ramp, f"the ramp of {name}")
         sides = [directions_of(self.mesh, group, component) for group in (first, second)]
-        for (nodes, directions), (opposite, directions_opposite) in zip(*sides, strict=True):
-            match = matched(self.mesh, (first, nodes), (second, opposite), translation)
-            rows = coefficients[0] * along(nodes, directions, self.n_dofs)
-            rows = csr_array(rows + coefficients[1] * along(opposite[match], directions_opposite[match], self.n_dofs))
+        for (nodes, vectors), (opposite, opposite_vectors) in zip(*sides, strict=True):
+            match = matching_nodes(self.mesh, (first, nodes), (second, opposite), translation)
+            rows = coefficients[0] * rows_along(nodes, vectors, self.n_dofs)
+            rows = csr_array(rows + coefficients[1] * rows_along(opposite[match], opposite_vectors[match], self.n_dofs))
             rows.eliminate_zeros()
             self.relations.append(MultiPointConstraint(name, rows[np.diff(rows.indptr) > 0], float(value), table))
 
@@ -253,9 +253,9 @@ class ModelConnections(ModelInitialStates):
     ) -> None:
         """Model one of several identical sectors of a ring, whose two ends have equal cylindrical displacement components.
 
-        Loads are the same on all sectors, and resultant forces are those of the modelled sector. Rotation about the axis
-        and, in 3D, translation along it remain possible and must be prevented by supports. The ends may be curved and may
-        meet on the axis. The remark on contact at the ends in `add_periodicity` also applies here.
+        Loads are the same on all sectors, and resultant forces are those of the modelled sector. Rotation about the
+        axis and, in 3D, translation along it remain possible and must be prevented by supports. The ends may be curved
+        and may meet on the axis. The remark on contact at the ends, see `add_periodicity`, applies here as well.
 
         Parameters
         ----------
@@ -292,7 +292,7 @@ class ModelConnections(ModelInitialStates):
         valid_axis = len(point) == self.mesh.dim and len(axis) == 3 and any(axis)
         if sectors < 2 or sectors != int(sectors) or not valid_axis:
             raise ModelError(
-                f"{name} needs at least two sectors, a whole number, an origin of {self.mesh.dim} numbers, and a direction "
+                f"{name} needs at least two sectors (a whole number), an origin of {self.mesh.dim} numbers, and a direction "
                 f"of three numbers, not {sectors}, {point} and {axis}"
             )
         relations, interface = cyclic(self.mesh, (first, second), sectors, point, axis)
@@ -301,7 +301,7 @@ class ModelConnections(ModelInitialStates):
             self.periodic_interfaces.append(interface)
         if interface.relation is None:
             nodes = np.union1d(*(self.mesh.points_of(end) for end in (first, second)))
-            self.interpolated[name] = np.setdiff1d(nodes, interface[:2])
+            self.nodes_on_facets[name] = np.setdiff1d(nodes, interface[:2])
 
     def relate(
         self, terms: Iterable[tuple[str | int, str, float]], value: float = 0.0, *, ramp: History = None
@@ -311,9 +311,9 @@ class ModelConnections(ModelInitialStates):
         Parameters
         ----------
         terms : iterable of (str or int, str, float)
-            For each term the name of a group or the number of a point, the component and the coefficient. A group of several
-            nodes represents the sum over these nodes. Sums over many nodes are expensive, because they couple all
-            displacements in them.
+            For each term the name of a group or the number of a point, the component and the coefficient. A group of
+            several nodes represents the sum over these nodes. Sums over many nodes are expensive, because they couple
+            all of these displacements.
         value : float
             Value of the linear combination at multiplier 1 [length times the unit of the coefficients].
         ramp : Ramp or iterable of (float, float), optional
@@ -460,11 +460,11 @@ class ModelConnections(ModelInitialStates):
                 raise ModelError(f"group '{end}' is empty: no spring can act on it")
         if opposite is None:
             if translation is not None:
-                raise ModelError(f"{name} acts on the ground: leave out the translation, or name the group to connect")
+                raise ModelError(f"{name} acts on the ground: leave out the translation, or name the second group")
             self.springs.append(grounded(name, nodes, axes, self.n_dofs, self.mesh.dim, along_line, vector))
             return
         if len(nodes) > 1 < len(opposite):
-            match = matched(self.mesh, (str(group), nodes), (str(to), opposite), translation)
+            match = matching_nodes(self.mesh, (str(group), nodes), (str(to), opposite), translation)
             opposite = opposite[match]
         elif translation is not None:
             raise ModelError(f"{name} connects all nodes with a single one: leave out the translation")

@@ -26,7 +26,7 @@ from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.loads import Value, axes_of, check_number
 from fastcontact.errors import ContactError, ModelError, check_known
-from fastcontact.model.contact_pair import ContactPair, Driving, FluidPressure, method, rotation_of
+from fastcontact.model.contact_pair import ContactPair, DrivingForce, FluidPressure, method, rotation_of
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.pair_options import SHARED_OPTIONS, ContactOptions, pair_options
 from fastcontact.model.parts.connections import ModelConnections
@@ -114,11 +114,11 @@ class ModelContact(ModelConnections):
             - ``conductance``: heat flux per unit temperature difference [power / (area temperature)]: a number, which
               applies at closed points; a function of pressures and gaps (m,); pairs (pressure, conductance); or a mapping
               of ``"pressure"`` and ``"gap"`` to pairs. By default the contact is insulated.
-            - ``friction_heat``: fraction of the frictional work that becomes heat, of which one half flows into each side
-              [-]. The heating power is computed with the load factor as time.
+            - ``friction_heat``: fraction of the frictional work that becomes heat [-]. Half of this heat flows into
+              each side. The heating power is computed with the load factor as time.
             - ``obstacle_temperature``: temperature of a rigid obstacle [temperature].
-            - ``search_distance``: largest distance, and largest penetration, at which a point has an opposite point, either
-              in the current configuration or at the beginning of the load step [length].
+            - ``search_distance``: largest distance, and largest penetration, at which a point is paired with an
+              opposite point, either in the current configuration or at the beginning of the load step [length].
             - ``normals``: the normal field. ``"facet"``: normals of the primary facets. ``"averaged"``: averages over the
               facets that meet at a node at less than 48 degrees, which conforming curved sides need. ``"secondary"``:
               normals of the secondary side. A vector (dim,): the outward normal of the entire primary side [-].
@@ -153,7 +153,7 @@ class ModelContact(ModelConnections):
         formulation: str | None = None,
         **options: Unpack[ContactOptions],
     ) -> FoundContacts:
-        """Find the surfaces of different bodies that face each other, and add a contact pair for each two such surfaces.
+        """Find the surfaces of different bodies that face each other, and add a contact pair for every two such surfaces.
 
         Groups with the facets of these surfaces are added to the mesh of the model. Surfaces of existing pairs and of
         pretension sections are skipped. If materials have been assigned, the choice of the secondary side takes their
@@ -215,10 +215,10 @@ class ModelContact(ModelConnections):
         """Apply a fluid pressure to both sides of a contact pair, wherever the fluid can penetrate from a source.
 
         Starting at the source, the fluid advances from facet to facet where the sides are open, or where the contact
-        pressure does not exceed the fluid pressure. There it acts on the secondary side along its normals, and on the
-        primary side along the normal of the gap, in finite strain those of the deformed surfaces. The pressure at each
-        secondary node is the attribute ``fluid_pressure`` of the contact result. To apply the pressure of the fluid to
-        other surfaces, use `add_pressure`.
+        pressure does not exceed the fluid pressure. There it acts along the normals of the secondary side and, on the
+        primary side, along the normal of the gap. At finite strain these are the normals of the deformed surfaces. The
+        pressure at each secondary node is the attribute ``fluid_pressure`` of the contact result. To apply the pressure
+        of the fluid to other surfaces, use `add_pressure`.
 
         Parameters
         ----------
@@ -276,7 +276,7 @@ class ModelContact(ModelConnections):
             Displacement of the obstacle at multiplier 1, such as ``{"y": -0.1}``; by default zero [length].
         force : mapping of str to float, optional
             Force on the obstacle at multiplier 1, such as ``{"y": -100.0}`` [force], in axisymmetry integrated over the
-            full circle. In the given components the obstacle is a free rigid body, which only contact holds; in the other
+            full circle. In these components the obstacle is a free rigid body that only contact restrains; in the other
             components it follows `motion`. The results contain its displacement.
         rotation : mapping, optional
             Rotation of the obstacle about an axis that moves with `motion`. ``angle``: angle at multiplier 1 [radian].
@@ -287,15 +287,16 @@ class ModelContact(ModelConnections):
             History of motion and force, and of the rotation if it has no ``ramp``.
         formulation : str, optional
             ``"node_to_segment"`` (nodes against the obstacle), ``"mortar"`` with one weighted gap per node, or
-            ``"continuous"``. The default is node-to-segment on linear triangles and, in 3D, on facets whose nodes all carry
-            pressure (tri3, quad4, quad9); mortar in 3D on other quadratic facets with friction; and otherwise continuous.
+            ``"continuous"``. The default is node-to-segment on linear triangles and, in 3D, on facets whose nodes all
+            carry pressure (tri3, quad4, quad9). On other quadratic facets in 3D it is mortar if there is friction. In
+            all other cases it is continuous.
         **options
             Options of `add_contact`.
 
         Raises
         ------
         MeshError, ModelError, ContactError
-            If a group does not exist, an argument is invalid, or the obstacle has another dimension than the mesh.
+            If a group does not exist, an argument is invalid, or the obstacle and the mesh differ in dimension.
 
         Examples
         --------
@@ -340,7 +341,7 @@ class ModelContact(ModelConnections):
         if not mask[side.points].any():
             raise ContactError(
                 f"the source '{pair.fluid.source}' of the fluid in contact '{pair.name}' has no nodes of the secondary side "
-                f"'{side.group}': name a group that has"
+                f"'{side.group}': name a group that does"
             )
         if options.kind != "unilateral" or options.cohesion is not None:
             raise ContactError(
@@ -358,7 +359,7 @@ class ModelContact(ModelConnections):
         only_simplices = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
         return list(facets), only_simplices
 
-    def _driving_force(self, name: str, motion: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
+    def _driving_force(self, name: str, motion: Mapping[int, Value], force: Mapping[str, float] | None) -> DrivingForce:
         """Return the components of the force on obstacle `name`, None where its motion is prescribed.
 
         The result is empty if no force is given.

@@ -27,7 +27,7 @@ HEAT_FLUX = ("heat_flux_x", "heat_flux_y", "heat_flux_z")
 
 @typed(ModelError)
 class ModelHeat(ModelBase):
-    """A model with optional heat conduction, which adds temperatures, heat fluxes and thermal strains to the steps."""
+    """A model with optional heat conduction, which adds temperatures, heat fluxes and thermal strains to the results."""
 
     def fix_temperature(
         self, group: str, value: Value, *, ramp: History = None, begins: float | None = None, ends: float | None = None
@@ -42,9 +42,9 @@ class ModelHeat(ModelBase):
         ramp : Ramp or iterable of (float, float), optional
             History of the rise above `Model.reference_temperature`; by default that of the analysis.
         begins, ends : float, optional
-            Load factors [-] between which the temperature is prescribed; both must be ends of load steps. By default it is
-            prescribed in all steps. A temperature that begins later changes linearly from the current values to the next
-            point of its `ramp`.
+            Load factors [-] between which the temperature is prescribed; both must be ends of load steps. By default it
+            is prescribed in all steps. A temperature that is prescribed from a later step on changes linearly from the
+            current values to the next point of its `ramp`.
 
         Examples
         --------
@@ -53,7 +53,7 @@ class ModelHeat(ModelBase):
         >>> model.fix_temperature("TOP", 120.0)
         """
         table = table_of(ramp, f"the ramp of the temperature on '{group}'")
-        self._add_heat(FixedTemperature(group, value, table, *_span(begins, ends)))
+        self._add_heat(FixedTemperature(group, value, table, *_interval(begins, ends)))
 
     def add_heat_flux(self, group: str, value: Value, *, ramp: History = None) -> None:
         """Apply a heat flux to a group of facets.
@@ -141,7 +141,7 @@ class ModelHeat(ModelBase):
         >>> model.add_film("TOP", 1.5, 20.0)
         """
         table = table_of(ramp, f"the ramp of the film on '{group}'")
-        self._add_heat(Film(group, coefficient, ambient, table, *_span(begins, ends)))
+        self._add_heat(Film(group, coefficient, ambient, table, *_interval(begins, ends)))
 
     def _add_heat(self, load: FixedTemperature | Heating | Film) -> None:
         """Add a heat load after checking it."""
@@ -180,7 +180,7 @@ class ModelHeat(ModelBase):
         return Conduction(self.mesh, self.kinematics, [m for m, _ in self.materials], self.material_of_cells())
 
     def same_temperature(self) -> Indices:
-        """Return for each node (n_points,) the first node that has the same temperature.
+        """Return for each node (n_points,) the first of the nodes that share its temperature.
 
         Nodes share their temperature at the ends of a period or sector and on the two sides of a pretension section.
         """
@@ -225,9 +225,9 @@ class ModelHeat(ModelBase):
             return
         if self.temperatures:
             raise ModelError("temperatures are both given by add_temperature and computed: use fix_temperature")
-        if self.interpolated:
+        if self.nodes_on_facets:
             raise ModelError(
-                f"{next(iter(self.interpolated))} connects different meshes and conducts no heat: use equal meshes"
+                f"{next(iter(self.nodes_on_facets))} connects different meshes and conducts no heat: use matching meshes"
             )
         self.conduction().check()
         without_expansion = [material for material, _ in self.materials if material.expansion is None]
@@ -252,7 +252,7 @@ class ModelHeat(ModelBase):
         if len(undetermined):
             raise ModelError(
                 f"nothing determines the temperature of body {body_name(self.mesh, body, undetermined[0])}: fix a "
-                "temperature, add a film, or give a contact with another body a conductance"
+                "temperature, add a film, or specify the conductance of a contact with another body"
             )
 
     def conductances(self) -> dict[str, Conductance]:
@@ -261,6 +261,6 @@ class ModelHeat(ModelBase):
         return {name: Conductance(name, value) for name, value in values.items() if value is not None}
 
 
-def _span(begins: float | None, ends: float | None) -> tuple[float, float]:
+def _interval(begins: float | None, ends: float | None) -> tuple[float, float]:
     """Return the load factors between which a load acts, by default minus and plus infinity."""
     return -np.inf if begins is None else float(begins), np.inf if ends is None else float(ends)

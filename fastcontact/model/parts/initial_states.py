@@ -146,7 +146,7 @@ class ModelInitialStates(ModelLoads):
             self.add_temperature(values[0], names, reference=reference, ramp=ramp)
             return
         if ramp is not None:
-            raise ModelError(f"field '{field}' has {len(values)} instants and thus no ramp: give times, or one instant")
+            raise ModelError(f"field '{field}' has {len(values)} instants and takes no ramp: give times or one instant")
         times_used = times if times_of_file is None or times is not None else times_of_file.tolist()
         if times_used is None:
             raise ModelError(f"field '{field}' has {len(values)} instants without times: give the load factor of each")
@@ -240,7 +240,7 @@ class ModelInitialStates(ModelLoads):
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:
         """Return the sum of the temperature rises (n_points,) [temperature], or None if there are none.
 
-        `factors` contains the multiplier of each temperature; those of a step result are
+        `factors` contains the multiplier of each temperature. In a step result, the multipliers are
         ``step.iterations["temperature_factors"]``.
         """
         if not self.temperatures or not len(factors):

@@ -97,7 +97,7 @@ class ModelLoads(ModelHeat):
     def add_gravity(
         self, groups: Sequence[str] | str | None = None, *, ramp: History = None, **components: float | None
     ) -> None:
-        """Apply the weight of groups of solid cells, from the densities of their materials.
+        """Apply the weight of groups of solid cells, computed from the densities of their materials.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class ModelLoads(ModelHeat):
         direction: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Apply the centrifugal force of a rotation to groups of solid cells, from the densities of their materials.
+        """Apply centrifugal forces to groups of solid cells, computed from the densities of their materials.
 
         Parameters
         ----------
@@ -222,8 +222,8 @@ class ModelLoads(ModelHeat):
             for a group of points.
         at : sequence of float (dim,), optional
             Point through which the resultant acts [length]. The force on each node of the group is proportional to its
-            tributary area and to the weight of its distance from this point (see `weighting`). Additional forces that are
-            linear in the position make the moment about the point zero.
+            tributary area and to the weight of its distance from this point (see `weighting`). Additional forces, which
+            are linear in the position, make the moment about this point vanish.
         weighting : str
             Weight as a function of the distance from `at`: ``"uniform"``, or ``"linear"``, ``"quadratic"`` or ``"cubic"``,
             which decrease to zero at `radius`.
@@ -279,8 +279,8 @@ class ModelLoads(ModelHeat):
         Parameters
         ----------
         group : str
-            Name of a reference point or of a group. On a group of facets the moment is applied by forces in proportion to
-            tributary area and distance from the centroid, whose resultant is zero.
+            Name of a reference point or of a group. On a group of facets the moment is applied by nodal forces with a
+            zero resultant, which are proportional to the tributary area and to the distance from the centroid.
         ramp : Ramp or iterable of (float, float), optional
             History of the moment; by default that of the analysis.
         **moments : float

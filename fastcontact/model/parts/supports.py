@@ -23,7 +23,7 @@ from fastcontact.model.contact_pair import rotation_of
 from fastcontact.model.parts.base import Support, displacement_name
 from fastcontact.model.parts.contact import ModelContact
 from fastcontact.model.ramp import History, PartHistory, Table, interpolation_tables, table_of
-from fastcontact.model.relation_rows import NORMAL, along, normals_of
+from fastcontact.model.relation_rows import NORMAL, normals_of, rows_along
 from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
@@ -97,10 +97,10 @@ class ModelSupports(ModelContact):
         ramp : Ramp or iterable of (float, float), optional
             History of the displacement.
         **components : float, callable or sequence of (float, float or callable)
-            Displacements ``x``, ``y`` and ``z`` at multiplier 1: numbers, or functions from reference positions (n, dim)
-            [length] to displacements (n,) [length]. Fields that are not proportional to one history are given as pairs of
-            a load factor and a displacement, also for `normal` and with `axes`: displacements are interpolated linearly
-            between these load factors, beginning with zero at the load factor 0.
+            Displacements ``x``, ``y`` and ``z`` at multiplier 1: numbers, or functions from reference positions (n,
+            dim) [length] to displacements (n,) [length]. A displacement that is not proportional to a single history is
+            given as pairs of load factor and displacement, also for `normal` and with `axes`. Displacements are
+            interpolated linearly between these load factors, starting from zero at the load factor 0.
 
         Raises
         ------
@@ -120,7 +120,7 @@ class ModelSupports(ModelContact):
         >>> x_at_half, x_at_end = (lambda points: 0.0 * points[:, 1]), (lambda points: 0.01 * points[:, 1])
         >>> model.prescribe("LEFT", x=[(0.5, x_at_half), (1.0, x_at_end)])
 
-        A group that turns by a quarter of a circle while the load factor goes from 0 to 1:
+        A group that rotates by 90 degrees while the load factor goes from 0 to 1:
 
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain", strain="finite")
         >>> model.prescribe("TOP", rotation={"angle": 1.5707963, "centre": (0.5, 1.0)})
@@ -162,8 +162,8 @@ class ModelSupports(ModelContact):
     def _add_along(self, group: str, name: str, nodes: Indices, directions: Array, value: Any, ramp: History) -> None:
         """Prescribe the displacements of `nodes` (n,) along `directions` (n, dim) by multi-point constraints."""
         value, table = _checked(name, value, table_of(ramp, f"the ramp of {name}"))
-        rows, positions = along(nodes, directions, self.n_dofs), self.mesh.points[nodes]
-        if isinstance(value, tuple):  # the displacement of each node has a history of its own
+        rows, positions = rows_along(nodes, directions, self.n_dofs), self.mesh.points[nodes]
+        if isinstance(value, tuple):  # the displacement of each node has a separate history
             histories = zip(
                 *(evaluated(displacement, positions, name).tolist() for _, displacement in value), strict=True
             )

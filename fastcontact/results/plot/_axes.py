@@ -146,13 +146,13 @@ def zoom_to_axes(axes: Any) -> float:
 LETTER_WIDTH = 0.09
 
 
-def size_around(points: Array, least: float = 3.2) -> tuple[float, float]:
+def size_around(points: Array, smallest_height: float = 3.2) -> tuple[float, float]:
     """Return the width and the height of a figure for a body, with space for a colour bar, labels and a title [inch].
 
-    `points` (n, 2) are those of the body [length], and `least` is the smallest height.
+    `points` (n, 2) are those of the body [length], and `smallest_height` is the smallest height.
     """
     width, height = np.ptp(points, axis=0) / np.ptp(points, axis=0).max()
-    return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, least)
+    return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, smallest_height)
 
 
 def zoom_window(centre: Array, half_width: float, points: Array) -> tuple[Array, Array]:
@@ -167,8 +167,8 @@ def label_axes(
 ) -> Any:  # fmt: skip
     """Add a colour bar, a title, a label for each direction and a legend to axes, and return the axes.
 
-    `artist` has the colour scale of `plot_field`. `points` (n, 2) are those of a plane body [length], and None for 3D
-    axes. `alone` states that the figure has no other axes.
+    `artist` has the colour scale of `plot_field`. `points` (n, 2) are those of a plane body [length]; None for 3D axes.
+    `alone` states whether the figure has no other axes.
     """
     caption, length, below = axis_label(plot_field.caption, units, plot_field.quantity), 0.6, -0.02
     if points is not None:

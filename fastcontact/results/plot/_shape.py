@@ -129,7 +129,7 @@ def deformed_shape(
     >>> ax.figure.savefig("shape.png")
     """
     if zoom is not None and (mesh.dim == 3 or not 0.0 < zoom < LARGEST):
-        raise FastcontactError(f"zoom = {zoom:g}: it must be positive, and is for plane meshes; in 3D draw a section")
+        raise FastcontactError(f"zoom = {zoom:g}: it must be positive, and is for 2D meshes only; in 3D draw a section")
     plot_field, units = field_of(mesh, step, field), units_of(units, step)
     scale = scale_of(scale, mesh, [step])
     points = displaced_points(plot_field.mesh.points, scale, step.displacement[plot_field.node])
@@ -287,7 +287,7 @@ def section(
 def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple[Array, Array]:
     """Return the point (3,) [length] and the unit normal (3,) [-] of a plane. Raises FastcontactError if one is invalid."""
     if mesh.dim != 3:
-        raise FastcontactError("sections are for meshes in three dimensions: draw the deformed shape of this one")
+        raise FastcontactError("sections need a three-dimensional mesh: draw the deformed shape of this one")
     origin, direction = np.array(point, float), np.array(normal, float)
     valid = origin.shape == direction.shape == (3,) and bool(np.isfinite([origin, direction]).all())
     if not valid or not np.linalg.norm(direction) > 0.0:
@@ -312,7 +312,7 @@ def _intersection(plot_field: Field, step: StepResult, origin: Array, direction:
             return triangles, lines
     low, high = plot_field.mesh.points.min(axis=0), plot_field.mesh.points.max(axis=0)
     raise FastcontactError(
-        f"the plane through {position_text(origin, size)} with normal {position_text(direction, 1.0)} does not meet "
+        f"the plane through {position_text(origin, size)} with normal {position_text(direction, 1.0)} does not intersect "
         f"the mesh, which lies between {position_text(low, size)} and {position_text(high, size)}"
     )
 
@@ -565,7 +565,7 @@ def _failure_of_writer(path: Path) -> Iterator[None]:
         lines = str(error.stderr or "").strip().splitlines()
         reason = f"{error.returncode} ({lines[-1][:200]})" if lines else str(error.returncode)
         raise FastcontactError(
-            f"'{path}' was not written, ffmpeg ended with code {reason}: write a .gif instead"
+            f"'{path}' was not written, because ffmpeg ended with code {reason}: write a .gif instead"
         ) from error
     except IndexError as error:  # Matplotlib fails to finish a .gif without frames, which hides the original error
         raise error.__context__ or error from None

@@ -18,7 +18,7 @@ from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, new_pan
 from fastcontact.results.plot.patches import fill
 from fastcontact.results.plot.solid import view_axes
 from fastcontact.results.step import ContactResult
-from fastcontact.results.units import axis_label, valued
+from fastcontact.results.units import axis_label, value_text
 
 # Margin of the plotted region around the part of the surface that is in contact, relative to the half-width of that part.
 MARGIN = 0.15
@@ -88,7 +88,7 @@ def contact_map(
     >>> axes = fc.plot.contact_map(mesh, step.contact["ball"])
     """
     if mesh.dim != 3:
-        raise FastcontactError("maps of a contact are for meshes in three dimensions: draw the pressure profile")
+        raise FastcontactError("maps of a contact need a three-dimensional mesh: draw the pressure profile instead")
     blocks = _facets(mesh, contact)
     (basis, labels), units = _projection(contact, blocks), units_of(units, contact)
     flat = contact.coordinates @ basis.T
@@ -111,7 +111,7 @@ def contact_map(
         _mark_nodes(ax, flat, contact, two_maps)
         x_label, y_label = (axis_label(label, units, "length") for label in labels)
         ax.set(xlabel=x_label, ylabel=y_label, aspect="equal")
-        ax.set_title(f"{caption}\nlargest {valued(float(values.max(initial=0.0)), units, quantity)}", fontsize="medium")
+        ax.set_title(f"{caption}\nlargest {value_text(values.max(initial=0.0), units, quantity)}", fontsize="medium")
     if two_maps and beside_values.ndim == 2:
         large = size > 0.1 * size.max()  # the direction of small vectors is not shown
         panels[1].quiver(*flat[large].T, *(beside_values @ basis.T)[large].T, color="white", width=0.004, pivot="tail")
@@ -128,7 +128,7 @@ def _panels(axes: Sequence[Any] | None, two_maps: bool) -> list[Any]:
     if axes is not None:
         panels = list(np.atleast_1d(np.array(axes, dtype=object)))
         if len(panels) < 1 + two_maps:
-            raise FastcontactError(f"a contact with shear needs two axes, and {len(panels)} are given")
+            raise FastcontactError(f"a contact with shear needs two axes, but {len(panels)} are given")
         return panels[: 1 + two_maps]
     panels = list(new_panels(1, 1 + two_maps, (9.6 if two_maps else 5.6, 4.6))[0])
     panels[0].figure.set_layout_engine("compressed")  # places the colour bar next to a narrow map

@@ -45,8 +45,8 @@ def contacts(
     mesh = found_contacts.mesh
     width, height = size_around(mesh.points) if mesh.dim == 2 else (6.4, 6.2)
     if mesh.dim == 2:  # the legend is beside the axes
-        legend = LETTER_WIDTH * max((len(f"{pair.name}, secondary") for pair in found_contacts), default=0)
-        width = max(width, 4.2 * float(np.ptp(mesh.points[:, 0]) / np.ptp(mesh.points, axis=0).max()) + 1.1 + legend)
+        margin = LETTER_WIDTH * max((len(f"{pair.name}, secondary") for pair in found_contacts), default=0)
+        width = max(width, 4.2 * float(np.ptp(mesh.points[:, 0]) / np.ptp(mesh.points, axis=0).max()) + 1.1 + margin)
     axes = new_axes(ax, (width, height), "3d" if mesh.dim == 3 else None)
     if mesh.dim == 2:
         _draw_2d(axes, found_contacts)

@@ -17,7 +17,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot import _axes
 from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, contacts_of, new_axes, outer_legend, units_of
 from fastcontact.results.step import ContactResult, StepResult, half_width
-from fastcontact.results.units import axis_label, units_of_results, valued
+from fastcontact.results.units import axis_label, units_of_results, value_text
 
 
 @typed(FastcontactError)
@@ -97,9 +97,9 @@ def pressure_profile(
         end = min(curve.radius, high)
         x = np.unique(np.concatenate([[low, high], np.linspace(max(-end, low), end, 400)]))
         name = "$p_0$" if np.isfinite(curve.radius) else "$p$"  # with an infinite radius the pressure is uniform
-        label = f"{legend}: {name} = {valued(curve.pressure_max, units, 'pressure')}"
+        label = f"{legend}: {name} = {value_text(curve.pressure_max, units, 'pressure')}"
         ax.plot(x, curve.pressure(np.abs(x)), style, color="black", lw=1.1, label=label)
-    peak = f"$p_{{max}}$ = {valued(contact.pressure_max, units, 'pressure')}"
+    peak = f"$p_{{max}}$ = {value_text(contact.pressure_max, units, 'pressure')}"
     label = f"{contact.formulation.replace('_', '-')}: {peak}"
     pressure = contact.pressure[order][shown]
     ax.plot(position[shown], pressure, "o-" if flat else "o", color=colour, ms=4, lw=0.8, label=label)
@@ -131,13 +131,13 @@ def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
             curves[legend or curve.name] = curve
         elif candidate is not None and not is_dataclass(candidate):
             raise FastcontactError(
-                f"a theory needs a pressure, as the results of fastcontact.analytic have, but {candidate!r} has none"
+                f"a theory needs a pressure, like the results of fastcontact.analytic, but {candidate!r} has none"
             )
     return curves
 
 
 def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) -> tuple[float, float]:
-    """Return the limits of the x axis, which exceed the extent of the contact and of the theories by about one third.
+    """Return the limits of the x axis, which exceed the extents of the contact and of the theories by about one third.
 
     The limits exceed the farthest node and the radii of the theories by at most 2 %. They include both sides of the middle if
     the surface has nodes on both sides.
@@ -161,10 +161,10 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mappin
     closed, one_sided = contact.place[contact.active], position.min(initial=0.0) >= 0.0
     centre = 0.0 if one_sided else 0.5 * float(closed.min() + closed.max())
     before = contact.place[contact.place < closed.min()]
-    label = f"edges: {centre - inside:.4g} and {valued(centre + inside, units, 'length')}"
+    label = f"edges: {centre - inside:.4g} and {value_text(centre + inside, units, 'length')}"
     if one_sided and before.size:  # the contact is a ring around an open middle
         ax.axvspan(before.max(), closed.min(), color=colour, alpha=0.15, lw=0)
-        outer = f"{inside:.4g} to {valued(outside, units, 'length')}"
+        outer = f"{inside:.4g} to {value_text(outside, units, 'length')}"
         label = f"edges: {before.max():.4g} to {closed.min():.4g}, and {outer}"
     elif abs(centre) <= 0.01 * outside:
         # The difference of the bounds may be smaller than the distance of two nodes, because constraints may lie between
@@ -173,7 +173,7 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mappin
         place = np.abs(contact.place)
         near = np.flatnonzero(place <= outside)[np.argsort(place[place <= outside])]
         inside, outside = np.interp(contact.radius, np.abs(contact.across)[near], place[near])
-        label = f"edge: {inside:.4g} to {valued(outside, units, 'length')}"
+        label = f"edge: {inside:.4g} to {value_text(outside, units, 'length')}"
     label += "" if contact.tangent is None else " (arc length)"
     for side in (1.0,) if one_sided else (-1.0, 1.0):
         ends = centre + side * inside, centre + side * outside
@@ -313,7 +313,7 @@ def _axis(step: StepResult, pair: str) -> tuple[Array, Array]:
 
 
 def _rotated(stress: Array, direction: Array) -> Array:
-    """Return the stress (n, 4) in rotated axes, of which x is normal to and y along a direction (2,) [pressure]."""
+    """Return the stress (n, 4) in rotated axes, y along the `direction` (2,) and x normal to it [pressure]."""
     x, y = np.array([direction[1], -direction[0]]), direction
     tensor = stress[:, [0, 3, 3, 1]].reshape(-1, 2, 2)
     xx, yy, xy = (np.einsum("i,nij,j->n", a, tensor, b) for a, b in ((x, x), (y, y), (x, y)))

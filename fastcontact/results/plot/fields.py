@@ -15,7 +15,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.layout import CONTACT_FIELDS, cells_by_element, contact_fields, cut_at_interfaces
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import AXES, STRESS_COMPONENTS
-from fastcontact.results.units import valued
+from fastcontact.results.units import value_text
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class Field:
     def extreme_label(self, value: float, units: Mapping[str, str], region: str = "") -> str:
         """Return a label for an extreme value of the field, or of a `region` such as ``" on the section"``."""
         kind = "maximum" if value >= 0.0 else "minimum"
-        return f"{kind}{region} {valued(float(value), units, self.quantity, 5)}"
+        return f"{kind}{region} {value_text(float(value), units, self.quantity, 5)}"
 
     @property
     def colours(self) -> str:
@@ -75,7 +75,7 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     fluxes = [flux for key, flux in step.cell_fields.items() if key.startswith("heat_flux_")]
     heat = [*["temperature"] * (step.temperature is not None), *["heat_flux"] * bool(fluxes)]
     contact = contact_fields(mesh, step)
-    check_known("field", name, [*names(mesh), *contact, *step.cell_fields, *heat], FastcontactError)
+    check_known("field", name, [*field_names(mesh), *contact, *step.cell_fields, *heat], FastcontactError)
     if name in STRESS_FIELDS and name not in step.cell_fields:
         separate_mesh, node, stress = cut_at_interfaces(mesh, step)
         caption, stress_measure = STRESS_FIELDS[name]
@@ -98,7 +98,7 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     return Field(mesh, np.arange(mesh.n_points, dtype=np.int32), values, caption, quantity)
 
 
-def names(mesh: Mesh) -> list[str]:
+def field_names(mesh: Mesh) -> list[str]:
     """Return the names of the fields of bodies that each step on a mesh has."""
     missing = ("stress.yz", "stress.xz", "displacement.z") if mesh.dim == 2 else ()
     return [name for name in (*STRESS_FIELDS, *DISPLACEMENTS) if name not in missing]

@@ -14,7 +14,7 @@ from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.plot.fields import Field
 from fastcontact.results.plot.patches import lattice
 
-# Largest distance behind a triangle, relative to the total size, at which a point still counts as a point of the triangle.
+# Largest distance behind a triangle, relative to the total size, at which a point is still regarded as lying on it.
 ON_TRIANGLE = 1e-4
 
 
@@ -126,7 +126,7 @@ TICKS = 14
 NEAR_END = 0.1
 # Distances of tick labels and of axis labels from the axes in 3D, in the unit of Matplotlib and for a box of size 1, and the
 # smallest size of a box for which distances are computed.
-NUMBERS, NAMES, SHORTEST = 6.0, 17.0, 0.05
+TICK_LABEL_DISTANCE, AXIS_LABEL_DISTANCE, SMALLEST_BOX = 6.0, 17.0, 0.05
 
 
 def draw_solid(
@@ -144,7 +144,7 @@ def draw_solid(
     from matplotlib.colors import Normalize
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    facing, screen = _facing(plot_field, points, towards(view))
+    facing, screen = _facing(plot_field, points, viewer_direction(view))
     pieces, values, strokes = [], [], []
     for name, corners, field, flat in facing:
         weights = _subdivision(CUTS if elements.get(name).order == 1 else 1)
@@ -160,7 +160,7 @@ def draw_solid(
     lines = faces.copy()  # lines in the colour of the face close hairline gaps between faces
     if edges if edges is not None else sum(len(corners) for _, corners, _, _ in facing) <= MOST_EDGES:
         # Matplotlib draws nearer objects later. Strokes are moved towards the viewer, which does not change their projection.
-        moved = np.concatenate(strokes) + 4.0 * np.ptp(points, axis=0).max() * towards(view)
+        moved = np.concatenate(strokes) + 4.0 * np.ptp(points, axis=0).max() * viewer_direction(view)
         polygons += list(moved)
         faces = np.vstack([faces, np.zeros((len(moved), 4))])
         lines = np.vstack([lines, np.tile([0.0, 0.0, 0.0, 0.6], (len(moved), 1))])
@@ -178,7 +178,7 @@ def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> Non
 
     ax.set_proj_type("ortho")
     ax.view_init(elev=view[0], azim=view[1])
-    size, eye = np.maximum(high - low, 1e-9 * np.ptp([low, high])), towards(view)
+    size, eye = np.maximum(high - low, 1e-9 * np.ptp([low, high])), viewer_direction(view)
     diagonal = float(np.linalg.norm(size))
     horizontal = np.array([-np.sin(np.radians(view[1])), np.cos(np.radians(view[1])), 0.0])
     widest = float((np.abs([horizontal, np.cross(eye, horizontal)]) @ size).max()) / diagonal
@@ -203,14 +203,14 @@ def _place_labels(ax: Any, size: Array, eye: Array, horizontal: Array) -> None:
     screen = np.array([horizontal, np.cross(eye, horizontal)])
     near, sideways = np.sign(eye) * [1.0, 1.0, -1.0] * size, np.sign(horizontal) * size
     for name, outward in zip("xyz", (near * [0, 1, 1], near * [1, 0, 1], sideways)):
-        reach = max(float(np.linalg.norm(screen @ outward)), SHORTEST)
-        ax.tick_params(axis=name, pad=NUMBERS / reach - 8.0)  # 8 and 21 are offsets of Matplotlib
-        getattr(ax, f"{name}axis").labelpad = NAMES / reach - 21.0
+        reach = max(float(np.linalg.norm(screen @ outward)), SMALLEST_BOX)
+        ax.tick_params(axis=name, pad=TICK_LABEL_DISTANCE / reach - 8.0)  # 8 and 21 are offsets of Matplotlib
+        getattr(ax, f"{name}axis").labelpad = AXIS_LABEL_DISTANCE / reach - 21.0
 
 
 def shows_extreme(plot_field: Field, points: Array, view: tuple[float, float]) -> bool:
     """Return whether the extreme value of a field at the positions `points` (n_points, 3) is visible from `view`."""
-    _, screen = _facing(plot_field, points, towards(view))
+    _, screen = _facing(plot_field, points, viewer_direction(view))
     return not bool(screen.hidden(points[[plot_field.extreme]])[0])
 
 
@@ -219,7 +219,7 @@ def view_of_extreme(plot_field: Field, position: Array) -> tuple[float, float]:
     return next((view for view in VIEWS if shows_extreme(plot_field, position, view)), VIEWS[0])
 
 
-def towards(view: tuple[float, float]) -> Array:
+def viewer_direction(view: tuple[float, float]) -> Array:
     """Return the unit vector (3,) [-] towards the viewer from its elevation and azimuth [degree]."""
     height, direction = np.radians(view)
     return np.array([np.cos(height) * np.cos(direction), np.cos(height) * np.sin(direction), np.sin(height)])

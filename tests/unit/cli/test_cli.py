@@ -168,7 +168,7 @@ def fill_the_disk_at_step_2(patch):
 @pytest.mark.parametrize("background", [False, True])
 def test_a_run_interrupted_from_the_keyboard_says_what_it_keeps(solved, tmp_path, capsys, monkeypatch, background):
     path = tmp_path / "stopped.vtkhdf"
-    monkeypatch.setattr("fastcontact.cli.run.LARGE", 0 if background else np.inf)
+    monkeypatch.setattr("fastcontact.cli.run.LARGE_MESH", 0 if background else np.inf)
     with monkeypatch.context() as patch:
         interrupt_before_step_3(patch)
         assert main(["run", str(solved / "small.toml"), "-o", str(path)]) == 130
@@ -184,7 +184,7 @@ def test_a_run_interrupted_from_the_keyboard_says_what_it_keeps(solved, tmp_path
 
 def test_steps_of_large_meshes_are_written_in_the_background(solved, tmp_path, capsys, monkeypatch):
     """The results are the same, and what goes wrong with the disk ends the run with one line."""
-    monkeypatch.setattr("fastcontact.cli.run.LARGE", 0)
+    monkeypatch.setattr("fastcontact.cli.run.LARGE_MESH", 0)
     path = tmp_path / "large.vtkhdf"
     assert main(["run", str(solved / "small.toml"), "-q", "-o", str(path)]) == 0
     for one, other in zip(fc.open_results(path), fc.open_results(solved / "small.vtkhdf"), strict=True):
@@ -192,13 +192,13 @@ def test_steps_of_large_meshes_are_written_in_the_background(solved, tmp_path, c
     fill_the_disk_at_step_2(monkeypatch)
     assert main(["run", str(solved / "small.toml"), "-q", "-o", str(path)]) == 1
     told = capsys.readouterr().err.splitlines()[-1]
-    assert "cannot be written at step 2 (No space left on device), 1 steps are complete" in told
+    assert "cannot be written at step 2 (No space left on device); 1 steps are complete" in told
     assert len(fc.open_results(path)) == 1
 
 
 def test_a_disk_that_fails_before_an_interruption_is_told(solved, tmp_path, capsys, monkeypatch):
     path = tmp_path / "stopped.vtkhdf"
-    monkeypatch.setattr("fastcontact.cli.run.LARGE", 0)
+    monkeypatch.setattr("fastcontact.cli.run.LARGE_MESH", 0)
     interrupt_before_step_3(monkeypatch)
     fill_the_disk_at_step_2(monkeypatch)
     assert main(["run", str(solved / "small.toml"), "-q", "-o", str(path)]) == 130

@@ -90,7 +90,7 @@ def test_an_interrupted_run_goes_on_and_a_complete_one_stays(whole, path, capsys
     before = path.read_bytes()
     assert main(["run", str(case), "-o", str(path), "--resume"]) == 0
     captured = capsys.readouterr()
-    assert f"{path} was complete with {STEPS} steps, no step remained to be solved" in captured.out
+    assert f"{path} was complete with {STEPS} steps, so that no step was solved" in captured.out
     assert captured.err.count(DOUBT) == 1
     assert path.read_bytes() == before
 
@@ -102,7 +102,8 @@ def test_a_resumed_run_tells_that_its_steps_are_others(whole, path, capsys, tmp_
     other.write_text(case.read_text().replace(f"steps = {STEPS}", f"steps = {STEPS + 1}"))
     assert main(["run", str(other), "-o", str(path), "--resume"]) == 0
     assert (
-        f"contains {STEPS} steps, the case now has {STEPS + 1}: those in the file are kept" in capsys.readouterr().err
+        f"contains {STEPS} steps, but the case now has {STEPS + 1}: those in the file are kept"
+        in capsys.readouterr().err
     )
 
 
@@ -205,7 +206,7 @@ def test_a_disk_that_is_full_stops_the_run(extra, whole, path, capsys, monkeypat
     n_steps = len(fc.open_results(path))
     assert 1 <= n_steps < STEPS
     assert only_line(capsys.readouterr().err) == (
-        f"error: '{path}' cannot be written at step {n_steps + 1} (File too large), {n_steps} steps are complete: check "
+        f"error: '{path}' cannot be written at step {n_steps + 1} (File too large); {n_steps} steps are complete: check "
         "the disk space and the permissions of the folder"
     )
     assert_same(path, steps[:n_steps])

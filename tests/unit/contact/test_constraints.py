@@ -13,7 +13,7 @@ from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, rows_alon
 from fastcontact.contact.projection import places
 from fastcontact.contact.surface import surface
 from fastcontact.mesh import elements
-from fastcontact.model.rigid_motions import resisting
+from fastcontact.model.rigid_motions import cone_rows
 
 N_DOFS = 7
 
@@ -223,6 +223,6 @@ def test_what_nodes_move_apart_along_is_not_held():
 
 
 def test_no_constraints_resist_no_motion():
-    rows, gap0 = resisting(part(0, 0, tangents=2))
+    rows, gap0 = cone_rows(part(0, 0, tangents=2))
     assert rows.shape == (0, N_DOFS)
     assert not len(gap0)

@@ -13,7 +13,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.surface import surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames, smooth_side
 from fastcontact.mesh import elements
-from fastcontact.model.fingerprint import different, fingerprint
+from fastcontact.model.fingerprint import differing_parts, fingerprint
 
 STEEL = fc.LinearElastic(E=210e3, nu=0.3)
 
@@ -187,8 +187,8 @@ def test_steps_with_and_without_smoothing_are_of_different_cases():
     curved = [
         fingerprint(fit(**options)) for options in ({}, {"surface_smoothing": False}, {"surface_smoothing": True})
     ]
-    assert different(curved[0], curved[1]) == ["surface_smoothing of contact 'fit'"]
-    assert different(curved[0], curved[2]) == []
+    assert differing_parts(curved[0], curved[1]) == ["surface_smoothing of contact 'fit'"]
+    assert differing_parts(curved[0], curved[2]) == []
 
 
 def test_an_obstacle_has_no_facets_to_smooth():

@@ -9,7 +9,7 @@ from models import elastic_model, made_of, supported
 from pairwise import first_of
 
 import fastcontact as fc
-from fastcontact.model.fingerprint import different, fingerprint
+from fastcontact.model.fingerprint import differing_parts, fingerprint
 
 pytestmark = pytest.mark.each_value
 
@@ -343,7 +343,7 @@ def test_values_of_constants_count_in_a_fingerprint():
     given = [lambda x: 1.0 + x[:, 0], lambda x: x[:, 0] + 1.0, lambda x: 2.0 + x[:, 0], np.ones(8), np.full(8, 2.0)]
     one, same, other, cells, further = (fingerprint(block_model(E=E)) for E in given)
     assert one == same
-    assert different(one, other) == different(cells, further) == ["the materials"]
+    assert differing_parts(one, other) == differing_parts(cells, further) == ["the materials"]
 
 
 def test_a_table_is_straight_between_its_places_and_constant_beyond():

@@ -7,7 +7,7 @@ import pytest
 from models import elastic_model, supported
 
 import fastcontact as fc
-from fastcontact.model.fingerprint import different, fingerprint
+from fastcontact.model.fingerprint import differing_parts, fingerprint
 from fastcontact.model.ramp import ramp_of
 
 
@@ -36,7 +36,7 @@ def test_every_part_is_told():
     told = "\n".join(lines[1:])
     for text in (
         "Material: E = 1000, nu = 0.3 in 'LOWER'.",
-        "Material: E = 2000, nu = 0.499 in 'UPPER', with a mean dilatation against locking.",
+        "Material: E = 2000, nu = 0.499 in 'UPPER', with the mean-dilatation method.",
         "Support: x = 0, y = 0 on 'LOWER_BOTTOM' (9 points).",
         "Support: y = -0.1 on 'UPPER_TOP' (7 points), with a separate history.",
         "Load: the pressure on 'UPPER_LEFT': a function of position.",
@@ -261,7 +261,7 @@ def test_the_same_case_has_the_same_digests_however_it_was_put_together():
     ],
 )
 def test_what_changed_is_named(change, part):
-    assert different(parts(), parts(**change)) == [part]
+    assert differing_parts(parts(), parts(**change)) == [part]
 
 
 @pytest.mark.parametrize(("values", "digest"), [(100.0, "3ac392ebd97a4d4c"), (np.ones((2, 9)), "6895e0e40b806985")])
@@ -273,8 +273,8 @@ def test_digests_of_temperatures_are_those_in_files_of_earlier_versions(values, 
 
 def test_options_count():
     one, other = (fingerprint(model(), {"geometry_updates": updates}) for updates in (None, 2))
-    assert different(one, other) == ["the option geometry_updates"]
-    assert different(one, fingerprint(model())) == ["the option geometry_updates"]
+    assert differing_parts(one, other) == ["the option geometry_updates"]
+    assert differing_parts(one, fingerprint(model())) == ["the option geometry_updates"]
 
 
 def test_functions_that_fail_are_told_apart_by_their_names():
@@ -286,8 +286,8 @@ def test_functions_that_fail_are_told_apart_by_their_names():
     def other(points):
         raise ZeroDivisionError
 
-    assert different(parts(pressure=wrong), parts(pressure=wrong)) == []
-    assert different(parts(pressure=wrong), parts(pressure=other)) == ["the loads"]
+    assert differing_parts(parts(pressure=wrong), parts(pressure=wrong)) == []
+    assert differing_parts(parts(pressure=wrong), parts(pressure=other)) == ["the loads"]
 
 
 def test_a_piecewise_linear_table_is_interpolated():

@@ -10,7 +10,7 @@ from models import body_of, elastic_model, supported
 import fastcontact as fc
 from fastcontact.cases.case import build_case
 from fastcontact.cli._main import main
-from fastcontact.model.fingerprint import different, fingerprint
+from fastcontact.model.fingerprint import differing_parts, fingerprint
 
 E, NU = 1000.0, 0.3
 ANGLE = 0.4
@@ -270,7 +270,7 @@ def test_the_lock_counts_in_the_fingerprint():
         model.add_pretension("bolt", "CUT", force=1.0, locked_from=begin)
         prints.append(fingerprint(model))
     changed = ["the loads", "the relations", "the pretension sections"]
-    assert different(prints[0], prints[1]) == different(prints[1], prints[2]) == changed
+    assert differing_parts(prints[0], prints[1]) == differing_parts(prints[1], prints[2]) == changed
 
 
 def test_a_run_goes_on_before_at_and_after_the_lock():

@@ -89,7 +89,7 @@ def test_any_write_may_fail(
             assert not results.complete
         assert_holds(path, len(results))
         if isinstance(error, OSError):
-            assert f"(Input/output error), {len(results)} steps are complete: check the disk" in str(caught.value)
+            assert f"(Input/output error); {len(results)} steps are complete: check the disk" in str(caught.value)
         assert os.listdir(path.parent) == [path.name]
         del caught, refused
     assert lengths == {1, 2, 3}
@@ -114,7 +114,7 @@ READS = """
         with pytest.MonkeyPatch.context() as patch:
             out = t.ResultWriter(path, t.MESH, resume=True)
             calls = t.failing_after(count, OSError(errno.EIO, "Input/output error"), patch, "_get")
-            with pytest.raises(t.FileError, match=r"step 2 \\(Input/output error\\), 1 steps are complete"), out:
+            with pytest.raises(t.FileError, match=r"step 2 \\(Input/output error\\); 1 steps are complete"), out:
                 out.write(t.step_result(1))
             assert len(calls) > count
         assert path.read_bytes() == before
@@ -137,9 +137,9 @@ def test_a_writer_that_failed_does_not_write_again(count: int, path: Path, monke
     out.write(step_result(0))
     with monkeypatch.context() as patch:
         failing_after(count, OSError(errno.ENOSPC, "No space left on device"), patch, "_put")
-        with pytest.raises(FileError, match=r"written at step 2 \(No space left on device\), 1 steps are complete"):
+        with pytest.raises(FileError, match=r"written at step 2 \(No space left on device\); 1 steps are complete"):
             out.write(step_result(1))
-    with pytest.raises(FileError, match=r"written at step 2 \(No space left on device\), 1 steps are complete"):
+    with pytest.raises(FileError, match=r"written at step 2 \(No space left on device\); 1 steps are complete"):
         out.write(step_result(1))
     out.close()
     assert_holds(path, 1)
@@ -159,7 +159,7 @@ def test_what_another_program_writes_into_the_file_stays(path: Path) -> None:
             if not before_the_end:
                 out.write(step_result(1))
 
-    message = "was changed by another program after 1 steps, its contents are left unchanged"
+    message = "was changed by another program after 1 steps, and its contents are left unchanged"
     for before_the_end in (False, True):
         with pytest.raises(FileError, match=message):
             overwritten(before_the_end)
@@ -374,8 +374,8 @@ def record(place, count, is_new=True, data=b"\0" * 32):
     ("body", "said"),
     [
         (record(0, 1 << 62), "counts data twice"),
-        (record(1 << 62, 8), "leads beyond the contents"),
-        (record(1 << 62, 8, False, b"\0" * 8), "leads beyond the contents"),
+        (record(1 << 62, 8), "refers to data beyond the contents"),
+        (record(1 << 62, 8, False, b"\0" * 8), "refers to data beyond the contents"),
         (record(0, 1 << 40, False, b"\0" * 8), "is cut off"),
         (record(0, 8)[:20], "is cut off"),
         (b"\1" * 7, "is cut off"),

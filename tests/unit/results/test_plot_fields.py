@@ -20,7 +20,7 @@ from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import block, box, union
 from fastcontact.results.plot._shape import _cut_tetrahedra
-from fastcontact.results.plot.fields import field_of, names
+from fastcontact.results.plot.fields import field_names, field_of
 from fastcontact.results.plot.patches import fill, outlines
 from fastcontact.results.plot.solid import Screen
 
@@ -57,7 +57,7 @@ def test_every_field_is_what_its_name_says():
         np.testing.assert_allclose(field_of(mesh, step, name).values, values, atol=1e-12)
     np.testing.assert_allclose(step.tresca, expected["tresca"], atol=1e-12)
     np.testing.assert_allclose(step.principal_stress, principal, atol=1e-12)
-    assert {*expected, "von_mises", "von_mises_signed"} == set(names(mesh))
+    assert {*expected, "von_mises", "von_mises_signed"} == set(field_names(mesh))
     deviator = tensor - np.trace(tensor, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
     equivalent = np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2)))
     signs = np.where(np.trace(tensor, axis1=1, axis2=2) < 0, -1, 1)
@@ -66,7 +66,7 @@ def test_every_field_is_what_its_name_says():
 
 def test_a_field_of_the_plane_has_no_components_of_space():
     mesh = block((1.0, 1.0), (2, 2), "quad4")
-    assert "stress.xy" in names(mesh)
+    assert "stress.xy" in field_names(mesh)
     for name in ("stress.yz", "displacement.z", "stres.xx"):
         with pytest.raises(FastcontactError, match="unknown field"):
             fc.plot.deformed_shape(mesh, step_of(mesh), field=name)
@@ -238,13 +238,15 @@ def test_a_section_has_the_area_and_the_field_of_the_body(element, point, normal
 
 def test_a_section_is_refused_where_there_is_none():
     mesh = box((1.0, 1.0, 1.0), (1, 1, 1), "hex8")
-    with pytest.raises(FastcontactError, match=r"not meet the mesh, which lies between \(0, 0, 0\) and \(1, 1, 1\)"):
+    with pytest.raises(
+        FastcontactError, match=r"not intersect the mesh, which lies between \(0, 0, 0\) and \(1, 1, 1\)"
+    ):
         fc.plot.section(mesh, step_of(mesh), (0, 0, 2), (0, 0, 1))
     for point, normal in (((0, 0), (0, 0, 1)), ((0, 0, 0), (0, 0, 0)), ((0, 0, float("nan")), (0, 0, 1))):
         with pytest.raises(FastcontactError, match="a point and a normal of 3 numbers"):
             fc.plot.section(mesh, step_of(mesh), point, normal)
     flat = block((1.0, 1.0), (1, 1), "quad4")
-    with pytest.raises(FastcontactError, match="three dimensions"):
+    with pytest.raises(FastcontactError, match="three-dimensional"):
         fc.plot.section(flat, step_of(flat), (0, 0, 0), (0, 0, 1))
 
 
@@ -504,7 +506,9 @@ def test_what_ffmpeg_says_when_it_fails_is_told_in_one_line(reads, tmp_path, mon
     (folder / "ffmpeg").chmod(0o755)
     monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
     mesh = block((1.0, 1.0), (2, 2), "quad4")
-    with pytest.raises(FastcontactError, match=r"a.mp4' was not written, ffmpeg ended with code 3 \(no encoder\)"):
+    with pytest.raises(
+        FastcontactError, match=r"a.mp4' was not written, because ffmpeg ended with code 3 \(no encoder\)"
+    ):
         fc.plot.animate(mesh, [step_of(mesh)] * 3, target)
     assert [path.name for path in tmp_path.iterdir()] == ["bin"]
 

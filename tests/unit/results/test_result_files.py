@@ -586,7 +586,7 @@ def test_a_file_from_the_future(path: Path) -> None:
     write(path)
     with h5py.File(path, "r+") as file:
         file["fastcontact"].attrs.modify("schema", 7)
-    with pytest.raises(FileError, match="has schema 7, this fastcontact reads up to 4: update fastcontact"):
+    with pytest.raises(FileError, match="has schema 7, but this version reads schemas up to 4: update it"):
         fc.open_results(path)
 
 
