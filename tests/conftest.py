@@ -53,7 +53,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
         prepare_workers(whole=config.args_source is pytest.Config.ArgsSource.TESTPATHS)
     ahead.MAX_HELPERS = 0  # processes that compile ahead of a run would do so for each worker
-    interpreting.SECONDS = -1.0  # what is tested are compiled kernels
+    interpreting.MAX_SECONDS = -1.0  # what is tested are compiled kernels
     if config.getoption("--linear-solver"):
         config.addinivalue_line("filterwarnings", "ignore:multigrid gave up")
 

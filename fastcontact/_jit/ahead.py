@@ -1,10 +1,10 @@
 """Compilation of kernels ahead of the run that needs them, in parallel helper processes.
 
-`kernels.json`, which ``python bench/kernels.py`` writes, is a table of the kernels that the usual kinds of runs call, with
-the types of their arguments, in the order of the calls. Helpers begin with the kernels that cannot run in Python (see
-`interpreting`), and report which kernel they are compiling. If the run needs a kernel that a helper is compiling, it
-meanwhile compiles kernels that no helper has begun, and reports them to the helpers. If there are none, it waits. A kernel
-that is missing in the table, or listed with outdated types, is compiled by the run.
+`kernels.json`, which is written by ``python bench/kernels.py``, is a table of the kernels that are called by the usual kinds
+of runs, with the types of their arguments, in the order of the calls. Helpers begin with the kernels that cannot run in
+Python (see `interpreting`), and report which kernel they are compiling. While a helper is compiling a kernel that the run
+needs, the run compiles kernels that no helper has begun, and reports them to the helpers. If there are no such kernels, it
+waits. A kernel that is missing from the table, or listed with outdated types, is compiled by the run.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from fastcontact._jit import compiling, decorators
 
 TABLE = Path(__file__).with_name("kernels.json")
 ROOT = Path(__file__).resolve().parents[2]
-# Largest number of helpers of a run, each of which takes the memory of Python with Numba.
+# Largest number of helpers of a run. Each helper needs the memory of a Python process with Numba.
 MAX_HELPERS = 3
-# Largest number of uncompiled kernels that the run compiles without helpers, whose start would take longer.
+# Largest number of kernels that the run compiles without helpers, because starting helpers would take longer.
 MAX_UNHELPED = 2
 # Kinds of runs for which this process has already started helpers, so that later runs need none.
 _runs_with_helpers: set[str] = set()
@@ -51,13 +51,13 @@ def table() -> dict[str, Any]:
 
 
 def required_kernels(runs: Sequence[str]) -> list[int]:
-    """Return the numbers of the kernels that must be compiled for some kinds of runs, by default for all kinds."""
+    """Return the numbers of the kernels that must be compiled for the given kinds of runs; all kinds if none is given."""
     by_run = table()["runs"]
     return list(dict.fromkeys(number for run in runs or by_run for number in by_run.get(run, [[]])[0]))
 
 
 def kernel_numbers(runs: Sequence[str]) -> list[int]:
-    """Return the numbers of all kernels of some kinds of runs; those that may run in Python are last."""
+    """Return the numbers of all kernels of the given kinds of runs; those that may run in Python are last."""
     by_run = table()["runs"]
     others = [number for run in runs or by_run for number in by_run.get(run, [[], []])[1]]
     return list(dict.fromkeys([*required_kernels(runs), *others]))
@@ -66,9 +66,9 @@ def kernel_numbers(runs: Sequence[str]) -> list[int]:
 def numba_type(entry: Any) -> Any:
     """Return the Numba type of an entry of the table.
 
-    A string is a scalar in NumPy's notation of kind and bytes. A list ``[scalar, dimensions]`` is a contiguous array, and
-    ``[scalar, dimensions, "r"]`` a read-only one. ``{"class": [type, ...]}`` is a named tuple, or a plain tuple if the name
-    of the class is empty.
+    A string is a scalar in NumPy's notation of kind and size in bytes. A list ``[scalar, dimensions]`` is a contiguous array,
+    and ``[scalar, dimensions, "r"]`` is a read-only array. ``{"class": [type, ...]}`` is a named tuple, or a plain tuple if
+    the name of the class is empty.
     """
     if isinstance(entry, str):
         return from_dtype(dtype(entry))
@@ -108,9 +108,9 @@ def _file_name(number: int) -> str:
 def start(
     runs: Sequence[str], helpers: int, output: int = subprocess.PIPE, errors: int = subprocess.DEVNULL
 ) -> list[subprocess.Popen[str]]:
-    """Start helper processes that share the compilation of the kernels of some kinds of runs.
+    """Start helper processes that share the compilation of the kernels of the given kinds of runs.
 
-    Each helper writes the number of each kernel that it begins to `output`, and the reason of a failure to `errors`.
+    Each helper writes the numbers of the kernels that it begins to `output`, and the reasons for failures to `errors`.
     """
     path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
     command = [sys.executable, "-m", __name__, str(helpers)]
@@ -126,21 +126,21 @@ def start(
 
 
 def _end(processes: list[subprocess.Popen[str]]) -> None:
-    """Terminate helpers that are still running; the files of the kernels that they have compiled are complete."""
+    """Terminate helpers that are still running. The files of the kernels that they have compiled are complete."""
     for process in processes:
         process.terminate()
         process.wait()
 
 
 class Helpers:
-    """Helper processes of a run, with the kernels that they are compiling and those that no process has begun.
+    """Helper processes of a run, the kernels that they are compiling, and the kernels that no process has begun.
 
     Parameters
     ----------
     runs : sequence of str
         Kinds of runs.
     processes : list of subprocess.Popen
-        See `start`.
+        Result of `start`.
     """
 
     def __init__(self, runs: Sequence[str], processes: list[subprocess.Popen[str]]) -> None:
@@ -167,10 +167,10 @@ class Helpers:
             self._changed.notify_all()
 
     def wait(self, name: str) -> bool:
-        """Wait while helpers compile kernels of this name; return whether a helper was compiling one.
+        """Wait while helpers compile kernels called `name`; return whether a helper was compiling such a kernel.
 
-        Meanwhile this process compiles kernels that no helper has begun. A kernel of this name that no helper has begun is
-        reported to the helpers, which then skip it.
+        In the meantime, this process compiles kernels that no helper has begun. A kernel called `name` that no helper has
+        begun is reported to the helpers, which then skip it.
         """
         with self._changed:
             in_progress = [(helper, kernel) for helper, kernel in self._current.items() if _file_name(kernel) == name]
@@ -203,10 +203,10 @@ class Helpers:
 
 
 def expect(runs: Sequence[str]) -> None:
-    """Let helpers compile the kernels of some kinds of runs as soon as more than `MAX_UNHELPED` kernels were uncompiled.
+    """Start helpers for the given kinds of runs as soon as more than MAX_UNHELPED kernels were found to be uncompiled.
 
-    Helpers start only if one of the missing kernels cannot run in Python. There are no helpers in worker processes, with a
-    single thread, without a kernel cache, or if the interpreter is embedded in another program.
+    Helpers are started only if one of the missing kernels cannot run in Python. There are no helpers in worker processes,
+    with a single thread, without a kernel cache, or if the interpreter is embedded in another program.
     """
     new, helpers = [run for run in runs if run not in _runs_with_helpers], min(decorators.threads() - 1, MAX_HELPERS)
     is_python = Path(sys.executable or "").stem.startswith("python")
@@ -227,7 +227,7 @@ def expect(runs: Sequence[str]) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Compile every `n`-th kernel of some kinds of runs, as a helper; return the number of failures.
+    """Compile, as a helper, every `n`-th kernel of the given kinds of runs, and return the number of failures.
 
     Kernels whose numbers are read from standard input are skipped.
     """

@@ -1,8 +1,9 @@
-"""Cache of compiled kernels on disk, whose files are used only if they are undamaged, current and protected from other users.
+"""Disk cache of compiled kernels, whose files are used only if they are undamaged, current and protected from other users.
 
 Numba identifies a kernel only by the time and the size of its source file, executes any file in its cache, and fails if a
-file is damaged. Here the file name contains a digest of all sources on which the kernel depends, so that kernels remain valid
-when the same version is installed again. A file ends with its checksum. If it is damaged, the kernel is compiled again.
+file is damaged. Here, the file name contains a digest of all sources on which the kernel depends, so that kernels remain
+valid when the same version is installed again. Each file ends with a checksum. If a file is damaged, the kernel is compiled
+again.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ log = logging.getLogger("fastcontact")
 # Settings of Numba that affect compiled code but not the keys of its cache.
 OPTIONS = ("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "CPU_NAME", "CPU_FEATURES", "THREADING_LAYER")
 # Number of characters of a digest.
-DIGEST = 64
+DIGEST_LENGTH = 64
 # Types of global variables that are compiled into kernels as constants.
 CONSTANTS = (bool, int, float, complex, str, tuple, np.ndarray, np.generic, type(None))
 
@@ -92,7 +93,7 @@ class KernelFiles(_Cache):  # type: ignore[misc]
         return str(self.folder)
 
     def exist(self) -> bool:
-        """Return whether the current kernel is stored for any signature."""
+        """Return whether the current version of the kernel is stored for any signature."""
         with contextlib.suppress(OSError):
             return self.version in _versions(self.folder, os.stat(self.folder).st_mtime_ns)
         return False
@@ -123,8 +124,8 @@ class KernelFiles(_Cache):  # type: ignore[misc]
                     _log_once(f"other users may write to the compiled kernel '{path}'")
                     return None
                 content = file.read()
-            if _digest(content[:-DIGEST]).encode() == content[-DIGEST:]:
-                return _Unpickler(io.BytesIO(content)).load()  # the digest makes the file one of this package
+            if _digest(content[:-DIGEST_LENGTH]).encode() == content[-DIGEST_LENGTH:]:
+                return _Unpickler(io.BytesIO(content)).load()  # the digest shows that this package wrote the file
             _log_once(f"the compiled kernel '{path}' is damaged")
         except FileNotFoundError:
             pass
@@ -146,7 +147,7 @@ class KernelFiles(_Cache):  # type: ignore[misc]
                 temporary.unlink(missing_ok=True)
 
     def flush(self) -> None:
-        """Do nothing: outdated files have other names."""
+        """Do nothing, because outdated files have other names."""
 
     enable = disable = flush
 
@@ -170,7 +171,7 @@ files: dict[Any, KernelFiles] = {}
 def attach_cache(kernel: Any, function: Callable[..., Any], options: str) -> str:
     """Store the compiled versions of a kernel in `KernelFiles`.
 
-    Returns the reason if this is impossible, otherwise an empty string. `options` are those of the compilation.
+    Returns the reason why this is impossible, or an empty string. `options` are the options of the compilation.
     """
     if not hasattr(kernel, "_cache"):
         return ""  # compilation is disabled
@@ -186,13 +187,13 @@ def attach_cache(kernel: Any, function: Callable[..., Any], options: str) -> str
 
 @lru_cache(maxsize=1)
 def _versions(folder: Path, changed: int) -> set[str]:
-    """Return the versions of the kernels in a folder; the time `changed` [ns] of its last change invalidates the result."""
+    """Return the versions of the kernels in a folder, which was last modified at the time `changed` [ns]."""
     return {name.rsplit(".", 2)[0] for name in os.listdir(folder)}
 
 
 @cache
 def cache_folder() -> Path | None:
-    """Return the folder of compiled kernels in NUMBA_CACHE_DIR, in the user's cache or in the package; None if read-only."""
+    """Return the first writable folder for compiled kernels: in NUMBA_CACHE_DIR or the user's cache, or in the package."""
     configured = str(getattr(numba.config, "CACHE_DIR", ""))
     if configured:
         base = configured
@@ -217,7 +218,7 @@ def cache_folder() -> Path | None:
 def is_trusted(folder: Path) -> bool:
     """Return whether only the user of this process and root can write to a folder, whose files are executed.
 
-    The group of the process, which on many systems contains only its user, may also write.
+    Write permission for the group of the process, which contains only its user on many systems, is accepted as well.
     """
     folder.mkdir(parents=True, exist_ok=True)
     parent = os.stat(folder.parent)  # users who may write to it could replace the folder
@@ -225,7 +226,7 @@ def is_trusted(folder: Path) -> bool:
 
 
 def _is_protected(status: os.stat_result) -> bool:
-    """Return whether a file belongs to the user of this process or to root, and others cannot write to it."""
+    """Return whether a file belongs to the user of this process or to root and is not writable for other users."""
     if not hasattr(os, "getuid"):
         return True
     shared = status.st_mode & stat.S_IWOTH or (status.st_mode & stat.S_IWGRP and status.st_gid not in (0, os.getgid()))

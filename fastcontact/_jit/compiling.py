@@ -1,4 +1,4 @@
-"""Announcement that kernels are being compiled, which may take a minute, and requests for helper processes."""
+"""Announcement of the compilation of kernels, which may take a minute, and requests for helper processes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def notify() -> None:
 
 
 def announce() -> None:
-    """Call all listeners because kernels are being compiled, and log this once per process at level INFO."""
+    """Notify all listeners that kernels are being compiled, and log this once per process at level INFO."""
     global _reported
     if not _reported:
         _reported = True
@@ -37,12 +37,12 @@ def count_uncompiled() -> None:
 
 
 def wait(name: str) -> bool:
-    """Wait for helpers that compile a kernel called `name`; return whether there were any, so its file may now exist."""
+    """Wait for helpers that compile a kernel called `name`; return whether there were any, whose file may now exist."""
     return any(waiter(name) for waiter in waiters)
 
 
 def print_announcement() -> None:
-    """Print the announcement once to a terminal or a notebook, unless the log or another listener shows it."""
+    """Print the announcement once in a terminal or a notebook, unless the log or another listener shows it."""
     listeners.remove(print_announcement)
     visible = sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
     if not listeners and not log.isEnabledFor(logging.INFO) and visible and not in_worker():
@@ -55,7 +55,8 @@ def in_worker() -> bool:
     return multiprocessing is not None and multiprocessing.parent_process() is not None
 
 
-# Functions that are called when a kernel is compiled or waited for, but not when it is read from the disk cache.
+# Functions that are called when this process compiles a kernel or waits for one, but not when it reads a kernel from the
+# cache.
 listeners: list[Callable[[], None]] = [print_announcement]
 # Functions of `ahead` that are called when a kernel has no compiled version, to start helpers.
 helper_requests: list[Callable[[], None]] = []

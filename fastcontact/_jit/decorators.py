@@ -1,7 +1,7 @@
 """Decorators that compile kernels with a disk cache and strict floating-point arithmetic, and the number of threads.
 
-Kernels are compiled at their first call, never at import. If no folder is writable for the cache, they are compiled
-in every process instead, with one line in the log.
+Kernels are compiled at their first call, never at import. If there is no writable folder for the cache, they are compiled in
+every process, and a line in the log states this.
 """
 
 from __future__ import annotations
@@ -70,18 +70,18 @@ def kernel(function: Callable[..., Any]) -> Any:
 def interpretable_kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` like `kernel`, but run small calls in Python until it is compiled, with bitwise identical results.
 
-    The function may contain only sums, products, quotients and square roots, since powers and array sums differ in NumPy.
-    Other kernels cannot call it, since the returned object is not a Numba dispatcher.
+    The function may contain only sums, products, quotients and square roots, since powers and array sums have different
+    round-off in NumPy. Other kernels cannot call it, since the returned object is not a Numba dispatcher.
     """
     dispatcher = kernel(function)
     return interpreting.Interpretable(dispatcher, cache.files.get(function)) if compiled() else dispatcher
 
 
 def summing_kernel(function: Callable[..., Any]) -> Any:
-    """Compile `function` like `kernel`, with long sums of products vectorised in an order that is the same in every run.
+    """Compile `function` like `kernel`, with long sums of products vectorised in the same order in every run.
 
-    The last bits of results may differ between processors, as with BLAS. The function must neither call nor be called by
-    other kernels.
+    The last bits of results may differ between processors, as with BLAS. The function must neither call other kernels nor be
+    called by them.
     """
     return _compile(function, fastmath=ANY_ORDER)
 
@@ -101,7 +101,7 @@ def innermost_kernel(function: Callable[..., Any]) -> Any:
 
 def _compile(function: Callable[..., Any], fastmath: set[str] = AS_WRITTEN, **inlining: Any) -> Any:
     options: dict[str, Any] = {"fastmath": fastmath, "nogil": True, "error_model": "numpy"}
-    options["no_cfunc_wrapper"] = True  # an unused second entry point for C
+    options["no_cfunc_wrapper"] = True  # without the entry point for C, which is not used
     options |= inlining
     dispatcher = numba.njit(**options)(function)
     # The flags are sorted, because the order of a set is arbitrary.
@@ -118,7 +118,7 @@ if hasattr(os, "register_at_fork"):  # the helpers of the parent do not report t
 
 
 def compiled() -> bool:
-    """Return whether kernels are compiled in this process, which NUMBA_DISABLE_JIT prevents."""
+    """Return whether kernels are compiled in this process, that is, unless NUMBA_DISABLE_JIT is set."""
     return not getattr(numba.config, "DISABLE_JIT", False)
 
 

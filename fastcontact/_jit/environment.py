@@ -1,4 +1,4 @@
-"""Checks of the environment before Numba is imported, whose import would fail with a traceback."""
+"""Checks of the environment before Numba is imported, because its import would fail with a traceback."""
 
 from __future__ import annotations
 

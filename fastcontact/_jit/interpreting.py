@@ -1,10 +1,10 @@
 """Kernels that run in Python as long as this takes less time than their compilation.
 
-For a kernel that loops once or twice over a small mesh, Python takes some hundredths of a second and the compilation one or
-two seconds. The kernel runs in Python until the total time of its calls, in this run and in earlier ones, is about that of a
-compilation. The total time is then at most about twice that of the better alternative, however many runs follow. Results are
-bitwise identical, because the arithmetic consists of sums, products, quotients and square roots of doubles in the order
-written.
+If a kernel loops once or twice over a small mesh, it takes some hundredths of a second in Python, whereas its compilation
+takes one or two seconds. The kernel runs in Python until the total time of its calls, in this run and in earlier runs, is
+about the time of a compilation. The total time is then at most about twice that of the better alternative, however many runs
+follow. Results are bitwise identical, because the arithmetic consists of sums, products, quotients and square roots of
+doubles in the order in which they are written.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ import numpy as np
 from fastcontact._jit import compiling
 from fastcontact._jit.cache import KernelFiles, cache_folder
 
-# Limits for running a kernel in Python: number of entries of all arguments of a call, time [s] of all its calls in one run,
-# and time [s] of all its calls in all runs. Python takes 1 to 8 microseconds per entry. The compilation of a kernel takes 0.2
-# to 3 seconds, for most kernels less than the last limit.
-ENTRIES, SECONDS, SECONDS_OF_RUNS = 200_000, 0.5, 1.0
+# Limits for running a kernel in Python: number of entries of all arguments of a call, time of all its calls in one run [s],
+# and time of all its calls in all runs [s]. Python takes 1 to 8 microseconds per entry. The compilation of a kernel takes 0.2
+# to 3 seconds; for most kernels, it takes less than the last limit.
+MAX_ENTRIES, MAX_SECONDS, MAX_SECONDS_OF_RUNS = 200_000, 0.5, 1.0
 # Name of the file, in the folder of the compiled kernels, with the time of uncompiled kernels in Python [s], by version.
 TIMES_FILE = "interpreted.json"
-# Types for which NumPy and Numba give the same results. The two libraries promote smaller types differently; types of one
-# byte occur only in comparisons.
+# Types for which NumPy and Numba yield the same results. The two libraries promote smaller types differently, but types of
+# one byte occur only in comparisons.
 EXACT = ("float64", "int64", "int32", "uint8", "bool")
 
 
 class Interpretable:
-    """A kernel that runs in Python while calls are small and no compiled version exists.
+    """A kernel that runs in Python as long as its calls are small and no compiled version exists.
 
     Parameters
     ----------
@@ -73,12 +73,12 @@ class Interpretable:
 
     def _is_small(self, arguments: tuple[Any, ...]) -> bool:
         """Return whether a call may run in Python: it is small, and the time so far is less than that of a compilation."""
-        if self.spent > SECONDS or entries(arguments) > ENTRIES:
+        if self.spent > MAX_SECONDS or entries(arguments) > MAX_ENTRIES:
             return False
         if _overdue or self.files is None:
             return True
         earlier = _earlier_times(self.files.folder).get(self.files.version, 0.0)
-        _overdue.extend([self] if earlier + self.spent > SECONDS_OF_RUNS else [])
+        _overdue.extend([self] if earlier + self.spent > MAX_SECONDS_OF_RUNS else [])
         return not _overdue
 
 
@@ -130,7 +130,7 @@ def entries(argument: Any) -> float:
 
 @functools.cache
 def python_function(kernel: Any) -> Callable[..., Any]:
-    """Return the Python function of a kernel, in which the kernels that it calls are replaced by Python functions as well."""
+    """Return the Python function of a kernel, in which called kernels are replaced by their Python functions as well."""
     function = getattr(kernel, "py_func", kernel)
     names, code = function.__globals__, function.__code__
     called = {name: python_function(names[name]) for name in code.co_names if hasattr(names.get(name), "py_func")}
@@ -138,7 +138,7 @@ def python_function(kernel: Any) -> Callable[..., Any]:
 
 
 def _to_numpy(argument: Any) -> Any:
-    """Return an argument in a type whose division by zero gives the same result as in compiled code."""
+    """Return an argument in a type for which a division by zero has the same result as in compiled code."""
     return np.float64(argument) if isinstance(argument, float) else argument
 
 

@@ -19,16 +19,16 @@ from fastcontact.arrays import AnyArray
 Result = TypeVar("Result")
 Item = TypeVar("Item")
 Parameters = ParamSpec("Parameters")
-# Largest amount of work, counted in nodes, that a single thread completes sooner than several, since waking them takes
-# 0.03 ms; default number of nodes of a cell; and largest number of threads.
-WORTHWHILE, NODES = 80_000, 4
-MOST = 255
+# Largest amount of work, counted in nodes, that a single thread completes sooner than several threads, since waking them
+# takes 0.03 ms; default number of nodes of a cell; and largest number of threads.
+SINGLE_THREAD_WORK, NODES = 80_000, 4
+MAX_THREADS = 255
 
 
 @cache
 def _pool() -> ThreadPoolExecutor:
-    """Return the thread pool of this process, whose threads are created on demand and then kept."""
-    return ThreadPoolExecutor(MOST, "fastcontact")
+    """Return the thread pool of this process, whose threads are created on demand and then reused."""
+    return ThreadPoolExecutor(MAX_THREADS, "fastcontact")
 
 
 if hasattr(os, "register_at_fork"):
@@ -36,7 +36,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    """Return the results of a function for all items, of which this thread computes the first and others one each."""
+    """Return the results of a function for all items: this thread computes the first item, and others compute one each."""
     if len(items) == 1:
         return [function(items[0])]
     others = [_pool().submit(function, item) for item in items[1:]]
@@ -48,11 +48,11 @@ def parallel_map(function: Callable[[Item], Result], items: Sequence[Item]) -> l
 
 
 def parallel_for(kernel: Any, count: int, work: float, *arguments: Any) -> None:
-    """Call ``kernel(low, high, *arguments)`` for ranges that together cover 0 to `count`, each in a thread.
+    """Call ``kernel(low, high, *arguments)`` for ranges that together cover 0 to `count`, each in a separate thread.
 
-    `work` is the work per row or cell, see `portions`; 0 for rows that must be computed in order.
+    `work` is the work per row or cell, see `portions`. It is 0 for rows that must be computed in order.
     """
-    if count * work <= WORTHWHILE:
+    if count * work <= SINGLE_THREAD_WORK:
         kernel(0, count, *arguments)
     else:
         parallel_map(lambda portion: kernel(*portion, *arguments), portions(count, work))
@@ -69,8 +69,8 @@ def _libraries() -> Any:
 def on_one_blas_thread(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     """Limit BLAS to one thread while a function runs.
 
-    Further threads would spin between the small calls of a contact iteration. The number of threads would also determine the
-    order of summation, on which the round-off errors of results depend.
+    More threads would only wait actively between the small calls of a contact iteration. Moreover, the number of threads
+    would determine the order of summation, on which the round-off errors of results depend.
     """
 
     @wraps(function)
@@ -82,7 +82,7 @@ def on_one_blas_thread(function: Callable[Parameters, Result]) -> Callable[Param
 
 
 def read_only(numbers: AnyArray) -> AnyArray:
-    """Return a read-only view: arrays of a mesh are read-only, and a kernel would be compiled again for writable arrays."""
+    """Return a read-only view, because a kernel for the read-only arrays of a mesh would be compiled again for others."""
     view = numbers.view()
     view.flags.writeable = False
     return view
@@ -91,9 +91,9 @@ def read_only(numbers: AnyArray) -> AnyArray:
 def portions(count: int, work: float = NODES) -> list[tuple[int, int]]:
     """Return ranges of nearly equal size that cover 0 to `count`: one per thread, or a single one for little work.
 
-    `work` is the work per cell, counted in nodes, each of which takes some ten nanoseconds.
+    `work` is the work per cell, counted in nodes; a node takes about ten nanoseconds.
     """
-    if count * work <= WORTHWHILE:
+    if count * work <= SINGLE_THREAD_WORK:
         return [(0, count)]
-    n = min(decorators.threads(), MOST, count)
+    n = min(decorators.threads(), MAX_THREADS, count)
     return list(itertools.pairwise(count * k // n for k in range(n + 1)))

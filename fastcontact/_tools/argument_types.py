@@ -50,6 +50,11 @@ def typed(error: type[FastcontactError]) -> Callable[[F], F]:
     return decorate
 
 
+def unchecked(call: F) -> F:
+    """Return the function behind a `typed` one, for calls within the package whose arguments need no check."""
+    return typing.cast(F, inspect.unwrap(call))
+
+
 def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError]) -> Callable[..., Any]:
     """Return a function that calls `call` after a check of the arguments; errors call it `name`."""
 

@@ -6,7 +6,6 @@ contact forces of the load step are known.
 
 from __future__ import annotations
 
-import copy
 from dataclasses import replace
 
 import numpy as np
@@ -59,16 +58,11 @@ class ActiveDofs:
         self._system, self._T = system, csr_array(csr_array(T)[self.active][:, self._unknowns])
         self._transpose = csr_array(self._T.T)
 
-    # The largest absolute value of the unknowns that are condensed; set by `for_step`.
-    _largest_condensed: float
-
-    def for_step(self, u: Array, lift: Array) -> ActiveDofs:
-        """Return a copy for a load step that begins at displacements `u`, with the size of its condensed unknowns."""
-        step = copy.copy(self)
+    def largest_condensed(self, u: Array, lift: Array) -> float:
+        """Return the largest absolute value of the unknowns of displacements `u` that are condensed."""
         condensed = self._system.unknowns(u, lift)
         condensed[self._unknowns] = 0.0
-        step._largest_condensed = largest(condensed)
-        return step
+        return largest(condensed)
 
     def constraints(self, constraints: Constraints, lift: Array, start: Array) -> Constraints:
         """Return constraints on all displacements as constraints on the active unknowns.
@@ -81,16 +75,11 @@ class ActiveDofs:
         1e-16, multipliers of a mortar joint between two flanges with a fixed edge reached 1e23; with entries of 1e-7, active
         sets did not converge.
         """
-
-        def on_unknowns(rows: csr_array, offset: Array) -> tuple[csr_array, Array]:
-            reduced, offset = self._system.rows(rows, offset, lift)
-            return without_remnants(csr_array(reduced[:, self._unknowns]), rows, NOTABLE), offset
-
-        B, gap0 = on_unknowns(constraints.B, constraints.gap0)
-        tangents, slip0 = list(constraints.tangents), np.empty_like(constraints.slip0)
-        for k, T in enumerate(constraints.tangents):
-            tangents[k], slip0[k] = on_unknowns(T, constraints.slip0[k] - T @ start)
-        return replace(constraints, B=B, gap0=gap0, tangents=tuple(tangents), slip0=slip0)
+        rows, offsets = [], np.vstack([constraints.gap0, constraints.slip0])
+        for k, R in enumerate((constraints.B, *constraints.tangents)):
+            reduced, offsets[k] = self._system.rows(R, offsets[k] - R @ start if k else offsets[k], lift)
+            rows.append(without_remnants(csr_array(reduced[:, self._unknowns]), R, NOTABLE))
+        return replace(constraints, B=rows[0], gap0=offsets[0], tangents=tuple(rows[1:]), slip0=offsets[1:])
 
     def unknowns(self, u: Array, lift: Array) -> Array:
         """Return the active unknowns (l,) of displacements `u` that satisfy supports and multi-point constraints."""
@@ -111,7 +100,3 @@ class ActiveDofs:
     def numbers(self, unknowns: Indices) -> Indices:
         """Return the positions (k,) of `unknowns` (k,), numbers of unknowns of the system, among the active unknowns."""
         return np.searchsorted(self._unknowns, unknowns)
-
-    def size(self, v: Array) -> float:
-        """Return the largest absolute value of `v` and of the condensed unknowns at the beginning of the step."""
-        return max(self._largest_condensed, largest(v))

@@ -18,6 +18,7 @@ from fastcontact.contact.contact_middle import ContactMiddle, contact_middle
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import NO_AREA, lumped_areas
 from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.pair_options import ALWAYS_CLOSED
 from fastcontact.contact.pairing import normals
 from fastcontact.contact.surface import Surface
 from fastcontact.model.periodicity import PeriodicInterface
@@ -42,13 +43,14 @@ def contact_results(
     """
     displacement = problem.displacement(end.u)
     paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
-    results = {
-        name: contact_result(
-            name, problem.pairs[name], settled.constraints.parts[name], settled.solution, rows,
-            problem.configuration(name, start, load, paired_at, end.u), end.first_contact.get(name), displacement,
+    results = {}
+    for name, rows in settled.constraints.rows.items():
+        constraints, configuration = (
+            settled.constraints.parts[name],
+            problem.configuration(name, start, load, paired_at, end.u),
         )
-        for name, rows in settled.constraints.rows.items()
-    }  # fmt: skip
+        arguments = constraints, settled.solution, rows, configuration, end.first_contact.get(name), displacement
+        results[name] = contact_result(name, problem.pairs[name], *arguments)
     if problem.model.periodic_interfaces:
         results = _with_periodic_nodes(problem, results)
     if problem.model.strain == "small":
@@ -88,7 +90,7 @@ def contact_result(
     closed, pressure, nodal_multiplier, scale = _closed_nodes(
         pair, constraints, multiplier, active_gaps, gap, configuration
     )
-    if pair.options.tied:  # normals of the undeformed configuration
+    if pair.options.kind == "tied":  # normals of the undeformed configuration
         normal = pair.nodal_gap(replace(configuration, displacement=np.zeros_like(configuration.displacement)))[1]
     shear, sticking, tangential = _tangential_results(constraints, solution, rows, normal, closed, scale)
     if pair.axisymmetric:  # The radial traction is an odd function of the radius.
@@ -149,7 +151,7 @@ def _contact_radius(
     side = pair.secondary
     place = middle.places(pair.points[side.points])
     if pair.points.shape[1] == 3 and closed[place.argmin()]:  # not a ring around an open middle
-        free = ~closed & ~pair.options.excluded_nodes(side)
+        free = ~closed & ~pair.excluded[side.points]
         low = min(low, float(place[closed & (side.beside @ free > 0)].min(initial=np.inf)))
         high = max(high, float(place[free & (side.beside @ closed > 0)].max(initial=0.0)))
     return low, high
@@ -210,11 +212,11 @@ def _closed_nodes(
         well; zero at open nodes. If the formulation has negative pressures anywhere, the ratio is at most 1, since its
         pressure at a node may then nearly vanish [-].
     """
-    field, excluded = constraints.nodal, pair.options.excluded_nodes(pair.secondary)
+    field, excluded = constraints.nodal, pair.excluded[pair.secondary.points]
     assert field is not None
     forces = constraints.normal_forces(constraints.contact_forces(multiplier))
     side_pressure, covered = field.over_whole_side(forces), field.covered
-    if pair.options.always_closed:
+    if pair.options.kind in ALWAYS_CLOSED:
         # Nodes beyond the end of the other side are unpaired, but parts of their facets may face it.
         closed = np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
     else:
@@ -317,11 +319,10 @@ def mean_slip_before_closing(
 ) -> Array:
     """Return the part (n_nodes, dim) of the nodal slips in this step that precedes the closing of the nodes [length].
 
-    It is a mean over the constraints near each node, weighted by their contact forces, and zero unless the step was solved
-    in increments. For parameters see `contact_result`.
+    It is a mean over the constraints near each node, weighted by their contact forces, if the step was solved in increments.
+    For parameters see `contact_result`.
     """
-    if solution.slip_before_closing is None or not constraints.tangents:
-        return np.zeros_like(contact.coordinates)
+    assert solution.slip_before_closing is not None
     assert constraints.nodal is not None
     forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
     slips = np.einsum("mk,kmd->md", solution.slip_before_closing[rows], np.stack(constraints.directions))

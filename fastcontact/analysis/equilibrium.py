@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
+from operator import itemgetter
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,7 +25,7 @@ from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, largest
-from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies
+from fastcontact.elasticity.nonlinear_bodies import COMPLETE, DeformedBodies
 from fastcontact.elasticity.springs import Springs, ground_force, spring_force, spring_stiffness
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
@@ -85,9 +86,9 @@ class Bodies(Term):
         force[: bodies.force.size] = bodies.force.ravel()
         return force, (bodies.energy, bodies.plastic_work)
 
-    def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
+    def tangent(self, u: Array, geometric: int = COMPLETE) -> bsr_array:
         """See `Term`; `geometric` selects how much of the geometric stiffness is included, see `NonlinearBodies.at`."""
-        if geometric < WHOLE or u is self._tangent_passed_at:
+        if geometric < COMPLETE or u is self._tangent_passed_at:
             return self._problem.deformed(u, self._start, self._rise, geometric=geometric).K
         self._tangent_passed_at = u
         return self.at(u).K
@@ -149,7 +150,7 @@ class FollowingForce(Term):
 
 
 class Terms:
-    """The sum of the terms of a load step; for linear bodies and springs, the product of the stiffness and u.
+    """The sum of the terms of a load step with nonlinear bodies.
 
     Parameters
     ----------
@@ -160,35 +161,28 @@ class Terms:
 
     Attributes
     ----------
-    bodies : Bodies, optional
-        The term of the nonlinear bodies; None if all bodies are linear.
+    bodies : Bodies
+        The term of the nonlinear bodies.
     """
 
     def __init__(self, problem: Problem, start: State, load: StepLoad) -> None:
-        self.bodies = None if problem.bodies is None else Bodies(problem, start, load)
-        self._terms: list[Term] = []
-        self._K = problem.system.K
-        if self.bodies is not None:
-            springs, n = problem.model.springs, problem.model.n_dofs
-            self._terms = [SpringForces(springs, n)] if springs else []
-            for (pressure, _), factor in zip(problem.following, load.following, strict=True):
-                force, tangent = (lambda u, index=index, at=pressure.at: at(u)[index] for index in (0, 1))
-                self._terms.append(FollowingForce(problem, force, tangent, np.zeros_like(start.u), factor))
+        self.bodies = Bodies(problem, start, load)
+        springs, n = problem.model.springs, problem.model.n_dofs
+        self._terms: list[Term] = [SpringForces(springs, n)] if springs else []
+        for (pressure, _), factor in zip(problem.following, load.following, strict=True):
+            force, tangent = (lambda u, index=index, at=pressure.at: at(u)[index] for index in (0, 1))
+            self._terms.append(FollowingForce(problem, force, tangent, np.zeros_like(start.u), factor))
 
     def residual(self, u: Array, others: Sequence[Term] = ()) -> tuple[Array, Energies]:
         """Return the sums of the nodal forces and of the energies of all terms, including the terms `others`; see `Term`."""
-        if self.bodies is None:
-            force = self._K @ u
-            return force, (0.5 * float(u @ force), 0.0)
         force, energy = self.bodies.residual(u)
         for term in (*self._terms, *others):
             added, stored = term.residual(u)
             force, energy = force + added, (energy[0] + stored[0], energy[1] + stored[1])
         return force, energy
 
-    def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
+    def tangent(self, u: Array, geometric: int = COMPLETE) -> bsr_array:
         """Return the sum of the tangents, see `Term`, of nonlinear bodies and all other terms."""
-        assert self.bodies is not None
         K = self.bodies.tangent(u, geometric)
         for term in self._terms:
             K = sum_of_blocks(K, term.tangent(u))
@@ -240,10 +234,8 @@ class Balance:
         """
         return self.residual / self.noise if self.residual > self.noise > self.bound else self.excess
 
-    def check(self, index: int, problem: Problem, history: Sequence[dict[str, Any]]) -> None:
-        """Raise a ConvergenceError for step `index` if the residual exceeds its bound."""
-        if self.residual <= self.bound:
-            return
+    def failure(self, index: int, problem: Problem, history: Sequence[dict[str, Any]]) -> ConvergenceError:
+        """Return the error for step `index`, in which the residual exceeds its bound."""
         tolerance_advice = (
             f", or accept it with Criteria(relative={2 * self.relative:.0e})" if 2 * self.relative <= NOTABLE else ""
         )
@@ -251,7 +243,7 @@ class Balance:
             "round-off allows no less if moduli or displacements differ by many orders of magnitude. Put a rigid obstacle "
             f"in the place of a stiff body{tolerance_advice}"
         )  # fmt: skip
-        raise ConvergenceError(
+        return ConvergenceError(
             f"step {index}: the out-of-balance force {self.residual:.3g} stays above {self.bound:.3g} "
             f"({problem.criteria.relative:g} of the largest force): {remedy}",
             history,
@@ -282,7 +274,7 @@ def balance(
     unbalanced -= external
     reaction, residual = problem.system.balance(unbalanced)
     forces = (reaction, contact_force, external)
-    force = max(largest(nodal_forces) for nodal_forces in forces)
+    force = max(map(largest, forces))
     largest_so_far = max(largest_so_far, force)
     bound = max(criteria.relative * force, criteria.absolute or 0.0)
     full_residual, round_off, noise = residual, 0.0, 0.0
@@ -342,8 +334,8 @@ class StepEquilibrium:
         Displacements of all points, and then of the force-driven obstacles [length].
     balance : Balance
         Reactions and residual.
-    terms : Terms
-        Terms of the equilibrium.
+    terms : Terms, optional
+        Terms of the equilibrium; None if all bodies are linear.
     newton : list of dict
         Convergence data of each Newton iteration; empty if all bodies are linear.
     """
@@ -351,31 +343,26 @@ class StepEquilibrium:
     settled: SettledContact | None
     u: Array
     balance: Balance
-    terms: Terms
+    terms: Terms | None = None
     newton: list[dict[str, Any]] = field(default_factory=list)
-
-    @property
-    def history(self) -> list[dict[str, Any]]:
-        """Convergence data of each pairing of the contact surfaces."""
-        return self.settled.iterate.history if self.settled is not None else []
 
     def counts(self, linear_iterations: int) -> dict[str, Any]:
         """Return the numbers of iterations of the step, see `StepResult.iterations`.
 
         For nonlinear bodies the history is that of Newton's method, and the numbers are sums over all Newton iterations.
         """
-        history, scatter = self.history, None if self.settled is None else self.settled.scatter
+        history, scatter = ([], None) if self.settled is None else (self.settled.iterate.history, self.settled.scatter)
         counts: dict[str, Any] = {
             "geometry_updates": max(len(history) - 1, 0),
-            "active_set_iterations": sum(entry["active_set_iterations"] for entry in history),
+            "active_set_iterations": sum(map(itemgetter("active_set_iterations"), history)),
             "linear_iterations": linear_iterations,
             "history": history,
             **({} if scatter is None else {"scatter": asdict(scatter)}),
         }
-        if self.terms.bodies is None:
+        if self.terms is None:
             return counts
         keys = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
-        newton_sums = {name: sum(entry[key] for entry in self.newton) for name, key in keys.items()}
+        newton_sums = {name: sum(map(itemgetter(key), self.newton)) for name, key in keys.items()}
         return {**counts, **newton_sums, "history": self.newton}
 
 

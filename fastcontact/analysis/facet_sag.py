@@ -45,7 +45,7 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
         corrected = pair.smoothing is not None or not isinstance(pair.normals, str)
-        if corrected or pair.options.tied or pair.options.gap_only or not (contact.pressure > 0.0).any():
+        if corrected or pair.options.kind in ("tied", "gap_only") or not (contact.pressure > 0.0).any():
             continue
         configuration = problem.configuration(name, state, load, displacement, state.u)
         text = _warning(pair, *_sag(pair, configuration, contact.active), contact) or _inclination(

@@ -25,7 +25,6 @@ from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_moves, nearest_nodes
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.inequalities import Iterate, StepContext, initially_active, pair_surfaces, solve_inequalities
-from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.tolerances import Scatter, ScatterWindow, Tolerances
@@ -98,9 +97,9 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
     ConvergenceError
         If the active set or the geometry does not converge.
     """
-    touching = Touching(step, _linearises(step.problem))
+    touching = Touching(step)
     try:
-        settled = _settle(step, iterate, touching, paired if _linearises(step.problem) else None)
+        settled = _settle(step, iterate, touching, paired if step.linearises_contact else None)
     except ConvergenceError as error:
         error.history = error.history or iterate.history
         raise
@@ -109,12 +108,6 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
     return replace(
         settled, solution=settled.nodes.with_distributed_forces(settled.solution, settled.constraints, iterate.u)
     )
-
-
-def _linearises(problem: Problem) -> bool:
-    """Return whether Newton's method applies to the contact geometry: with a direct solver, without fluid pressure."""
-    fluid = any(pair.options.source is not None for pair in problem.pairs.values())
-    return not (fluid or problem.solver.iterative)
 
 
 def _settle(
@@ -151,8 +144,7 @@ def _settle(
             if not solution.settled:
                 raise ConvergenceError("an increment does not converge", iterate.history)
             step = replace(step, path=solution.slip_so_far)
-            mixing = _Mixing(step)
-            window.forget()
+            mixing, window = _Mixing(step), ScatterWindow()
         last_update = _store_solution(step, iterate, constraints, solution, displacement)
         if not (solution.settled or accuracy.inexact):
             nodes_that_change = nearest_nodes(problem, constraints, np.flatnonzero(solution.active != solution.wanted))
@@ -167,7 +159,7 @@ def _settle(
         paired_at = last_update.before[step.dofs.compared]
         settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=paired_at)
         if not solution.settled or tolerances.inexact:
-            window.forget()
+            window = ScatterWindow()
         elif last_update.change <= tolerances.enough(last_update.size) and not (touching.due or touching.unfinished):
             return settled
         elif scatter := window.add(
@@ -186,8 +178,7 @@ def _settle(
         if late and any(pair.alternates(constraints.parts[name]) for name, pair in problem.pairs.items()):
             log.info("pairings alternate: from now on edges of facets are rounded, and small overlaps have no gap")
             iterate.rounded = True
-            mixing.restart()
-            window.forget()
+            mixing.accelerated, window = None, ScatterWindow()
     if problem.until_settled:
         change = np.zeros_like(iterate.u)
         change[step.dofs.active] = displacement - last_update.before
@@ -229,11 +220,14 @@ def _store_solution(
     before = iterate.u[step.dofs.active]
     iterate.u[step.dofs.active] = displacement
     # The unknowns of the solution do not include rigid-body motions of floating bodies, which may be much larger.
-    size = max(step.dofs.size(solution.u), largest(step.load.lift))
+    size = max(step.condensed_size, largest(solution.u), largest(step.load.lift))
     change = largest(displacement - before)
     significant = size and change > step.state.gap_round_off
     last_update = _Update(before, change, size, change / size if significant else 0.0)
-    iterate.remember(constraints, solution)
+    for name, rows in constraints.rows.items():
+        iterate.active[name] = solution.wanted[rows]
+        forces = constraints.parts[name].contact_forces(solution.multiplier[rows])
+        iterate.pressure[name] = constraints.parts[name].pressure(forces)  # without fluid pressure
     entry = {"displacement_change": last_update.relative, "active": int(solution.active.sum())}
     entry |= {"active_set_iterations": solution.iterations, "settled": solution.settled}
     iterate.history.append(entry | ({"rounded": True} if iterate.rounded else {}))
@@ -252,20 +246,18 @@ class _Mixing:
 
     Attributes
     ----------
+    accelerated : Anderson, optional
+        Anderson acceleration with the earlier iterates that it uses; None to discard them.
     contraction : float
         Factor by which a solution contracts changes of the geometry, from the last Newton step; infinite if unknown.
     """
 
     def __init__(self, step: StepContext) -> None:
-        self._step, self._accelerated = step, None
+        self._step, self.accelerated = step, None
         self._last_state, self._earlier_states, self._cycles = b"", set[bytes](), False
-        self._newton, self._change, self.contraction = _linearises(step.problem), np.inf, np.inf
+        self._newton, self._change, self.contraction = step.linearises_contact, np.inf, np.inf
 
-    _accelerated: Anderson | None
-
-    def restart(self) -> None:
-        """Discard the earlier iterates."""
-        self._accelerated = None
+    accelerated: Anderson | None
 
     def next(
         self, settled: SettledContact, last_update: _Update, displacement: Array, tolerances: Tolerances
@@ -284,18 +276,20 @@ class _Mixing:
             if newton_result is not None:
                 next_pairing, self.contraction = newton_result
                 return next_pairing
-        state = settled.constraints.state(solution.active).tobytes()
+        branches = settled.constraints.branches
+        # While this state is constant, the solution depends smoothly on the geometry.
+        state = solution.active.tobytes() + (b"" if branches is None else branches.tobytes())
         same_state = self._last_state == state
         self._cycles |= not (same_state or self._newton) and state in self._earlier_states
         self._last_state = state if solution.settled else b""
         self._earlier_states.add(self._last_state)
         if tolerances.inexact or not (same_state or self._cycles or settled.iterate.rounded):
-            self.restart()
+            self.accelerated = None
         if tolerances.inexact:
             return None
-        if self._accelerated is None:
-            self._accelerated = Anderson(DEPTH, self._step.dofs.compared, self._step.problem.solver.iterative)
-        return self._accelerated.mixed(last_update.before, displacement)
+        if self.accelerated is None:
+            self.accelerated = Anderson(DEPTH, self._step.dofs.compared, self._step.problem.solver.iterative)
+        return self.accelerated.mixed(last_update.before, displacement)
 
 
 def newton_step(

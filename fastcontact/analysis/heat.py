@@ -12,7 +12,7 @@ from scipy.sparse import bsr_array, coo_array, csr_array
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.errors import ConvergenceError
-from fastcontact.heat.conduction import Conduction, not_reached
+from fastcontact.heat.conduction import Conduction, undetermined_bodies
 from fastcontact.heat.loads import Film, Heating
 from fastcontact.linear import choice
 from fastcontact.mesh.topology import bodies
@@ -206,7 +206,7 @@ class Heat:
         determined = self.merged @ self.fixed + films.diagonal() > 0.0
         pairs = coo_array(self.merged if contact is None else self.merged + contact)
         joined = np.stack([pairs.row, pairs.col], axis=1)[pairs.data != 0.0]
-        cut_off = not_reached(self.body, determined, joined)
+        cut_off = undetermined_bodies(self.body, determined, joined)
         if len(cut_off):
             raise ConvergenceError(
                 f"no heat reaches body {body_name(self.model.mesh, self.body, cut_off[0])}: its contacts are open or conduct "

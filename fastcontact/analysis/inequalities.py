@@ -73,13 +73,6 @@ class Iterate:
         """Return the initial iterate of a load step."""
         return cls(state.u.copy(), dict(state.active), dict(state.pressure))
 
-    def remember(self, constraints: StackedConstraints, solution: Solution) -> None:
-        """Store for each pair the active set that the solution predicts, and the nodal pressures without fluid pressure."""
-        for name, rows in constraints.rows.items():
-            self.active[name] = solution.wanted[rows]
-            forces = constraints.parts[name].contact_forces(solution.multiplier[rows])
-            self.pressure[name] = constraints.parts[name].pressure(forces)
-
 
 def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Iterate) -> StackedConstraints:
     """Return the constraints of all pairs, from the deformed or, with `keep_pairing`, from the undeformed configuration."""
@@ -144,6 +137,8 @@ class StepContext:
         Scale of the displacements in the first step, if only forces act [length].
     index : int
         Number of the step.
+    condensed_size : float
+        Largest absolute value of the unknowns that are condensed, at the beginning of the step [length].
     path : Path or SlipSoFar, optional
         Load path of the step, if friction is solved along it in increments; or the data at the beginning of its last
         increment, if only this increment is solved again.
@@ -157,7 +152,13 @@ class StepContext:
     extrapolation: Extrapolation = field(default_factory=Extrapolation)
     expected: float = 0.0
     index: int = 0
+    condensed_size: float = 0.0
     path: Path | SlipSoFar | None = None
+
+    @property
+    def linearises_contact(self) -> bool:
+        """Whether Newton's method applies to the contact geometry: with a direct solver, without fluid pressure."""
+        return not (self.problem.solver.iterative or self.load.fluids)
 
     @cached_property
     def prescribed_motion(self) -> Array:
@@ -178,7 +179,9 @@ class StepContext:
         ndarray (k, m)
             Imposed slip along each of k tangents of the m constraints [-].
         """
-        slips = np.stack([T @ self.prescribed_motion for T in constraints.tangents])
+        slips = np.empty_like(constraints.slip0)
+        for k, T in enumerate(constraints.tangents):
+            slips[k] = T @ self.prescribed_motion
         # Without prescribed displacements in this step, `prescribed_motion` is the round-off of earlier displacements.
         scale = max(largest(self.prescribed_motion), largest(self.state.u))
         if isinstance(constraints, StackedConstraints):

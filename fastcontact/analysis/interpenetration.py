@@ -118,7 +118,7 @@ def _points_of_sides(problem: Problem, contact: Contacts, names: Sequence[str]) 
     secondary, primary = np.zeros((2, problem.model.mesh.n_points), bool)
     for name in names:
         pair = problem.pairs[name]
-        facing = np.isfinite(contact[name].gap) | pair.options.excluded_nodes(pair.secondary)
+        facing = np.isfinite(contact[name].gap) | pair.excluded[pair.secondary.points]
         secondary[pair.secondary.points[facing]] = True
         primary[pair.primary.points] = True
     return secondary, primary

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from fastcontact._jit import parallel
+from fastcontact._tools.argument_types import unchecked
 from fastcontact.analysis.contact_result import contact_results, mean_slip_before_closing, sliding_load
 from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact
@@ -42,6 +44,9 @@ from fastcontact.model.pretension import section_results
 from fastcontact.model.rigid_motions import generalised
 from fastcontact.results.step import ContactResult, StepResult, by_largest_von_mises
 from fastcontact.results.units import units_of_results
+
+nodal_stress = unchecked(recovery.nodal_stress)
+von_mises, von_mises_signed = unchecked(recovery.von_mises), unchecked(recovery.von_mises_signed)
 
 
 @parallel.on_one_blas_thread
@@ -105,7 +110,7 @@ def _end_of_step(
         start, u=u, largest_force=balance.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
         instant=instant[1], rise=None if heat_solution is None else heat_solution.rise,
     )  # fmt: skip
-    bodies = None if solution.terms.bodies is None else solution.terms.bodies.at(u)
+    bodies = None if solution.terms is None else solution.terms.bodies.at(u)
     if bodies is not None:
         end = replace(end, history=bodies.history)
     # In the first step, which begins without a history, the path is unknown.
@@ -168,7 +173,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         # rest is the first of the extrapolated states.
         quantities = [load.lift, load_as_force.force, *(() if problem.bodies is None else load.obstacles.values())]
         extrapolation = state.extrapolation
-        if problem.bodies is not None and not (extrapolation.loads or state.u.any()):
+        if not (extrapolation.loads or state.u.any()):
             extrapolation = extrapolation.to(*map(np.zeros_like, quantities)).converged(state.u, {})
         start = replace(start, extrapolation=extrapolation.to(*quantities))
     return StepContext(problem, start, load, loaded, problem.dofs, start.extrapolation, expected, index)
@@ -229,17 +234,17 @@ def accumulate_results(
         pair, contact, constraints = problem.pairs[name], results[name], settled.constraints.parts[name]
         configuration = problem.configuration(name, start, load, displacement, end.u)
         slip = np.zeros_like(contact.coordinates)
-        if contact.active.any() and not pair.options.tied:
+        if contact.active.any() and pair.options.kind != "tied":
             rigid_stick = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
-            slip = pair.nodal_slip(configuration) - mean_slip_before_closing(
-                constraints, settled.solution, rows, contact
-            )
+            slip = pair.nodal_slip(configuration)
+            if settled.solution.slip_before_closing is not None and constraints.tangents:
+                slip -= mean_slip_before_closing(constraints, settled.solution, rows, contact)
             slip = np.where((contact.active & ~rigid_stick)[:, None], slip, 0.0)
         slipped[name] = slip + start.slipped.get(name, 0.0)
         results_so_far[name] = replace(contact, slip=slip, slip_total=slipped[name])
         if name in end.bonds:
             results_so_far[name] = replace(results_so_far[name], damage=end.bonds[name].at(contact.coordinates)[1])
-        elif not (pair.options.tied or pair.options.gap_only):
+        elif pair.options.kind not in ("tied", "gap_only"):
             arguments = constraints, settled.solution, rows, configuration, contact, start.forces.get(name)
             forces[name], work_of_pair, slip_integrals = contact_work(pair, *arguments)
             load_of_pair = None
@@ -253,8 +258,8 @@ def accumulate_results(
             before = start.worn.get(name, Worn.nothing(len(contact.points)))
             worn[name] = before.after(pair, configuration, results_so_far[name], pair.options.wear)
             results_so_far[name] = replace(results_so_far[name], wear=worn[name].depth)
-    stored = sum(entry.stored for entry in forces.values()) + sum(entry.stored for entry in end.bonds.values())
-    released = sum(entry.released for entry in end.bonds.values())
+    stored = sum(map(attrgetter("stored"), (*forces.values(), *end.bonds.values())))
+    released = sum(map(attrgetter("released"), end.bonds.values()))
     work = None if start.work is None else start.work.after(energy, stored, works.tolist(), released)
     touched = start.touched.union(name for name, contact in results.items() if contact.active.any())
     first = {name: positions for name, positions in end.first_contact.items() if name in touched}
@@ -286,21 +291,20 @@ def recover(
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
     sections, reaction = problem.model.pretensions, reaction.reshape(-1, mesh.dim)
-    histories = problem.model.temperatures, problem.model.initial_states, sections
-    temperature, initial, pretension = (problem.factors(parts, instant[1]) for parts in histories)
-    pressures, spins = (
-        problem.factors([load for load in problem.model.loads if isinstance(load, kind)], instant[1])
-        for kind in (Pressure, Centrifugal)
-    )
-    factors = {
-        "temperature_factors": temperature, "initial_factors": initial, "pressure_factors": pressures, "spin_factors": spins,
-    }  # fmt: skip
-    iterations = {**iterations, **{key: multipliers for key, multipliers in factors.items() if multipliers}}
+    loads, iterations = problem.model.loads, dict(iterations)
+    temperature = problem.factors(problem.model.temperatures, instant[1])
+    initial = problem.factors(problem.model.initial_states, instant[1])
+    pressures = problem.factors([load for load in loads if isinstance(load, Pressure)], instant[1])
+    spins = problem.factors([load for load in loads if isinstance(load, Centrifugal)], instant[1])
+    for name, factors in (("temperature", temperature), ("initial", initial), ("pressure", pressures), ("spin", spins)):
+        if factors:
+            iterations[f"{name}_factors"] = factors
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
-    if references := reference_reactions(problem.model, reaction.ravel(), u.ravel()):
-        iterations["reference_reactions"] = references
+    if points := problem.reference_points:
+        iterations["reference_reactions"] = reference_reactions(problem.model, points, reaction, u)
     if sections:
-        iterations["pretension"] = section_results(sections, u, reaction, pretension)
+        factors = problem.factors(sections, instant[1])
+        iterations["pretension"] = section_results(sections, u, reaction, factors)
     if bodies is not None:
         stress = recovery.nodal_average(mesh, bodies.stress, problem.sides)
     else:
@@ -308,14 +312,14 @@ def recover(
         if temperature or initial or heat is not None:
             offset = problem.model.stress_offset(temperature, initial, field, heat)
         materials = field.moduli, field.moduli_rows, u, field.treatment
-        stress = recovery.nodal_stress(mesh, problem.model.kinematics, *materials, problem.sides, offset)
+        stress = nodal_stress(mesh, problem.model.kinematics, *materials, problem.sides, offset)
     by_material = None
     if len(problem.sides.points):
         materials_of_cells = np.concatenate(list(problem.field.distinct.values()))
         stress, by_material = by_largest_von_mises(problem.sides, materials_of_cells, stress, mesh.n_points)
-    von_mises, units = recovery.von_mises(stress), problem.model.units
+    equivalent, units = von_mises(stress), problem.model.units
     return StepResult(
-        *instant, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction, contact,
+        *instant, u.copy(), stress, equivalent, von_mises_signed(stress, equivalent), reaction, contact,
         iterations, material_stress=by_material,
         cell_fields={} if bodies is None or problem.bodies is None else problem.bodies.cell_fields(bodies, u),
         temperature=heat, units=units and units_of_results(units, problem.model.kinematics),

@@ -25,7 +25,7 @@ from fastcontact.elasticity.mass import mass, stress_stiffness
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.recovery import CellStress
-from fastcontact.elasticity.springs import stiffened
+from fastcontact.elasticity.springs import with_springs
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.errors import ModelError, warn
 from fastcontact.linear import choice
@@ -236,7 +236,7 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField, dens
     """
     mesh, kinematics, bodies = model.mesh, model.kinematics, model.nonlinear_bodies(field)
     if step is None or bodies is None:
-        K = stiffened(
+        K = with_springs(
             stiffness(mesh, kinematics, field.moduli, field.moduli_rows, None, field.treatment), model.springs
         )
     if step is None:
@@ -249,7 +249,7 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField, dens
         if model.strain == "small":
             model.refuse_nonlinear("modes about a step are")
         deformation, rise = step.displacement, model.expanding_rise(temperature, step.temperature)
-        K = stiffened(bodies.at(deformation, bodies.beginning, rise=rise).K, model.springs)
+        K = with_springs(bodies.at(deformation, bodies.beginning, rise=rise).K, model.springs)
     else:
         offset = model.stress_offset(temperature, initial, field, step.temperature)
         stresses = CellStress(mesh, kinematics, field.moduli, step.displacement, field.treatment, offset)

@@ -32,9 +32,9 @@ from fastcontact.analysis.inequalities import Iterate, StepContext
 from fastcontact.analysis.problem import Problem, StepLoad, linearised
 from fastcontact.analysis.tolerances import DECLINE, WINDOW
 from fastcontact.arrays import Array, largest
-from fastcontact.elasticity.nonlinear_bodies import WHOLE
+from fastcontact.elasticity.nonlinear_bodies import COMPLETE
 from fastcontact.errors import ConvergenceError, ModelError
-from fastcontact.linear.choice import LOOSEST
+from fastcontact.linear.choice import MAX_TOLERANCE
 from fastcontact.linear.protocol import TOLERANCE, Loaded
 from fastcontact.round_off import SINGLE_PRECISION
 
@@ -63,7 +63,9 @@ def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = 
         If the iterations do not converge, a cell is inverted, or forces stay out of balance.
     """
     start = begin.state
-    if begin.problem.bodies is not None and (before is not None or start.extrapolation.ratio):
+    if begin.problem.bodies is None:
+        return _equilibrium_of_linear_bodies(begin, load, before)
+    if before is not None or start.extrapolation.ratio:
         origin = start.extrapolation.predicted(start.u) if before is None else before.u
         try:
             return _Newton(begin, load).equilibrium_from(origin)
@@ -71,6 +73,47 @@ def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = 
             log.info("the step restarts from the previous displacement instead of a predicted one: %s", error)
             before = None
     return _Newton(begin, load, before).equilibrium_from(start.u)
+
+
+def _equilibrium_of_linear_bodies(
+    begin: StepContext, load: StepLoad, before: StepEquilibrium | None
+) -> StepEquilibrium:
+    """Return the result of `newton` for linear bodies, whose tangents are constant.
+
+    As long as forces do not balance, the contact problem is solved again, with more accurate linear solutions.
+    """
+    problem, start, u, settled = begin.problem, begin.state, begin.state.u, None
+    iterate = Iterate.of(start) if before is None or before.settled is None else before.settled.iterate
+    while True:
+        loaded = begin.loaded if load is begin.load and settled is None else with_loads(problem, load)
+        settled = _contact(begin, load, loaded, iterate)
+        u, contact_force = solve_displacements(problem, load, loaded, settled, u)
+        force = problem.system.K @ u
+        internal = force, (0.5 * float(u @ force), 0.0)
+        force_balance = balance(problem, u, contact_force, load.force, start.largest_force, internal)
+        if iterate.history:
+            iterate.history[-1]["residual"] = force_balance.relative
+        if force_balance.excess <= 1.0 or not problem.solver.improve(force_balance.accuracy_factor):
+            if force_balance.residual > force_balance.bound:
+                raise force_balance.failure(begin.index, problem, iterate.history)
+            return StepEquilibrium(settled, u, force_balance)
+
+
+def _contact(
+    step: StepContext, load: StepLoad, loaded: Loaded, iterate: Iterate, paired: SettledContact | None = None
+) -> SettledContact | None:
+    """Return the contact of a problem whose terms are linear; None without contact pairs.
+
+    `step` contains the problem, and `loaded` is its matrix with the right-hand side of `load`. `iterate` and `paired` are
+    those of `settle_geometry`.
+    """
+    problem, u, bodies = step.problem, iterate.u, step.problem.floating_bodies
+    if not problem.pairs:
+        return None
+    lift = load.lift if bodies is None else load.lift + bodies.rigid(u[bodies.dofs])
+    condensed_size = problem.dofs.largest_condensed(u, lift)
+    condensed = replace(step, load=load, loaded=loaded.condensed(), dofs=problem.dofs, condensed_size=condensed_size)
+    return settle_geometry(condensed, iterate, paired)
 
 
 @dataclass(frozen=True)
@@ -89,7 +132,7 @@ class Regularisation:
         Whether the springs along closed gaps replace those of floating bodies, provided that they resist all free motions.
     """
 
-    geometric: int = WHOLE
+    geometric: int = COMPLETE
     gap_stiffness: float = 0.0
     stiff: bool = False
     replaces: bool = False
@@ -97,11 +140,11 @@ class Regularisation:
     @property
     def linear(self) -> bool:
         """Whether iterations with this tangent converge linearly only."""
-        return self.geometric < WHOLE or self.gap_stiffness > 0.0
+        return self.geometric < COMPLETE or self.gap_stiffness > 0.0
 
 
 class _Newton:
-    """The iterations of a load step; see `newton` for the parameters."""
+    """The iterations of a load step with nonlinear bodies; see `newton` for the parameters."""
 
     def __init__(self, begin: StepContext, load: StepLoad, before: StepEquilibrium | None = None) -> None:
         self._problem, self._begin, self._start, self._load = begin.problem, begin, begin.state, load
@@ -133,12 +176,8 @@ class _Newton:
                     raise
                 log.info("an iterate is rejected: %s", error)  # an equilibrium may exist nevertheless
                 break
-            u, fraction = (target, 1.0) if self._terms.bodies is None else self._damped_step(before, target, changes)
+            u, fraction = self._damped_step(before, target, changes)
             force_balance = self._force_balance(u, contact_force, before)
-            if self._terms.bodies is None:
-                if self._is_exact(force_balance):
-                    return StepEquilibrium(self._settled, u, force_balance, self._terms)
-                continue
             if history and fraction == 1.0 and force_balance.excess > 1.0:
                 u, fraction = self._line_search(before, u, contact_force)
                 force_balance = self._force_balance(u, contact_force, before) if fraction < 1.0 else force_balance
@@ -157,21 +196,6 @@ class _Newton:
             f"of the largest one, and forces are out of balance by {force_balance.relative:.1e}; use smaller load steps",
             history,
         )
-
-    def _is_exact(self, force_balance: Balance) -> bool:
-        """Return whether forces balance where tangents are exact; otherwise request more accurate linear solutions.
-
-        Raises
-        ------
-        ConvergenceError
-            If no higher accuracy is available.
-        """
-        if self._iterate.history:
-            self._iterate.history[-1]["residual"] = force_balance.relative
-        if force_balance.excess > 1.0 and self._problem.solver.improve(force_balance.accuracy_factor):
-            return False
-        force_balance.check(self._begin.index, self._problem, self._iterate.history)
-        return True
 
     def _relative(self, change: float, u: Array) -> float:
         """Return the largest `change` [length] of displacements relative to the largest one; u (n_dofs,) are the new ones."""
@@ -243,10 +267,6 @@ class _Newton:
         added along closed gaps, with which convergence remains quadratic except for motions that contact does not restrain.
         Finally, parts of the geometric stiffness are omitted. Once springs have sufficed, they are tried first.
         """
-        if self._terms.bodies is None:
-            first = self._load is self._begin.load and self._settled is None
-            loaded = self._begin.loaded if first else with_loads(self._problem, self._load)
-            return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
         # While a floating body moves along motions that springs along gaps do not resist, its forces are not in balance.
         if self._regularisation.gap_stiffness and changes[-1] > changes[-2] > min(changes):
             self._replaces = True
@@ -279,7 +299,7 @@ class _Newton:
         if self._regularisation in with_springs:
             unmodified = []  # the unmodified tangent failed before
         geometric = self._regularisation.geometric
-        parts = range(min(geometric + 1, WHOLE))[::-1]
+        parts = range(min(geometric + 1, COMPLETE))[::-1]
         return [*unmodified, *with_springs, *(Regularisation(part, stiff=floats) for part in parts)]
 
     def _linearised_contact(
@@ -297,7 +317,7 @@ class _Newton:
             problem = replace(self._problem, linearised_at=u if bodies and bodies.finite else None)
         else:
             K = terms.tangent(u, regularisation.geometric)
-            contact = self._stiffness_of_contact(K, u, regularisation) if regularisation.geometric == WHOLE else None
+            contact = self._stiffness_of_contact(K, u, regularisation) if regularisation.geometric == COMPLETE else None
             problem = linearised(self._problem, K, u, contact, regularisation.stiff, regularisation.replaces)
         unbalanced, floating = self._load.force - terms.residual(u)[0], problem.floating_bodies
         # Under load, the tangent resists rigid-body rotations, which the unknowns of floating bodies do not include.
@@ -306,10 +326,17 @@ class _Newton:
         iterate.u, iterate.history = u.copy(), []
         self._linear_tolerance = self._forcing(problem, load, u, unbalanced)
         # The contact geometry is iterated no further than the linearisation of the bodies is accurate.
-        tolerance = min(max(problem.criteria.geometry, LOOSEST * changes[-1]), NOTABLE)
+        tolerance = min(max(problem.criteria.geometry, MAX_TOLERANCE * changes[-1]), NOTABLE)
         inner_problem = replace(problem, criteria=replace(problem.criteria, geometry=tolerance))
-        solution = self._contact(inner_problem, load, with_loads(problem, load), u, Extrapolation())
-        self._reusable = problem if regularisation.geometric == WHOLE else None
+        loaded, step = (
+            with_loads(problem, load),
+            replace(self._begin, problem=inner_problem, extrapolation=Extrapolation()),
+        )
+        paired = self._settled if self._moved_fully and problem.linearised_at is None else None
+        settled = _contact(step, load, loaded, iterate, paired)
+        solution = solve_displacements(problem, load, loaded, settled, u, self._linear_tolerance)
+        self._settled = settled
+        self._reusable = problem if regularisation.geometric == COMPLETE else None
         return solution
 
     def _is_at_rest(self, u: Array) -> bool:
@@ -329,25 +356,7 @@ class _Newton:
             return None
         missing = largest(system.displacement(system.unknowns(u, lift), lift) - u)  # prescribed displacements
         ratio = max(largest(system.reduced(unbalanced)) / scale, missing and missing / max(largest(u), largest(lift)))
-        return LOOSEST * ratio if ratio**2 > self._tolerance else None
-
-    def _contact(
-        self, problem: Problem, load: StepLoad, loaded: Loaded, u: Array, start: Extrapolation
-    ) -> tuple[Array, Array]:
-        """Return displacements and contact forces of a problem whose terms are linear, and store the contact."""
-        settled = None
-        if problem.pairs:
-            u0, bodies = self._iterate.u, problem.floating_bodies
-            lift = load.lift if bodies is None else load.lift + bodies.rigid(u0[bodies.dofs])
-            dofs = problem.dofs.for_step(u0, lift)
-            condensed = loaded.condensed()
-            step = replace(self._begin, problem=problem, load=load, loaded=condensed, dofs=dofs, extrapolation=start)
-            paired = self._settled if self._moved_fully and problem.linearised_at is None else None
-            settled = settle_geometry(step, self._iterate, paired)
-            self._iterate = settled.iterate
-        solution = solve_displacements(problem, load, loaded, settled, u, self._linear_tolerance)
-        self._settled = settled
-        return solution
+        return MAX_TOLERANCE * ratio if ratio**2 > self._tolerance else None
 
     def _stiffness_of_contact(self, K: bsr_array, u: Array, regularisation: Regularisation) -> csr_array | None:
         """Return the stiffness that the last contact adds to a tangent at displacements u (n_dofs,) [force / length].
@@ -386,7 +395,6 @@ class _Newton:
         The step is halved until no cells are inverted. After a full step, `changes` decide whether another tangent is needed.
         """
         fraction, bodies = 1.0, self._terms.bodies
-        assert bodies is not None
         changes = [*changes, self._relative(largest(target - u), target)]
         last = self._has_converged(changes) or (self._reusable is not None and self._tangent_suffices(changes))
         for _ in range(HALVINGS):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -29,8 +30,9 @@ from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
-from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies, NonlinearBodies
-from fastcontact.elasticity.springs import stiffened, too_stiff
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
+from fastcontact.elasticity.nonlinear_bodies import COMPLETE, DeformedBodies, NonlinearBodies
+from fastcontact.elasticity.springs import stiffness_warnings, with_springs
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ContactError
@@ -38,6 +40,7 @@ from fastcontact.linear import choice
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 from fastcontact.linear.sparse_rows import stacked_rows, sum_of_blocks
 from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import ROTATION
 from fastcontact.model.contact_pair import angle_at
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.model import Model
@@ -47,6 +50,8 @@ from fastcontact.model.rigid_motions import FreeMotions, free_motions
 from fastcontact.round_off import SINGLE_PRECISION
 
 ByRamp = Mapping[PartHistory, Array]
+# Shear of nodes that close and slide which is neglected by default, relative to the frictional capacity.
+NEGLIGIBLE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,6 +164,31 @@ class Problem:
         """Whether the contact geometry is updated until displacements converge; otherwise the number of updates is fixed."""
         return self.criteria.geometry_updates is None and not self.criteria.keep_pairing
 
+    @cached_property
+    def reference_points(self) -> dict[str, tuple[int, int]]:
+        """Numbers of the points with the displacement and the rotation of each supported reference point, by name."""
+        mesh, (supported, _) = self.model.mesh, self.model.prescribed()
+        names = [name for name in mesh.point_groups if name + ROTATION in mesh.point_groups]
+        points = {name: (mesh.point(name), mesh.point(name + ROTATION)) for name in names}
+        return {name: pair for name, pair in points.items() if supported[list(pair)].any()}
+
+    @cached_property
+    def friction_while_touching(self) -> float:
+        """`Criteria.friction_while_touching` or its default; 1 means that friction is solved in whole steps.
+
+        With nonlinear bodies it is 1, because their steps are halved instead. Between bodies the default is 1 unless each
+        node has one weighted gap: the other formulations reproduce code_aster, which counts slip from the beginning of the
+        step.
+        """
+        criteria, floats = self.criteria, self.floating_bodies is not None
+        if self.bodies is not None:
+            return 1.0
+        if criteria.friction_while_touching is not None:
+            return criteria.friction_while_touching
+        whole_steps = self.model.mesh.dim == 3 or criteria.geometry_updates is not None or floats
+        pairs = [pair for pair in self.pairs.values() if pair.friction and not isinstance(pair.primary, RigidSide)]
+        return NEGLIGIBLE if not whole_steps and all(pair.weighs_gaps for pair in pairs) else 1.0
+
     @property
     def extrapolates(self) -> bool:
         """Whether load steps start from an extrapolation of earlier ones."""
@@ -173,8 +203,7 @@ class Problem:
     def load_at(self, instant: float) -> StepLoad:
         """Return the loads at an instant of the ramp."""
         prescribed = combined(self.prescribed, self.ramp, instant, self.shape)
-        factors = [multiplier(relation.ramp, self.ramp, instant) for relation in self.model.relations]
-        lift = self.system.lift(prescribed.ravel(), factors)
+        lift = self.system.lift(prescribed.ravel(), self.factors(self.model.relations, instant))
         obstacles, clearance_factors, angles, friction_factors, fluids = {}, {}, {}, {}, {}
         for pair in self.model.contact:
             side = self.pairs[pair.name].primary
@@ -195,9 +224,9 @@ class Problem:
         return StepLoad(lift, force, obstacles, clearance_factors, angles, following, friction_factors, fluids, rise)
 
     def factors(
-        self, histories: Iterable[Temperature | InitialState | Pretension | Load], instant: float
+        self, histories: Iterable[Temperature | InitialState | Pretension | Load | MultiPointConstraint], instant: float
     ) -> list[float]:
-        """Return the multipliers of temperatures, initial states, pretension sections or loads at an instant [-]."""
+        """Return the multipliers of loads, temperatures and other parts of the model at an instant [-]."""
         return [multiplier(history.ramp, self.ramp, instant) for history in histories]
 
     def displacement(self, u: Array) -> Array:
@@ -257,7 +286,7 @@ class Problem:
         )
 
     def deformed(
-        self, u: Array, start: State, rise: Array | None, *, geometric: int = WHOLE, tangent: bool = True
+        self, u: Array, start: State, rise: Array | None, *, geometric: int = COMPLETE, tangent: bool = True
     ) -> DeformedBodies:
         """Return the nonlinear bodies at displacements u (n_dofs,) [length], see `NonlinearBodies.at`.
 
@@ -306,15 +335,15 @@ def prepare(
             )
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,
-        tolerance=choice.tight_enough(linear_tolerance, criteria.relative),
+        tolerance=choice.limited_tolerance(linear_tolerance, criteria.relative),
         columns=not all(pair.eliminable for pair in pairs.values()), quadratic=linear_with_quadratic_cells(model),
     )  # fmt: skip
     field = model.material_field()
     solver.contrast = field.contrast
     sides = material_sides(mesh, field.distinct)
     K = stiffness(mesh, model.kinematics, field.moduli, field.moduli_rows, None, field.treatment)
-    warnings = too_stiff(K, model.springs)
-    K = stiffened(K, model.springs)
+    warnings = stiffness_warnings(K, model.springs)
+    K = with_springs(K, model.springs)
     system = System(
         driven.stiffness(K),
         driven.supported(supported).ravel(),

@@ -132,4 +132,4 @@ def _history(table: Sequence[Sequence[float]], end: float, other_table: Sequence
 
 def _kind(solver: Any) -> list[Any]:
     """Return the kind of a solver. Solvers of the same kind can continue from each other's snapshots."""
-    return [getattr(solver, "name", type(solver).__name__), solver.tolerance if solver.asked is None else solver.asked]
+    return [getattr(solver, "name", type(solver).__name__), solver.original_tolerance or solver.tolerance]

@@ -27,6 +27,7 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.found_contacts import SOFTER
 from fastcontact.contact.integration import lumped_areas
 from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.pair_options import ALWAYS_CLOSED
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.energy import slopes_at
@@ -97,7 +98,7 @@ def result_warnings(
     clearances = _clearances(problem, state)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
-        if pair.options.gap_only:
+        if pair.options.kind == "gap_only":
             continue
         without_force = [] if name in clearances else _without_force(problem, name, last, name in state.touched, loaded)
         configuration = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
@@ -157,7 +158,7 @@ def _undetermined_tractions(pair: Formulation, contact: ContactResult, undetermi
     `undetermined` (n_nodes,) are the nodes of such facets.
     """
     nearly_closed = contact.gap <= LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
-    nodes = undetermined & (contact.active | nearly_closed | pair.options.always_closed)
+    nodes = undetermined & (contact.active | nearly_closed | (pair.options.kind in ALWAYS_CLOSED))
     count = sum(int(nodes[block.local].all(axis=1).sum()) for block in pair.secondary.blocks)
     if count:
         where = np.array2string(pair.points[pair.secondary.points[nodes]].mean(axis=0), precision=4)
@@ -427,19 +428,19 @@ def _depth_of_primary(problem: Problem, pair: Formulation, last: StepResult) -> 
 
 def _unresolved(pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:
     """Yield a warning where too few elements lie across the radius of a contact that carries a force."""
-    if pair.options.always_closed or largest(contact.force_vectors) <= SINGLE_PRECISION * state.largest_force:
+    if pair.options.kind in ALWAYS_CLOSED or largest(contact.force_vectors) <= SINGLE_PRECISION * state.largest_force:
         return
     if not contact.active.any():
         if contact.fluid_pressure is not None and (contact.fluid_pressure > 0.0).all():
             yield f"contact '{contact.name}' is blown open: the fluid acts on all of its nodes, so that a seal leaks"
         return
-    count = across(pair.secondary, contact.active, pair.options.excluded_nodes(pair.secondary))
+    count = across(pair.secondary, contact.active, pair.excluded[pair.secondary.points])
     if count is not None and count < ACROSS:
         resolution = f"{count} {'elements' if count > 1 else 'element'} across its radius"
         needed, remedy = f"its pressure needs {ACROSS} or more", f"refine '{pair.secondary.group}'"
         if count == 1:
             friction = ", its direction and the work of friction" if pair.friction else " and its direction"
-            needed += f", and with less than 2 the force{friction} may be inaccurate, too"
+            needed += f", and with fewer than 2 the force{friction} may be inaccurate, too"
             # Two balls, hex20: forces 3 to 5 times too large with dual multipliers, up to 35 % too small with continuous
             # contact. On linear facets, none of the formulations is generally more accurate.
             if pair.weighs_gaps and pair.secondary.order == 2:
@@ -490,7 +491,7 @@ def oscillating(pair: Formulation, contact: ContactResult, model: Model) -> Iter
 
     Sides that never separate or that adhere carry tension as well. Their mean may be zero or round-off and is not used.
     """
-    if pair.options.always_closed or pair.options.cohesion is not None:
+    if pair.options.kind in ALWAYS_CLOSED or pair.options.cohesion is not None:
         return
     side = pair.secondary
     others = _alternation_matrix(side)
@@ -543,9 +544,9 @@ def _peak_at_edge(pair: Formulation, last: StepResult, contact: ContactResult) -
     formulation, and 845, 920 and 940 with mortar. Means over neighbouring facets do not overshoot.
     """
     plastic, side = last.cell_fields.get("plastic_strain"), pair.secondary
-    if plastic is None or plastic.max(initial=0.0) < NOTABLE or pair.options.always_closed:
+    if plastic is None or plastic.max(initial=0.0) < NOTABLE or pair.options.kind in ALWAYS_CLOSED:
         return
-    near_open = side.near @ (~contact.active & ~pair.options.excluded_nodes(side)) > 0
+    near_open = side.near @ (~contact.active & ~pair.excluded[side.points]) > 0
     weight = np.where(contact.active, lumped_areas(side, pair.points, pair.axisymmetric), 0.0)
     inside = contact.active & ~near_open
     means = (side.near[inside] @ (weight * contact.pressure)) / (side.near[inside] @ weight)

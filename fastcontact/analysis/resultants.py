@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,9 +18,9 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.springs import ground_force
 from fastcontact.errors import ContactError, ModelError, unknown
-from fastcontact.mesh.mesh import ROTATION
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -400,15 +400,12 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     array([0., 2.])
     """
     _check(model, step)
-    n, (supported, _) = model.n_dofs, model.prescribed()
+    supported, _ = model.prescribed()
     related = [relation for _, relation in model.related_supports]
     coupling = [relation for relation in model.relations if not any(relation is other for other in related)]
-    reaction = step.reaction.ravel() - ground_force(model.springs, step.displacement.ravel())
-    rows = [relation.rows for relation in (*related, *coupling)]
-    forces = multipliers(reaction, rows, supported.ravel())
-    reaction = reaction - sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(n))
+    reaction, forces = _at_supports(model, [*related, *coupling], supported, step.reaction, step.displacement)
     by_support: dict[str, Array] = {}
-    unassigned = np.where(supported, reaction.reshape(supported.shape), 0.0)
+    unassigned = np.where(supported, reaction, 0.0)
     for support in model.supports:
         nodes, k = model.mesh.points_of(support.group), support.component
         by_support.setdefault(support.group, np.zeros(supported.shape[1]))[k] += unassigned[nodes, k].sum()
@@ -419,27 +416,32 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     return by_support
 
 
-def reference_reactions(model: Model, reaction: Array, u: Array) -> dict[str, dict[str, list[float]]]:
-    """Return `StepResult.reference_reactions`, given the reactions (n_dofs,) [force] and displacements (n_dofs,) [length]."""
-    groups, supported = model.mesh.point_groups, model.prescribed()[0]
-    points = {
-        name: (model.mesh.point(name), model.mesh.point(name + ROTATION))
-        for name in groups
-        if name + ROTATION in groups
-    }
-    points = {name: pair for name, pair in points.items() if supported[list(pair)].any()}
-    if not points:
-        return {}
-    rows = [relation.rows for relation in model.relations] + [s.row(model.n_dofs) for s in model.pretensions]
-    reaction = reaction - ground_force(model.springs, u)
-    forces = multipliers(reaction, rows, supported.ravel())
-    nodal = reaction - sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(model.n_dofs))
-    nodal = nodal.reshape(supported.shape)
-    moments = 1 if model.mesh.dim == 2 else 3
+def reference_reactions(
+    model: Model, points: Mapping[str, tuple[int, int]], reaction: Array, u: Array
+) -> dict[str, dict[str, list[float]]]:
+    """Return `StepResult.reference_reactions` of the `points` that `Problem.reference_points` contains.
+
+    The arguments are the reactions [force] and displacements `u` [length] (n_points, dim).
+    """
+    nodal, moments = _at_supports(model, model.relations, model.prescribed()[0], reaction, u)[0], 2 * model.mesh.dim - 3
     return {
         name: {"force": nodal[point].tolist(), "moment": nodal[rotation, :moments].tolist()}
         for name, (point, rotation) in points.items()
     }
+
+
+def _at_supports(
+    model: Model, relations: Sequence[MultiPointConstraint], supported: Mask, reaction: Array, u: Array
+) -> tuple[Array, list[Array]]:
+    """Return the nodal forces (n_points, dim) of supports alone, and the forces of constraints, `relations` first [force].
+
+    `reaction` and the displacements `u` [length] have the shape (n_points, dim) or (n_dofs,).
+    """
+    rows = [relation.rows for relation in relations]
+    reaction = reaction.ravel() - ground_force(model.springs, u.ravel())
+    forces = multipliers(reaction, rows, supported.ravel())
+    reaction = reaction - sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(model.n_dofs))
+    return reaction.reshape(supported.shape), forces
 
 
 def multipliers(reaction: Array, rows: Sequence[csr_array], supported: Mask) -> list[Array]:

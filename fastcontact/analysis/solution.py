@@ -158,11 +158,9 @@ class Path:
         closed : ndarray (1 + k, q)
             Gaps, then the components of `closing` [length].
         """
-        forces, closed = (
-            np.vstack([normal[rows], *((vectors[rows] * tangent[rows]).sum(axis=1) for tangent in directions)])
-            for normal, vectors in ((self.normal, self.traction), (self.gap, self.closing))
-        )
-        return forces, closed
+        tangents, (traction, closing) = np.stack(directions)[:, rows], (self.traction[rows], self.closing[rows])
+        forces = np.vstack([self.normal[rows], (traction * tangents).sum(axis=2)])
+        return forces, np.vstack([self.gap[rows], (closing * tangents).sum(axis=2)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,8 +264,8 @@ class Solution:
         """
         if self.tangential.shape != (m, len(directions)):
             return None
-        vectors = sum(t[:, None] * along for t, along in zip(self.tangential.T, self.directions, strict=True))
-        return np.vstack([self.multiplier, *((vectors * tangent).sum(axis=1) for tangent in directions)])
+        vectors = (self.tangential.T[:, :, None] * np.stack(self.directions)).sum(axis=0)
+        return np.vstack([self.multiplier, (vectors * np.stack(directions)).sum(axis=2)])
 
 
 def in_increments(
@@ -375,14 +373,15 @@ def _integrals(before: Array, after: Array, slip: Array, duration: float) -> Arr
 
 def in_last_increment(constraints: Constraints, slip_so_far: SlipSoFar) -> Constraints:
     """Return the constraints with slips measured from the beginning of the last increment."""
-    before = np.stack([(slip_so_far.slip * tangent).sum(axis=1) for tangent in constraints.directions])
+    before = (slip_so_far.slip * np.stack(constraints.directions)).sum(axis=2)
     return replace(constraints, slip0=constraints.slip0 - before)
 
 
 def over_whole_step(solution: Solution, slip_so_far: SlipSoFar) -> Solution:
     """Return the solution with the slips and the integrals of the step, given the solution of its last increment."""
+    directions = np.stack(solution.directions, axis=1)
     before, slip_before_closing, traction = (
-        np.stack([(vectors * tangent).sum(axis=1) for tangent in solution.directions], axis=1)
+        (vectors[:, None] * directions).sum(axis=2)
         for vectors in (slip_so_far.slip, slip_so_far.slip_before_closing, slip_so_far.traction)
     )
     forces = (np.vstack([slip_so_far.normal, traction.T]), np.vstack([solution.multiplier, solution.tangential.T]))

@@ -56,7 +56,7 @@ def advance(problem: Problem, state: State, index: int, begin: float, end: float
 
 def _begins_loaded(problem: Problem, begin: float, end: float) -> bool:
     """Return whether loads act at the beginning of the first step that change in it, and friction depends on their order."""
-    if not any(pair.friction and not pair.options.tied for pair in problem.pairs.values()):
+    if not any(pair.friction and pair.options.kind != "tied" for pair in problem.pairs.values()):
         return False
     before, after = (_values(problem.load_at(instant)) for instant in (begin, end))
     return bool(before.any()) and not np.array_equal(before, after)
@@ -130,7 +130,7 @@ def _has_two_equilibria(problem: Problem, state: State, after: State, index: int
     load path leads. The equilibrium is assumed to be unique in steps that begin with contact, in which contact surfaces move
     by less than the smallest facet, with heat conduction, and with a fixed number of geometry updates.
     """
-    pairs = {name: pair for name, pair in problem.pairs.items() if pair.friction and not pair.options.tied}
+    pairs = {name: pair for name, pair in problem.pairs.items() if pair.friction and pair.options.kind != "tied"}
     closed = [any(ends.active[name].any() for name in pairs if name in ends.active) for ends in (state, after)]
     if not pairs or closed != [False, True] or problem.heat is not None or not problem.until_settled:
         return False

@@ -111,7 +111,7 @@ def settle_heat(
         f"heat and contact do not converge: after {limit} times temperatures still change by {change:.3g}, for "
         "instance because a contact opens when heat flows through it and closes when none does; let its "
         "conductance fall gradually with the gap, or grow from zero with the pressure",
-        equilibrium.history,
+        [] if equilibrium.settled is None else equilibrium.settled.iterate.history,
     )
 
 
@@ -187,10 +187,10 @@ def _normal_state(
     pair, constraints, solution = problem.pairs[name], settled.constraints.parts[name], settled.solution
     touching = LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
     forces = np.maximum(constraints.normal_forces(constraints.contact_forces(solution.multiplier[rows])), 0.0)
-    if pair.options.tied:
+    if pair.options.kind == "tied":
         return pair.unilateral(Configuration.undeformed(pair.points)), forces, np.zeros(len(forces))
     closed, layer, wetted = solution.active[rows], constraints.tied, constraints.wetted
-    if not pair.options.gap_only and layer is None and wetted is None:
+    if pair.options.kind != "gap_only" and layer is None and wetted is None:
         gap = np.maximum(solution.gap[rows], 0.0)
         return constraints, forces, np.where(closed | (gap <= touching), 0.0, gap)
     constraints = pair.unilateral(configuration)
@@ -199,6 +199,6 @@ def _normal_state(
         closed = closed & ~wetted.rows
     elif isinstance(layer, Layer):  # adhesion conducts up to its strength, a cohesive layer until it is broken
         closed = layer.damage == 0.0 if layer.law.reversible else layer.damage < 1.0
-    elif pair.options.gap_only:
+    elif pair.options.kind == "gap_only":
         closed, forces = np.zeros(len(gap), bool), np.zeros(len(gap))
     return constraints, forces, np.where(closed | (gap <= touching), 0.0, gap)

@@ -147,7 +147,7 @@ class ScatterWindow:
             None if the updates may still converge, or if they scatter by more than is acceptable.
         """
         if not change <= SINGLE_PRECISION * size:
-            self.forget()
+            self._window.clear()
             return None
         self._window.append((displacement.copy(), force.copy(), change))
         contracts = contraction <= DECLINE and change <= LENGTH_ROUND_OFF * size
@@ -162,10 +162,6 @@ class ScatterWindow:
             return None
         acceptable = scatter.displacement <= SINGLE_PRECISION and scatter.force <= 100 * SINGLE_PRECISION
         return scatter if acceptable else None
-
-    def forget(self) -> None:
-        """Discard the updates in the window."""
-        self._window.clear()
 
 
 def _spread(vectors: tuple[Array, ...]) -> float:

@@ -13,16 +13,12 @@ import numpy as np
 
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.inequalities import Iterate, StepContext, pair_surfaces
-from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Path, Solution
 from fastcontact.arrays import Array, largest
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
-
-# Shear of nodes that close and slide which is neglected by default, relative to the frictional capacity.
-NEGLIGIBLE = 1e-3
 
 
 class Touching:
@@ -31,9 +27,8 @@ class Touching:
     Parameters
     ----------
     step : StepContext
-    newton : bool
-        Whether the geometry converges quadratically. The increments are then solved once it has nearly converged, otherwise
-        once it has converged.
+        If its geometry converges quadratically, the increments are solved once it has nearly converged, otherwise once it has
+        converged.
 
     Attributes
     ----------
@@ -43,8 +38,9 @@ class Touching:
         Whether the last pairing was solved in increments, so that its last increment is to be solved again.
     """
 
-    def __init__(self, step: StepContext, newton: bool) -> None:
-        self._shear_limit, self._near = _shear_limit(step.problem), NOTABLE if newton else 0.0
+    def __init__(self, step: StepContext) -> None:
+        self._shear_limit = step.problem.friction_while_touching
+        self._near = NOTABLE if step.linearises_contact else 0.0
         self.due = self.unfinished = self._settled = False
         self._paired, self._shift = None, np.inf
 
@@ -130,23 +126,6 @@ def _path(
         gap, normal, traction, slips = nodes.of_representatives(constraints, gap, normal, traction, slips)
     waiting = (gap > LENGTH_ROUND_OFF * size) & ~constraints.equality
     return Path(gap, normal, traction, slips, waiting) if waiting.any() else None
-
-
-def _shear_limit(problem: Problem) -> float:
-    """Return `Criteria.friction_while_touching` or its default; 1 means that friction is solved in whole steps.
-
-    With nonlinear bodies it is 1, because their steps are halved instead. Between bodies the default is 1 unless each node
-    has one weighted gap: the other formulations reproduce code_aster, which counts slip from the beginning of the step.
-    """
-    criteria = problem.criteria
-    if problem.bodies is not None:
-        return 1.0
-    if criteria.friction_while_touching is not None:
-        return criteria.friction_while_touching
-    floats = problem.floating_bodies is not None
-    whole_steps = problem.model.mesh.dim == 3 or criteria.geometry_updates is not None or floats
-    pairs = [pair for pair in problem.pairs.values() if pair.friction and isinstance(pair.primary, Surface)]
-    return NEGLIGIBLE if not whole_steps and all(pair.weighs_gaps for pair in pairs) else 1.0
 
 
 def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> Array:

@@ -1,7 +1,7 @@
 """Wear of the secondary nodes of a contact pair by slip.
 
 By the law of Archard (J. Appl. Phys. 24, 1953), the wear depth is proportional to the product of pressure and sliding
-distance. In this module m is the number of secondary nodes.
+distance. On quadratic facets the wear depth of each step is linear. In this module m is the number of secondary nodes.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ import numpy as np
 from fastcontact.arrays import Array, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.integration import facet_measure, fine_rule
+from fastcontact.mesh import elements
 from fastcontact.results.step import ContactResult
 
 
@@ -41,7 +43,7 @@ class Worn(NamedTuple):
     ) -> Worn:
         """Return the wear after one more load step; for parameters see `wear_depth_in_step`."""
         depth = wear_depth_in_step(pair, configuration, contact, self.pressure, coefficient)
-        mean = 0.5 * np.maximum(contact.pressure + self.pressure, 0.0)
+        mean = _linear_on_facets(pair, 0.5 * np.maximum(contact.pressure + self.pressure, 0.0))
         largest_rate = np.divide(depth, mean, out=np.zeros_like(depth), where=mean > 0.0)
         return Worn(self.depth + depth, contact.pressure, max(self.largest_rate, float(largest_rate.max(initial=0.0))))
 
@@ -66,12 +68,36 @@ def wear_depth_in_step(
         Archard's coefficient divided by the hardness [1 / pressure].
     """
     if contact.sliding_load is not None:
-        return coefficient * contact.sliding_load
+        return coefficient * _linear_on_facets(pair, contact.sliding_load)
     distance = np.linalg.norm(pair.nodal_slip(configuration), axis=1)
     if pair.friction:
         distance = np.where(contact.sticking, 0.0, distance)
     pressure = np.maximum(contact.pressure + earlier_pressure, 0.0)
-    return np.asarray(coefficient * 0.5 * pressure * distance)
+    return coefficient * 0.5 * _linear_on_facets(pair, pressure * distance)
+
+
+def _linear_on_facets(pair: Formulation, values: Array) -> Array:
+    """Return nodal values (m,) that are linear in the facets and have the integral of `values` (m,).
+
+    Pressures at corners and mid-side nodes of quadratic facets differ by their scatter, which the wear would amplify in every
+    step. The values at corners are means, weighted with the linear shape functions.
+    """
+    elements_of_blocks = [elements.get(block.element) for block in pair.secondary.blocks]
+    if all(element.order == 1 for element in elements_of_blocks):
+        return values
+    integrals, areas, linear = np.zeros(len(values)), np.zeros(len(values)), np.empty_like(values)
+    for block, element in zip(pair.secondary.blocks, elements_of_blocks, strict=True):
+        xi, weights = fine_rule(block.element)
+        N, corner_shape = element.shape(xi), element.corner_shape(xi)
+        dA = facet_measure(block.facets, block.element, pair.points, xi, pair.axisymmetric) * weights
+        corners = block.local[:, : corner_shape.shape[1]]
+        np.add.at(integrals, corners, (dA * (values[block.local] @ N.T)) @ corner_shape)
+        np.add.at(areas, corners, dA @ corner_shape)
+    means = np.divide(integrals, areas, out=np.zeros_like(values), where=areas > 0.0)
+    for block, element in zip(pair.secondary.blocks, elements_of_blocks, strict=True):
+        shape = element.corner_shape(element.nodes)
+        linear[block.local] = means[block.local[:, : shape.shape[1]]] @ shape.T
+    return linear
 
 
 def at_points(points: Numbers, depth: Array, n_points: int) -> Array:

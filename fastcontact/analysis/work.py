@@ -25,7 +25,6 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import RigidSide
-from fastcontact.contact.pairing import Candidates
 from fastcontact.results.step import ContactResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
@@ -227,8 +226,7 @@ def contact_work(
     sliding = float((work_at_end + work_at_begin).sum())
     displacement = configuration.displacement - configuration.start
     if isinstance(pair.primary, RigidSide):  # relative to the obstacle
-        points = pair.secondary.points
-        displacement[points] -= pair.rigid_motion(Candidates(points[:, None], np.ones((len(points), 1))), configuration)
+        displacement[pair.secondary.points] -= pair.rigid_motion(pair.at_nodes, configuration)
     (work_after, energy_after), (work_before, energy_before) = (
         forces.normal_work(other, displacement) for forces, other in ((after, before), (before, after))
     )

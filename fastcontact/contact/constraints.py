@@ -7,8 +7,7 @@ secondary nodes, and k the number of tangents, which is one in 2D, two in 3D, an
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -33,7 +32,7 @@ class Compliance(Protocol):
         """Return the value of `block`, or an equivalent object that linear solvers can use without forming the submatrix."""
 
     def apply(self, multiplier: Array) -> Array:
-        """Return ``C @ multiplier`` (m,) [length] for multipliers (m,) [force]."""
+        """Return ``C @ multiplier`` [length] for multipliers (m,) or vectors of forces (m, dim) [force]."""
 
 
 class NodalField(Protocol):
@@ -245,13 +244,13 @@ class Constraints:
     compliance: Compliance | None = None
     tangents: tuple[csr_array, ...] = ()
     directions: tuple[Array, ...] = ()
-    friction: Array = field(default_factory=lambda: np.empty(0))
-    slip0: Array = field(default_factory=lambda: np.empty(0))
-    equality: Mask = field(default_factory=lambda: np.empty(0, bool))
-    softness: Array = field(default_factory=lambda: np.empty(0))
-    low_rank_compliance: Array = field(default_factory=lambda: np.empty(0))
-    tangential_softness: Array = field(default_factory=lambda: np.empty(0))
-    elastic_slip: Array = field(default_factory=lambda: np.empty(0))
+    friction: Array = field(default_factory=np.empty(0).copy)
+    slip0: Array = field(default_factory=np.empty(0).copy)
+    equality: Mask = field(default_factory=np.empty(0, bool).copy)
+    softness: Array = field(default_factory=np.empty(0).copy)
+    low_rank_compliance: Array = field(default_factory=np.empty(0).copy)
+    tangential_softness: Array = field(default_factory=np.empty(0).copy)
+    elastic_slip: Array = field(default_factory=np.empty(0).copy)
     areas: Array | None = None
     nodes: Indices | None = None
     nodal: NodalField | None = None
@@ -351,8 +350,7 @@ class Constraints:
         if self.compliance is not None:
             axes = self.coupled_directions or self.directions
             forces = multiplier[:, None] * normals(axes) + np.einsum("mk,kmd->md", tangential, np.stack(axes))
-            elastic = np.column_stack([self.compliance.apply(component) for component in forces.T])
-            slips += np.einsum("md,kmd->mk", elastic, np.stack(axes))
+            slips += np.einsum("md,kmd->mk", self.compliance.apply(forces), np.stack(axes))
         return np.einsum("mk,kmd->md", slips, np.stack(self.directions))
 
     def pressure(self, multiplier: Array) -> Array:
@@ -369,32 +367,23 @@ class StackedConstraints(Constraints):
     ----------
     parts : dict of str to Constraints
         The constraints of each pair, by the name of the pair.
+    rows : dict of str to slice
+        Range of rows of each pair.
     """
 
     parts: Mapping[str, Constraints] = field(default_factory=dict)
-
-    def state(self, active: Mask) -> AnyArray:
-        """Return the active set (m,) and the `branches` of all pairs, in one array.
-
-        While this array is constant, the solution depends smoothly on the geometry.
-        """
-        branches = (pair.branches for pair in self.parts.values() if pair.branches is not None)
-        return np.concatenate([active.astype(np.int8), *branches])
-
-    @cached_property
-    def rows(self) -> dict[str, slice]:
-        """Range of rows of each pair, by the name of the pair."""
-        ends = np.cumsum([0, *(len(pair) for pair in self.parts.values())]).tolist()
-        return {name: slice(first, end) for name, first, end in zip(self.parts, ends[:-1], ends[1:], strict=True)}
+    rows: Mapping[str, slice] = field(default_factory=dict)
 
 
 def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
     """Return the stacked constraints of contact pairs, given the constraints of each pair by its name."""
     pairs = list(by_pair.values())
+    ends = np.cumsum([0, *map(len, pairs)]).tolist()
+    rows_of_pairs = dict(zip(by_pair, map(slice, ends[:-1], ends[1:]), strict=True))
     if len(pairs) == 1:
-        values = {entry.name: getattr(pairs[0], entry.name) for entry in fields(Constraints)}
-        return StackedConstraints(**values, parts=by_pair)
+        return StackedConstraints(**vars(pairs[0]), parts=by_pair, rows=rows_of_pairs)
     count, nodes = max(len(pair.tangents) for pair in pairs), [pair.nodes for pair in pairs if pair.nodes is not None]
+    branches = [pair.branches for pair in pairs if pair.branches is not None]
     tangents = [pair.tangents or (csr_array(pair.B.shape),) * count for pair in pairs]
 
     columns: dict[str, Any] = {
@@ -413,8 +402,10 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
         directions=_stacked_directions(pairs),
         low_rank_compliance=np.stack([block_diag(*component) for component in zip(*factors, strict=True)]),
         nodes=None if len(nodes) < len(pairs) else np.concatenate(nodes),
+        branches=np.concatenate(branches) if branches else None,
         coupled_directions=_stacked_directions(pairs, coupled=True),
         parts=by_pair,
+        rows=rows_of_pairs,
         **columns,
     )
 
@@ -447,7 +438,7 @@ class _Softened:
         return self.block(rows)
 
     def apply(self, multiplier: Array) -> Array:
-        elastic = self._softness * multiplier
+        elastic = (self._softness * multiplier.T).T
         return elastic if self._inner is None else elastic + self._inner.apply(multiplier)
 
 
@@ -477,4 +468,4 @@ class _BlockDiagonal:
 
     def apply(self, multiplier: Array) -> Array:
         blocks = zip(self._compliances, np.split(multiplier, np.cumsum(self._sizes)[:-1]), strict=True)
-        return np.concatenate([np.zeros(len(y)) if C is None else C.apply(y) for C, y in blocks])
+        return np.concatenate([np.zeros_like(y) if C is None else C.apply(y) for C, y in blocks])

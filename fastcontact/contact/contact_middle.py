@@ -22,16 +22,10 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.formulations._formulation import LEANING
-from fastcontact.contact.held_motions import SAME_DIRECTION
 from fastcontact.contact.pairing import FACING
-from fastcontact.contact.projection import closest, nodal_normals
-from fastcontact.contact.surface import Surface, line_neighbours
-from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
-
-# Largest distance of nodes from a plane of symmetry, relative to the size of the surface, and smallest cosine of the angle
-# between directions that are regarded as parallel. Coordinates in files may have six digits.
-PLANE, PARALLEL = 2e-5, 1.0 - SINGLE_PRECISION
+from fastcontact.contact.projection import closest
+from fastcontact.contact.surface import Surface
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +57,8 @@ class UnrolledLine:
 
     def at(self, length: float) -> Array:
         """Return the point (2,) at an arc length along the line [length]."""
-        return np.array([np.interp(length, self.abscissa, component) for component in self.nodes.T])
+        x, y = self.nodes.T
+        return np.array([np.interp(length, self.abscissa, x), np.interp(length, self.abscissa, y)])
 
     def lengths(self, positions: Array) -> Array:
         """Return the arc length (n,) of the point of the line nearest to each of `positions` (n, 2) [length]."""
@@ -95,7 +90,7 @@ def _loop(surface: Surface) -> list[int] | None:
     """Return the nodes, as rows of the points of a surface, in order along its closed line; None if there is no such line."""
     # The nodes of each facet in order along the line, without its end.
     chains = [chain for block in surface.blocks for chain in np.delete(block.local, 1, axis=1).tolist()]
-    following = line_neighbours(surface.ends)[:, 1].tolist()
+    following = surface.line_neighbours[:, 1].tolist()
     order = [0]
     while (facet := following[order[-1]]) > 0 and len(order) < len(chains):
         order.append(facet)
@@ -169,13 +164,10 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     axial = abs(mean[0]) <= abs(mean[1])
     if pair.axisymmetric and (meets_axis or (axial and _radius_is_monotone(surface, pair.points))):
         return ContactMiddle(np.array([0.0, float(weight @ points[:, 1])]), direction=np.array([0.0, 1.0]))
-    planes = symmetry_planes(pair)
+    planes = pair.symmetry_planes
     if closed.any():  # only the planes that the contact reaches
-        reached = [
-            any(closed[block.local[np.isin(block.local, nodes).any(axis=1)]].any() for block in surface.blocks)
-            for _, nodes in planes
-        ]
-        planes = [plane for plane, is_reached in zip(planes, reached, strict=True) if is_reached]
+        near_closed = surface.beside @ closed > 0
+        planes = [(axis, nodes) for axis, nodes in planes if near_closed[nodes].any()]
     if dim == 2:
         return _middle_in_2d(surface, pair.points, weight, planes, mean)
     return _middle_in_3d(points, weight, planes, mean)
@@ -208,55 +200,6 @@ def _radius_is_monotone(surface: Surface, coordinates: Array) -> bool:
         return True
     steps, noise = np.diff(line.nodes[:, 0]), LENGTH_ROUND_OFF * float(np.ptp(line.nodes, axis=0).max())
     return bool(steps.min() >= -noise or steps.max() <= noise)
-
-
-def symmetry_planes(pair: Formulation) -> list[tuple[Array, Indices]]:
-    """Return the planes of symmetry at the ends of the secondary surface.
-
-    Each is given by its unit normal (dim,) and the nodes of the surface in the plane. Supports prescribe zero displacement
-    along the normal, and the opposite body does not extend beyond the plane.
-    """
-    surface, coordinates, motions = pair.secondary, pair.points, pair.held
-    if motions is None:
-        return []
-    points, opposite = coordinates[surface.points], coordinates[pair.primary.points]
-    held, driven = motions.at(surface.points), motions.driven[surface.points]
-    partly_held = np.trace(held, axis1=1, axis2=2) < points.shape[1] - 0.5
-    tolerance, planes = PLANE * float(np.ptp(points, axis=0).max()), []
-    normals = nodal_normals(surface, coordinates)
-    for axis in _held_directions(held[partly_held]):
-        x, x_opposite = points @ axis, opposite @ axis
-        components = np.abs(axis) > PLANE
-        for end, outward in ((x.min(), -1.0), (x.max(), 1.0)):
-            if np.ptp(x) <= tolerance or (outward * (x_opposite - end) > tolerance).any():
-                continue
-            nodes = np.flatnonzero(partly_held & (np.abs(x - end) <= tolerance))
-            on_plane = np.einsum("d,nde,e->n", axis, held[nodes], axis) >= SAME_DIRECTION**2
-            on_plane &= ~driven[nodes][:, components].any(axis=1)
-            on_plane &= np.abs(normals[nodes] @ axis) < LEANING  # otherwise the plane does not cut the surface
-            if len(nodes) and on_plane.all():
-                planes.append((axis, nodes))
-    return planes
-
-
-def _held_directions(projectors: Array) -> Array:
-    """Return distinct unit vectors (k, dim) along which nodes are held, given their `projectors` (n, dim, dim).
-
-    For a node that is held in several directions, the directions of other nodes are preferred, then the coordinate axes.
-    """
-    dim = projectors.shape[1]
-    directions = np.empty((0, dim))
-    distinct = np.unique(np.round(projectors, 9).reshape(-1, dim * dim), axis=0).reshape(-1, dim, dim)
-    for P in distinct[np.argsort(np.trace(distinct, axis1=1, axis2=2), kind="stable")]:
-        candidates = np.concatenate([directions, np.eye(dim)])
-        in_range = candidates[np.linalg.norm(candidates @ P, axis=1) > PARALLEL]
-        for n in [*in_range, *np.linalg.eigh(P)[1].T[::-1]]:
-            if (length := np.linalg.norm(P @ n)) > 0.5:
-                direction = P @ n / length * (1.0 if n[np.argmax(np.abs(n))] > 0.0 else -1.0)
-                P = P - np.outer(direction, direction)
-                if not (np.abs(directions @ direction) > PARALLEL).any():
-                    directions = np.vstack([directions, direction])
-    return directions
 
 
 def _weights(force: Array, gap: Array) -> Array:

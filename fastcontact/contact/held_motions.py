@@ -1,7 +1,7 @@
 """Directions in which supports or multi-point constraints hold nodes.
 
 The held directions of a node are described by an orthogonal projector P (dim, dim): the component ``P u`` of the displacement
-u of the node is prescribed.
+u of the node is prescribed. Supports at the end of a surface may represent a plane of symmetry.
 """
 
 from __future__ import annotations
@@ -15,12 +15,19 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.projection import CORNER
+from fastcontact.contact.projection import CORNER, nodal_normals
+from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.multipoint_constraints import eliminate
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION, TINY
 
 # Cosine of the largest angle between directions at two adjacent nodes that belong to the same field, as along a curved rim.
 SAME_DIRECTION = float(np.cos(np.radians(0.5 * CORNER)))
+# Sine of the largest angle between the normal of a surface and a plane of symmetry at which the surface of the full model has
+# no corner at the plane. Octagons, with an angle of 22.5 degrees, have corners there irrespective of round-off.
+LEANING = float(np.sin(np.radians(21.0)))
+# Largest distance of nodes from a plane of symmetry, relative to the size of the surface, and smallest cosine of the angle
+# between directions that are regarded as parallel. Coordinates in files may have six digits.
+PLANE, PARALLEL = 2e-5, 1.0 - SINGLE_PRECISION
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,3 +182,52 @@ def _distances(points: Array, other_points: Array) -> Array:
 def _unit(vectors: Array) -> Array:
     """Return vectors (n, dim), normalised to unit length; zero vectors stay zero."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), TINY))
+
+
+def symmetry_planes(
+    motions: HeldMotions, surface: Surface, coordinates: Array, opposite: Array
+) -> list[tuple[Array, Indices]]:
+    """Return the planes of symmetry at the ends of the secondary surface.
+
+    Each is given by its unit normal (dim,) and the nodes of the surface in the plane. Supports prescribe zero displacement
+    along the normal, and the opposite body, with nodes at `opposite` (q, dim) [length], does not extend beyond the plane.
+    `coordinates` (n_points, dim) are the reference coordinates of all points [length].
+    """
+    points = coordinates[surface.points]
+    held, driven = motions.at(surface.points), motions.driven[surface.points]
+    partly_held = np.trace(held, axis1=1, axis2=2) < points.shape[1] - 0.5
+    tolerance, planes = PLANE * float(np.ptp(points, axis=0).max()), []
+    normals = nodal_normals(surface, coordinates)
+    for axis in _held_directions(held[partly_held]):
+        x, x_opposite = points @ axis, opposite @ axis
+        components = np.abs(axis) > PLANE
+        for end, outward in ((x.min(), -1.0), (x.max(), 1.0)):
+            if np.ptp(x) <= tolerance or (outward * (x_opposite - end) > tolerance).any():
+                continue
+            nodes = np.flatnonzero(partly_held & (np.abs(x - end) <= tolerance))
+            on_plane = np.einsum("d,nde,e->n", axis, held[nodes], axis) >= SAME_DIRECTION**2
+            on_plane &= ~driven[nodes][:, components].any(axis=1)
+            on_plane &= np.abs(normals[nodes] @ axis) < LEANING  # otherwise the plane does not cut the surface
+            if len(nodes) and on_plane.all():
+                planes.append((axis, nodes))
+    return planes
+
+
+def _held_directions(projectors: Array) -> Array:
+    """Return distinct unit vectors (k, dim) along which nodes are held, given their `projectors` (n, dim, dim).
+
+    For a node that is held in several directions, the directions of other nodes are preferred, then the coordinate axes.
+    """
+    dim = projectors.shape[1]
+    directions = np.empty((0, dim))
+    distinct = np.unique(np.round(projectors, 9).reshape(-1, dim * dim), axis=0).reshape(-1, dim, dim)
+    for P in distinct[np.argsort(np.trace(distinct, axis1=1, axis2=2), kind="stable")]:
+        candidates = np.concatenate([directions, np.eye(dim)])
+        in_range = candidates[np.linalg.norm(candidates @ P, axis=1) > PARALLEL]
+        for n in [*in_range, *np.linalg.eigh(P)[1].T[::-1]]:
+            if (length := np.linalg.norm(P @ n)) > 0.5:
+                direction = P @ n / length * (1.0 if n[np.argmax(np.abs(n))] > 0.0 else -1.0)
+                P = P - np.outer(direction, direction)
+                if not (np.abs(directions @ direction) > PARALLEL).any():
+                    directions = np.vstack([directions, direction])
+    return directions

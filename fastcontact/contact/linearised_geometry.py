@@ -17,8 +17,8 @@ forces and slips. The equations of slips are in `Slips`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
@@ -26,13 +26,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact.arrays import Array, Indices, largest
+from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, Pairing, normals, tangents
 from fastcontact.contact.projection import (
     Places,
-    at_nodes_of_facets,
     nodal_normals,
     places,
     smooth_normals,
@@ -64,7 +63,8 @@ class NodalNormals:
     def along(self, du: Array) -> Array:
         """Return the variation (m, dim) [-] of the normals for a variation `du` (n_points, dim) of displacements [length]."""
         rate = (largest(du[self._side.points]) or 1.0) / self._step
-        ahead, behind = (nodal_normals(self._side, self._coordinates + sign / rate * du) for sign in (0.5, -0.5))
+        ahead = nodal_normals(self._side, self._coordinates + 0.5 / rate * du)
+        behind = nodal_normals(self._side, self._coordinates - 0.5 / rate * du)
         return np.asarray(rate * (ahead - behind))
 
 
@@ -98,7 +98,7 @@ class InterpolatedNormals:
     @classmethod
     def smooth(cls, side: Surface, coordinates: Array, facet: Indices, at: Places) -> InterpolatedNormals:
         """Return the interpolated `smooth_normals` of a side at the places `at` of its facets `facet` (n,)."""
-        at_nodes = at_nodes_of_facets(smooth_normals(side, coordinates))[facet]
+        at_nodes = smooth_normals(side, coordinates)[facet]
         return cls(NodalNormals(side, coordinates), at.local, at.shape, at_nodes)
 
     def bend(self, gradient: Array) -> Array:
@@ -284,8 +284,8 @@ class Closing:
     ----------
     mean, size : ndarray (n, dim), ndarray (n, 1)
         Mean direction m of the normals of both sides, and the length of the difference of these normals [-].
-    secondary : NodalNormals or InterpolatedNormals
-        Normals of the secondary side.
+    secondary : NodalNormals or InterpolatedNormals or None
+        Normals of the secondary side; None if m is the normal of an obstacle.
     opening : ndarray (n, dim)
         Vector o from the primary to the secondary side at the beginning of the step [length].
     length : ndarray (n,)
@@ -296,22 +296,23 @@ class Closing:
 
     mean: Array
     size: Array
-    secondary: NodalNormals | InterpolatedNormals
+    secondary: NodalNormals | InterpolatedNormals | None
     opening: Array
     length: Array
     along_mean: bool
 
     @classmethod
     def of(
-        cls, primary: Array, secondary: NodalNormals | InterpolatedNormals, opening: Array, length: Array | None = None
-    ) -> Closing:
+        cls, primary: Array, secondary: NodalNormals | InterpolatedNormals | None, opening: Array,
+        length: Array | None = None,
+    ) -> Closing:  # fmt: skip
         """Return the closing motion between sides with the normals `primary` (n, dim) and `secondary`.
 
         Without a given `length` (n,), the direction a is m.
         """
-        mean = primary - secondary.normal
+        mean = primary if secondary is None else primary - secondary.normal
         size = np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), TINY)
-        mean /= size
+        mean = mean / size
         opening_along_mean = np.einsum("nd,nd->n", mean, opening)
         return cls(mean, size, secondary, opening, opening_along_mean if length is None else length, length is None)
 
@@ -327,13 +328,52 @@ class Closing:
         the primary normals and of o, all (n, dim).
         """
         mean = self.mean
-        d_mean = transverse(mean, primary - self.secondary.along(du)) / self.size
+        turned = primary if self.secondary is None else primary - self.secondary.along(du)
+        d_mean = transverse(mean, turned) / self.size
         a, d_a = (mean, d_mean) if self.along_mean else normal
         cosine = np.einsum("nd,nd->n", a, mean)
         numerator = np.einsum("nd,nd->n", d_a, self.opening) + np.einsum("nd,nd->n", a, opening)
         numerator -= self.length * (np.einsum("nd,nd->n", d_a, mean) + np.einsum("nd,nd->n", a, d_mean))
         q = np.divide(numerator, cosine, out=np.zeros_like(cosine), where=(self.length != 0.0) & (cosine != 0.0))
         return q[:, None] * mean + self.length[:, None] * d_mean
+
+
+@dataclass(frozen=True, eq=False)
+class Substitution:
+    """Additional slip along an axis in which supports hold nodes, whose functions those of their neighbours replace.
+
+    Attributes
+    ----------
+    axis : ndarray (m, dim)
+        Unit vectors, which are constant [-].
+    held : ndarray of bool (m,)
+        Held nodes.
+    secondary : csr_array (m, m)
+        Mean values of fields on the secondary side, minus those without the replacement.
+    functions : csr_array (m, n)
+        Mean values of fields at points, minus those without the replacement.
+    """
+
+    axis: Array
+    held: Mask
+    secondary: csr_array
+    functions: csr_array
+
+    def along_axis(self, vectors: Array) -> Array:
+        """Return the components of vectors (m, dim) along the axis, as vectors."""
+        return np.asarray(np.einsum("md,md->m", vectors, self.axis)[:, None] * self.axis)
+
+    def closing(self, motion: Array) -> Array:
+        """Return the slip (m, dim) by a motion (m, dim) of nodes that closes their gaps [length].
+
+        On curved sides, the neighbours close their gaps along other normals, and this motion is not slip.
+        """
+        transverse = motion - np.where(self.held[:, None], self.along_axis(motion), 0.0)
+        return self.along_axis(self.secondary @ transverse)
+
+    def slip(self, closing: Array, motion: Array) -> Array:
+        """Return the slip (m, dim) by the relative motion (n, dim) of points, of which `closing` closes gaps [length]."""
+        return self.closing(closing) + self.along_axis(self.functions @ motion)
 
 
 @dataclass(frozen=True, eq=False)
@@ -361,9 +401,13 @@ class Slips:
     motion, start : ndarray (n_points, dim)
         Increments of displacements in the step and positions at its beginning, of all nodes [length].
     closing : Closing, optional
-        Part q m; None for obstacles and if slip is not symmetric.
+        Part q m; None if neither the slip nor that of `substitutions` contains it.
+    symmetric : bool
+        Whether q m is part of the slip at all points.
     turning : ndarray (dim, dim), optional
         Derivative of the motion that points share with a rotating obstacle with respect to their displacements [-].
+    substitutions : list of Substitution
+        Additional slips.
     """
 
     tangents: Array
@@ -372,7 +416,15 @@ class Slips:
     motion: Array
     start: Array
     closing: Closing | None = None
+    symmetric: bool = True
     turning: Array | None = None
+    substitutions: Sequence[Substitution] = ()
+
+    def with_substitution(self, substitution: Substitution, motion: csr_array) -> Slips:
+        """Return the slips with an additional one; `motion` (n, n_points) is that of the points."""
+        assert self.closing is not None
+        total = self.total + substitution.slip(self.closing.vector, motion @ self.motion)
+        return replace(self, total=total, substitutions=(*self.substitutions, substitution))
 
     @property
     def force(self) -> Array:
@@ -397,17 +449,18 @@ class Slips:
         normals : (ndarray (n, dim), ndarray (n, dim), ndarray (n, dim))
             Normals of the constraints, their variation, and the variation of the primary normals of `closing` [-].
         """
-
-        def by_sliding(values: Array) -> Array:
-            return _sums(weights, variation.motion @ values)
-
-        change, (normal, d_normal, primary) = by_sliding(self.motion), normals
+        motion, (normal, d_normal, primary) = variation.motion @ self.motion, normals
+        change, closing = _sums(weights, motion), np.zeros_like(normal)
+        if self.closing is not None:
+            if self.closing.along_mean:
+                d_opening = _sums(weights, variation.motion @ self.start)
+            else:  # The openings that weighted gaps close are those of smooth surfaces, whose variation `foot` contains.
+                d_opening = -change - _sums(weights, variation.foot)
+            closing = self.closing.along(du, (normal, d_normal), primary, d_opening)
+            change = change + closing if self.symmetric else change
         if self.turning is not None:
             change -= _sums(weights, points.motion @ du @ self.turning)
-        if self.closing is not None:
-            # The openings that weighted gaps close are those of smooth surfaces, whose variation `foot` contains.
-            d_opening = by_sliding(self.start) if self.closing.along_mean else -change - _sums(weights, variation.foot)
-            change += self.closing.along(du, (normal, d_normal), primary, d_opening)
+        change += sum(substitution.slip(closing, motion) for substitution in self.substitutions)
         normal_part = np.einsum("nd,nd->n", normal, self.total)
         T = self.tangents
         return np.einsum("knd,nd->kn", T, change) - np.einsum("knd,nd,n->kn", T, d_normal, normal_part)
@@ -415,14 +468,6 @@ class Slips:
 
 def _sums(weights: csr_array | None, values: Array) -> Array:
     return values if weights is None else np.asarray(weights @ values)
-
-
-def _force_variation(multiplier: Array, tangential: Array | None, normal: Array, d_normal: Array) -> Array:
-    """Return the variation (n, dim) of contact forces due to the variation `d_normal` (n, dim) of their normals."""
-    change = multiplier[:, None] * d_normal
-    if tangential is not None:
-        change -= np.einsum("nd,nd->n", tangential, d_normal)[:, None] * normal
-    return change
 
 
 @dataclass(frozen=True, eq=False)
@@ -480,16 +525,24 @@ class LinearisedPoints:
                 primary = _sums(self.functions, turned)
             normals = self.normal, normal, primary
             gaps = np.vstack([gaps, self.slips.along(du, varied, self.points, self.functions, normals)])
-        tangential = None if self.slips is None else self.slips.force
-        force = _force_variation(self.multiplier, tangential, self.normal, normal)
+        force, tangential = self.multiplier[:, None] * normal, np.zeros_like(normal)
+        if self.slips is not None:
+            tangential = -np.einsum("md,md->m", self.slips.force, normal)[:, None] * self.normal
         if self.compliance is not None and self.slips is not None:
-            gaps += self._elastic(normal, force)
-        force = force if self.functions is None else self.functions.T @ force
+            gaps += self._elastic(normal, force + tangential)
         if self.place is not None:
             rows, of_rows = self.place[0], gaps
             gaps = np.zeros((len(gaps), self.place[1]))
             gaps[:, rows] = of_rows
-        return self.points.motion.T @ force + varied.motion.T @ self._force, gaps
+        return self.points.motion.T @ self._at_points(force, tangential) + varied.motion.T @ self._force, gaps
+
+    def _at_points(self, normal: Array, tangential: Array) -> Array:
+        """Return the forces (n, dim) at the points for normal and tangential forces (m, dim) of the constraints [force]."""
+        if self.functions is None:
+            return normal + tangential
+        force = np.asarray(self.functions.T @ (normal + tangential))
+        substitutions = () if self.slips is None else self.slips.substitutions
+        return sum((s.functions.T @ s.along_axis(tangential) for s in substitutions), force)
 
     def _elastic(self, normal: Array, force: Array) -> Array:
         """Return the variation (1 + k, m) of elastic gaps and slips [length] due to those of normals and forces (m, dim)."""
@@ -505,18 +558,18 @@ class LinearisedPoints:
     def _elastic_displacements(self) -> Array:
         """Elastic displacements (m, dim) of the constraints [length]."""
         assert self.compliance is not None
-        return self.compliance(self._forces)
+        return self.compliance(np.add(*self._forces))
 
-    @property
-    def _forces(self) -> Array:
-        """Forces of the constraints (m, dim) [force]."""
-        force = self.multiplier[:, None] * self.normal
-        return force if self.slips is None else force + self.slips.force
+    @cached_property
+    def _forces(self) -> tuple[Array, Array]:
+        """Normal and tangential forces (m, dim) of the constraints [force]."""
+        normal = self.multiplier[:, None] * self.normal
+        return normal, np.zeros_like(normal) if self.slips is None else self.slips.force
 
     @cached_property
     def _force(self) -> Array:
         """Forces at the points (n, dim) [force]."""
-        return self._forces if self.functions is None else np.asarray(self.functions.T @ self._forces)
+        return self._at_points(*self._forces)
 
     @cached_property
     def _length(self) -> Array:

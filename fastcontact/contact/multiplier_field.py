@@ -77,14 +77,17 @@ class Projection:
         return FieldCompliance(P, areas, stiffness, mass_of_others, lambda: self.block(rows), self.quadratic)
 
     def apply(self, multiplier: Array) -> Array:
-        """Return ``C @ multiplier`` (m,) [length] for point forces (m,) [force]."""
-        with_area = self.areas > 0
-        pressure = np.divide(multiplier, self.areas, out=np.zeros_like(multiplier), where=with_area)
-        return np.where(with_area, pressure - self.P @ self.field(np.where(with_area, multiplier, 0.0)), 0.0) / self.rho
+        """Return ``C @ multiplier`` [length] for point forces (m,) or (m, dim) [force]."""
+        forces = multiplier if multiplier.ndim == 2 else multiplier[:, None]
+        areas, with_area = self.areas[:, None], self.areas[:, None] > 0
+        pressure = np.divide(forces, areas, out=np.zeros_like(forces), where=with_area)
+        elastic = np.where(with_area, pressure - self.P @ self.field(np.where(with_area, forces, 0.0)), 0.0)
+        return elastic.reshape(multiplier.shape) / self.rho
 
     def field(self, multiplier: Array) -> Array:
-        """Return the independent values (k,) of the multiplier field [pressure] for point forces (m,) [force]."""
-        return np.zeros(self.P.shape[1]) if self.mass is None else self.mass.solve(self.P.T @ multiplier)
+        """Return the independent values (k, ...) of the multiplier field [pressure] for point forces (m, ...) [force]."""
+        shape = self.P.shape[1], *multiplier.shape[1:]
+        return np.zeros(shape) if self.mass is None else self.mass.solve(np.ascontiguousarray(self.P.T @ multiplier))
 
     def compliance_factor(self, columns: Indices) -> Array:
         r"""Return the factor Z (m, h) of a compliance that replaces h values of the multiplier field.

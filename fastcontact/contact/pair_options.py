@@ -13,13 +13,13 @@ from fastcontact.contact.cohesion import CohesiveLaw
 from fastcontact.contact.conductance import Conductance
 from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.contact.overclosure import OverclosureLaw
-from fastcontact.contact.pairing import Candidates, Pairing, normals
-from fastcontact.contact.projection import places
+from fastcontact.contact.pairing import Candidates, normals
 from fastcontact.contact.surface import Surface
-from fastcontact.mesh import elements
 from fastcontact.round_off import SINGLE_PRECISION
 
 KINDS = ("unilateral", "bilateral", "bilateral_once_closed", "tied", "gap_only")
+# Kinds of pairs in which the constraints of all paired points are equations from the beginning.
+ALWAYS_CLOSED = ("tied", "bilateral")
 Field = Callable[[Array], Array]
 
 
@@ -83,43 +83,6 @@ class PairOptions:
     same_place: Indices | None = None
     turning: Rotation | None = None
 
-    @property
-    def gap_only(self) -> bool:
-        """Whether the pair only measures gaps, without forces."""
-        return self.kind == "gap_only"
-
-    @property
-    def tied(self) -> bool:
-        """Whether the sides of the pair are tied: they can neither separate nor slide."""
-        return self.kind == "tied"
-
-    @property
-    def always_closed(self) -> bool:
-        """Whether the constraints of all paired points are equations from the beginning."""
-        return self.kind in ("tied", "bilateral")
-
-    def excludes(self, candidates: Candidates) -> Mask:
-        """Return the candidates (n,) whose node with the largest weight is excluded from contact."""
-        n = len(candidates.nodes)
-        return np.zeros(n, bool) if self.excluded is None else candidates.belonging_to(self.excluded)
-
-    def borders(self, side: Surface) -> tuple[Indices, Array]:
-        """Return the boundaries of the excluded part of a line, as facets (n,) and reference coordinates xi (n,)."""
-        mask = self.excluded
-        if mask is None:
-            return np.empty(0, np.intp), np.empty(0)
-        order = np.argsort(elements.get(side.element).nodes[:, 0])
-        excluded = mask[side.facets[:, order]]
-        # The border lies where the shape functions of two adjacent nodes are equal: at 0 on linear lines, and at -2/3 and 2/3
-        # on quadratic lines.
-        crossover = np.linspace(-2 / 3, 2 / 3, 2) if len(order) == 3 else np.zeros(1)
-        facet, edge = np.nonzero(excluded[:, 1:] != excluded[:, :-1])
-        return facet, crossover[edge]
-
-    def excluded_nodes(self, side: Surface) -> Mask:
-        """Return which nodes (m,) of a side are excluded from contact."""
-        return np.zeros(len(side.points), bool) if self.excluded is None else self.excluded[side.points]
-
     def friction_axes(
         self, friction: float, directions: Sequence[Array], candidates: Candidates
     ) -> tuple[Array, tuple[Array, ...], tuple[Array, ...]]:
@@ -155,25 +118,6 @@ class PairOptions:
         first = np.where(has_direction, projected / np.where(has_direction, length, 1.0), directions[0])
         rotated = (first, *(np.where(has_direction, np.cross(normal, first), tangent) for tangent in directions[1:]))
         return np.full(len(is_frictionless), friction), rotated, (np.where(has_direction, 0.0, first), *rotated[1:])
-
-    def added_gap(
-        self, candidates: Candidates, pairing: Pairing, primary: object, reference: Array, factor: float
-    ) -> Array:
-        """Return the clearances (n,) of candidates, multiplied by `factor`; zero for unpaired candidates [length].
-
-        `reference` (n_points, dim) are the undeformed coordinates of all points [length].
-        """
-        clearances = np.zeros(len(candidates.nodes))
-        rows = np.flatnonzero(pairing.paired)
-        if not len(rows):
-            return clearances
-        if self.clearance is not None:
-            position = np.einsum("nk,nkd->nd", candidates.shape[rows], reference[candidates.nodes[rows]])
-            clearances[rows] += self.clearance(position)
-        if self.clearance_primary is not None and isinstance(primary, Surface):
-            feet = places(primary, pairing.facet[rows], pairing.xi[rows])
-            clearances[rows] += self.clearance_primary(np.einsum("nk,nkd->nd", feet.shape, reference[feet.nodes]))
-        return factor * clearances
 
 
 def nodal_map(side: Surface, excluded: Mask, givers: Indices) -> csr_array:

@@ -7,29 +7,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
+from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.projection import (
     Closest,
     Places,
     along_line_normals,
     along_normals,
-    at_nodes_of_facets,
     closest_of_kinds,
     distance_from_edges,
-    facet_normals,
     interpolate,
     nodal_normals,
+    normals_at_nodes,
     places,
     smooth_ends,
     smooth_normals,
 )
-from fastcontact.contact.surface import Surface
+from fastcontact.contact.surface import Surface, padded
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -75,6 +74,11 @@ class Candidates:
         shapes = [np.tile(elements.get(block.element).shape(of_block), (n, 1)) for block, n, of_block in blocks]
         coordinates = [np.tile(of_block, (n, 1)) for _, n, of_block in blocks]
         return cls(padded(nodes), padded(shapes), facet, np.concatenate(coordinates))
+
+    @classmethod
+    def at(cls, nodes: Numbers) -> Candidates:
+        """Return the `nodes` (n,), given by their point numbers, as candidates."""
+        return cls(nodes[:, None], np.ones((len(nodes), 1)))
 
     @classmethod
     def nodes_of(cls, side: Surface) -> Candidates:
@@ -185,7 +189,7 @@ def pair(
         overhangs = paired & ~at_smooth_end & (closest.overhang > LENGTH_ROUND_OFF)
         pairing = Pairing(closest.facet, closest.xi, closest.normal, paired)
         return _with_overhang(pairing, candidates, primary, coordinates, overhangs)
-    at_nodes = at_nodes_of_facets(smooth_normals(primary, coordinates))
+    at_nodes = smooth_normals(primary, coordinates)
     if not isinstance(normals, str):
         at_nodes = np.broadcast_to(np.array(normals), at_nodes.shape).copy()
     project = along_normals if coordinates.shape[1] == 3 else along_line_normals
@@ -217,8 +221,7 @@ def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array
         Averaged normals at the points, which are the result at edges [-]. Over the fraction ROUNDED of the facet, the result
         changes to the normal of the facet.
     """
-    normals = at_nodes_of_facets([facet_normals(block, coordinates) for block in primary.blocks])[facet]
-    normals = interpolate(normals, places(primary, facet, xi))
+    normals = interpolate(normals_at_nodes(primary, coordinates)[facet], places(primary, facet, xi))
     weight = np.clip(1.0 - distance_from_edges(primary, facet, xi) / ROUNDED, 0.0, 1.0)[:, None]
     normal = weight * mean + (1.0 - weight) * normals
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
@@ -249,18 +252,8 @@ def _at_smooth_ends(primary: Surface, coordinates: Array, closest: Closest) -> M
     overhangs = closest.overhang > 0.0
     if closest.position.shape[1] == 3 or not overhangs.any():
         return np.zeros(len(overhangs), bool)
-    smooth = smooth_ends(primary, at_nodes_of_facets(smooth_normals(primary, coordinates)))
+    smooth = smooth_ends(primary, smooth_normals(primary, coordinates))
     return np.asarray(overhangs & smooth[closest.facet, (closest.xi[:, 0] > 0.0).astype(np.intp)])
-
-
-def padded(arrays: Sequence[AnyArray]) -> AnyArray:
-    """Return arrays (n_i, k_i) concatenated along the first axis, padded to the largest k_i.
-
-    Integers are padded with the last entry of the row, floating-point numbers with zeros.
-    """
-    width = max(values.shape[1] for values in arrays)
-    mode: Any = "edge" if np.issubdtype(arrays[0].dtype, np.integer) else "constant"
-    return np.concatenate([np.pad(values, ((0, 0), (0, width - values.shape[1])), mode) for values in arrays])
 
 
 def gap_rows(

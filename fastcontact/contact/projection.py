@@ -20,7 +20,7 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.search import search_2d_kernels
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import flat_triangles, tables
-from fastcontact.contact.surface import FacetBlock, Surface, by_block, line_neighbours
+from fastcontact.contact.surface import FacetBlock, Surface, by_block, padded
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
@@ -61,15 +61,12 @@ class Places:
 
 def places(side: Surface, facet: Indices, xi: Array) -> Places:
     """Return the points of `side` at the reference coordinates `xi` (n, dim - 1) in the facets numbered `facet` (n,)."""
-    width, n = max(block.facets.shape[1] for block in side.blocks), len(facet)
-    nodes, local = np.empty((n, width), np.int32), np.empty((n, width), np.intp)
-    shape, gradient = np.zeros((n, width)), np.zeros((n, width, xi.shape[1]))
-    for block, (rows, number) in zip(side.blocks, by_block(facet, side.sizes), strict=True):
-        element, k = elements.get(block.element), block.facets.shape[1]
-        columns = np.minimum(np.arange(width), k - 1)
-        nodes[rows], local[rows] = block.facets[number][:, columns], block.local[number][:, columns]
-        shape[rows, :k], gradient[rows, :k] = element.shape(xi[rows]), element.gradient(xi[rows])
-    return Places(nodes, local, shape, gradient)
+    nodes = side.all_facets[facet]
+    shape, gradient = np.zeros(nodes.shape), np.zeros((*nodes.shape, xi.shape[1]))
+    for block, (rows, _) in zip(side.blocks, by_block(facet, side.sizes), strict=True):
+        element, n = elements.get(block.element), block.facets.shape[1]
+        shape[rows, :n], gradient[rows, :n] = element.shape(xi[rows]), element.gradient(xi[rows])
+    return Places(nodes, side.all_local[facet], shape, gradient)
 
 
 def at_common_edges(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, Indices, Array]:
@@ -111,58 +108,47 @@ def nodal_normals(side: Surface, coordinates: Array) -> Array:
     The normal of a node is the mean of the unit normals of its facets, weighted by their angles at the node. With these
     weights it does not depend on how the surface is divided into facets (Thuermer and Wuethrich, 1998).
     """
-    return _nodal_means(side, *_at_nodes(side, coordinates))
+    return _nodal_means(side, normals_at_nodes(side, coordinates), _angles(side, coordinates))
 
 
-def _at_nodes(side: Surface, coordinates: Array) -> tuple[Indices, Array, Array]:
-    """Return the node (p,), the unit normal (p, dim) and the angle (p,) [radian] of each facet at each of its nodes."""
-    normals = [facet_normals(block, coordinates).reshape(-1, coordinates.shape[1]) for block in side.blocks]
-    angles = [facet_angles(elements.get(block.element), coordinates[block.facets]).ravel() for block in side.blocks]
-    return side.nodes_of_facets, np.concatenate(normals), np.concatenate(angles)
-
-
-def _nodal_means(side: Surface, node: Indices, normal: Array, angle: Array) -> Array:
-    """Return unit nodal normals (m, dim) of a side, given the nodes, normals and angles that `_at_nodes` returns."""
-    weighted_normals = (angle[:, None] * normal).T
-    total: Array = np.column_stack([np.bincount(node, component, len(side.points)) for component in weighted_normals])
+def _nodal_means(side: Surface, normal: Array, angle: Array) -> Array:
+    """Return unit nodal normals (m, dim) of a side, given the results of `normals_at_nodes` and `_angles`."""
+    node, total = side.all_local.ravel(), np.empty((len(side.points), normal.shape[2]))
+    for axis, component in enumerate((angle[..., None] * normal).reshape(-1, normal.shape[2]).T):
+        total[:, axis] = np.bincount(node, component, len(total))
     side.add_across_ends(total)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.divide(total, length, out=np.zeros_like(total), where=length != 0.0)
 
 
-def smooth_normals(side: Surface, coordinates: Array, corner: float = CORNER) -> list[Array]:
-    """Return averaged unit normals at the nodes of the facets, separately on both sides of corners.
+def smooth_normals(side: Surface, coordinates: Array, corner: float = CORNER) -> Array:
+    """Return averaged unit normals (n_facets, k, dim) at the nodes of all facets, separately on both sides of corners.
 
     Except at corners, they are those of `nodal_normals`. At a corner, the mean for a facet includes only those facets that
     continue it smoothly, so that a punch is flat up to its corner although its flanks belong to the surface. Two facets form
-    a corner if their normals enclose a larger angle than `corner` [degrees].
-
-    Returns
-    -------
-    list of ndarray (n_facets, n_nodes, dim)
-        Normals of each block.
+    a corner if their normals enclose a larger angle than `corner` [degrees]. Nodes are those of `Surface.all_facets`.
     """
-    node, normal, angle = _at_nodes(side, coordinates)
-    smooth = _nodal_means(side, node, normal, angle)[node]
+    node, dim = side.all_local.ravel(), coordinates.shape[1]
+    normals, angles = normals_at_nodes(side, coordinates), _angles(side, coordinates)
+    smooth, normal, angle = _nodal_means(side, normals, angles)[node], normals.reshape(-1, dim), angles.ravel()
     # A node is a corner if the normal of one of its facets deviates from the mean by more than half of the angle.
-    corners = np.unique(node[np.einsum("pd,pd->p", normal, smooth) < np.cos(np.radians(0.5 * corner))])
-    by_node, start = np.argsort(node, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(node))])
+    own = np.flatnonzero(side.node_weights)
+    deviates = np.einsum("pd,pd->p", normal[own], smooth[own]) < np.cos(np.radians(0.5 * corner))
+    corners = np.unique(node[own[deviates]])
+    by_node, start = own[np.argsort(node[own], kind="stable")], np.append(0, np.cumsum(np.bincount(node[own])))
     for node_at_corner in corners:
         entries = by_node[start[node_at_corner] : start[node_at_corner + 1]]
         similar = normal[entries] @ normal[entries].T >= np.cos(np.radians(corner)) - LENGTH_ROUND_OFF
         total = (similar * angle[entries]) @ normal[entries]
         smooth[entries] = total / np.linalg.norm(total, axis=1, keepdims=True)
-    of_blocks = np.split(smooth, np.cumsum([block.local.size for block in side.blocks])[:-1])
-    return [values.reshape(*block.local.shape, -1) for values, block in zip(of_blocks, side.blocks, strict=True)]
+    return smooth.reshape(*side.all_local.shape, dim)
 
 
-def at_nodes_of_facets(of_blocks: Sequence[Array]) -> Array:
-    """Return the values at the nodes of facets of all blocks in one array (n_facets, k, ...).
-
-    k is the largest number of nodes of a facet. For facets with fewer nodes the last value is repeated, as in `places`.
-    """
-    width = max(values.shape[1] for values in of_blocks)
-    return np.concatenate([values[:, np.minimum(np.arange(width), values.shape[1] - 1)] for values in of_blocks])
+def normals_at_nodes(side: Surface, coordinates: Array) -> Array:
+    """Return the unit normals (n_facets, k, dim) of all facets at the nodes `Surface.all_facets`, zero at repeated nodes."""
+    if len(side.blocks) == 1:
+        return facet_normals(side.blocks[0], coordinates)
+    return padded([facet_normals(block, coordinates) for block in side.blocks])
 
 
 def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
@@ -180,16 +166,24 @@ def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
     return np.divide(normal, length, out=np.zeros_like(normal), where=length != 0.0)  # facets may degenerate to points
 
 
-def facet_angles(element: elements.Element, nodes: Array) -> Array:
-    """Return the angles (n, k) of facets with nodes (n, k, dim) at their corners [radian]; 1 at other nodes and for lines."""
-    if element.dim == 1:
-        return np.ones(nodes.shape[:2])
+def _angles(side: Surface, coordinates: Array) -> Array:
+    """Return the angles (n_facets, k) of all facets at their corners [radian].
+
+    They are 1 at other nodes and on lines, and 0 where `Surface.all_facets` repeats a node.
+    """
+    if coordinates.shape[1] == 2:
+        return side.node_weights
+    return padded([_corner_angles(block, coordinates) for block in side.blocks])
+
+
+def _corner_angles(block: FacetBlock, coordinates: Array) -> Array:
+    """Return the angles (n_facets, n_nodes) of the faces of a block at their corners [radian]; 1 at other nodes."""
     from fastcontact.contact import projection_kernels
 
-    angle, n = np.empty(nodes.shape[:2]), element.n_corners
-    corners = np.arange(n)
+    nodes, n = coordinates[block.facets], elements.get(block.element).n_corners
+    angle, corners = np.empty(block.facets.shape), np.arange(n)
     adjacent = np.column_stack([(corners + 1) % n, (corners - 1) % n])
-    parallel_map(lambda span: projection_kernels.angles(nodes, adjacent, *span, angle), portions(*nodes.shape[:2]))
+    parallel_map(lambda span: projection_kernels.angles(nodes, adjacent, *span, angle), portions(*block.facets.shape))
     return angle
 
 
@@ -314,7 +308,7 @@ def along_normals(
     coordinates : ndarray (n_points, 3)
         Coordinates of all nodes [length].
     normals : ndarray (n_facets, k, 3)
-        Unit normals at the nodes of the facets of all blocks, see `smooth_normals` and `at_nodes_of_facets`.
+        Unit normals at the nodes of the facets of all blocks, see `smooth_normals`.
     start : Closest
         Closest points, from which the iteration starts, and which are the result if it fails.
 
@@ -367,22 +361,16 @@ def along_line_normals(
     points: Array, side: Surface, coordinates: Array, normals: Array, start: Closest
 ) -> tuple[Indices, Array, Array, Array]:
     """Project points (n, 2) onto a line along its interpolated normals; for the other parameters see `along_normals`."""
-    corners = side.corners(coordinates)
-    at_nodes = [n[:, : x.shape[1]] for n, x in zip(np.split(normals, np.cumsum(side.sizes)[:-1]), corners, strict=True)]
+    corners, at_nodes = coordinates[side.all_facets], normals
+    if len(side.blocks) > 1:  # beside curved lines, straight ones get a third node in the middle
+        curved = side.node_weights[:, :, None] > 0.0
+        corners, at_nodes = (np.where(curved, x, x[:, :2].mean(axis=1, keepdims=True)) for x in (corners, at_nodes))
     facet, xi, overhang = start.facet.astype(np.intp), start.xi[:, 0].copy(), start.overhang.copy()
-    neighbour = np.where(smooth_ends(side, normals), line_neighbours(side.ends), -1)
-    search_2d_kernels.along_normals(
-        np.ascontiguousarray(points), _of_one_width(corners), _of_one_width(at_nodes), neighbour, facet, xi, overhang
-    )
+    neighbour = np.where(smooth_ends(side, normals), side.line_neighbours, -1)
+    arguments = map(np.ascontiguousarray, (points, corners, at_nodes))
+    search_2d_kernels.along_normals(*arguments, neighbour, facet, xi, overhang)
     xi = xi[:, None]
     return facet, xi, overhang, interpolate(normals[facet], places(side, facet, xi))
-
-
-def _of_one_width(lines: Sequence[Array]) -> Array:
-    """Return vectors (n, k, 2) at the nodes of lines; beside curved lines, straight ones get a third node in the middle."""
-    if len(lines) == 1:
-        return np.ascontiguousarray(lines[0])
-    return np.concatenate([np.concatenate([x, x[:, :2].mean(axis=1, keepdims=True)], axis=1)[:, :3] for x in lines])
 
 
 def smooth_ends(side: Surface, normals: Array) -> Mask:

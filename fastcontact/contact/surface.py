@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.arrays import Array, Indices, Mask, Numbers
+from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.errors import ContactError, MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
@@ -33,6 +34,11 @@ class FacetBlock:
     element: str
     facets: Numbers
     local: Indices
+
+    @cached_property
+    def neighbours(self) -> Indices:
+        """Line facets (n_facets, 2) of the block before and after each of its line facets; -1 if there is none."""
+        return _line_neighbours(self.local)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,22 +100,9 @@ class Surface:
         """Order of the facets: 1 if all facets are linear, otherwise 2."""
         return max(elements.get(block.element).order for block in self.blocks)
 
-    @cached_property
-    def element(self) -> str:
-        """Name of the element type of the facets; ContactError if there are several types."""
-        return self._only_block().element
-
-    @cached_property
-    def facets(self) -> Numbers:
-        """`FacetBlock.facets` (n_facets, n_nodes) of the only block; ContactError if there are several."""
-        return self._only_block().facets
-
-    @cached_property
-    def local(self) -> Indices:
-        """`FacetBlock.local` (n_facets, n_nodes) of the only block; ContactError if there are several."""
-        return self._only_block().local
-
-    def _only_block(self) -> FacetBlock:
+    @property
+    def only_block(self) -> FacetBlock:
+        """The only block of facets; ContactError if there are several."""
         if len(self.blocks) > 1:
             raise ContactError(
                 f"group '{self.group}' mixes facets of {' and '.join(block.element for block in self.blocks)}, which this "
@@ -120,7 +113,7 @@ class Surface:
     @cached_property
     def ends(self) -> Indices:
         """Nodes (n_facets, 2) at both ends of line facets, numbered on the side."""
-        return np.concatenate([block.local[:, :2] for block in self.blocks])
+        return self.all_local[:, :2]
 
     @cached_property
     def inner_ends(self) -> Mask:
@@ -128,14 +121,29 @@ class Surface:
         return np.asarray(np.bincount(self.ends.ravel())[self.ends] > 1)
 
     @cached_property
-    def nodes_of_facets(self) -> Indices:
-        """Nodes (p,) of all facets one after the other, numbered on the side."""
-        return np.concatenate([block.local.ravel() for block in self.blocks])
+    def line_neighbours(self) -> Indices:
+        """Line facets (n_facets, 2) before and after each line facet of the side; -1 if there is none."""
+        return _line_neighbours(self.ends)
+
+    @cached_property
+    def all_facets(self) -> Numbers:
+        """Point numbers (n_facets, k) of the nodes of all facets; if a facet has fewer than k nodes, the last is repeated."""
+        return padded([block.facets for block in self.blocks])
+
+    @cached_property
+    def all_local(self) -> Indices:
+        """The nodes `all_facets` (n_facets, k), numbered on the side."""
+        return padded([block.local for block in self.blocks])
+
+    @cached_property
+    def node_weights(self) -> Array:
+        """One for each node of `all_facets` (n_facets, k), zero where the last node of a facet is repeated."""
+        return padded([np.ones(block.local.shape) for block in self.blocks])
 
     @cached_property
     def incidence(self) -> csr_array:
         """Incidence matrix (n_facets, m) of facets and nodes: one if a node belongs to a facet, otherwise zero."""
-        nodes = self.nodes_of_facets
+        nodes = np.concatenate([block.local.ravel() for block in self.blocks])
         sizes = np.concatenate([np.full(len(block.local), block.local.shape[1]) for block in self.blocks])
         start = np.concatenate([[0], np.cumsum(sizes)])
         return csr_array((np.ones(len(nodes)), nodes, start), shape=(self.n_facets, len(self.points)))
@@ -192,11 +200,19 @@ def by_block(numbers: Indices, sizes: Iterable[int]) -> Iterator[tuple[Indices, 
         first += size
 
 
-def line_neighbours(local: Indices) -> Indices:
-    """Return the line facets (n, 2) before and after each line facet with nodes (n, k); -1 if there is none.
+def padded(arrays: Sequence[AnyArray]) -> AnyArray:
+    """Return arrays (n_i, k_i, ...) concatenated along the first axis, padded to the largest k_i.
 
-    All facets must have the same orientation.
+    Integers are padded with the last entry of the row, floating-point numbers with zeros.
     """
+    width = max(values.shape[1] for values in arrays)
+    mode: Any = "edge" if np.issubdtype(arrays[0].dtype, np.integer) else "constant"
+    unpadded = [(0, 0)] * (arrays[0].ndim - 2)
+    return np.concatenate([np.pad(x, ((0, 0), (0, width - x.shape[1]), *unpadded), mode) for x in arrays])
+
+
+def _line_neighbours(local: Indices) -> Indices:
+    """Return `Surface.line_neighbours` for lines with nodes (n, k), which must have the same orientation."""
     begins, ends = np.full((2, int(local.max()) + 1), -1, np.intp)
     begins[local[:, 0]] = ends[local[:, 1]] = np.arange(len(local))
     return np.column_stack([ends[local[:, 0]], begins[local[:, 1]]])

@@ -160,7 +160,7 @@ def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
         rows = slice(start, start + len(block.facets))
         fit = _fit(block, points, neighbourhood[rows], valid[rows], 2 * side.order)
         extends = fit.extends_to(neighbourhood[rows], valid[rows])
-        heights, curvature, axes = _heights(block, points, fit)
+        heights, curvature, axes = _heights(block, points, fit, fit.error(neighbourhood[rows], valid[rows]))
         fits.append((heights * extends[:, None, None], curvature * extends[:, None, None], axes))
         start += len(block.facets)
     heights, curvature, axes = (np.concatenate(of_blocks) for of_blocks in zip(*fits, strict=True))
@@ -232,6 +232,11 @@ class _Fit:
         bent = np.einsum("nqd,nde->nqe", self.in_planes(points)[0], self.curvature)
         return np.asarray((((bent**2).sum(axis=2) < 1.0) | ~valid).all(axis=1))
 
+    def error(self, points: Array, valid: Mask) -> Array:
+        """Return the largest distances (n,) from the surfaces to those `points` (n, m, dim) that are `valid` (n, m)."""
+        plane, height = self.in_planes(points)
+        return np.asarray(np.where(valid, np.abs(self.at(plane) - height), 0.0).max(axis=1))
+
     def at_middle(self) -> tuple[Array, Array]:
         """Return slopes (n, d) and curvatures (n, d, d) in the middle of the facets."""
         term = {(int(a), int(b)): n for n, (a, b) in enumerate(zip(*self.powers, strict=True))}
@@ -269,13 +274,17 @@ def _tilted(axes: Array, slope: Array) -> Array:
     return np.concatenate([axes[:, :-1] - tilt[:, :, None] * twice_mean[:, None], normal[:, None]], axis=1)
 
 
-def _heights(block: FacetBlock, points: Array, smooth: _Fit) -> tuple[Array, Array, Array]:
-    """Return coefficients (n, k, m) of the heights of surfaces above facets, their curvatures and tangents in the middle."""
+def _heights(block: FacetBlock, points: Array, smooth: _Fit, error: Array) -> tuple[Array, Array, Array]:
+    """Return coefficients (n, k, m) of the heights of surfaces above facets, their curvatures and tangents in the middle.
+
+    Heights of surfaces with an `error` (n,) of more than the largest height are zero: no smooth surface fits these nodes.
+    """
     element, k = elements.get(block.element), smooth.powers[0].max() + 1
     (xi, powers), (corners, _) = _lattice(element, k), smooth.in_planes(points[block.facets])
     shape = element.shape(xi)
     height = smooth.at(np.einsum("qk,nke->nqe", shape, corners)) - smooth.at(corners) @ shape.T
-    height = smooth.size[:, None] * np.where(np.abs(height) > LENGTH_ROUND_OFF, height, 0.0)
+    least = np.where(error > np.abs(height).max(axis=1), np.inf, LENGTH_ROUND_OFF)
+    height = smooth.size[:, None] * np.where(np.abs(height) > least[:, None], height, 0.0)
     heights = np.zeros((len(corners), k, k if element.dim == 2 else 1))
     heights[:, powers[0], powers[1]] = np.linalg.solve(_terms(xi, *powers), height.T).T
     curvature = smooth.at_middle()[1]

@@ -22,7 +22,7 @@ from fastcontact.round_off import ROUND_OFF
 # Pairs of material axes to which Poisson's ratios and shear moduli belong.
 NAMES = ("12", "13", "23")
 # Largest difference between symmetric entries of the matrix of moduli, relative to its largest entry.
-SYMMETRIC = 1e-9
+SYMMETRY_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,8 @@ class Orthotropic(Material):
     Parameters
     ----------
     E : (float, float, float)
-        Young's moduli E1, E2, E3 along the material axes [pressure]. Each constant in E, nu and G may be a number, a
-        function or an array, as described for E of `LinearElastic`.
+        Young's moduli E1, E2, E3 along the material axes [pressure]. Each of the constants in E, nu and G may be a number, a
+        function or an array, as described for E in `LinearElastic`.
     nu : (float, float, float)
         Poisson's ratios nu12, nu13, nu23 [-]. Under a uniaxial stress along axis 1, nu12 is minus the ratio of the strain
         along axis 2 to the strain along axis 1. The reciprocal ratio is nu21 = nu12 E2 / E1.
@@ -41,10 +41,10 @@ class Orthotropic(Material):
         Shear moduli G12, G13, G23 [pressure].
     axes : sequence or callable, optional
         Material axes; by default the axes of the mesh, which in axisymmetry are the radial, axial and circumferential
-        directions. They are given as two or three orthogonal vectors (x, y, z) of any length; in 2D the first vector (x, y)
-        suffices. Axes that vary are a function from positions (n, dim) [length] to unit vectors in rows (n, 3, 3), such as
-        `CylindricalAxes`, which is evaluated at the quadrature points, or an array (n_cells, 3, 3) for the cells of the
-        material or of the mesh.
+        directions. They are given as two or three orthogonal vectors (x, y, z) of any length. In 2D, the first vector (x, y)
+        suffices. Axes that vary are given as a function from positions (n, dim) [length] to unit vectors in rows (n, 3, 3),
+        such as `CylindricalAxes`, which is evaluated at the quadrature points, or as an array (n_cells, 3, 3) for the cells
+        of the material or of the mesh.
     density : float, callable or ndarray (n,), optional
         Mass per unit volume [mass / length^3].
     expansion : float, callable, ndarray (n,) or three of them, optional
@@ -61,8 +61,8 @@ class Orthotropic(Material):
 
     Notes
     -----
-    The conditions for a positive energy are those of Lempriere, AIAA J. 6, 1968. The compliance is that of Lekhnitskii,
-    Theory of elasticity of an anisotropic body, 1963.
+    The conditions for a positive energy are those of Lempriere, AIAA J. 6, 1968. The definition of the compliance is that of
+    Lekhnitskii, Theory of elasticity of an anisotropic body, 1963.
 
     Examples
     --------
@@ -85,12 +85,12 @@ class Orthotropic(Material):
         for name in ("E", "nu", "G", "axes", "density", "expansion", "conductivity"):
             check_type(f"{name} of Orthotropic", getattr(self, name), Any, ModelError)
         for name in ("E", "nu", "G"):
-            object.__setattr__(self, name, _three(name, getattr(self, name)))
+            object.__setattr__(self, name, _three_constants(name, getattr(self, name)))
         names = [f"Young's modulus E{axis}" for axis in "123"] + [f"the shear modulus G{pair}" for pair in NAMES]
         for name, modulus in zip(names, (*self.E, *self.G), strict=True):
             if not isinstance(modulus, Varying):
                 check_positive(name, modulus)
-        if not self.graded:  # constants that vary are checked when the cells are known
+        if not self.graded:  # Constants that vary are checked when the cells are known.
             _check_ratios(self.E, self.nu)
         _set_other_properties(self)
 
@@ -153,7 +153,7 @@ class Orthotropic(Material):
         return ", ".join(f"{name} = ({', '.join(f'{v:g}' for v in getattr(self, name))})" for name in ("E", "nu", "G"))
 
     def compliances(self, constants: Any) -> Array:
-        """Return the compliances (n, 6, 6) [1 / pressure] in material axes for constants that may be arrays (n,)."""
+        """Return the compliances (n, 6, 6) [1 / pressure] in material axes; the constants may be arrays (n,)."""
         values = np.broadcast_arrays(*map(np.atleast_1d, (*constants.E, *constants.nu, *constants.G)))
         E1, E2, E3, nu12, nu13, nu23, G12, G13, G23 = values
         S = np.zeros((len(E1), 6, 6))
@@ -165,7 +165,7 @@ class Orthotropic(Material):
         return S
 
     def admissible(self, constants: Any) -> Any:
-        """Return whether the strain energy is positive definite, for each set of constants (n,)."""
+        """Return, for each set of constants (n,), whether the strain energy is positive definite."""
         constant_groups = constants.E, constants.nu, constants.G
         E, nu, G = (np.broadcast_arrays(*map(np.atleast_1d, values)) for values in constant_groups)
         in_range = np.all([(v >= 1.0 / LARGEST) & (v <= LARGEST) for v in np.broadcast_arrays(*E, *G)], axis=0)
@@ -182,7 +182,7 @@ class Anisotropic(Material):
     Parameters
     ----------
     D : array_like (6, 6)
-        Matrix of moduli in material axes, from strains 11, 22, 33, 2*12, 2*23, 2*13 to stresses 11, 22, 33, 12, 23, 13
+        Matrix of moduli in material axes, which maps strains 11, 22, 33, 2*12, 2*23, 2*13 to stresses 11, 22, 33, 12, 23, 13
         [pressure].
     axes : sequence or callable, optional
         Material axes: unit vectors in rows (3, 3) [-], or a function, as described for `Orthotropic`.
@@ -228,7 +228,7 @@ class Anisotropic(Material):
                 f"the moduli D must be a matrix of 6 x 6 finite numbers, not of shape {np.shape(np.asarray(self.D, object))}"
             )
         asymmetry = np.abs(D - D.T)
-        if asymmetry.max() > SYMMETRIC * np.abs(D).max():
+        if asymmetry.max() > SYMMETRY_TOLERANCE * np.abs(D).max():
             i, j = np.unravel_index(asymmetry.argmax(), D.shape)
             raise ModelError(f"the moduli D are not symmetric: D[{i}, {j}] = {D[i, j]:g} and D[{j}, {i}] = {D[j, i]:g}")
         D = (D + D.T) / 2.0
@@ -256,7 +256,7 @@ class Anisotropic(Material):
 
 
 def _set_other_properties(material: Orthotropic | Anisotropic) -> None:
-    """Check and normalise the properties that do not determine the moduli, and the axes."""
+    """Check and normalise the axes and the properties that do not determine the moduli."""
     object.__setattr__(material, "density", wrapped(material.density))
     for name in ("expansion", "conductivity"):
         value = getattr(material, name)
@@ -272,7 +272,7 @@ def _set_other_properties(material: Orthotropic | Anisotropic) -> None:
 
 
 def _axes(axes: Any) -> Any:
-    """Return the normalised axes of a material; ModelError if they are not orthogonal vectors."""
+    """Return the normalised axes of a material; raise ModelError if they are not orthogonal vectors."""
     if isinstance(axes, CellAxes):
         return axes
     if not isinstance(axes, np.ndarray) or axes.ndim != 3:
@@ -280,8 +280,8 @@ def _axes(axes: Any) -> Any:
     return CellAxes(frames(lambda points: axes, np.zeros((len(axes), 3)), "3d"))
 
 
-def _three(name: str, values: Any) -> tuple[Any, Any, Any]:
-    """Return the three constants E, nu or G of an orthotropic material, numbers or `Varying`; ModelError otherwise."""
+def _three_constants(name: str, values: Any) -> tuple[Any, Any, Any]:
+    """Return the three constants E, nu or G of an orthotropic material; raise ModelError unless they are valid."""
     try:
         a, b, c = (v if isinstance(v, Varying) else _real(v) for v in map(wrapped, values))
     except (TypeError, ValueError):
@@ -307,7 +307,7 @@ def _determinant(nu: Sequence[Any], reciprocal: Sequence[Any]) -> Any:
 
 
 def _check_ratios(E: Sequence[float], nu: Sequence[float]) -> None:
-    """Raise ModelError unless Poisson's ratios make the strain energy positive definite."""
+    """Raise ModelError if the strain energy is not positive definite for these Poisson's ratios."""
     for value, pair, (i, j) in zip(nu, NAMES, ((0, 1), (0, 2), (1, 2)), strict=True):
         limit = math.sqrt(E[i] / E[j])
         if not abs(value) < limit:

@@ -1,8 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Element loop of nonlinear bodies: tangent stiffness, internal forces, stresses, energies and history.
 
-The formulation is total Lagrangian: nodal forces are integrals of P . dN/dX over the reference configuration, and the tangent
-consists of integrals of dN/dX . A . dN/dX (Bonet and Wood, 2008, chapter 9). At small strains, P is the Cauchy stress and J
+The formulation is total Lagrangian. Nodal forces are integrals of P . dN/dX over the reference configuration, and the tangent
+consists of integrals of dN/dX . A . dN/dX (Bonet and Wood, 2008, chapter 9). At small strains, P is the Cauchy stress, and J
 is one plus the trace of the strain. With thermal expansion, F is the elastic part of the deformation gradient, relative to
 the stress-free intermediate configuration (Lu and Pister, 1975).
 """
@@ -26,8 +26,8 @@ from fastcontact.elasticity.tile_product import tile
 from fastcontact.mesh.jacobian_kernels import cofactors
 
 # Largest number of Newton iterations for F_zz in plane stress, and tolerance of P_zz relative to its derivative.
-MOST_ITERATIONS, TOLERANCE = 50, 1e-13
-# Status codes of `linearise`, which returns them with the number of a cell; zero means success.
+MAX_ITERATIONS, TOLERANCE = 50, 1e-13
+# Status codes that `linearise` returns together with the number of a cell; zero means success.
 INVERTED, NO_PLANE_STRESS = 1, 2
 
 
@@ -46,8 +46,8 @@ def _tables(dN, columns, rows):
 def _map(points, displacement, cells, c, columns, x, maps):
     """Fill three rows of `maps` for each point: derivatives of positions (columns 0 to 2) and displacements (4 to 6).
 
-    `columns` (n_nodes, n_rows) are the derivatives of the shape functions, see `_tables`. Positions and displacements of the
-    nodes of cell `c` are filled into `x` (n_nodes, 8).
+    `columns` (n_nodes, n_rows) contains the derivatives of the shape functions, see `_tables`. The positions and
+    displacements of the nodes of cell `c` are stored in `x` (n_nodes, 8).
     """
     n_nodes = cells.shape[1]
     for a in range(n_nodes):
@@ -63,7 +63,7 @@ def _map(points, displacement, cells, c, columns, x, maps):
 def _at_point(maps, q, dim, rows, inverse, gradient, F):
     """Fill F (3, 3) and the three rows of point q in `gradient` (n_q * 3 + 1, width); return det J.
 
-    `maps` are from `_map`, and `rows` from `_tables`. `inverse` (3, 4) is overwritten.
+    `maps` is computed by `_map`, and `rows` by `_tables`. `inverse` (3, 4) is overwritten.
     """
     k = 3 * q
     j00, j01, j02, j10, j11, j12 = maps[k, 0], maps[k, 1], maps[k, 2], maps[k + 1, 0], maps[k + 1, 1], maps[k + 1, 2]
@@ -100,8 +100,8 @@ def _about_axis(x, N, q, gradient, F):
 def _expanded(strain, N, cell, rise, finite, F, gradient):
     """Remove thermal expansion from F and from the shape derivatives `gradient` (3, width), in place.
 
-    `rise` (n_points,) is the temperature rise, and `strain` (6,) the thermal strain per unit rise, with engineering shears.
-    Returns the thermal volume ratio and the thermal stretch along z.
+    `rise` (n_points,) is the temperature rise, and `strain` (6,) the thermal strain per unit rise, with engineering shear
+    strains. Returns the thermal volume ratio and the thermal stretch along z.
     """
     rise_at_point = 0.0
     for a in range(len(cell)):
@@ -119,7 +119,7 @@ def _expanded(strain, N, cell, rise, finite, F, gradient):
     ratio = determinant(U)
     inverse /= ratio
     elastic, pulled_back = F @ inverse, np.ascontiguousarray(inverse.T) @ gradient
-    for i in range(3):  # assigning to a slice would compile its error message as well
+    for i in range(3):  # assigning to a slice would also compile the error message for wrong shapes
         for j in range(3):
             F[i, j] = elastic[i, j]
         for a in range(gradient.shape[1]):
@@ -142,8 +142,8 @@ def _dilatation(F, finite, G):
 def _subtract_initial_stress(omitted, G, J, P, pressure, d2J_factor, A):
     """Subtract the initial-stress term delta_ik S_JL from A if `omitted` is true.
 
-    S is the second Piola-Kirchhoff stress that belongs to ``P + (d2J_factor - pressure) G``. In compression, where
-    `d2J_factor` is negative, the contribution of the variation of the dilatation within a cell is subtracted as well.
+    S is the second Piola-Kirchhoff stress that corresponds to ``P + (d2J_factor - pressure) G``. In compression, where
+    `d2J_factor` is negative, the contribution due to the variation of the dilatation within a cell is also subtracted.
     """
     for row in range(9 if omitted else 0):
         for column in range(9):
@@ -159,13 +159,13 @@ def _subtract_initial_stress(omitted, G, J, P, pressure, d2J_factor, A):
 
 @kernel
 def _respond_in_plane_stress(constants, D, bulk, finite, stretch_z, F, old, new, P, A, G):
-    """Solve for the F_zz at which P_zz vanishes, and eliminate F_zz from A.
+    """Solve for the value of F_zz at which P_zz vanishes, and eliminate F_zz from A.
 
-    `stretch_z` is the thermal out-of-plane stretch. Returns the energy density, and whether the iteration converged.
+    `stretch_z` is the thermal out-of-plane stretch. Returns the energy density, and whether the iteration has converged.
     """
-    tangent = np.bool_(True)  # for literals, Numba would compile the laws once more
+    tangent = np.bool_(True)  # for a literal, Numba would compile the laws again
     F[2, 2] = (1.0 + old[8]) / stretch_z if finite else 2.0 + old[8] - stretch_z
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         J = _dilatation(F, finite, G)
         pressure = bulk * (J - 1.0)
         volumetric = (pressure, bulk, pressure if finite else 0.0)
@@ -186,10 +186,10 @@ def _respond_in_plane_stress(constants, D, bulk, finite, stretch_z, F, old, new,
 def _respond(
     constants, D, bulk, pressure, stretch_z, plane_stress, finite, geometric, tangent, F, J, G, old, new, P, A
 ):
-    """Fill the history `new` (9,), P and A of a point; return its energy density, and whether plane stress converged.
+    """Fill the history `new` (9,), P and A of a point; return its energy density, and whether plane stress has converged.
 
-    `pressure` is that of the projected dilatation, `bulk` the bulk modulus of the remainder, and G (3, 3) the derivative of
-    J. Other arguments are described for `linearise`, `_respond_in_plane_stress` and `respond`.
+    `pressure` is due to the projected dilatation, `bulk` is the bulk modulus for the remainder, and G (3, 3) is the
+    derivative of J. For the other arguments, see `linearise`, `_respond_in_plane_stress` and `respond`.
     """
     omitted = finite and geometric == 0 and tangent
     if plane_stress:
@@ -205,7 +205,7 @@ def _respond(
 
 @kernel
 def _subtract_elastic(constants, D, bulk, plane_stress, A):
-    """Subtract the elastic tangent at small strains from A (18, 12), without the contribution of the projected dilatation."""
+    """Subtract the elastic tangent of small strains, without the projected dilatation, from A (18, 12)."""
     no_history, new, P, G, elastic = np.zeros(9), np.empty(9), np.empty((3, 3)), np.empty((3, 3)), np.zeros((18, 12))
     F, finite, tangent, geometric = np.eye(3), np.bool_(False), np.bool_(True), np.int64(2)  # no literals, see above
     J = _dilatation(F, finite, G)
@@ -219,7 +219,7 @@ def _subtract_elastic(constants, D, bulk, plane_stress, A):
 def _weigh(P, first, weight, dim, out, row):
     """Fill three rows of `out` (n_rows, 4), from `row` on, with `weight` times P.T; P begins at row `first` of its array.
 
-    The third of them belongs to the shape derivatives along z or, in axisymmetry, to N / r, which multiplies the radial
+    The third row is for the shape derivatives along z or, in axisymmetry, for N / r, which multiplies the radial
     displacement.
     """
     for i in range(3):
@@ -230,14 +230,14 @@ def _weigh(P, first, weight, dim, out, row):
 
 @kernel
 def _integrate(factors, gradient, out, row):
-    """Fill four rows of `out` (n_rows, width) with the nodal forces of all points; `factors` (3 n_q, 4) are from `_weigh`."""
+    """Fill four rows of `out` (n_rows, width) with the nodal forces of all points; see `_weigh` for `factors` (3 n_q, 4)."""
     for a in range(0, gradient.shape[1], 4):
         tile(factors, 0, 0, gradient, 0, a, len(factors), out, row, True)
 
 
 @kernel
 def _copy(source, first, out, row):
-    """Copy a matrix (3, 3) that begins at row `first` of `source` to `out`, where it begins at `row`."""
+    """Copy the matrix (3, 3) that begins at row `first` of `source` to the rows of `out` from `row` on."""
     for i in range(3):
         for j in range(3):
             out[row + i, j] = source[first + i, j]
@@ -292,11 +292,11 @@ def _pressures(bulk, polynomials, mass, projected, pressure):
 
 @kernel
 def _store_tangent(gradient, q, weight, A, dim, n, left, right):
-    """Store the factors of the stiffness at point q, three rows from n on, for `_stiffness`.
+    """Store the factors of the stiffness at point q for `_stiffness`, in three rows from n on.
 
-    `left` (3 n_q, width) receives the weighted shape derivatives, and `right` (n_pairs * (3 n_q + 1), width) the products of
-    the blocks (i, k) of A and the shape derivatives, for the pairs i <= k of displacement components. If dim is 2, rows and
-    columns of A are moved first, because the third shape derivative multiplies the radial displacement.
+    The weighted shape derivatives are stored in `left` (3 n_q, width). The products of the blocks (i, k) of A and the shape
+    derivatives, for the pairs i <= k of displacement components, are stored in `right` (n_pairs * (3 n_q + 1), width). If dim
+    is 2, rows and columns of A are moved first, because the third shape derivative multiplies the radial displacement.
     """
     step, pair = len(left) + 1, 0
     for e in range(9 if dim == 2 else 0):
@@ -344,9 +344,9 @@ def _cauchy(F, P, finite, c, q, out):
 
 @kernel
 def _assemble(local, slots, inside, data):
-    """Add the stiffness of a cell, see `_stiffness`, to `data` (n_blocks, dim, dim), in the rows of nodes that are `inside`.
+    """Add the stiffness of a cell, see `_stiffness`, to `data` (n_blocks, dim, dim), in the rows of nodes marked in `inside`.
 
-    The block of a node pair is the transpose of the opposite one, and a diagonal block is symmetric.
+    The blocks (a, b) and (b, a) of a node pair are transposes of each other, and diagonal blocks are symmetric.
     """
     n_nodes, dim, width, flat = len(slots), data.shape[1], local.shape[1], data.reshape(-1)
     for b in range(n_nodes):
@@ -381,9 +381,9 @@ def linearise(
 
     With ``geometric = 2``, the tangent is complete. With 1, the second derivative of J is omitted. With 0, the initial-stress
     stiffness and, in tension, the second derivative of J are omitted, so that the tangent is positive semidefinite. If `data`
-    is empty, no tangent is computed. If `elastic` is true, `data` contains the elastic tangent of small strains, and the
-    difference between the tangents is added at points with plastic flow. Returns a status code and the number of the cell
-    that caused it, or 0 and -1.
+    is empty, no tangent is computed. If `elastic` is true, `data` must contain the elastic tangent of small strains, and the
+    difference from this tangent is added at points with plastic flow. Returns a status code and the number of the cell that
+    caused it, or 0 and -1.
     """
     n_cells, n_nodes = cells.shape
     n_q, dim, m, tangent = N.shape[0], points.shape[1], polynomials.shape[1], len(data) > 0
@@ -399,8 +399,8 @@ def linearise(
     left, right = np.empty((3 * n_q, width)), np.empty((n_pairs * (3 * n_q + 1), width))
     local = np.empty((n_pairs * width, width))
     mass, projected, slopes = np.empty((m, m)), np.empty((m, 1)), np.empty((4 * m if stiff else 0, width))
-    # Numba counts array references by atomic operations where it makes views, and in functions that call others in branches.
-    # This would take as long as the law of the first invariant itself, which is therefore called directly here.
+    # Numba counts array references by atomic operations where views are created, and in functions that call others in
+    # branches. This would take as long as the law of the first invariant itself. Therefore, the law is called directly here.
     row, law, D, direct = -1, constants[0], moduli[0], False
     for c in range(n_cells):
         if not owned(cells, c, owner, part, inside):

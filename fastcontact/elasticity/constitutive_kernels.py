@@ -3,7 +3,7 @@
 
 Shared arguments: ``F`` (3, 3) is the deformation gradient [-] and ``P`` (3, 3) the first Piola-Kirchhoff stress [pressure].
 The first nine rows and columns of ``A`` (18, 12) contain its derivative dP/dF, in which component iJ has the index 3 i + J;
-the other entries are work space. Laws for small strains take the symmetric part of F - I; their P is the Cauchy stress.
+the other entries are work space. Laws for small strains use the symmetric part of F - I; their P is the Cauchy stress.
 `constants` (n_constants,) begin with the number of the law, see `nonlinear_materials`. `old` and `new` (9,) are the history
 variables at the beginning and the end of the load step: the plastic strain (xx, yy, zz, xy, yz, xz, tensor
 components), the equivalent plastic strain, the plastic work [energy / volume], and in plane stress F_zz - 1. At finite
@@ -18,14 +18,14 @@ from fastcontact._jit.decorators import innermost_kernel, kernel
 from fastcontact.elasticity.tile_product import tile
 
 LINEAR, PLASTIC, SAINT_VENANT, INVARIANTS, OGDEN, LOGARITHMIC = range(6)
-# First rows of the two groups of rows of A that are work space of `first_invariant`.
+# First rows of the two groups of rows of A that `first_invariant` uses as work space.
 LEFT, RIGHT = 12, 15
-# Relative excess of the trial stress over the yield stress that counts as round-off.
+# Relative excess of the trial stress over the yield stress that is considered round-off.
 YIELD_TOLERANCE = 1e-12
 # Relative difference of squared stretches below which the tangent treats them as equal.
-EQUAL = 1e-7
+EQUAL_STRETCHES = 1e-7
 # Relative difference of squared stretches below which second divided differences are computed by a series.
-CLOSE = 1e-3
+SERIES_LIMIT = 1e-3
 
 
 @kernel
@@ -123,7 +123,7 @@ def _linear(D, F, tangent, P, A):
 
 @kernel
 def _yield_stress(constants, p):
-    """Return the yield stress and its slope at the equivalent plastic strain p, and the end of this segment of the table."""
+    """Return the yield stress, its slope at the equivalent plastic strain p, and the end of this segment of the table."""
     n = int(constants[4])
     for k in range(n - 1):
         p0, s0, p1, s1 = constants[5 + 2 * k], constants[6 + 2 * k], constants[7 + 2 * k], constants[8 + 2 * k]
@@ -226,7 +226,7 @@ def _first_difference(x, y):
 @kernel
 def _second_difference(x, y, z):
     """Return the second divided difference of ln(x) / 2 at x <= y <= z."""
-    if z - x > CLOSE * z:
+    if z - x > SERIES_LIMIT * z:
         return (_first_difference(y, z) - _first_difference(x, y)) / (z - x)
     mean = (x + y + z) / 3.0
     a, b, c = x / mean - 1.0, y / mean - 1.0, z / mean - 1.0
@@ -237,9 +237,9 @@ def _second_difference(x, y, z):
 def _logarithmic(constants, F, tangent, old, new, P, A):
     """Apply plasticity with logarithmic elastic strains (Eterovic and Bathe, 1990; Simo, 1992); return the elastic energy.
 
-    For the plastic deformation at the beginning of the load step, with the factor L, the trial elastic strain is ln(C) / 2
-    with C = (F L)^T F L. `_plastic` relates it to its conjugate stress T. The plastic flow is integrated by the exponential
-    map, in the principal axes of C. Derivatives of the strain in principal axes are divided differences of the logarithm
+    With the factor L of the plastic deformation at the beginning of the load step, the trial elastic strain is ln(C) / 2,
+    where C = (F L)^T F L. `_plastic` relates it to its conjugate stress T. The plastic flow is integrated by the exponential
+    map in the principal axes of C. Derivatives of the strain in principal axes are divided differences of the logarithm
     (Daleckii and Krein).
     """
     C, T, D, L = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9)), np.eye(3)
@@ -250,7 +250,7 @@ def _logarithmic(constants, F, tangent, old, new, P, A):
     squared, axes = np.linalg.eigh(C)
     without_strain = old.copy()
     without_strain[:6] = 0.0
-    with_moduli = np.bool_(True)  # for a literal, Numba would compile the law once more
+    with_moduli = np.bool_(True)  # for a literal, Numba would compile the law again
     energy = _plastic(constants, (axes * (0.5 * np.log(squared))) @ axes.T, with_moduli, without_strain, new, T, D)
     slope, L_axes = np.empty((3, 3)), L @ axes
     _flow(L_axes, axes, old, new)
@@ -280,7 +280,7 @@ def _logarithmic(constants, F, tangent, old, new, P, A):
 
 @kernel
 def _congruence(axes):
-    """Return the matrix (9, 9) that transforms a tensor M, as 9 components, to `axes` (3, 3) M `axes`^T."""
+    """Return the matrix (9, 9) that maps the 9 components of a tensor M to those of Q M Q^T, with `axes` (3, 3) as Q."""
     transformation = np.empty((9, 9))
     for row in range(9):
         for column in range(9):
@@ -290,7 +290,7 @@ def _congruence(axes):
 
 @kernel
 def _flow(L_axes, axes, old, new):
-    """Replace the increment of plastic strain in `new` by L - I at the end of the load step, see the header.
+    """Replace the increment of plastic strain in `new` by L - I at the end of the load step; see the module docstring.
 
     The columns of `axes` (3, 3) are the principal axes of the increment, and `L_axes` (3, 3) is the factor before the load
     step times `axes`.
@@ -306,7 +306,7 @@ def _flow(L_axes, axes, old, new):
             for j in range(i + 1):
                 new[voigt(i, j)] = factor[i, j] - (1.0 if i == j else 0.0)
     else:
-        for k in range(6):  # assigning a slice would compile its error message as well, which takes seconds
+        for k in range(6):  # assigning to a slice would also compile its error message, which takes seconds
             new[k] = old[k]
 
 
@@ -333,7 +333,7 @@ def _saint_venant(D, F, tangent, P, A):
 def _add_isochoric(value, first, number, power, scale, J, G, dW, d2W, tangent, P, A):
     """Add to P and A the terms of a function of the isochoric invariant ``scale * value``, except for second derivatives.
 
-    `scale` is ``J**-power``, and `first` (3, 3) the derivative of the value; `dW` and `d2W` are the first and second
+    `scale` is ``J**-power``, and `first` (3, 3) is the derivative of the value. `dW` and `d2W` are the first and second
     derivatives of the energy with respect to the invariant. The terms of A are stored in the rows LEFT, ``LEFT + number``
     and ``RIGHT + number``, see `first_invariant`. Returns the factors of the second derivatives of the value and of J.
     """
@@ -380,9 +380,9 @@ def first_invariant(constants, F, J, G, volumetric, tangent, P, A):
 
 @innermost_kernel
 def sum_products(n, factor, d2J_factor, tangent, F, A):
-    """If `tangent`, fill A with the n dyadic products of its work space and the terms with second derivatives.
+    """Fill A with the n dyadic products of its work space and the terms with second derivatives, if `tangent` is true.
 
-    See `first_invariant` for the work space and the factors.
+    For the work space and the factors, see `first_invariant`.
     """
     for row in range(0, 12 if tangent else 0, 4):
         for column in range(0, 12, 4):
@@ -463,7 +463,7 @@ def _ogden(constants, F, tangent, P, A):
             if a != b:
                 difference = squared[b] - squared[a]
                 shear = 0.5 * (gamma[b, b] - 2.0 * beta[b] - gamma[a, b]) / (squared[b] * squared[b])
-                if abs(difference) > EQUAL * squared[b]:
+                if abs(difference) > EQUAL_STRETCHES * squared[b]:
                     shear = (beta[b] / squared[b] - beta[a] / squared[a]) / difference
                 moduli[3 * a + b, 3 * a + b] = moduli[3 * a + b, 3 * b + a] = shear
     _push_forward(F, S, transformation @ moduli @ transformation.T, A)
@@ -487,12 +487,12 @@ def _other(constants, D, F, tangent, old, new, P, A):
 
 @kernel
 def respond(constants, D, F, J, G, volumetric, tangent, old, new, P, A):
-    """Fill `new`, P and A by the law of `constants` and return the elastic energy [energy / volume].
+    """Fill `new`, P and A according to the law of `constants`, and return the elastic energy [energy / volume].
 
     The energy does not include the volumetric part of the law. `volumetric` contains a pressure, a bulk modulus and a factor:
-    P includes ``pressure dJ/dF``, and A includes ``bulk dJ/dF dJ/dF + factor d2J/dF2``. D (6, 6) are the moduli of Hooke's
-    law, and J and G (3, 3) the determinant of F and its derivative. If `tangent` is false, the caller needs A at small
-    strains only where plastic flow occurs, and not at all at finite strains.
+    P includes ``pressure dJ/dF``, and A includes ``bulk dJ/dF dJ/dF + factor d2J/dF2``. D (6, 6) contains the moduli of
+    Hooke's law. J and G (3, 3) are the determinant of F and its derivative. If `tangent` is false, A is required only at
+    small strains, and only where plastic flow occurs.
     """
     for e in range(9):
         new[e] = old[e]

@@ -1,9 +1,9 @@
 """Linear system from which supports and multi-point constraints are eliminated: ``u = T v + t``.
 
-v are the unknowns. T is the identity except for the rows of displacements that multi-point constraints express in terms of
-others, and t contains the prescribed displacements and the effect of the right-hand sides of the constraints. The matrix of
-the solver is ``T.T K T``. It has the size and the blocks of K, but only the diagonal remains in the rows and columns of
-eliminated components.
+The vector v contains the unknowns. T is the identity, except in the rows of displacements that multi-point constraints
+express in terms of other displacements. The vector t contains the prescribed displacements and the contribution of the
+right-hand sides of the constraints. The matrix of the solver is ``T.T K T``. It has the size and the blocks of K, but only
+the diagonal remains in the rows and columns of eliminated components.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import entry_rows, stacked_rows
 from fastcontact.round_off import ROUND_OFF
 
-# Relative tolerance of the conditions under which supports and constraints are consistent.
-CONFLICT = 1e-9
+# Relative tolerance within which supports and constraints must be consistent.
+CONSISTENCY_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Stiffness:
-    """A stiffness matrix as the sum of the matrices `parts` (n, n) [force / length].
+    """A stiffness matrix in the form of a sum of matrices, `parts` (n, n) [force / length].
 
-    Without multi-point constraints there are two parts: the matrix of the linear solver, and the rows and columns of
+    Without multi-point constraints, there are two parts: the matrix of the linear solver, and the rows and columns of
     supports that were removed from it.
     """
 
@@ -43,7 +43,7 @@ class Stiffness:
         return total
 
     def absolute_product(self, u: Array) -> Array:
-        """Return ``|K| |u|`` (n,), summed over the parts, to which the round-off of ``K u`` is proportional [force]."""
+        """Return ``|K| |u|`` (n,), summed over the parts; the round-off of ``K u`` is proportional to it [force]."""
         return sum(
             (K.absolute_product(u) if hasattr(K, "absolute_product") else abs(K) @ np.abs(u) for K in self.parts),
             np.zeros(u.shape),
@@ -95,8 +95,8 @@ class ConstrainedMotion:
         values = np.concatenate([side * factor for side, factor in zip(right_sides, multipliers, strict=True)])
         conditions, known = self._elimination.conditions, np.concatenate([u_prescribed, values])
         violation = np.abs(conditions @ known)
-        # Coefficients may be round-off, such as the cosine of a right angle.
-        tolerance = np.maximum(CONFLICT * (np.abs(conditions) @ np.abs(known)), ROUND_OFF * largest(known))
+        # Coefficients may consist of round-off, such as the cosine of a right angle.
+        tolerance = np.maximum(CONSISTENCY_TOLERANCE * (np.abs(conditions) @ np.abs(known)), ROUND_OFF * largest(known))
         conflicts = np.flatnonzero(violation > tolerance)
         if len(conflicts):
             row = self._elimination.origin[conflicts[0]]
@@ -115,7 +115,7 @@ class System(ConstrainedMotion):
     Parameters
     ----------
     K : bsr_array (n, n)
-        Stiffness [force / length]; rows and columns of supports are removed from this array.
+        Stiffness [force / length]. The rows and columns of supports are removed from this array.
     supported : ndarray of bool (n,)
         Displacement components that are prescribed.
     relations : sequence of MultiPointConstraint
@@ -129,11 +129,11 @@ class System(ConstrainedMotion):
     matrix : bsr_array (n, n), or its replacement by the linear solver
         Matrix of the linear solver [force / length].
     fixed : ndarray of bool (n,)
-        Supported components, and those of points without stiffness or constraint, whose displacements are zero.
+        Supported components, and components without stiffness or constraint, whose displacements are zero.
     free : ndarray of bool (n,)
         The unknowns.
     weightless : ndarray of bool (n,)
-        Unknowns without stiffness: those of rigid obstacles, and motions of bodies that constraints make rigid.
+        Unknowns without stiffness: those of rigid obstacles, and those for motions of bodies that constraints make rigid.
     """
 
     def __init__(
@@ -153,7 +153,7 @@ class System(ConstrainedMotion):
         self._set_stiffness(K, diagonal)
 
     def renewed(self, K: bsr_array) -> System:
-        """Return the system with another stiffness K (n, n) [force / length], which is modified as in the constructor."""
+        """Return the system with a different stiffness K (n, n) [force / length], which is modified as by the constructor."""
         pattern = self._entries.pattern if self._entries else ()
         if self.T is None and not (pattern and all(map(np.array_equal, pattern, (K.indptr, K.indices)))):
             K = _with_diagonal(K)
@@ -166,7 +166,7 @@ class System(ConstrainedMotion):
         """Set the stiffness K (n, n), given with its diagonal (n,), and the attributes that depend on it."""
         self.free = self._independent.copy()
         if self.T is None:
-            self.K = Stiffness((K, self._entries.remove_from(K)) if self._entries else supports_apart(K, self.fixed))
+            self.K = Stiffness((K, self._entries.remove_from(K)) if self._entries else separate_supports(K, self.fixed))
             self.matrix = self.K.parts[0]
             self.weightless: Mask = self.free & (diagonal_of_K == 0.0)
         else:
@@ -174,12 +174,12 @@ class System(ConstrainedMotion):
             transformed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
             transformed.sort_indices()
             diagonal = transformed.diagonal()
-            # The transformed diagonal without the contribution of off-diagonal terms of K, which may cancel the other terms.
+            # The transformed diagonal without the contribution of off-diagonal terms of K, which may cancel the others.
             magnitude = self.T.multiply(self.T).T @ diagonal_of_K
             # Points without stiffness that constraints couple only with each other are excluded from the unknowns.
             self.free &= (magnitude > 0.0) | self._without_stiffness
             self.weightless = self.free & (diagonal <= ROUND_OFF * magnitude)
-            self.matrix = supports_apart(transformed, ~self.free)[0]
+            self.matrix = separate_supports(transformed, ~self.free)[0]
         self._no_unknowns = np.flatnonzero(~self.free)
 
     def keep(self, matrix: Any) -> None:
@@ -190,7 +190,7 @@ class System(ConstrainedMotion):
 
     def right(self, f: Array, t: Array) -> Array:
         """Return the right-hand side (n,) of the solver for forces `f` (n,) on all displacements [force]."""
-        # Without constraints t contains displacements of supports only, which load the unknowns through the removed columns.
+        # Without constraints, t contains only displacements of supports, which load the unknowns through the removed columns.
         return self.reduced(f - (self.K.parts[1] if self.T is None else self.K) @ t)
 
     def reduced(self, force: Array) -> Array:
@@ -230,8 +230,8 @@ class System(ConstrainedMotion):
     def balance(self, unbalanced: Array, round_off: Array | None = None) -> tuple[Array, float]:
         """Return the forces (n,) of supports and constraints [force], and the largest residual force on an unknown.
 
-        The argument `unbalanced` (n,) contains internal minus all other forces [force]. The residual does not include forces
-        up to its `round_off` (n,).
+        The argument `unbalanced` (n,) contains internal minus all other forces [force]. Residual forces up to `round_off`
+        (n,) are treated as zero, and larger ones are reduced by this amount.
         """
         residual = self.reduced(unbalanced)
         if round_off is not None:
@@ -239,7 +239,7 @@ class System(ConstrainedMotion):
         return np.where(self._reacting, unbalanced, 0.0), largest(residual)
 
 
-def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
+def separate_supports(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
     """Remove the rows and columns of supported degrees of freedom from K (n, n), in place.
 
     Returns
@@ -256,7 +256,7 @@ def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
 class _SupportedEntries:
     """Entries in the rows and columns of the degrees of freedom `fixed` (n,), for the pattern of a matrix K (n, n).
 
-    K has a block in every place of the diagonal.
+    All diagonal blocks of K must be stored.
     """
 
     def __init__(self, K: bsr_array, fixed: Mask) -> None:
@@ -279,7 +279,7 @@ class _SupportedEntries:
         return np.asarray(K.data.reshape(-1)[self._diagonal_entries])
 
     def remove_from(self, K: bsr_array) -> csr_array:
-        """Set the entries in K to zero, except for positive numbers on the diagonal, and return the removed part."""
+        """Set the entries of K to zero, except for positive numbers on the diagonal, and return the removed part."""
         K.data = np.ascontiguousarray(K.data)
         numbers = K.data.reshape(-1)
         removed = numbers[self._positions]

@@ -1,10 +1,10 @@
 """Mean dilatation (B-bar method), which avoids volumetric locking.
 
 The dilatation, the trace of the strain, is projected onto polynomials of low degree in each cell: constants in linear
-elements (the B-bar method of Hughes, Int. J. Numer. Meth. Engng 15, 1980), and linear functions in quadratic ones. The
+elements (the B-bar method of Hughes, Int. J. Numer. Meth. Engng 15, 1980), and linear functions in quadratic elements. The
 deviatoric strain is unchanged. Quadratic triangles, tetrahedra, wedges and pyramids would lock even with a linear dilatation.
-In these elements, only the mean dilatation has the full bulk modulus. The remainder has at most the bulk modulus of a
-material with nu = 0.3 and the same shear modulus. Without the remainder, single cells in 3D and in axisymmetry would have
+In these elements, the full bulk modulus is applied only to the mean dilatation. The bulk modulus for the remainder is at most
+that of a material with nu = 0.3 and the same shear modulus. If it were zero, single cells in 3D and in axisymmetry would have
 mechanisms (conformal maps, whose deviatoric strain is zero).
 
 The element loops use moduli without the bulk modulus, and the loops of `dilatation_kernels` add the contribution of the
@@ -23,21 +23,21 @@ from fastcontact.elasticity.energy import cell_volumes
 from fastcontact.elasticity.incompatible_modes import BENDING, MODES
 from fastcontact.mesh import elements
 
-# Flags of moduli with a mean dilatation: True, or the codes of `MaterialField.treatment`.
+# Mask of the moduli with a mean dilatation, or the codes of `MaterialField.treatment`.
 Mask = NDArray[np.bool_] | NDArray[np.uint8]
 # Ratio of the bulk to the shear modulus at nu = 0.3: 2 (1 + nu) / (3 (1 - 2 nu)).
-REMAINDER = 2.6 / 1.2
+BULK_TO_SHEAR = 2.6 / 1.2
 
 
 class Split(NamedTuple):
-    """Moduli of an element, split into a part for the element loops and bulk moduli of the projected dilatation.
+    """Moduli for an element type, split into a part for the element loops and bulk moduli for the projected dilatation.
 
     Attributes
     ----------
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
         Moduli for the element loops, without the bulk modulus if the dilatation is projected [pressure].
     bulk : ndarray (n_materials, 2)
-        Bulk moduli of the mean dilatation of a cell and of the remainder, zero without projection [pressure].
+        Bulk moduli for the mean dilatation of a cell and for the remainder; zero without projection [pressure].
     """
 
     moduli: Array
@@ -45,17 +45,17 @@ class Split(NamedTuple):
 
 
 def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
-    """Return the split moduli of an element; None if its dilatation is not projected for any of the moduli.
+    """Return the split moduli for an element type; None if its dilatation is not projected for any of the moduli.
 
     Parameters
     ----------
     name : str
-        The element.
+        Element type.
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
         From `LinearElastic.moduli` [pressure].
     averaged : ndarray of bool or uint8 (n_materials,), optional
-        Materials with a mean dilatation, or the codes of `MaterialField.treatment`: 1, and 3 for elements outside `BENDING`.
-        None by default.
+        Mask of the materials with a mean dilatation, or the codes of `MaterialField.treatment`, of which 1 and, for elements
+        not in `BENDING`, 3 stand for a mean dilatation. By default, there are no such materials.
     """
     if averaged is not None:
         treatment = np.asarray(averaged).astype(np.uint8)
@@ -66,17 +66,17 @@ def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
     deviatoric = moduli.copy()
     deviatoric[:, :3, :3] -= bulk[:, None, None]
     complete = elements.get(name).dilatation == elements.get(name).order - 1
-    bulk_remainder = bulk if complete else np.minimum(bulk, REMAINDER * moduli[:, 3, 3])
+    bulk_remainder = bulk if complete else np.minimum(bulk, BULK_TO_SHEAR * moduli[:, 3, 3])
     return Split(deviatoric, np.column_stack([bulk, bulk_remainder]))
 
 
 def projected(name: str, corners: Array, values: Array, xi: Array, axisymmetric: bool) -> Array:
-    """Return the mean and the remainder (n_cells, 2, n) of the projection of a field, as for dilatations [unit of the field].
+    """Return the mean and the remainder (n_cells, 2, n) of a field, projected like the dilatation [unit of the field].
 
     Parameters
     ----------
     name : str
-        The element.
+        Element type.
     corners : ndarray (n_cells, n_nodes, dim)
         Nodes of the cells [length].
     values : ndarray (n_cells, n_q)
@@ -96,7 +96,7 @@ def projected(name: str, corners: Array, values: Array, xi: Array, axisymmetric:
 
 
 def basis(name: str, xi: Array) -> Array:
-    """Return the polynomials (n, m) [-] onto which an element projects its dilatation, at the points `xi` (n, dim) [-]."""
+    """Return the polynomials (n, m) [-] onto which dilatations are projected, at the points `xi` (n, dim) [-]."""
     element = elements.get(name)
     constant = np.ones((len(xi), 1))
     if element.order == 1:

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loops of the projected dilatation: its stiffness, and its mean stress at points of the cells.
+"""Element loops for the projected dilatation: its stiffness, and the mean stress that it causes at points of the cells.
 
 Shared arguments: ``points`` (n_points, dim) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
 n_nodes, dim), ``weights`` (n_q,) of the reference element; ``basis`` (n_q, m), the polynomials at the same points, the
@@ -83,8 +83,8 @@ def back_substitute(L, y):
 def add_products(factors, g, slots, c, inside, row, data):
     """Add ``g^T diag(factors) g`` of cell `c`, with `g` (m, n_nodes * dim), to `data` (n_blocks, dim, dim).
 
-    Only the rows of nodes that are `inside` (n_nodes,) are changed. `slots` (n_cells, n_nodes, n_nodes) are the indices of
-    the blocks in `data`, and `row` (n_nodes * dim,) is overwritten.
+    Only the rows of nodes that are marked in `inside` (n_nodes,) are changed. `slots` (n_cells, n_nodes, n_nodes) contains
+    the indices of the blocks in `data`, and `row` (n_nodes * dim,) is overwritten.
     """
     n_nodes, dim = len(inside), data.shape[1]
     for a in range(n_nodes):
@@ -104,7 +104,7 @@ def add_products(factors, g, slots, c, inside, row, data):
 def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymmetric, slots, owner, part, data):
     """Add the stiffness of the projected dilatation to `data` (n_blocks, dim, dim), for nodes with ``owner[node] == part``.
 
-    `slots`, `owner`, `part` and `data` are those of `element_2d_kernels.add_stiffness`, which checks that Jacobians are
+    `slots`, `owner`, `part` and `data` are as in `element_2d_kernels.add_stiffness`, which checks that Jacobians are
     positive.
     """
     n_cells, n_nodes = cells.shape

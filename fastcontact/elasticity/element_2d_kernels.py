@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loops of plane and axisymmetric solids: stiffness and stresses; and nodal sums.
+"""Element loops for plane and axisymmetric solids, which compute stiffness and stresses, and nodal sums.
 
 Shared arguments: ``points`` (n_points, 2) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes),
 ``dN`` (n_q, n_nodes, 2), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 4, 4) [pressure] for
@@ -36,7 +36,7 @@ def _map(points, cell, N, dN, q, gradient):
 
 @kernel
 def owned(cells, c, owner, part, inside):
-    """Fill `inside` (n_nodes,) with whether each node of cell `c` belongs to `part`; return whether any of them does."""
+    """Fill `inside` (n_nodes,) with the mask of the nodes of cell `c` that belong to `part`; return whether there are any."""
     any_inside = False
     for a in range(cells.shape[1]):
         inside[a] = owner[cells[c, a]] == part
@@ -77,8 +77,8 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
     """Add element stiffness blocks to `data` (n_blocks, 2, 2), in the rows of nodes with ``owner[node] == part``.
 
     The block of each node pair of a cell has the index `slots` (n_cells, n_nodes, n_nodes). Each thread adds to the rows of
-    its own nodes, in the order of the cells. Returns the number of the first cell with a Jacobian that is not positive, or
-    -1. `isotropic` has no effect: the loops of both dimensions are called in the same way.
+    the nodes of its part, in the order of the cells. Returns the number of the first cell whose Jacobian is not positive, or
+    -1. `isotropic` has no effect, and is an argument because the loops of both dimensions are called in the same way.
     """
     n_cells, n_nodes = cells.shape
     gradient = np.empty((n_nodes, 2))
@@ -91,7 +91,7 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
         if not _integrate(points, cells[c], N, dN, weights, moduli[material[c]], axisymmetric, gradient, local):
             return c
         for b in range(n_nodes):
-            local[b, b, 1, 0] = local[b, b, 0, 1]  # equal up to round-off; keeps K bitwise symmetric
+            local[b, b, 1, 0] = local[b, b, 0, 1]  # equal up to round-off; makes K bitwise symmetric
             for a in range(b + 1):
                 upper, lower = slots[c, a, b], slots[c, b, a]
                 if inside[a]:
@@ -109,8 +109,8 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
 def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
     """Fill `out` (n_cells, n_q, 4) with the stress xx, yy, zz, xy at the points of the tables N, dN.
 
-    Positions and displacements are differentiated in reference coordinates, and their derivatives combined, without gradients
-    of shape functions.
+    Positions and displacements are differentiated with respect to reference coordinates, and their derivatives are combined,
+    without computing gradients of shape functions.
     """
     n_cells, n_nodes = cells.shape
     slopes, x, u = transposed(dN), np.empty((2, n_nodes)), np.empty((2, n_nodes))
@@ -140,7 +140,7 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
 
 @interpretable_kernel
 def add_nodal(cells, extrapolation, at_points, low, high, total, count):
-    """Extrapolate values from quadrature points to the nodes of each cell, and add them up at the points of the mesh.
+    """Extrapolate values from quadrature points to the nodes of each cell, and sum them at the points of the mesh.
 
     Only nodes with numbers from `low` to ``high - 1`` are processed. `extrapolation` is (n_nodes, n_q) and `at_points`
     (n_cells, n_q, n_components). The values are added to `total` (n_points, n_components), and the number of cells of each

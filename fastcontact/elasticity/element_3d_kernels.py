@@ -1,9 +1,9 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loops of three-dimensional solids: stiffness and stresses.
+"""Element loops for three-dimensional solids, which compute stiffness and stresses.
 
 Shared arguments: ``points`` (n_points, 3) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
 n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6) [pressure], symmetric, for strains
-(xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` have no effect: they are arguments because the
+(xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` have no effect, and are arguments because the
 loops of both dimensions are called in the same way.
 """
 
@@ -52,8 +52,8 @@ def _tensor(D, tensor):
 def _integrate_products(x, slopes, weights, gradient, g):
     """Fill `g` (6, n_nodes, n_nodes) with the integrals of dN_a/dx_i dN_b/dx_j for ij = 00, 01, 02, 11, 12, 22.
 
-    Returns whether the Jacobian is positive at all points. The compiler vectorises the innermost loop, which is short and has
-    one sum.
+    Returns whether the Jacobian is positive at all points. The innermost loop is short and contains a single sum, so that the
+    compiler vectorises it.
     """
     n_nodes = x.shape[1]
     g[:] = 0.0
@@ -75,9 +75,9 @@ def _integrate_products(x, slopes, weights, gradient, g):
 
 @kernel
 def add_block(flat, at_upper, at_lower, upper, lower, block):
-    """Add the `block` (9,) of a node pair at slot `upper` if `at_upper`, and its transpose at slot `lower` if `at_lower`.
+    """Add the `block` (9,) of a node pair at the slot `upper`, and its transpose at the slot `lower`.
 
-    The transpose of a diagonal block is not added.
+    They are added only if `at_upper` and `at_lower` are true. The transpose of a diagonal block is not added.
     """
     u, v = 9 * upper, 9 * lower
     if at_upper:
@@ -92,13 +92,13 @@ def add_block(flat, at_upper, at_lower, upper, lower, block):
 def _add_isotropic_block(flat, differ, at_upper, at_lower, upper, lower, coupling, shear, g):
     """Add the block of two nodes for Lamé's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij.
 
-    `differ` is whether the nodes differ; the order of g is xx, yy, zz, xy, xz, yz, yx, zx, zy.
+    `differ` states whether the nodes differ. The order of g is xx, yy, zz, xy, xz, yz, yx, zx, zy.
     """
     xx, yy, zz, xy, xz, yz, yx, zx, zy = g
     trace, both = shear * (xx + yy + zz), coupling + shear
     k01, k02, k12 = coupling * xy + shear * yx, coupling * xz + shear * zx, coupling * yz + shear * zy
     k10, k20, k21 = coupling * yx + shear * xy, coupling * zx + shear * xz, coupling * zy + shear * yz
-    if not differ:  # equal up to round-off; keeps K bitwise symmetric
+    if not differ:  # equal up to round-off; makes K bitwise symmetric
         k10, k20, k21 = k01, k02, k12
     block = both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace
     add_block(flat, at_upper, at_lower, upper, lower, block)
@@ -129,7 +129,7 @@ def _add_general(g, tensor, products, block, slots, c, inside, flat):
                 for column in range(9):
                     total += tensor[row, column] * products[column]
                 block[row] = total
-            if a == b:  # equal up to round-off; keeps K bitwise symmetric
+            if a == b:  # equal up to round-off; makes K bitwise symmetric
                 block[3], block[6], block[7] = block[1], block[2], block[5]
             add_block(flat, inside[a], inside[b], slots[c, a, b], slots[c, b, a], block)
 
@@ -138,8 +138,8 @@ def _add_general(g, tensor, products, block, slots, c, inside, flat):
 def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, inside, gradient, flat):
     """Add the blocks of a linear tetrahedron, whose gradients (4, 3) are constant, for Lamé's constants.
 
-    `volume` is that of the reference cell. Returns whether the Jacobian is positive. With a fixed number of nodes this takes
-    half the time of `_integrate_products` and `_add_isotropic`.
+    `volume` is that of the reference cell. Returns whether the Jacobian is positive. With a fixed number of nodes, this takes
+    half as long as `_integrate_products` and `_add_isotropic`.
     """
     first = cells[c, 0]
     x0, y0, z0 = points[first, 0], points[first, 1], points[first, 2]
@@ -170,9 +170,9 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
     """Add element stiffness blocks to `data` (n_blocks, 3, 3), in the rows of nodes with ``owner[node] == part``.
 
     The block of each node pair of a cell has the index `slots` (n_cells, n_nodes, n_nodes). Each thread adds to the rows of
-    its own nodes, in the order of the cells. Returns the number of the first cell with a Jacobian that is not positive, or
-    -1. The products of gradients are integrated first, and then multiplied with the moduli of the cell. For the materials
-    that are `isotropic` (n_materials,), these are Lamé's constants ``D[0, 1]`` and ``D[3, 3]``.
+    the nodes of its part, in the order of the cells. Returns the number of the first cell whose Jacobian is not positive, or
+    -1. The products of gradients are integrated first, and then multiplied by the moduli of the cell. For materials that are
+    marked in `isotropic` (n_materials,), the moduli are Lamé's constants ``D[0, 1]`` and ``D[3, 3]``.
     """
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
@@ -205,8 +205,8 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
 def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
     """Fill `out` (n_cells, n_q, 6) with the stress xx, yy, zz, xy, yz, xz at the points of the table dN.
 
-    Positions and displacements are differentiated in reference coordinates, and their derivatives combined, without gradients
-    of shape functions.
+    Positions and displacements are differentiated with respect to reference coordinates, and their derivatives are combined,
+    without computing gradients of shape functions.
     """
     n_cells, n_nodes = cells.shape
     slopes, x, u = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))

@@ -1,4 +1,4 @@
-"""Strain energy of stresses, volumes and gradients at quadrature points, and a quadrature rule of higher order."""
+"""Elastic energy due to stresses, volumes and gradients at quadrature points, and a quadrature rule of higher order."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def elastic_energy(stress: Array, compliance: Array) -> Array:
     stress : ndarray (n_cells, n, n_components)
         Stress [pressure].
     compliance : ndarray (n_cells, m, n_components, n_components)
-        Compliance of cells (m = 1) or of their points (m = n), see `Material.compliance_at` [1 / pressure].
+        Compliance of cells (m = 1) or of points (m = n), see `Material.compliance_at` [1 / pressure].
     """
     (n_cells, n, n_components), m = stress.shape, compliance.shape[1]
     strain = stress.reshape(n_cells, m, n // m, n_components) @ compliance
@@ -25,7 +25,7 @@ def elastic_energy(stress: Array, compliance: Array) -> Array:
 
 
 def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Array:
-    """Return det J (n_cells, n_q) [length^dim], the ratio of the volumes of a cell and of the reference cell at points.
+    """Return det J (n_cells, n_q) [length^dim], the ratio of the volume of a cell to that of the reference cell at points.
 
     In axisymmetry, det J is multiplied by the circumference 2 pi r [length^3].
 
@@ -81,5 +81,5 @@ def derivatives_at(values: Array, dN: Array) -> Array:
 
 
 def integration_rule(element: Element, n_points: int | None = None) -> quadrature.Rule:
-    """Return a product rule with `n_points` in each direction of the reference cell, by default order + 3."""
+    """Return a product rule with `n_points` points in each direction of the reference cell, by default order + 3."""
     return quadrature.product_rule(element.linear, element.order + 3 if n_points is None else n_points)

@@ -12,13 +12,13 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import weighted_area_vectors
 from fastcontact.mesh.mesh import Mesh
 
-# Number of quadrature points in each direction of a facet, with which a constant pressure on quadratic facets is integrated
-# exactly, also in axisymmetry.
+# Number of quadrature points in each direction of a facet. With this number, a constant pressure on quadratic facets is
+# integrated exactly, also in axisymmetry.
 POINTS = 4
 
 
 class FollowingPressure:
-    """A pressure along the normals of deformed facets, whose values are those at reference positions.
+    """A pressure along the normals of deformed facets, whose values are evaluated at reference positions.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class FollowingPressure:
         return facets, N, element.gradient(xi), evaluated(load.value, x, load.name) * weights
 
     def at(self, displacement: Array) -> tuple[Array, csr_array]:
-        """Return nodal forces (n_points, dim) [force] at a `displacement` (n_points, dim) [length], and the load stiffness.
+        """Return the nodal forces (n_points, dim) [force] at `displacement` (n_points, dim) [length] and the load stiffness.
 
         The load stiffness (n_dofs, n_dofs) is minus the symmetric part of the derivative of the forces [force / length].
         The derivative is symmetric if the pressure is uniform and the facets enclose a volume or end at supports.

@@ -1,12 +1,12 @@
 """Incompatible modes, which avoid shear locking and volumetric locking of quadrangles and hexahedra.
 
-Each linear cell has additional displacement modes 1 - xi^2 along each reference direction, with which its edges can curve.
-They are internal to the cell and eliminated by static condensation (Wilson, Taylor, Doherty and Ghaboussi, Numerical and
-computer methods in structural mechanics, 1973). Their gradients are computed with the Jacobian at the centre of the cell, so
-that their mean strain is zero and the patch test is passed (Taylor, Beresford and Wilson, Int. J. Numer. Meth. Engng 10,
-1976). Hexahedra have four additional enhanced dilatations, the products of two and of three reference coordinates. Without
-these, hexahedra lock if nu is 0.49 or more (Simo, Armero and Taylor, Comput. Methods Appl. Mech. Engng 110, 1993). The loops
-over cells are in `incompatible_modes_kernels`.
+Each linear cell has additional displacement modes 1 - xi^2 along each reference direction, which permit its edges to curve.
+The modes are internal to the cell and are eliminated by static condensation (Wilson, Taylor, Doherty and Ghaboussi, Numerical
+and computer methods in structural mechanics, 1973). Their gradients are computed with the Jacobian at the centre of the cell,
+so that their mean strain is zero and the patch test is passed (Taylor, Beresford and Wilson, Int. J. Numer. Meth. Engng 10,
+1976). Hexahedra have four additional modes of enhanced dilatation, the products of two and of three reference coordinates.
+Without these, hexahedra lock if nu is 0.49 or more (Simo, Armero and Taylor, Comput. Methods Appl. Mech. Engng 110, 1993).
+The loops over cells are in `incompatible_modes_kernels`.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ PAIRS = {2: np.array([[0, 3], [3, 1]]), 3: np.array([[0, 3, 5], [3, 1, 4], [5, 4
 
 
 class Tables(NamedTuple):
-    """Constants of an element for the loops in `incompatible_modes_kernels`.
+    """Constants of an element type for the loops in `incompatible_modes_kernels`.
 
     Attributes
     ----------
     dN, xi, weights : ndarray (n_q, n_nodes, dim), (n_q, dim), (n_q,)
-        Shape derivatives, points and weights of the quadrature [-].
+        Derivatives of the shape functions at the quadrature points, these points, and their weights [-].
     middle : ndarray (1, n_nodes, dim)
-        Shape derivatives at the centre of the cell [-].
+        Derivatives of the shape functions at the centre of the cell [-].
     pairs : ndarray of int (dim, dim)
         Number of the stress component (i, j).
     """
@@ -47,14 +47,14 @@ class Tables(NamedTuple):
 
 
 def tables(name: str) -> Tables:
-    """Return the constants of the element `name`."""
+    """Return the constants of the element type `name`."""
     element = elements.get(name)
     _, dN, weights = element.tables
     return Tables(dN, element.quadrature[0], weights, element.gradient(np.zeros((1, element.dim))), PAIRS[element.dim])
 
 
 def with_modes(name: str, treatment: AnyArray | None) -> Mask | None:
-    """Return which moduli (n_moduli,) have incompatible modes in the element `name`; None if there are none."""
+    """Return a mask (n_moduli,) of moduli with incompatible modes in elements of type `name`; None if there are none."""
     if treatment is None or name not in BENDING:
         return None
     has_modes = (np.asarray(treatment).astype(np.uint8) & MODES) > 0

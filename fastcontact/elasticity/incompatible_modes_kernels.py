@@ -1,13 +1,13 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loops of incompatible modes: condensed stiffness and additional stresses.
+"""Element loops for incompatible modes, which compute the condensed stiffness and additional stresses.
 
 Shared arguments: ``points`` (n_points, dim) [length]; ``cells`` (n_cells, n_nodes); ``dN`` (n_q, n_nodes, dim), ``xi`` (n_q,
 dim) and ``weights`` (n_q,) of the quadrature; ``middle`` (1, n_nodes, dim), shape derivatives at the centre of the reference
 cell; ``pairs`` (dim, dim), the number of the stress component (i, j); ``moduli`` (n_moduli, n_components, n_components)
-[pressure]; ``with_modes`` (n_moduli,) of bool, which of them have modes; ``material`` (n_cells, 1 or n_q), numbers of the
-moduli of cells, or of their quadrature points. dim is 2 or 3, with 4 or 13 modes.
+[pressure]; ``with_modes`` (n_moduli,) of bool, the mask of moduli with modes; ``material`` (n_cells, 1 or n_q), the rows of
+moduli for cells, or for their quadrature points. There are 4 modes if dim is 2, and 13 modes if dim is 3.
 
-With the strains M due to unit modes and B due to unit nodal displacements, let modal = sum w M^T D M = L L^T and mixed =
+Let M be the strains due to unit modes, B those due to unit nodal displacements, modal = sum w M^T D M = L L^T, and mixed =
 sum w M^T D B. Static condensation eliminates the amplitudes of the modes, a = -modal^-1 mixed u, and subtracts
 (L^-1 mixed)^T (L^-1 mixed) from the stiffness.
 """
@@ -82,7 +82,7 @@ def subtract_stiffness(
 ):
     """Subtract the stiffness of condensed modes from `data` (n_blocks, dim, dim), in the rows of nodes that `part` owns.
 
-    `slots`, `owner` and `part` are as for the element loops of the stiffness, which have checked the Jacobians.
+    `slots`, `owner` and `part` are as in `element_2d_kernels.add_stiffness`, which checks that Jacobians are positive.
     """
     n_cells, n_nodes = cells.shape
     dim = points.shape[1]
@@ -103,7 +103,7 @@ def add_stress(
     points, cells, dN, xi, weights, middle, pairs, moduli, with_modes, material, displacement, subtracted, xi_out, dN_out,
     interpolation, out,
 ):  # fmt: skip
-    """Add the stresses of modes to `out` (n_cells, n_out, n_components), in place.
+    """Add the stresses due to the modes to `out` (n_cells, n_out, n_components), in place.
 
     `displacement` (n_points, dim) contains the displacements, and `subtracted` (n_cells or 0, n_q, n_components) the stresses
     that were subtracted for temperature and initial states. The points of `out` are `xi_out` (n_out, dim). The shape

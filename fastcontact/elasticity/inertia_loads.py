@@ -1,4 +1,4 @@
-"""Inertia loads: gravity and centrifugal forces, from the densities of the materials."""
+"""Inertia loads: gravity and centrifugal forces, computed from the densities of the materials."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ class Densities:
 
 
 class InertiaLoad(VolumeLoad):
-    """A load per volume that is density times acceleration."""
+    """A load per unit volume that is the product of density and acceleration."""
 
     CONSTANT = True
 
     def vector(self, mesh: Mesh, kinematics: str, density: DensityField | None = None) -> Array:
-        """Return the nodal forces (n_points, dim) at multiplier 1 [force]; ModelError if some of the cells have no density.
+        """Return the nodal forces (n_points, dim) at multiplier 1 [force]; raise ModelError if cells have no density.
 
         Parameters
         ----------
@@ -78,7 +78,7 @@ class InertiaLoad(VolumeLoad):
 
 @dataclass(frozen=True)
 class Gravity(InertiaLoad):
-    """Gravity on groups of solid cells, or on all of them, given by the components of the acceleration [length / time^2]."""
+    """Gravity on groups of solid cells, or on all solid cells, given by its components [length / time^2]."""
 
     KIND = "gravity"
     groups: tuple[str, ...] | None
@@ -91,13 +91,13 @@ class Gravity(InertiaLoad):
             raise ModelError(f"{self.name} has a radial component x: in axisymmetry it can act only along the axis, y")
 
     def acceleration(self, x: Array, kinematics: str) -> Array:
-        """Return the same vector (..., dim) [length / time^2] at all positions `x` (..., dim) [length]."""
+        """Return the acceleration (..., dim) [length / time^2], the same at all positions `x` (..., dim) [length]."""
         return np.broadcast_to([float(self.components.get(axis, 0.0)) for axis in range(x.shape[-1])], x.shape)
 
 
 @dataclass(frozen=True)
 class Centrifugal(InertiaLoad):
-    """The centrifugal force due to a rotation at constant speed.
+    """Centrifugal force due to a rotation at constant speed.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class Centrifugal(InertiaLoad):
     speed : float
         Angular speed [radian / time].
     origin, direction : (float, float, float)
-        A point of the axis [length], and a vector along it [-].
+        A point on the axis [length], and a vector along the axis [-].
     ramp : tuple, optional
         Points (instant, multiplier) of the ramp of the force, which is proportional to the square of the speed.
     """
@@ -141,7 +141,7 @@ class Centrifugal(InertiaLoad):
         return np.asarray(self.speed**2 * (np.eye(3) - np.outer(axis, axis))[:dim, :dim])
 
     def acceleration(self, x: Array, kinematics: str) -> Array:
-        """Return speed^2 times the vector from the axis (..., dim) [length / time^2] at `x` (..., dim) [length]."""
+        """Return the acceleration (..., dim) [length / time^2] at `x` (..., dim) [length]: speed^2 times the radius."""
         radius = np.zeros((*x.shape[:-1], 3))
         radius[..., : x.shape[-1]] = x
         radius -= self.origin

@@ -33,9 +33,9 @@ class InitialState:
     cells : Cells
         The cells of these groups.
     components : mapping of int to float or Varying
-        Stresses [pressure], or strains with engineering shear strains [-], by the number of the component in `COMPONENTS`.
+        Stresses [pressure], or strains [-] with engineering shear strains, by the number of the component in `COMPONENTS`.
     axes : Axes
-        Axes to which the components refer, as for materials.
+        Axes to which the components refer, in the forms of material axes.
     kinematics : str
     ramp : tuple
         Points (instant, multiplier) of the ramp.
@@ -57,9 +57,9 @@ class InitialState:
     def values(self, element: str, rows: Indices, N: Array) -> Array:
         """Return the components (n_rows, n, n_components) in the axes x, y and z, in cells of the type `element`.
 
-        The components are stresses [pressure] or strains [-], and zero in cells of other groups. `rows` (n_rows,) of int
-        contains the numbers of the cells, and `N` (n, n_nodes) [-] the shape functions at n points of a cell. ModelError if a
-        component does not exist in the kinematics.
+        The components are stresses [pressure] or strains [-], and are zero in cells of other groups. `rows` (n_rows,) of int
+        contains the numbers of the cells, and `N` (n, n_nodes) [-] the shape functions at n points of a cell. Raises
+        ModelError if a component does not exist in the kinematics.
         """
         size = 6 if self.kinematics == "3d" else 4
         is_member = np.isin(rows, self.cells.rows.get(element, ()))
@@ -93,7 +93,7 @@ def initial_state(
     kind: str, groups: tuple[str, ...] | None, cells: Cells, values: Mapping[str, Any], axes: Axes, kinematics: str,
     ramp: Table | None,
 ) -> InitialState:  # fmt: skip
-    """Return the initial state of a `kind` with the `values` of its components by name; ModelError if it is not admissible.
+    """Return an initial stress or strain, given the `values` of its components by name; raise ModelError if inadmissible.
 
     The other arguments are attributes of `InitialState`.
     """

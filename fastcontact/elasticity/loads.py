@@ -1,7 +1,7 @@
 """Loads and their nodal forces in the reference configuration.
 
-Each kind of load is a subclass of `Load`, with a method ``add_...`` of the model. Nodal forces are work-equivalent: the
-integrals of the load times the shape functions. In axisymmetry, forces are those over the full circle.
+Each kind of load is a subclass of `Load` and has a method ``add_...`` of the model. Nodal forces are work-equivalent: they
+are the integrals of the load times the shape functions. In axisymmetry, forces refer to the full circle.
 
 A `Value` is a number, or a function from positions (n, dim) [length] in the reference configuration to numbers (n,) [unit of
 the load]. `Components` map the numbers of axes to values.
@@ -31,13 +31,13 @@ Table = tuple[tuple[float, float], ...]
 Value = float | Callable[[Array], Array]
 # Name of the cells of a load without groups, in messages and results.
 EVERYWHERE = "all solid cells"
-# Largest admissible magnitude of a number in a model: the square of a product of two such numbers is finite.
+# Largest admissible magnitude of a number in a model. The square of the product of two such numbers is finite.
 LARGEST = 1e60
 Components = Mapping[int, Value]
 
-# Numbers of points of the product rule in each direction, and in the Cartesian directions of squares, cubes and prisms. The
-# rules are exact at least to degree 7, which suffices for constant loads on curved quadratic cells in axisymmetry and for
-# quadratic loads on straight facets.
+# Number of points of the product rule in each direction, and its number in the Cartesian directions of squares, cubes and
+# prisms. The rules are exact at least to degree 7, which suffices for constant loads on curved quadratic cells in axisymmetry
+# and for quadratic loads on straight facets.
 LOAD_POINTS = 5, 4
 
 
@@ -45,16 +45,16 @@ class DensityField(Protocol):
     """Densities of solid cells."""
 
     def at(self, name: str, rows: Indices, N: Array) -> Array:
-        """Return the densities (n_rows, n) [mass / length^3] in cells of an element, NaN where there are none.
+        """Return the densities (n_rows, n) [mass / length^3] at n points of cells of an element, NaN where there are none.
 
-        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape functions at the points.
+        `rows` (n_rows,) of int contains the numbers of the cells, and `N` (n, n_nodes) [-] the shape functions at the points.
         """
 
 
 class Load:
     """Base class of the loads of a model.
 
-    `ramp` contains points (instant, multiplier); None means the ramp of the analysis.
+    `ramp` contains the points (instant, multiplier) of the ramp; None means the ramp of the analysis.
     """
 
     KIND: ClassVar[str]
@@ -86,7 +86,7 @@ class Load:
             (check_number if self.CONSTANT else check_value)(self.name, value)
 
     def vector(self, mesh: Mesh, kinematics: str, density: DensityField | None = None) -> Array:
-        """Return the nodal forces (n_points, dim) at multiplier 1 [force]; errors as for `check`.
+        """Return the nodal forces (n_points, dim) at multiplier 1 [force]; the errors are those of `check`.
 
         Parameters
         ----------
@@ -113,7 +113,7 @@ class Load:
             add_density(forces, cells, N, self._density(x) * measure[:, :, None])
 
     def _density(self, x: Array) -> Array:
-        """Return the force per area or volume (c, q, dim) at positions `x` (c, q, dim) [length]."""
+        """Return the force per unit area or volume (c, q, dim) at positions `x` (c, q, dim) [length]."""
         density = np.zeros(x.shape)
         for axis, value in self.components.items():
             density[:, :, axis] = evaluated(value, x, self.name)
@@ -122,7 +122,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Pressure(Load):
-    """A pressure [pressure] on a group of outer facets, which acts against their outward normals if it is positive."""
+    """A pressure [pressure] on a group of outer facets. If it is positive, it acts against their outward normals."""
 
     KIND = "the pressure"
     group: str
@@ -141,7 +141,7 @@ class Pressure(Load):
 
 @dataclass(frozen=True)
 class Hydrostatic:
-    """The pressure of a liquid of the specific weight `weight` [force / length^3], whose surface is at `level` [length].
+    """Pressure of a liquid with the specific weight `weight` [force / length^3], whose surface is at `level` [length].
 
     The level is the coordinate of the surface along the axis with the number `axis`, which points upwards.
     """
@@ -157,7 +157,7 @@ class Hydrostatic:
 
 @dataclass(frozen=True)
 class Traction(Load):
-    """A force per area on a group of facets, given by its components [pressure]."""
+    """A force per unit area on a group of facets, given by its components [pressure]."""
 
     KIND = "the traction"
     group: str
@@ -166,7 +166,7 @@ class Traction(Load):
 
 
 class VolumeLoad(Load):
-    """A load on groups of solid cells, or on all of them."""
+    """A load on groups of solid cells, or on all solid cells."""
 
     groups: tuple[str, ...] | None
 
@@ -190,7 +190,7 @@ class VolumeLoad(Load):
 
 @dataclass(frozen=True)
 class BodyForce(VolumeLoad):
-    """A force per volume on groups of solid cells, or on all of them, given by its components [force / length^3]."""
+    """A force per unit volume on groups of solid cells, or on all solid cells, given by its components [force / length^3]."""
 
     KIND = "the body force"
     groups: tuple[str, ...] | None
@@ -214,7 +214,7 @@ class NodalForce(Load):
             if len(on_axis):
                 raise ModelError(
                     f"{self.name} has a radial component x on the axis of symmetry (number of points: {len(on_axis)}, first: "
-                    f"point {on_axis[0]}), where the circle that it acts along has no length: leave the points at x = 0 out"
+                    f"point {on_axis[0]}), where the circumference is zero: leave out the points at x = 0"
                 )
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
@@ -297,9 +297,9 @@ def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:
 
 
 def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
-    """Return the facets (n, n_nodes) of `block` (n, n_nodes), oriented such that their normals point out of the solid.
+    """Return facets (n, n_nodes), given as `block` (n, n_nodes), with normals that point out of the solid.
 
-    Raises ModelError if a facet does not lie on the outside of a solid; the message names the `group`.
+    Raises ModelError, with the name of the `group`, if a facet does not lie on the outside of a solid.
     """
     outer = outer_facets(mesh).get(element, np.empty((0, block.shape[1]), np.int32))
     rows = same_facets(outer, block)
@@ -316,7 +316,7 @@ def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
 def evaluated(value: Value, points: Array, name: str) -> Array:
     """Return the value (...) [unit of the load] at `points` (..., dim) [length].
 
-    Raises ModelError if a function returns an array of another shape, or numbers that are not finite or too large.
+    Raises ModelError if a function returns an array of a different shape, or numbers that are too large or not finite.
     """
     if not callable(value):
         return np.full(points.shape[:-1], float(value))
@@ -338,7 +338,7 @@ def evaluated(value: Value, points: Array, name: str) -> Array:
 
 
 def check_number(name: str, value: Any) -> None:
-    """Raise ModelError, with its `name`, if `value` is not a finite number, or its magnitude exceeds `LARGEST`."""
+    """Raise ModelError, with the `name` of the value, if it is not a finite number or its magnitude exceeds LARGEST."""
     number: Any = value if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     if not abs(number) < math.inf:
         raise ModelError(f"{name} is {value!r}, which is not a finite number")
@@ -347,7 +347,7 @@ def check_number(name: str, value: Any) -> None:
 
 
 def check_value(name: str, value: Any) -> None:
-    """Raise ModelError, with its `name`, if `value` is neither a finite number nor a function."""
+    """Raise ModelError, with the `name` of the value, if it is neither a finite number nor a function."""
     if not callable(value):
         check_number(name, value)
 
@@ -355,7 +355,8 @@ def check_value(name: str, value: Any) -> None:
 def axes_of(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, Any]:
     """Return the components that are not None by axis number, given `components` by the axis names x, y and z.
 
-    Raises ModelError, which begins with `caption`, if all components are None, or an axis does not exist in `dim` dimensions.
+    Raises ModelError if all components are None, or if an axis does not exist in `dim` dimensions. The message begins with
+    `caption`.
     """
     specified = {name: value for name, value in components.items() if value is not None}
     if not specified:
@@ -376,8 +377,8 @@ def _quadrature(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array,
 def facet_points(mesh: Mesh, element: str, facets: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
     """Return positions (f, q, dim) [length], shape functions (q, n) [-] and area vectors (f, q, dim) [length^2] of facets.
 
-    They are those of the quadrature points of `facets` (f, n) of int of an element. Area vectors include the weight of a
-    point and, in axisymmetry, the circumference.
+    The values are those at the quadrature points of `facets` (f, n) of int of an element type. Area vectors include the
+    weight of a point and, in axisymmetry, the circumference.
     """
     x, N, dN, weights = _quadrature(mesh, element, facets)
     normal = area_vectors(mesh.points[facets], dN) * weights[:, None]
@@ -387,8 +388,8 @@ def facet_points(mesh: Mesh, element: str, facets: Numbers, kinematics: str) -> 
 def measured_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
     """Return positions (c, q, dim) [length], shape functions (q, n) [-] and volumes or areas (c, q) [length^dim].
 
-    They are those of the quadrature points of cells or facets, `cells` (c, n) of int. Volumes and areas include the weight of
-    a point and, in axisymmetry, the circumference.
+    The values are those at the quadrature points of cells or facets, `cells` (c, n) of int. Volumes and areas include the
+    weight of a point and, in axisymmetry, the circumference.
     """
     if elements.get(element).dim < mesh.dim:
         x, N, normal = facet_points(mesh, element, cells, kinematics)
@@ -400,7 +401,7 @@ def measured_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -
 def add_density(forces: Array, cells: Numbers, N: Array, density: Array) -> None:
     """Add the integrals of a density times the shape functions to nodal `forces` (n_points, dim) [force], in place.
 
-    `density` (c, q, dim) [force] includes the volume or area of each quadrature point; `cells` (c, n) of int are the nodes
-    of the cells, and `N` (q, n) [-] the shape functions.
+    `density` (c, q, dim) [force] includes the volume or area of each quadrature point. `cells` (c, n) of int contains the
+    nodes of the cells, and `N` (q, n) [-] the shape functions.
     """
     np.add.at(forces, cells, np.einsum("qn,cqd->cnd", N, density))

@@ -18,15 +18,15 @@ from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-# Number of entries of local matrices that are computed at a time, which limits the memory.
-AT_ONCE = 2_000_000
+# Number of entries of local matrices that are computed at a time. It limits the memory.
+ENTRIES_AT_ONCE = 2_000_000
 
 
 def mass(mesh: Mesh, kinematics: str, density: DensityField, groups: Sequence[str] | None = None) -> bsr_array:
     """Return the consistent mass matrix (n_dofs, n_dofs) [mass] of groups of solid cells, or of all solid cells.
 
-    In axisymmetry it is that of the full circle. Integrals are exact on straight cells with constant density. Raises
-    ModelError if cells have no density, or all densities are zero.
+    In axisymmetry, it refers to the full circle. Integrals are exact on straight cells with constant density. Raises
+    ModelError if cells have no density, or if all densities are zero.
     """
     missing, selected = 0, solid_rows(mesh, groups)
 
@@ -55,9 +55,9 @@ def mass(mesh: Mesh, kinematics: str, density: DensityField, groups: Sequence[st
 def stress_stiffness(mesh: Mesh, stresses: CellStress, material: Mapping[str, Any], axisymmetric: bool) -> bsr_array:
     """Return the geometric or initial-stress stiffness (n_dofs, n_dofs) [force / length].
 
-    It consists of the integrals of ``grad(N_a) . stress . grad(N_b)`` for every component, plus the hoop stress term of
-    radial components in axisymmetry, with the quadrature of the stiffness (Bathe, Finite Element Procedures, 2014, section
-    6.2.3).
+    It consists of the integrals of ``grad(N_a) . stress . grad(N_b)`` for every component and, in axisymmetry, of the hoop
+    stress terms of the radial components (Bathe, Finite Element Procedures, 2014, section 6.2.3). The quadrature is that of
+    the stiffness.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def stress_stiffness(mesh: Mesh, stresses: CellStress, material: Mapping[str, An
 
 
 def _diagonal_blocks(mesh: Mesh, local: Callable[[str, Indices], Array]) -> bsr_array:
-    """Return the matrix whose nodal blocks are diagonal, with the `local` diagonals (n_cells, n_nodes, n_nodes, dim or 1)."""
+    """Return the matrix with diagonal nodal blocks, assembled from the diagonals (n_cells, n_nodes, n_nodes, dim or 1)."""
     pattern, diagonals = assembled(mesh, local)
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
     data[:, range(mesh.dim), range(mesh.dim)] = diagonals
@@ -97,10 +97,10 @@ def _diagonal_blocks(mesh: Mesh, local: Callable[[str, Indices], Array]) -> bsr_
 
 
 def assembled(mesh: Mesh, local: Callable[[str, Indices], Array]) -> tuple[Sparsity, Array]:
-    """Return the sparsity of a mesh, and the sums (n_blocks, k) of the local matrices of all cells at its blocks.
+    """Return the sparsity of a mesh, and the sums (n_blocks, k) of the matrices of all cells for its blocks.
 
-    The function `local` receives an element type and the numbers (n_cells,) of some cells, and returns their matrices
-    (n_cells, n_nodes, n_nodes, k).
+    The function `local` is called with an element type and the numbers (n_cells,) of some cells, and returns the matrices of
+    these cells (n_cells, n_nodes, n_nodes, k).
     """
     pattern = sparsity(mesh)
     total = np.zeros((len(pattern.indices), 1))
@@ -115,6 +115,6 @@ def portions(mesh: Mesh) -> Iterator[tuple[str, Indices]]:
     """Yield element types and numbers (n,) of solid cells, in portions that limit the memory."""
     for name, cells in mesh.solids.items():
         n_q = len(integration_rule(elements.get(name))[1])
-        size = max(1, AT_ONCE // (cells.shape[1] * max(n_q, cells.shape[1])))
+        size = max(1, ENTRIES_AT_ONCE // (cells.shape[1] * max(n_q, cells.shape[1])))
         for first in range(0, len(cells), size):
             yield name, np.arange(first, min(first + size, len(cells)))

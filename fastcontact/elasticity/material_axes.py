@@ -22,7 +22,7 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 class CylindricalAxes:
     """Cylindrical axes about a line: axis 1 is radial, axis 2 circumferential, and axis 3 parallel to the line.
 
-    In plane models the default direction is normal to the plane. In axisymmetry the line must be the axis of symmetry, with
+    In plane models, the default direction is normal to the plane. In axisymmetry, the line must be the axis of symmetry, with
     ``direction=(0, 1, 0)``.
 
     Parameters
@@ -39,7 +39,7 @@ class CylindricalAxes:
 
     Examples
     --------
-    Axes of wood whose growth rings are concentric to a line parallel to z, and of a coil in an axisymmetric model:
+    Axes of wood with growth rings about a line parallel to z, and of a coil in an axisymmetric model:
 
     >>> import fastcontact as fc
     >>> around_z = fc.CylindricalAxes(origin=(10.0, 0.0, 0.0))
@@ -65,7 +65,10 @@ class CylindricalAxes:
         return not any((self.origin[0], self.origin[2], self.direction[0], self.direction[2]))
 
     def __call__(self, points: Array) -> Array:
-        """Return the axes at `points` (n, dim) [length] as unit vectors in rows (n, 3, 3) [-]; ModelError on the line."""
+        """Return the axes at `points` (n, dim) [length] as unit vectors in rows (n, 3, 3) [-].
+
+        Raises ModelError for points on the line.
+        """
         x = np.zeros((len(points), 3))
         x[:, : points.shape[1]] = points
         axis = np.array(self.direction) / np.linalg.norm(self.direction)
@@ -85,8 +88,8 @@ class CylindricalAxes:
 def checked_axes(axes: Any) -> Axes:
     """Return axes given by vectors as three orthonormal vectors; return functions and None unchanged.
 
-    ModelError unless the axes are one vector with two components, or two or three orthogonal vectors with three components
-    that form a right-handed frame.
+    Raises ModelError unless the axes are one vector with two components, or two or three orthogonal vectors with three
+    components that form a right-handed frame.
     """
     if axes is None or callable(axes):
         return axes  # type: ignore[no-any-return]
@@ -117,8 +120,8 @@ def checked_axes(axes: Any) -> Axes:
 def frames(axes: Axes, points: Array, kinematics: str) -> Array:
     """Return axes from `checked_axes` at `points` (n, dim) [length] as unit vectors in rows (n, 3, 3) [-].
 
-    ModelError if a function returns an array of another shape or vectors that are not orthonormal, or if the line of
-    cylindrical axes is not the axis of symmetry of an axisymmetric model.
+    Raises ModelError if a function returns an array of a different shape or vectors that are not orthonormal, or if the line
+    of cylindrical axes is not the axis of symmetry of an axisymmetric model.
     """
     if axes is None:
         return np.broadcast_to(np.eye(3), (len(points), 3, 3))

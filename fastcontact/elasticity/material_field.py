@@ -86,8 +86,8 @@ class MaterialField:
     def treatment(self) -> AnyArray:
         """Codes (n_moduli,) of the treatment of locking: 1 for a mean dilatation, 2 for incompatible modes, 0 for neither.
 
-        3 means incompatible modes in the elements that support them, and a mean dilatation in others. In axisymmetry there
-        are no incompatible modes.
+        The code 3 stands for incompatible modes in the elements that support them, and a mean dilatation in others. In
+        axisymmetry, there are no incompatible modes.
         """
         modes = np.array([material.incompatible_modes for material in self.materials], bool)[self.owner]
         treatment = self.averaged.astype(np.uint8)
@@ -118,7 +118,7 @@ class MaterialField:
         return self._evaluated(np.zeros(self.moduli.shape[:2]), "expansion_at")
 
     def _evaluated(self, values: Array, method: str) -> Array:
-        """Fill `values` (n_moduli, ...) with the results of a method of the materials, and return them."""
+        """Fill `values` (n_moduli, ...) with the results of a method of the materials, and return `values`."""
         arbitrary_point = np.zeros((1, 3 if self.kinematics == "3d" else 2))
         for number, material in enumerate(self.materials):
             if not material.varies:  # rows of varying materials are unused
@@ -162,7 +162,7 @@ class MaterialField:
         Equal materials have the same moduli, axes and expansion, so that the stress is continuous across their interface.
         """
         first_number: dict[object, int] = {}
-        laws = [_law(material, moduli) for material, moduli in zip(self.materials, self.moduli, strict=False)]
+        laws = [_law_key(material, moduli) for material, moduli in zip(self.materials, self.moduli, strict=False)]
         representative = np.array([first_number.setdefault(law, number) for number, law in enumerate(laws)], np.int32)
         return {name: representative[values] for name, values in self.material_numbers.items()}
 
@@ -194,16 +194,16 @@ def material_field(
         owner.append(np.full(len(points), index, np.int32))
         return first + np.arange(len(points), dtype=np.int32)
 
-    of_materials = [
+    cells_by_material = [
         (index, material, name, block, np.flatnonzero(material_numbers[name] == index))
         for index, material in enumerate(materials)
         for name, block in mesh.solids.items()
     ]
-    for index, material, name, block, cells in of_materials:
+    for index, material, name, block, cells in cells_by_material:
         if material.varies:
             centres = mesh.points[block[cells]].mean(axis=1)
             rows[name][cells] = add(index, centres, material.constants_at(name, cells, centre_weights(name)))
-    for index, material, name, block, cells in of_materials:
+    for index, material, name, block, cells in cells_by_material:
         if material.varies_inside:
             N = elements.get(name).tables[0]
             rows_at_points.setdefault(name, np.repeat(rows[name][:, None], len(N), axis=1))
@@ -215,7 +215,7 @@ def material_field(
     )
 
 
-def _law(material: Material, moduli: Array) -> tuple[object, ...]:
+def _law_key(material: Material, moduli: Array) -> tuple[object, ...]:
     """Return a key that is equal for two materials if the stress is continuous across their interface."""
     constants = tuple(getattr(material, name, None) for name in MODULI) if material.graded else None
     compliance = b"" if material.graded else material.local_compliance.tobytes()

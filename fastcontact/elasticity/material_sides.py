@@ -22,8 +22,8 @@ class MaterialSides:
     node : ndarray of int (n_slots,)
         Node of each slot; slot k of the first n_points belongs to node k.
     points, material, slot : ndarray of int (k,)
-        Node, material number and slot of each pair of a node at an interface and one of its materials, in ascending order of
-        the nodes.
+        For each pair of a node at an interface and one of its materials, the node, the material number and the slot. The
+        nodes are in ascending order.
     """
 
     cells: Mapping[str, Numbers]
@@ -34,7 +34,7 @@ class MaterialSides:
 
 
 def material_sides(mesh: Mesh, material: Mapping[str, Numbers]) -> MaterialSides:
-    """Return the slots for nodal values; `material` contains the material number (n_cells,) of cells by element type."""
+    """Return the slots for nodal values; `material` contains the material numbers of cells (n_cells,) by element type."""
     n = mesh.n_points
     lowest, highest = np.full(n, np.iinfo(np.int32).max, np.int32), np.full(n, -1, np.int32)
     for number in np.unique(np.concatenate([np.empty(0, np.int32), *material.values()]))[::-1]:
@@ -46,7 +46,7 @@ def material_sides(mesh: Mesh, material: Mapping[str, Numbers]) -> MaterialSides
         empty = np.empty(0, np.int32)
         return MaterialSides(dict(mesh.solids), np.arange(n, dtype=np.int32), empty, empty, empty)
     n_materials = int(highest.max()) + 1
-    keys = {  # of pairs of an interface node and a material
+    keys = {  # each key identifies a pair of an interface node and a material
         name: (block.astype(np.int64) * n_materials + material[name][:, None])[on_interface[block]]
         for name, block in mesh.solids.items()
     }

@@ -46,8 +46,8 @@ class Material:
     conductivity : float, Varying, tuple or None
         Thermal conductivity, or one conductivity along each axis [power / (length temperature)].
     axes : sequence, callable or None
-        Material axes: unit vectors in rows (3, 3) [-], or a function of position, see `Orthotropic`; None means the
-        axes of the mesh.
+        Material axes as unit vectors in rows (3, 3) [-], or as a function of position, see `Orthotropic`. None means the axes
+        of the mesh.
     averaged : bool
         Whether elements that support a mean dilatation use it, except in plane stress.
     incompatible_modes : bool
@@ -75,16 +75,16 @@ class Material:
         return float(np.min([D[i, i] - D[i, j] * D[j, i] / D[j, j] for i, j in pairs]))
 
     def _all_compliances(self) -> Array:
-        """Return the compliances (n, 6, 6) [1 / pressure] in material axes, at all points of `Cells.samples` if they vary."""
+        """Return the compliances (n, 6, 6) [1 / pressure] in material axes; varying ones at the points `Cells.samples`."""
         if not self.graded:
             return self.local_compliance[None]
         return np.concatenate([self.compliances(self.constants_at(*sample)) for sample in self._cells().samples()])
 
     @property
     def local_compliance(self) -> Array:
-        """Compliance matrix (6, 6) [1 / pressure] in material axes, from stresses 11, 22, 33, 12, 23, 13 to strains.
+        """Compliance matrix (6, 6) [1 / pressure] in material axes, which maps stresses 11, 22, 33, 12, 23, 13 to strains.
 
-        The shear components of the strain are engineering shear strains, twice those of the tensor.
+        The shear components of the strain are engineering shear strains, which are twice those of the tensor.
         """
         return np.asarray(self.compliances(self)[0])
 
@@ -115,8 +115,8 @@ class Material:
     def check_thermal_and_density(self, most: int) -> None:
         """Raise ModelError if the density is negative or a thermal constant is inadmissible.
 
-        For thermal constants see `check_expansion` and `check_conductivity`. A material may have one constant or `most` of
-        them, which is 3 for materials with axes and otherwise 1. Constants that vary are checked by `bound`.
+        For thermal constants, see `check_expansion` and `check_conductivity`. A material may have one constant of each kind,
+        or `most` constants, which is 3 for materials with axes and 1 otherwise. Constants that vary are checked by `bound`.
         """
         density = self.density
         if not isinstance(density, Varying) and density is not None and not 0.0 <= _real(density) < math.inf:
@@ -127,7 +127,7 @@ class Material:
     def bound(self: AnyMaterial, cells: Cells) -> AnyMaterial:
         """Return a copy of the material whose varying constants are assigned to `cells`, so that they can be evaluated.
 
-        ModelError if a varying constant is not admissible somewhere in these cells.
+        Raises ModelError if a varying constant is not admissible somewhere in these cells.
         """
         names = [name for name in (*CONSTANTS, "axes") if varying(getattr(self, name, None))]
         if not names:
@@ -147,8 +147,9 @@ class Material:
     def constants_at(self, name: str, rows: Indices, N: Array) -> SimpleNamespace:
         """Return the constants at n points in each of the given cells of an element type, as attributes.
 
-        Varying constants are arrays (n_rows * n,) [unit of the constant], and the others numbers. `name` is the element type,
-        `rows` (n_rows,) of int contains the numbers of the cells, and `N` (n, n_nodes) [-] the shape functions at the points.
+        Varying constants are arrays (n_rows * n,) [unit of the constant], and the others are numbers. `name` is the element
+        type, `rows` (n_rows,) of int contains the numbers of the cells, and `N` (n, n_nodes) [-] the shape functions at the
+        points.
         """
 
         def at(value: Any) -> Any:
@@ -157,22 +158,22 @@ class Material:
         return SimpleNamespace(**{key: at(getattr(self, key, None)) for key in (*CONSTANTS, "axes")})
 
     def compliances(self, constants: Any) -> Array:
-        """Return the compliances (n, 6, 6) [1 / pressure] in material axes for constants that may be arrays (n,)."""
+        """Return the compliances (n, 6, 6) [1 / pressure] in material axes; the constants may be arrays (n,)."""
         raise NotImplementedError
 
     def admissible(self, constants: Any) -> Any:
-        """Return whether moduli are in range and the elastic energy is positive definite, for each set of constants (n,)."""
+        """Return, for each set of constants (n,), whether moduli are in range and the elastic energy is positive definite."""
         raise NotImplementedError
 
     def _cells(self) -> Cells:
-        """Return the cells of the material; ModelError if the material has not been assigned to cells."""
+        """Return the cells of the material; raise ModelError if the material has not been assigned to cells."""
         varying_constants = [v for name in CONSTANTS for v in varying(getattr(self, name, None))]
         if not varying_constants or varying_constants[0].cells is None:
             raise ModelError("constants of the material depend on the position: add the material to a model first")
         return varying_constants[0].cells
 
     def _check_at(self, names: Sequence[str], element: str, rows: Indices, N: Array) -> None:
-        """Raise ModelError with the position if constants are inadmissible in a cell; `names` are those that vary."""
+        """Raise ModelError, with the position, if constants are inadmissible in a cell; `names` are the varying constants."""
         constants, count = self.constants_at(element, rows, N), len(rows) * len(N)
         wrong = np.array(np.broadcast_to(~np.asarray(self.admissible(constants), bool), count))
         if constants.density is not None:
@@ -194,11 +195,11 @@ class Material:
             raise ModelError(f"{where}: {error}") from None
 
     def moduli(self, kinematics: str) -> Array:
-        """Return the matrix (4, 4), in 3D (6, 6) [pressure] from strains (xx, yy, zz, 2xy, in 3D 2yz, 2xz) to stresses.
+        """Return the matrix (4, 4), in 3D (6, 6) [pressure] that maps strains (xx, yy, zz, 2xy, in 3D 2yz, 2xz) to stresses.
 
-        In axisymmetry x, y and z denote the radial, axial and circumferential directions. In plane stress the rows and
-        columns of zz are zero (Timoshenko and Goodier, 1970, section 16). ModelError if material axes or moduli depend on
-        position.
+        In axisymmetry, x, y and z denote the radial, axial and circumferential directions. In plane stress, the rows and
+        columns of zz are zero (Timoshenko and Goodier, 1970, section 16). Raises ModelError if material axes or moduli depend
+        on position.
         """
         if callable(self.axes) or varying(self.axes) or self.graded:
             raise ModelError(
@@ -211,7 +212,7 @@ class Material:
 
         If constants vary, `constants` must be the result of `constants_at` for these points.
         """
-        compliance = self._compliance6(points, kinematics, constants)
+        compliance = self._mesh_compliance(points, kinematics, constants)
         if kinematics == "3d":
             return np.asarray(np.linalg.inv(compliance))
         if kinematics != "plane_stress":
@@ -224,17 +225,17 @@ class Material:
     def compliance_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the compliance (n, 4, 4), in 3D (n, 6, 6) [1 / pressure] at `points` (n, dim) [length].
 
-        In 2D it includes the component zz, and the stresses yz and xz are zero. Therefore stress : compliance : stress is
-        twice the density of the elastic energy.
+        In 2D, it includes the component zz, whereas the stresses yz and xz are zero. Therefore, stress : compliance : stress
+        is twice the density of the elastic energy.
         """
         size = 6 if kinematics == "3d" else 4
-        return np.asarray(self._compliance6(points, kinematics, constants)[:, :size, :size])
+        return np.asarray(self._mesh_compliance(points, kinematics, constants)[:, :size, :size])
 
     def expansion_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the strain (n, 4), in 3D (n, 6) [1 / temperature] per unit temperature rise at `points` (n, dim) [length].
 
-        It is NaN without a coefficient of thermal expansion. ModelError if it has an out-of-plane shear component, which
-        plane kinematics exclude.
+        It is NaN without a coefficient of thermal expansion. Raises ModelError if it has an out-of-plane shear component,
+        which plane kinematics exclude.
         """
         size = 6 if kinematics == "3d" else 4
         if self.expansion is None:
@@ -252,7 +253,7 @@ class Material:
     def conductivity_at(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the conductivity (n, dim, dim) [power / (length temperature)] at `points` (n, dim) [length].
 
-        `constants` is the result of `constants_at` for these points. ModelError if, due to inclined material axes, an
+        `constants` is the result of `constants_at` for these points. Raises ModelError if, due to inclined material axes, an
         in-plane temperature gradient causes an out-of-plane heat flux.
         """
         conductivity, dim = constants.conductivity, points.shape[1]
@@ -267,9 +268,9 @@ class Material:
         return np.asarray(tensor[:, :dim, :dim])
 
     def _along_axes(self, values: Any, points: Array, kinematics: str, constants: Any) -> tuple[Array, Array]:
-        """Return one or three constants `values` as components (n, 3) along the material axes, and as tensors (n, 3, 3).
+        """Return `values`, one constant or three, as components (n, 3) along the material axes and as tensors (n, 3, 3).
 
-        Both have the unit of `values`; the tensors refer to the axes of the mesh.
+        Both have the unit of `values`. The tensors refer to the axes of the mesh.
         """
         components, axes = np.empty((len(points), 3)), self._frames(points, kinematics, constants)
         for axis in range(3):
@@ -283,10 +284,10 @@ class Material:
             raise ModelError("axes given by cell need `constants`: pass `constants_at` of a model's material")
         return frames(axes, points, kinematics)
 
-    def _compliance6(self, points: Array, kinematics: str, constants: Any) -> Array:
+    def _mesh_compliance(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the compliance (n, 6, 6) [1 / pressure] at `points` (n, dim) [length] in the axes of the mesh.
 
-        ModelError if the material couples in-plane stresses with out-of-plane shear, which plane kinematics exclude.
+        Raises ModelError if the material couples in-plane stresses with out-of-plane shear, which plane kinematics exclude.
         """
         check_known("kinematics", kinematics, KINEMATICS, ModelError)
         stress_rotation = rotations(self._frames(points, kinematics, constants))
@@ -306,7 +307,7 @@ class Material:
 
 
 def _real(value: Any) -> float:
-    """Return `value` as a float, infinity if it is too large for a float, and NaN if it is not a real number."""
+    """Return `value` as a float; infinity if it is too large for a float, and NaN if it is not a real number."""
     try:
         return float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     except OverflowError:
@@ -314,7 +315,7 @@ def _real(value: Any) -> float:
 
 
 def check_positive(name: str, value: Any) -> None:
-    """Raise ModelError unless `value` is a number from 1 / LARGEST to LARGEST; the message calls it `name`."""
+    """Raise ModelError, with the `name` of the value, unless it is a number from 1 / LARGEST to LARGEST."""
     number = _real(value)
     if not 0.0 < number < math.inf:
         raise ModelError(f"{name} = {value!r} must be a positive number")
@@ -342,8 +343,8 @@ def check_conductivity(value: Any, most: int) -> None:
             check_positive("the conductivity", number)
 
 
-# A number, a function of position, or numbers for all cells or points. For type checkers it is Any, because callers compute
-# with the attributes of materials whose constants are numbers.
+# A number, a function of position, or numbers for all cells or points. For type checkers, it is Any, because callers use the
+# attributes of materials with constant properties as numbers.
 if TYPE_CHECKING:
     Constant = Any
 else:
@@ -367,9 +368,9 @@ class LinearElastic(Material):
     volumetric : {"auto", "plain", "mean_dilatation"}
         Treatment of the dilatation. ``"plain"`` does not modify it. ``"mean_dilatation"`` projects it
         onto constants in linear cells and onto linear functions in quadratic cells, so that nearly incompressible materials
-        do not lock. In quadratic triangles, tetrahedra, wedges and pyramids only the mean has the full bulk modulus, and the
-        remainder has at most that of nu = 0.3. ``"auto"`` selects the mean dilatation for nu >= 0.49. The treatment has no
-        effect on linear triangles and tetrahedra, and in plane stress.
+        do not lock. In quadratic triangles, tetrahedra, wedges and pyramids, only the mean has the full bulk modulus, and the
+        remainder has at most the bulk modulus for nu = 0.3. ``"auto"`` selects the mean dilatation for nu >= 0.49. The
+        treatment has no effect on linear triangles and tetrahedra, and none in plane stress.
     density : float, callable or ndarray (n,), optional
         Mass per unit volume, at least 0, in one of the forms of E [mass / length^3]. Gravity, centrifugal loads and
         vibration modes need it.
@@ -431,7 +432,7 @@ class LinearElastic(Material):
         return 0.0 if self.nu.cells is None else self.nu.range[1]
 
     def compliances(self, constants: Any) -> Array:
-        """Return the compliances (n, 6, 6) [1 / pressure] for constants that may be arrays (n,)."""
+        """Return the compliances (n, 6, 6) [1 / pressure]; the constants may be arrays (n,)."""
         E, nu = np.broadcast_arrays(np.atleast_1d(constants.E), np.atleast_1d(constants.nu))
         S = np.zeros((len(E), 6, 6))
         S[:, range(3), range(3)] = ((1 + nu) / E)[:, None]
@@ -446,7 +447,7 @@ class LinearElastic(Material):
 
     @property
     def averaged(self) -> bool:  # type: ignore[override]
-        """Whether elements that support a mean dilatation have it, except in plane stress."""
+        """Whether elements that support a mean dilatation use it, except in plane stress."""
         nearly_incompressible = self.largest_nu >= NEARLY_INCOMPRESSIBLE
         return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly_incompressible)
 

@@ -11,9 +11,9 @@ from scipy.sparse import csr_array, diags_array
 from fastcontact.arrays import Array, Indices, Mask
 
 Table = tuple[tuple[float, float], ...]
-# Coefficients below this fraction of the largest coefficient in their row are round-off from cancellation.
-ZERO = 1e-10
-# Coefficients by column: first the n displacement components, then the right-hand sides.
+# Coefficients below this fraction of the largest coefficient in their row are considered round-off due to cancellation.
+CANCELLATION = 1e-10
+# Coefficients of a row by column. The columns are the n displacement components, followed by the right-hand sides.
 Row = dict[int, float]
 
 
@@ -41,7 +41,7 @@ class MultiPointConstraint:
 
 @dataclass(frozen=True, eq=False)
 class TemporaryConstraint(MultiPointConstraint):
-    """A constraint that acts in the load steps between two instants, with ``rows @ u`` continuous where it begins.
+    """A constraint that acts in the load steps between two instants, and at whose beginning ``rows @ u`` is continuous.
 
     Parameters
     ----------
@@ -52,10 +52,10 @@ class TemporaryConstraint(MultiPointConstraint):
     value : float or ndarray (m,)
         Right-hand sides at multiplier 1 of the ramp [length times the unit of the coefficients].
     begins, ends : float
-        The two instants, at ends of load steps [-].
+        The two instants, which must be ends of load steps [-].
     keeps : bool
-        Whether ``rows @ u`` keeps its values at the beginning, irrespective of `value` and `ramp`. Otherwise it changes
-        linearly from these values to the next point of the ramp.
+        Whether ``rows @ u`` retains the values that it has at the beginning, irrespective of `value` and `ramp`. Otherwise,
+        it changes linearly from these values to the next point of the ramp.
     """
 
     begins: float = -np.inf
@@ -69,7 +69,7 @@ class TemporaryConstraint(MultiPointConstraint):
     def after(self, reached: Array) -> list[MultiPointConstraint]:
         """Return the constraints that begin at the instant `begins`.
 
-        The values of ``rows @ u`` then are `reached` (m,) [length times the unit of the coefficients].
+        `reached` (m,) [length times the unit of the coefficients] contains the values of ``rows @ u`` at this instant.
         """
         if self.keeps:
             return [MultiPointConstraint(self.name, self.rows, reached, ((0.0, 1.0),))]
@@ -88,9 +88,9 @@ class Elimination:
     Attributes
     ----------
     pivots : ndarray of int (n_pivots,)
-        The displacement components expressed in terms of the others.
+        The displacement components that are expressed in terms of the others.
     T : csr_array (n, n)
-        Identity except for the rows of the pivots; the columns of the pivots are empty [-].
+        Identity, except in the rows of the pivots; the columns of the pivots are empty [-].
     S : csr_array (n, m)
         Derivatives of the pivots with respect to the right-hand sides [length / unit of r].
     conditions : csr_array (k, n + m)
@@ -108,7 +108,7 @@ class Elimination:
 
 
 def eliminate(R: csr_array, known: Mask) -> Elimination:
-    """Express one unknown component in terms of the others for each linearly independent row of ``R u = r``.
+    """For each linearly independent row of ``R u = r``, express one unknown component in terms of the others.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def eliminate(R: csr_array, known: Mask) -> Elimination:
         if not unknown:
             conditions[k] = row
             continue
-        # The pivot is the component that occurs in the fewest constraints, so that its elimination changes few of them.
+        # The pivot is the component that occurs in the fewest constraints, so that few constraints change.
         pivot = min(unknown, key=lambda key: (n_uses[key], -abs(row[key]), key))
         coefficient = row.pop(pivot)
         _express(pivot, {key: -c / coefficient for key, c in row.items()}, expressions, users)
@@ -151,13 +151,13 @@ def _substitute(R: csr_array, k: int, expressions: dict[int, Row]) -> Row:
         for component, d in expressions.get(key, {key: 1.0}).items():
             row[component] = row.get(component, 0.0) + c * d
     largest = np.abs(R.data[entries]).max(initial=0.0)
-    return {key: c for key, c in row.items() if abs(c) > ZERO * largest}
+    return {key: c for key, c in row.items() if abs(c) > CANCELLATION * largest}
 
 
 def _express(pivot: int, expression: Row, expressions: dict[int, Row], users: dict[int, set[int]]) -> None:
-    """Add a pivot, and substitute its expression in those of earlier pivots.
+    """Add the expression of a pivot, and substitute it into the expressions of earlier pivots.
 
-    `users` are the pivots whose expressions contain a component.
+    `users` contains, for each component, the pivots whose expressions contain this component.
     """
     expressions[pivot] = expression
     for key in expression:

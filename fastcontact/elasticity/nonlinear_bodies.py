@@ -1,4 +1,4 @@
-"""Bodies with nonlinear laws or finite strains: internal forces, consistent tangent and history."""
+"""Bodies with nonlinear material laws or finite strains: internal forces, consistent tangent and history."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from fastcontact._jit import parallel
 from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity import dilatation
 from fastcontact.elasticity.constitutive_kernels import LINEAR, LOGARITHMIC, PLASTIC, SAINT_VENANT
-from fastcontact.elasticity.dilatation import REMAINDER
+from fastcontact.elasticity.dilatation import BULK_TO_SHEAR
 from fastcontact.elasticity.energy import cell_volumes, gradients_at
 from fastcontact.elasticity.material_field import MaterialField, material_field
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, NonlinearElastic
-from fastcontact.elasticity.recovery import AT_ONCE, von_mises
+from fastcontact.elasticity.recovery import CELLS_AT_ONCE, von_mises
 from fastcontact.elasticity.stiffness import Sparsity, sparsity
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 History = dict[str, Array]
-# Number of history variables of a quadrature point, and the indices of two of them: the equivalent plastic strain, and
-# F_zz - 1 in plane stress; see `constitutive_kernels`.
-HISTORY, PLASTIC_STRAIN, ACROSS = 9, 6, 8
+# Number of history variables at a quadrature point, and the indices of the equivalent plastic strain and, in plane stress,
+# of F_zz - 1 among them; see `constitutive_kernels`.
+N_HISTORY, PLASTIC_STRAIN, OUT_OF_PLANE = 9, 6, 8
 # Value of the argument `geometric` for the complete tangent, see `NonlinearBodies.at`.
-WHOLE = 2
+COMPLETE = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,15 +39,15 @@ class DeformedBodies:
     Attributes
     ----------
     tangent : callable
-        Function without arguments that returns K.
+        Function without arguments that returns the tangent stiffness K.
     force : ndarray (n_points, dim)
         Internal forces [force].
     history : dict of str to ndarray (n_cells, n_q, 9)
-        History by solid element type, at the end of a load step with this displacement.
+        History variables by solid element type, at the end of a load step with this displacement.
     stress : dict of str to ndarray (n_cells, n_q, n_components)
         Cauchy stress by solid element type [pressure].
     energy, plastic_work : float
-        Elastic energy, and plastic work since the beginning of the analysis [energy].
+        Elastic energy, and plastic work that has been done since the beginning of the analysis [energy].
     """
 
     tangent: Callable[[], bsr_array]
@@ -64,7 +64,7 @@ class DeformedBodies:
 
 
 class NonlinearBodies:
-    """The solid cells of a model with nonlinear laws or finite strains; see `body_kernels`.
+    """The solid cells of a model with nonlinear material laws or finite strains; see `body_kernels`.
 
     Parameters
     ----------
@@ -121,10 +121,10 @@ class NonlinearBodies:
     @property
     def beginning(self) -> History:
         """The history before the first load step."""
-        return {name: np.zeros((*numbers.shape, HISTORY)) for name, numbers in self._cells.items()}
+        return {name: np.zeros((*numbers.shape, N_HISTORY)) for name, numbers in self._cells.items()}
 
     def _split(self, name: str) -> tuple[Array, Array]:
-        """Return moduli for an element, and the bulk moduli (n_moduli, 2) of its dilatation.
+        """Return the moduli for an element type, and the bulk moduli (n_moduli, 2) for its dilatation.
 
         The bulk moduli are those of the projected dilatation and of the remainder, as in `dilatation.Split`. If the
         dilatation is projected, the moduli do not contain the bulk modulus.
@@ -139,12 +139,12 @@ class NonlinearBodies:
         moduli[:, :3, :3] -= subtracted_bulk[:, None, None]
         bulk[:, 1] += subtracted_bulk
         shear = np.where(is_hookean, moduli[:, 3, 3], self._constants[:, 1])
-        remainder = 0.0 if element.dilatation == element.order - 1 else np.minimum(bulk[:, 1], REMAINDER * shear)
+        remainder = 0.0 if element.dilatation == element.order - 1 else np.minimum(bulk[:, 1], BULK_TO_SHEAR * shear)
         bulk[projected] = np.column_stack([bulk[:, 1] - remainder, np.broadcast_to(remainder, len(bulk))])[projected]
         return moduli, bulk
 
     def at(
-        self, displacement: Array, before: Mapping[str, Array], *, rise: Array | None = None, geometric: int = WHOLE,
+        self, displacement: Array, before: Mapping[str, Array], *, rise: Array | None = None, geometric: int = COMPLETE,
         tangent: bool = True,
     ) -> DeformedBodies:  # fmt: skip
         """Return the response to a displacement, with internal forces, stresses, history and tangent.
@@ -156,19 +156,19 @@ class NonlinearBodies:
         before : mapping of str to ndarray (n_cells, n_q, 9)
             History at the beginning of the load step, by solid element type.
         rise : ndarray (n_points,), optional
-            Temperature rise over the reference temperature; zero by default [temperature].
+            Temperature rise above the reference temperature; zero by default [temperature].
         geometric : int
-            2 for the complete tangent, 1 without the second derivative of J, 0 also without initial-stress stiffness; see
-            `body_kernels.linearise`. With 0, the tangent is positive definite farther from the solution, and if only contact
-            prevents the rotation of a body under load.
+            2 for the complete tangent, 1 without the second derivative of J, 0 also without the initial-stress stiffness; see
+            `body_kernels.linearise`. With 0, the tangent is positive definite farther from the solution, and also if the
+            rotation of a loaded body is prevented by contact alone.
         tangent : bool
-            Whether K is computed at once. If not, it is computed at its first use. This halves the time if K is not used,
-            and increases it by a half if K is used.
+            Whether K is computed at once. Otherwise, it is computed when it is first used. This halves the time if K is not
+            used, and increases it by half if K is used.
 
         Raises
         ------
         ConvergenceError
-            If a cell is inverted, or plane stress does not converge at a point.
+            If a cell is inverted, or if the iteration for plane stress does not converge at a point.
         """
         data = np.zeros((0, *self._blocks[1:]))
         if tangent:
@@ -179,14 +179,14 @@ class NonlinearBodies:
     def _elastic(self) -> Array:
         """Blocks (n_blocks, dim, dim) of the tangent without plastic flow at small strains [force / length]."""
         data = np.zeros(self._blocks)
-        self._assembled(np.zeros_like(self.mesh.points), self.beginning, None, WHOLE, data, False)
+        self._assembled(np.zeros_like(self.mesh.points), self.beginning, None, COMPLETE, data, False)
         return data
 
     def _assembled(
         self, displacement: Array, before: Mapping[str, Array], rise: Array | None, geometric: int, data: Array,
         elastic: bool,
     ) -> DeformedBodies:  # fmt: skip
-        """Return the result of `at`; the tangent is added to `data` (n_blocks, dim, dim), see `body_kernels.linearise`."""
+        """Return the result of `at`, and add the tangent to `data` (n_blocks, dim, dim); see `body_kernels.linearise`."""
         from fastcontact.elasticity import body_kernels  # most models are linear
 
         mesh, dim, pattern = self.mesh, self.mesh.dim, self._pattern
@@ -197,7 +197,7 @@ class NonlinearBodies:
             N, dN, weights = elements.get(name).tables
             moduli, bulk = self._split(name)
             polynomials = np.ascontiguousarray(dilatation.basis(name, elements.get(name).quadrature[0]))
-            if (bulk[:, 1] > 0.0).any():  # the remainder is not a linear function
+            if (bulk[:, 1] > 0.0).any():  # because the remainder is not a linear function
                 polynomials = polynomials[:, :1].copy() if elements.get(name).dilatation == 0 else polynomials
             owner, row_ranges = pattern.owners(mesh, name)
             cauchy = np.empty((*before[name].shape[:2], 6 if dim == 3 else 4))
@@ -231,10 +231,10 @@ class NonlinearBodies:
     def change_if_halved(
         self, middle: Array, end: Array, before: Mapping[str, Array], bodies: DeformedBodies
     ) -> tuple[float, float]:
-        """Return the Euclidean norm of the stresses at points that yield in a step, and their change if the step is halved.
+        """Return the norm of the stresses at points that yield in a step, and that of their change if the step is halved.
 
-        The change is an estimate of the error of the radial return, which is exact if the direction of the plastic flow does
-        not change in the step.
+        The norm is the Euclidean norm. The change is an estimate of the error of the radial return, which is exact if the
+        direction of plastic flow does not change in the step.
 
         Parameters
         ----------
@@ -248,7 +248,7 @@ class NonlinearBodies:
         Returns
         -------
         size, change : float
-            Both are zero if no point yields, or if a cell is inverted in the middle [pressure].
+            Both are zero if no point yields, or if a cell is inverted in the middle of the step [pressure].
         """
         yields = {k: bodies.history[k][..., PLASTIC_STRAIN] > before[k][..., PLASTIC_STRAIN] for k in before}
         if not any(points.any() for points in yields.values()):
@@ -265,18 +265,18 @@ class NonlinearBodies:
         return float(np.linalg.norm(stress)), float(np.linalg.norm(halved_stress - stress))
 
     def _failure(self, status: int, name: str, cell: int, displacement: Array) -> str:
-        """Return the message for a status other than zero of `body_kernels.linearise`."""
+        """Return the message for a nonzero status of `body_kernels.linearise`."""
         from fastcontact.elasticity import body_kernels
 
         where = self.mesh.points[self.mesh.cells[name][cell]].mean(axis=0)
         J = np.linalg.det(self._deformation(name, slice(cell, cell + 1), displacement)).min()
         failure = f"is inverted (J = {J:.3g})"
         if status != body_kernels.INVERTED:
-            failure = "has no out-of-plane strain of zero stress"
-        return f"cell {cell} of {name} near {where} {failure}: smaller load steps, or a mesh that is coarser there, may help"
+            failure = "has no out-of-plane strain for which the out-of-plane stress is zero"
+        return f"cell {cell} of {name} near {where} {failure}: try smaller load steps, or a coarser mesh at this point"
 
     def _deformation(self, name: str, rows: slice, displacement: Array) -> Array:
-        """Return the deformation gradients (n, n_q, 3, 3) [-] of cells; in plane stress F_zz is 1."""
+        """Return the deformation gradients (n, n_q, 3, 3) [-] of cells, with F_zz = 1 in plane stress."""
         N, dN, _ = elements.get(name).tables
         nodes, dim = self.mesh.cells[name][rows], self.mesh.dim
         points, u = self.mesh.points[nodes], displacement[nodes]
@@ -287,7 +287,7 @@ class NonlinearBodies:
         return F
 
     def cell_fields(self, bodies: DeformedBodies, displacement: Array) -> dict[str, Array]:
-        """Return the fields of `field_names` (n_solids,): extremes over the points of each cell, and its volume ratio."""
+        """Return the fields of `field_names` (n_solids,): the volume ratio of each cell, and extremes over its points."""
         fields = {name: self._fields(name, bodies, displacement) for name in self._cells}
         names = field_names(self._materials, "finite" if self.finite else "small")
         return {name: np.concatenate([field[i] for field in fields.values()]) for i, name in enumerate(names)}
@@ -304,11 +304,11 @@ class NonlinearBodies:
     def _strains(self, name: str, bodies: DeformedBodies, displacement: Array) -> list[Array]:
         """Return J (n_cells, n_q), the volume ratios (n_cells,), and the extreme logarithmic strains (n_cells,)."""
         (N, dN, weights), cells, results = elements.get(name).tables, self.mesh.cells[name], []
-        for first in range(0, len(cells), AT_ONCE):
-            rows = slice(first, first + AT_ONCE)
+        for first in range(0, len(cells), CELLS_AT_ONCE):
+            rows = slice(first, first + CELLS_AT_ONCE)
             F = self._deformation(name, rows, displacement)
             if self.kinematics == "plane_stress":
-                F[..., 2, 2] += bodies.history[name][rows, :, ACROSS]
+                F[..., 2, 2] += bodies.history[name][rows, :, OUT_OF_PLANE]
             J, squared = np.linalg.det(F), np.linalg.eigvalsh(np.swapaxes(F, 2, 3) @ F)
             volume = cell_volumes(self.mesh.points[cells[rows]], N, dN, self.kinematics == "axisymmetric") * weights
             ratio = (volume * J).sum(axis=1) / volume.sum(axis=1)
@@ -319,7 +319,7 @@ class NonlinearBodies:
     def _plastic_fields(self, name: str, bodies: DeformedBodies, J: Array) -> list[Array]:
         """Return the largest equivalent plastic strain and the largest ratio of stress to yield stress (n_cells,) in cells.
 
-        The yield condition applies to the Kirchhoff stress, J (n_cells, n_q) times the Cauchy stress.
+        The yield condition refers to the Kirchhoff stress, which is J (n_cells, n_q) times the Cauchy stress.
         """
         history, owner = bodies.history[name], self._owner[self._cells[name]]
         strain = history[..., PLASTIC_STRAIN]
@@ -334,7 +334,7 @@ class NonlinearBodies:
 
 
 def field_names(materials: Sequence[Material], strain: str) -> tuple[str, ...]:
-    """Return the names of the cell fields for these materials and strains; none for linear bodies."""
+    """Return the names of the cell fields for given materials and strains; there are none for linear bodies."""
     plastic = ("plastic_strain", "yield_ratio") if any(isinstance(law, ElasticPlastic) for law in materials) else ()
     return (*(("J", "logarithmic_strain") if strain == "finite" else ()), *plastic)
 
@@ -360,7 +360,7 @@ def check_law(law: Material, strain: str) -> None:
 
 
 def _at_points(numbers: Numbers, name: str) -> Numbers:
-    """Return the number of the moduli of each quadrature point (n_cells, n_q), given the numbers of cells or points."""
+    """Return the row of moduli of each quadrature point (n_cells, n_q), given the rows of cells or of quadrature points."""
     n_q = len(elements.get(name).quadrature[1])
     columns = numbers[:, None] if numbers.ndim == 1 else numbers
     return np.array(np.broadcast_to(columns, (len(columns), n_q)), order="C")  # writable, also if n_q is 1

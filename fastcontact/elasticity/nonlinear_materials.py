@@ -1,7 +1,7 @@
 """Nonlinear material laws: von Mises plasticity, and hyperelasticity at finite strains.
 
-For `constitutive_kernels`, a law is a row of constants: its number, the shear modulus, the bulk modulus of the volumetric
-part ``U(J) = K (J - 1)^2 / 2``, and further constants of the law. Loads, contact and checks use its isotropic elasticity at
+For `constitutive_kernels`, a law is a row of constants: the number of the law, the shear modulus, the bulk modulus of the
+volumetric part ``U(J) = K (J - 1)^2 / 2``, and further constants. Loads, contact and checks use the isotropic elasticity at
 small strains.
 """
 
@@ -21,20 +21,20 @@ from fastcontact.elasticity.materials import NEARLY_INCOMPRESSIBLE, Constant, Li
 from fastcontact.errors import ModelError
 
 STRAINS = ("small", "finite")
-# Largest plastic strain in a cell for which linear kinematics cause no warning. Under a ball on a material without hardening,
-# the mean contact pressure is 2.6 times the yield stress if the largest plastic strain is 0.1, 2.3 times if it is 0.5, and
-# 2.1 times if it is 1.1. At plastic strains from 0.13 to 0.24, the pressure is 8 to 10 % lower and the force 4 to 7 % lower
-# than with finite strains.
+# Largest plastic strain in a cell for which linear kinematics cause no warning. Under a ball that is pressed into a material
+# without hardening, the mean contact pressure is 2.6 times the yield stress if the largest plastic strain is 0.1, 2.3 times
+# if it is 0.5, and 2.1 times if it is 1.1. At plastic strains from 0.13 to 0.24, the pressure is 8 to 10 % lower and the
+# force 4 to 7 % lower than with finite strains.
 LARGEST_PLASTIC_STRAIN = 0.2
 
 
 class NonlinearElastic(LinearElastic):
-    """Base class of nonlinear laws, which inherit from `LinearElastic` the isotropic elasticity at small strains."""
+    """Base class of nonlinear laws, which inherit the isotropic elasticity at small strains from `LinearElastic`."""
 
     strains: tuple[str, ...] = STRAINS  # kinds of strain that the law supports
 
     def _check_numbers(self) -> None:
-        """Raise ModelError if E or nu is not a number: constants of these laws do not vary."""
+        """Raise ModelError if E or nu is not a number, because the constants of these laws do not vary."""
         for name in ("E", "nu"):
             if not isinstance(getattr(self, name), (int, float)):
                 raise ModelError(f"{name} of {type(self).__name__} must be a number: its constants do not vary")
@@ -46,13 +46,13 @@ class NonlinearElastic(LinearElastic):
 
     @property
     def averaged(self) -> bool:  # type: ignore[override]
-        """Whether elements that support a mean dilatation have it, except in plane stress."""
+        """Whether elements that support a mean dilatation use it, except in plane stress."""
         nearly_incompressible = "small" in self.strains or self.nu >= NEARLY_INCOMPRESSIBLE
         return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly_incompressible)
 
     @property
     def constants(self) -> list[float]:
-        """The law's row for `constitutive_kernels`."""
+        """Row of constants of the law for `constitutive_kernels`."""
         raise NotImplementedError
 
 
@@ -61,11 +61,11 @@ class NonlinearElastic(LinearElastic):
 class ElasticPlastic(NonlinearElastic):
     """Von Mises plasticity with associated flow (Simo and Hughes, 1998, chapter 3).
 
-    With ``strain="finite"`` the deformation gradient is split multiplicatively, and the same law relates the logarithmic
+    With ``strain="finite"``, the deformation gradient is split multiplicatively, and the same law relates the logarithmic
     elastic strain to the Kirchhoff stress (Simo, Comput. Methods Appl. Mech. Engrg. 99, 1992). Stresses and strains in
     uniaxial tension are then true stresses and logarithmic strains, apart from the elastic change of volume. Load steps must
-    be small where the principal axes of strain rotate: in simple shear, steps of 0.1 cause a normal stress of 5 % of the
-    shear stress.
+    be small if the principal axes of strain rotate. In simple shear, for example, steps of 0.1 cause a spurious normal stress
+    of 5 % of the shear stress.
 
     Parameters
     ----------
@@ -75,11 +75,11 @@ class ElasticPlastic(NonlinearElastic):
         Initial yield stress in uniaxial tension [pressure].
     hardening : sequence of (float, float)
         Isotropic hardening: pairs of equivalent plastic strain [-], ascending from zero, and yield stress [pressure]. The
-        yield stress is interpolated linearly, and constant beyond the last pair; by default plasticity is perfect. The first
-        pair, (0, `yield_stress`), may be omitted.
+        yield stress is interpolated linearly, and is constant beyond the last pair. By default, plasticity is perfect. The
+        first pair, (0, `yield_stress`), may be omitted.
     kinematic : float
         Modulus of linear kinematic hardening (Prager, 1956), the slope of the stress over the plastic strain in uniaxial
-        tension [pressure]; only for small strains.
+        tension [pressure]. It is available only for small strains.
     volumetric : str
         As for `LinearElastic`, but ``"auto"`` always selects the mean dilatation, because plastic flow preserves the volume.
     density, expansion, conductivity : float, optional
@@ -111,7 +111,7 @@ class ElasticPlastic(NonlinearElastic):
         object.__setattr__(self, "hardening", self._table())
 
     def _table(self) -> tuple[tuple[float, float], ...]:
-        """Return the hardening table, beginning at zero plastic strain; ModelError if it is not valid."""
+        """Return the hardening table, which begins at zero plastic strain; raise ModelError if it is not valid."""
         try:
             rows = np.array([[float(value) for value in pair] for pair in self.hardening]).reshape(-1, 2)
         except (TypeError, ValueError, OverflowError):
@@ -128,11 +128,11 @@ class ElasticPlastic(NonlinearElastic):
         if rows[0, 0] < 0.0 or not math.isclose(rows[0, 1], self.yield_stress):
             raise ModelError(
                 f"hardening begins with the yield stress {rows[0, 1]:g} at the plastic strain {rows[0, 0]:g}, where "
-                f"yield_stress = {self.yield_stress:g}: the first pair is (0, yield_stress), or left out"
+                f"yield_stress = {self.yield_stress:g}: the first pair must be (0, yield_stress), or be omitted"
             )
         slopes = np.diff(rows[:, 1]) / np.diff(rows[:, 0])
         if slopes.min(initial=0.0) <= -(3.0 * self.shear_modulus + self.kinematic):
-            raise ModelError("hardening falls faster than the elastic stress can: softening must be slower than 3 G")
+            raise ModelError("the yield stress decreases too fast: its slope must be greater than -(3 G + kinematic)")
         return tuple((float(p), float(s)) for p, s in rows)
 
     @property
@@ -142,7 +142,7 @@ class ElasticPlastic(NonlinearElastic):
 
     @property
     def constants(self) -> list[float]:
-        """The law's row for `constitutive_kernels`."""
+        """Row of constants of the law for `constitutive_kernels`."""
         table = [value for row in self.hardening for value in row]
         return [PLASTIC, self.shear_modulus, self.bulk_modulus, self.kinematic, len(self.hardening), *table]
 
@@ -188,7 +188,7 @@ class NeoHookean(Hyperelastic):
 
     @property
     def constants(self) -> list[float]:
-        """The law's row for `constitutive_kernels`."""
+        """Row of constants of the law for `constitutive_kernels`."""
         return [INVARIANTS, self.shear_modulus, self.bulk_modulus, 0.5 * self.shear_modulus, 0.0, 0.0, 0.0]
 
 
@@ -211,9 +211,9 @@ class OwnConstants(Hyperelastic):
     conductivity: Constant | None = field(default=None, kw_only=True)
 
     def _set_initial_moduli(self, mu: float, formula: str, bulk: float) -> None:
-        """Set E and nu, given the shear modulus `mu` at small strains and the bulk modulus [pressure].
+        """Set E and nu, given the shear modulus `mu` at small strains and the bulk modulus `bulk` [pressure].
 
-        ModelError if one of them is not positive; the message contains the `formula` of mu.
+        Raises ModelError if one of the moduli is not positive; the message contains the `formula` of mu.
         """
         if not (0.0 < mu < math.inf):
             raise ModelError(f"the shear modulus {formula} = {mu:g} of {type(self).__name__} must be positive")
@@ -240,7 +240,7 @@ class Polynomial(OwnConstants):
 
     @property
     def constants(self) -> list[float]:
-        """The law's row for `constitutive_kernels`."""
+        """Row of constants of the law for `constitutive_kernels`."""
         return [INVARIANTS, self.shear_modulus, self.bulk_modulus, *self._coefficients]
 
 
@@ -249,7 +249,7 @@ class Polynomial(OwnConstants):
 class MooneyRivlin(Polynomial):
     """Mooney-Rivlin hyperelasticity (Mooney, 1940; Rivlin, 1948): C10 (I1 - 3) + C01 (I2 - 3) + K (J - 1)^2 / 2.
 
-    I1 and I2 are the invariants of the isochoric stretches, J is the volume ratio.
+    I1 and I2 are the invariants of the isochoric stretches, and J is the volume ratio.
 
     Parameters
     ----------
@@ -281,7 +281,7 @@ class MooneyRivlin(Polynomial):
 class Yeoh(Polynomial):
     """Yeoh hyperelasticity (Yeoh, 1993): C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 + K (J - 1)^2 / 2.
 
-    I1 is the first invariant of the isochoric stretches, J is the volume ratio.
+    I1 is the first invariant of the isochoric stretches, and J is the volume ratio.
 
     Parameters
     ----------
@@ -321,7 +321,7 @@ class Ogden(OwnConstants):
     mu : float or sequence of float
         Modulus of each term [pressure]; the sum is the shear modulus at small strains.
     alpha : float or sequence of float
-        Exponents [-], none of them zero.
+        Exponents, which must not be zero [-].
     bulk : float
         Bulk modulus K of ``K (J - 1)^2 / 2`` [pressure].
     volumetric, density, expansion, conductivity
@@ -348,15 +348,15 @@ class Ogden(OwnConstants):
         except (TypeError, ValueError, OverflowError):
             raise ModelError("mu and alpha of Ogden must be numbers, or lists with a number for each term") from None
         if len(terms[0]) != len(terms[1]) or not terms[0]:
-            raise ModelError(f"Ogden has {len(terms[0])} mu and {len(terms[1])} alpha: give the same number of both")
+            raise ModelError(f"Ogden has {len(terms[0])} mu and {len(terms[1])} alpha: their numbers must be equal")
         if not all(map(math.isfinite, terms[0] + terms[1])) or 0.0 in terms[1]:
-            raise ModelError("mu and alpha of Ogden must be finite, and no alpha zero")
+            raise ModelError("mu and alpha of Ogden must be finite, and alpha must not be zero")
         object.__setattr__(self, "mu", terms[0])
         object.__setattr__(self, "alpha", terms[1])
         self._set_initial_moduli(sum(terms[0]), "(the sum of mu)", self.bulk)
 
     @property
     def constants(self) -> list[float]:
-        """The law's row for `constitutive_kernels`."""
+        """Row of constants of the law for `constitutive_kernels`."""
         terms = [value for term in zip(self.mu, self.alpha, strict=True) for value in term]
         return [OGDEN, self.shear_modulus, self.bulk_modulus, len(self.mu), *terms]

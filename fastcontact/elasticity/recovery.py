@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 
 from fastcontact._jit import parallel
-from fastcontact._tools.argument_types import typed
+from fastcontact._tools.argument_types import typed, unchecked
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.elasticity import dilatation, dilatation_kernels, incompatible_modes, incompatible_modes_kernels
 from fastcontact.elasticity.energy import gradients_at
@@ -26,16 +26,16 @@ __all__ = [
 ]  # fmt: skip
 
 Materials = dict[str, Numbers]
-# Memory for the stresses of cells that are processed together [bytes].
+# Memory for the stresses of the cells that are processed together [bytes].
 BATCH = 16_000_000
-# Every SAMPLED-th cell is used to estimate the distribution of node numbers.
-SAMPLED = 16
-# Number of cells processed at a time in NumPy, which limits the memory for moduli and gradients at their points.
-AT_ONCE = 2_000
+# The distribution of node numbers is estimated from one of SAMPLING_INTERVAL cells.
+SAMPLING_INTERVAL = 16
+# Number of cells processed at a time by NumPy, which limits the memory for the moduli and gradients at their points.
+CELLS_AT_ONCE = 2_000
 
 
 def interpolation(name: str, xi: Array) -> Array:
-    """Return the interpolation weights (n, n_q) [-] from the quadrature points to points `xi` (n, dim) [-]."""
+    """Return the weights (n, n_q) [-] for interpolation from the quadrature points to the points `xi` (n, dim) [-]."""
     element = elements.get(name)
     if xi is element.quadrature[0]:
         return np.eye(len(xi))
@@ -43,7 +43,7 @@ def interpolation(name: str, xi: Array) -> Array:
 
 
 def _varying_product(moduli: Array, name: str, xi: Array, material: Numbers, strain: Array) -> Array:
-    """Return the product of strains at points `xi` and moduli, given at quadrature points by `material` (n_cells, n_q)."""
+    """Return the product of moduli and strains at points `xi`; `material` (n_cells, n_q) refers to quadrature points."""
     local = np.einsum("nq,cqij->cnij", interpolation(name, xi), moduli[material], optimize=True)
     return np.asarray(np.einsum("cnij,cnj->cni", local, strain))
 
@@ -62,9 +62,9 @@ class CellStress:
         Displacements of all points [length].
     averaged : ndarray of bool or uint8 (n_materials,), optional
         Whether each material has a mean dilatation, see `dilatation`; or the codes of `MaterialField.treatment`, which also
-        state whether it has incompatible modes. By default no material has either.
+        state whether it has incompatible modes. By default, no material has either.
     offset : StressOffset, optional
-        Stresses due to temperature and initial states.
+        Stresses due to temperatures and initial states.
     """
 
     def __init__(
@@ -79,8 +79,8 @@ class CellStress:
     def at(self, name: str, xi: Array, cells: Numbers, material: Numbers, rows: Indices) -> Array:
         """Return the stresses (n_cells, n, n_components) [pressure] at points `xi` (n, dim) [-] of cells of an element.
 
-        The integer arrays are the nodes `cells` (n_cells, n_nodes), the numbers `rows` (n_cells,) of the cells, and the
-        material numbers `material` (n_cells,) of cells, or (n_cells, n_q) of quadrature points.
+        The integer arrays contain the nodes of the cells, `cells` (n_cells, n_nodes), their numbers, `rows` (n_cells,), and
+        the material numbers of cells, `material` (n_cells,), or of quadrature points, (n_cells, n_q).
         """
         out = np.empty((len(cells), len(xi), self._moduli.shape[1]))
         self.fill(name, xi, cells, material, out, rows)
@@ -123,14 +123,14 @@ class CellStress:
     ) -> None:  # fmt: skip
         """Fill `out` with the stresses of cells within which the moduli vary.
 
-        The moduli are interpolated from the quadrature points. The strains are computed as stresses with unit moduli.
+        The moduli are interpolated from the quadrature points. The strains are computed as the stresses for unit moduli.
         """
         name, xi, N, dN = location
         unit_moduli, row_of_moduli = np.eye(moduli.shape[1])[None], np.zeros(len(cells), np.int32)
         strain, options = np.empty_like(out), (self._axisymmetric, self._displacement)
         LOOPS[self._mesh.dim].stress(self._mesh.points, cells, N, dN, unit_moduli, row_of_moduli, *options, strain)
-        for first in range(0, len(cells), AT_ONCE):
-            portion = slice(first, first + AT_ONCE)
+        for first in range(0, len(cells), CELLS_AT_ONCE):
+            portion = slice(first, first + CELLS_AT_ONCE)
             out[portion] = _varying_product(moduli, name, xi, material[portion], strain[portion])
 
     def _add_modes(
@@ -142,7 +142,7 @@ class CellStress:
         out: Array,
         rows: Indices,
     ) -> None:
-        """Add the stresses of incompatible modes of the moduli `with_modes` (n_materials,)."""
+        """Add the stresses due to incompatible modes, for the moduli that are marked in `with_modes` (n_materials,)."""
         name, xi, dN = location
         numbers, offset_stress = material.reshape(len(cells), -1), np.empty((0, 0, 0))
         if self._offset is not None:
@@ -174,7 +174,7 @@ class CellStress:
     def _add_offset(
         self, offset: StressOffset, location: tuple[str, Array, Indices], cells: Numbers, material: Numbers, out: Array
     ) -> None:
-        """Add initial stresses, and subtract the moduli times the stress-free strains, with their dilatation projected."""
+        """Add initial stresses, and subtract the stresses of the stress-free strains, whose dilatation is projected."""
         name, xi, rows = location
         stress = offset.initial("stress", name, rows, elements.get(name).shape(xi))
         if stress is not None:
@@ -209,7 +209,7 @@ def stress_at_points(
 ) -> dict[str, Array]:
     """Return the stress (n_cells, n_q, n_components) [pressure] at the default quadrature points, by solid element type.
 
-    Components are xx, yy, zz, xy, in 3D also yz, xz, and in axisymmetry rr, yy, hoop, ry.
+    The components are xx, yy, zz, xy, in 3D also yz, xz, and in axisymmetry rr, yy, hoop, ry.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def stress_at_points(
         Displacements of all points [length].
     averaged : ndarray of bool or uint8 (n_materials,), optional
         Whether each material has a mean dilatation, see `dilatation`; or the codes of `MaterialField.treatment`, which also
-        state whether it has incompatible modes. By default no material has either.
+        state whether it has incompatible modes. By default, no material has either.
     offset : StressOffset, optional
         Stresses due to temperatures and initial states [pressure].
     """
@@ -248,9 +248,9 @@ def nodal_stress(
 ) -> Array:
     """Return the stress (n_points, n_components) [pressure] at the nodes: `nodal_average` of `stress_at_points`.
 
-    Other arguments are as for `stress_at_points`. To save memory, stresses at points are computed for a limited number
-    of cells at a time. With `sides` the result has a row for each of its slots (n_slots, n_components): the mean at a
-    node over the cells of one material.
+    To save memory, stresses at quadrature points are computed for a limited number of cells at a time. If `sides` is given,
+    the result has one row for each slot of `sides` (n_slots, n_components), the mean at a node over the cells of one
+    material. The other arguments are as for `stress_at_points`.
     """
     stress = CellStress(mesh, kinematics, moduli, displacement, averaged, offset)
     slots = mesh.cells if sides is None else sides.cells
@@ -264,12 +264,12 @@ def nodal_stress(
             rows = slice(first, first + len(buffer))
             values = buffer[: len(block) - first]
             stress.fill(name, xi, block[rows], material[name][rows], values, np.arange(first, first + len(values)))
-            average.add(slots[name][rows], element.extrapolation, values)
+            _add(average, slots[name][rows], element.extrapolation, values)
     return average.result()
 
 
 class NodalAverage:
-    """Mean over the cells at each node of their stresses, with the same weight for all cells."""
+    """Mean of the stresses of the cells at each node, with the same weight for all cells."""
 
     def __init__(self, count: int, components: int) -> None:
         self._total, self._count = np.zeros((count, components)), np.zeros(count)
@@ -287,16 +287,19 @@ class NodalAverage:
         parallel.parallel_map(lambda nodes: LOOPS[2].add_nodal(*arguments, *nodes, *sums), self._node_ranges(cells))
 
     def _node_ranges(self, cells: Numbers) -> list[tuple[int, int]]:
-        """Return a range of nodes for each thread, such that all ranges have about the same number of cells."""
-        sampled_nodes = np.sort(cells[::SAMPLED, 0])
+        """Return a range of nodes for each thread, such that about the same number of cells belongs to each range."""
+        sampled_nodes = np.sort(cells[::SAMPLING_INTERVAL, 0])
         count = len(parallel.portions(*cells.shape)) if len(sampled_nodes) else 1
         ends = [0, *(int(sampled_nodes[k * len(sampled_nodes) // count]) for k in range(1, count)), len(self._count)]
         return list(itertools.pairwise(ends))
 
     def result(self) -> Array:
-        """Return the mean (n_points, n_components) [pressure], zero at points without cells; call this method only once."""
+        """Return the mean (n_points, n_components) [pressure], which is zero at points without cells; to be called once."""
         self._total /= np.maximum(self._count, 1.0)[:, None]
         return self._total
+
+
+_add = unchecked(NodalAverage.add)
 
 
 @typed(ModelError)
@@ -313,9 +316,9 @@ def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
 def nodal_average(mesh: Mesh, at_points: dict[str, Array], sides: MaterialSides | None = None) -> Array:
     """Return the stress (n_points, n_components) [pressure] at the nodes: the unweighted mean over the cells at each node.
 
-    It is computed from the stresses `at_points` (n_cells, n_q, n_components) [pressure], like SIEF_NOEU of code_aster. Points
-    without a solid cell have zero stress. With `sides` the result has a row for each of its slots (n_slots, n_components):
-    the mean at a node over the cells of one material.
+    It is computed from the stresses `at_points` (n_cells, n_q, n_components) [pressure], like SIEF_NOEU of code_aster. The
+    stress is zero at points without a solid cell. If `sides` is given, the result has one row for each slot of `sides`
+    (n_slots, n_components), the mean at a node over the cells of one material.
     """
     slots, count = (mesh.cells, mesh.n_points) if sides is None else (sides.cells, len(sides.node))
     average = NodalAverage(count, next(iter(at_points.values())).shape[2])
@@ -326,17 +329,17 @@ def nodal_average(mesh: Mesh, at_points: dict[str, Array], sides: MaterialSides 
 
 @typed(ModelError)
 def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> Array:
-    """Return the nodal forces (n_points, dim) [force] in equilibrium with the stresses at quadrature points.
+    """Return the nodal forces (n_points, dim) [force] that are in equilibrium with given stresses.
 
-    The stresses are `at_points` (n_cells, n_q, n_components) [pressure], by solid element type.
+    `at_points` (n_cells, n_q, n_components) [pressure] contains the stresses at quadrature points, by solid element type.
     """
     force, axisymmetric = np.zeros((mesh.n_points, mesh.dim)), kinematics == "axisymmetric"
     for name, stress in at_points.items():
         N, dN, weights = elements.get(name).tables
-        for first in range(0, len(stress), AT_ONCE):
-            cells = mesh.cells[name][first : first + AT_ONCE]
+        for first in range(0, len(stress), CELLS_AT_ONCE):
+            cells = mesh.cells[name][first : first + CELLS_AT_ONCE]
             corners, (gradient, volume) = mesh.points[cells], gradients_at(mesh.points[cells], dN)
-            weighted = (volume * weights)[..., None] * stress[first : first + AT_ONCE]
+            weighted = (volume * weights)[..., None] * stress[first : first + CELLS_AT_ONCE]
             if axisymmetric:
                 radius = np.einsum("qa,ca->cq", N, corners[..., 0])
                 weighted *= 2.0 * np.pi * radius[..., None]
@@ -352,7 +355,7 @@ def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> 
 def von_mises(stress: Array) -> Array:
     """Return the equivalent stress (...) [pressure] of `stress` (..., n_components) [pressure] (von Mises, 1913).
 
-    Components are xx, yy, zz, xy, in 3D also yz, xz.
+    The components are xx, yy, zz, xy, in 3D also yz, xz.
     """
     stress = _with_components(stress)
     xx, yy, zz = stress[..., 0], stress[..., 1], stress[..., 2]
@@ -364,7 +367,7 @@ def von_mises(stress: Array) -> Array:
 def principal_stress(stress: Array) -> Array:
     """Return the principal stresses (..., 3) [pressure], in ascending order, of `stress` (..., n_components) [pressure].
 
-    Components are xx, yy, zz, xy, in 3D also yz, xz.
+    The components are xx, yy, zz, xy, in 3D also yz, xz.
     """
     stress = _with_components(stress)
     six_components = np.concatenate([stress, np.zeros((*stress.shape[:-1], 6 - stress.shape[-1]))], axis=-1)
@@ -375,7 +378,7 @@ def principal_stress(stress: Array) -> Array:
 def tresca(stress: Array) -> Array:
     """Return the Tresca stress (...) [pressure] of `stress` (..., n_components) [pressure].
 
-    It is the largest minus the smallest principal stress, twice the largest shear stress.
+    It is the difference between the largest and the smallest principal stress, which is twice the largest shear stress.
     """
     return np.asarray(np.ptp(principal_stress(stress), axis=-1))
 
@@ -394,8 +397,8 @@ def _with_components(stress: Array) -> Array:
 def equivalent_strain(strain: Array) -> Array:
     """Return the equivalent strain (...) [-] of `strain` (..., n_components) [-].
 
-    For linear elastic isotropic materials it is the von Mises stress divided by 3 G. Components are xx, yy, zz and the
-    engineering shear strain xy, in 3D also those of yz and xz.
+    For isotropic linear elastic materials, it is the von Mises stress divided by 3 G. The components are xx, yy, zz and the
+    engineering shear strain xy, in 3D also the engineering shear strains yz and xz.
     """
     strain = _with_components(strain)
     tensor = strain * np.array([1.0] * 3 + [0.5] * (strain.shape[-1] - 3))
@@ -404,9 +407,9 @@ def equivalent_strain(strain: Array) -> Array:
 
 @typed(ModelError)
 def von_mises_signed(stress: Array, equivalent: Array | None = None) -> Array:
-    """Return the von Mises stress (...) [pressure] with the sign of the trace, as VMIS_SG of code_aster.
+    """Return the von Mises stress (...) [pressure] with the sign of the trace, like VMIS_SG of code_aster.
 
-    The argument `equivalent` (...) [pressure] is the von Mises stress of `stress` (..., n_components) [pressure]; it is
+    The argument `equivalent` (...) [pressure] is the von Mises stress of `stress` (..., n_components) [pressure]. It is
     computed if it is not given.
     """
     stress = _with_components(stress)

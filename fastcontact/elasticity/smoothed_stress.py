@@ -4,8 +4,8 @@ Stresses are most accurate at the centres of linear cells and at the reduced Gau
 In wedges and pyramids, the latter lie at 1/sqrt(3) of the distance from the centre to the corners. Stresses are extrapolated
 from these points to the nodes, and averaged at each node over the cells of one material. Polynomials fitted to patches of
 cells (Zienkiewicz and Zhu, 1992) are less accurate near the edge of a contact, where the pressure decreases like a square
-root. They smooth the decrease over two cells, and the estimated error of quadratic cells is too large by a factor of two to
-four.
+root. They smooth this decrease over two cells, so that the estimated error of quadratic cells is too large by a factor of two
+to four.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 # Distance of the sampling points from the centre of quadratic triangles and tetrahedra, divided by the distance of the
-# corners; by number of corners.
+# corners from the centre; by number of corners.
 SIMPLEX_FRACTION = {3: 0.5, 4: 1.0 / math.sqrt(5.0)}
 
 
 class PointStress:
-    """Stresses in the cells of a mesh, interpolated from given ones at the quadrature points.
+    """Stresses in the cells of a mesh, interpolated from given stresses at the quadrature points.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def smoothed_stress(mesh: Mesh, field: MaterialField, stress: CellStress | Point
         rows_of_material = {name: np.flatnonzero(material[name] == number) for name in at_nodes}
         rows_of_material = {name: rows for name, rows in rows_of_material.items() if len(rows)}
         for name, rows in rows_of_material.items():
-            xi, extrapolation = sampling(name)
+            xi, extrapolation = sampling_points(name)
             cells = mesh.cells[name][rows]
             average.add(cells, extrapolation, stress.at(name, xi, cells, field.moduli_rows[name][rows], rows))
         nodal = average.result()
@@ -76,10 +76,10 @@ def smoothed_stress(mesh: Mesh, field: MaterialField, stress: CellStress | Point
     return at_nodes
 
 
-def sampling(name: str) -> tuple[Array, Array]:
-    """Return the points (n_q, dim) [-] of an element where stress is most accurate, and the extrapolation (n_nodes, n_q) [-].
+def sampling_points(name: str) -> tuple[Array, Array]:
+    """Return the points (n_q, dim) [-] of an element type at which stresses are most accurate, and an extrapolation matrix.
 
-    The matrix of the extrapolation maps values at these points to values at the nodes.
+    The extrapolation matrix (n_nodes, n_q) [-] maps values at these points to values at the nodes.
     """
     element = elements.get(name)
     corners = element.nodes[: element.n_corners]

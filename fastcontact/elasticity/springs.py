@@ -1,7 +1,7 @@
 """Linear springs at nodes, which add the positive semidefinite matrix ``R.T diag(k) R`` to the stiffness.
 
-A spring with the stiffness k has the energy ``k (r u)^2 / 2``, where the row r of R yields its elongation from the
-displacements u. The direction of springs along a line is that of the undeformed line.
+A spring with the stiffness k has the energy ``k (r u)^2 / 2``, where the product of the row r of R and the displacements u is
+the elongation of the spring. The direction of springs along a line is that of the undeformed line.
 """
 
 from __future__ import annotations
@@ -18,23 +18,24 @@ from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows, stacked_rows, sum_of_blocks
 from fastcontact.round_off import ROUND_OFF
 
-# Ratios of the stiffness of a spring between nodes to that of the bodies at its ends that cause a warning and an error.
+# Ratios of the stiffness of a spring between nodes to that of the bodies at its ends above which a warning is issued and an
+# error is raised.
 WARNING_RATIO, ERROR_RATIO = 1e5, 1e12
 DIGITS = 16  # number of decimal digits in double precision
 
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """Springs that are defined together, under one name.
+    """Springs that are defined together under one name.
 
     Attributes
     ----------
     name : str
         Name for messages.
     rows : csr_array (m, n_dofs)
-        Rows R of the springs, which yield their elongations from the displacements [-].
+        Rows R of the springs, which map displacements to elongations [-].
     stiffness : ndarray (m,)
-        Stiffness [force / length]; in axisymmetry over the full circle.
+        Stiffness [force / length]; in axisymmetry, it refers to the full circle.
     grounded : bool
         Whether the springs connect nodes to the ground instead of to other nodes.
     """
@@ -56,8 +57,8 @@ def grounded(
     """Return springs from each of the `nodes` (n,) to the ground; see `joined`.
 
     A spring with the stiffness ``stiffness[axis]`` [force / length] acts along each axis in `stiffness`. Springs with the
-    stiffnesses ``along["axial"]`` and ``along["transverse"]`` [force / length] act along and across the unit vector
-    `direction` (dim,) [-].
+    stiffnesses ``along["axial"]`` and ``along["transverse"]`` [force / length] act parallel and perpendicular to the unit
+    vector `direction` (dim,) [-].
     """
     directions, values = _directions(stiffness, along or {}, direction, dim)
     rows = nodal_rows(np.tile(nodes, len(values))[:, None], np.repeat(directions, len(nodes), axis=0)[:, None], n_dofs)
@@ -70,10 +71,10 @@ def joined(
 ) -> Springs:  # fmt: skip
     """Return springs between pairs of the `points` (n_points, dim) [length].
 
-    `ends` (n,) of int each are the first and the second points of the pairs. Springs act along each axis in `stiffness`
-    [force / length]; those with the stiffnesses ``along["axial"]`` and ``along["transverse"]`` [force / length] act along
-    and across the line of a pair, or the unit vector `direction` (dim,) [-]. Raises ModelError if the points of a pair are
-    the same point, or coincide where the line between them is needed.
+    The two arrays `ends` (n,) of int contain the first and the second points of the pairs. Springs act along each axis in
+    `stiffness` [force / length]. Springs with the stiffnesses ``along["axial"]`` and ``along["transverse"]`` [force / length]
+    act parallel and perpendicular to the line of a pair, or to the unit vector `direction` (dim,) [-]. Raises ModelError if
+    the points of a pair are identical, or if they coincide and the line between them is needed.
     """
     rows, values = [], []
     for first, second in np.transpose(ends).tolist():
@@ -93,7 +94,7 @@ def _line(name: str, points: Array, first: int, second: int) -> Array:
     length = float(np.linalg.norm(line))
     if length <= ROUND_OFF * np.abs(points).max():
         raise ModelError(
-            f"{name}: points {first} and {second} coincide, and have no line between them: give x, y or z instead of "
+            f"{name}: points {first} and {second} coincide, so that no line connects them: give x, y or z instead of "
             "axial, or a direction"
         )
     return np.asarray(line / length)
@@ -113,8 +114,8 @@ def _directions(
     return np.array(directions), np.array(values, float)
 
 
-def stiffened(K: bsr_array, springs: Sequence[Springs]) -> bsr_array:
-    """Return the stiffness matrix `K` (n, n) [force / length] plus that of the springs, (n, n) [force / length]."""
+def with_springs(K: bsr_array, springs: Sequence[Springs]) -> bsr_array:
+    """Return the sum (n, n) [force / length] of the stiffness matrix `K` (n, n) [force / length] and that of the springs."""
     if not springs:
         return K
     return sum_of_blocks(K, spring_stiffness(springs, K.shape[0]))
@@ -134,11 +135,12 @@ def spring_force(springs: Sequence[Springs], u: Array) -> Array:
     return np.asarray(R.T @ (np.concatenate([spring.stiffness for spring in springs]) * (R @ u)))
 
 
-def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
-    """Return a warning for each set of springs so stiff, compared with the bodies at their ends, that results lose digits.
+def stiffness_warnings(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
+    """Return a warning for each set of springs that are too stiff, compared with the bodies at their ends.
 
-    The sum of the stiffnesses of a body and a spring has the absolute accuracy of the larger one. Springs along an axis
-    to the ground only add to the diagonal of K, like a penalty for a support, which does not impair the results.
+    The sum of the stiffnesses of a body and a spring has the absolute accuracy of the larger one, so that digits of the
+    results are lost. Springs along an axis to the ground only add to the diagonal of K, like a penalty for a support, which
+    does not impair the results.
 
     Parameters
     ----------
@@ -149,7 +151,7 @@ def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
     Raises
     ------
     ModelError
-        If a ratio of stiffnesses exceeds `ERROR_RATIO`, so that about four digits or fewer would remain.
+        If a ratio of stiffnesses exceeds ERROR_RATIO, so that about four digits or fewer would remain.
     """
     dim, texts = K.blocksize[0], []
     for spring in springs:
@@ -171,7 +173,7 @@ def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
 
 
 def _stiffness_ratio(spring: Springs, diagonal: Array, dim: int) -> tuple[float, float]:
-    """Return the largest ratio of a spring's stiffness to that of the softer body at its ends, and that stiffness."""
+    """Return the largest ratio of the stiffness of a spring to that of the softer body at its ends, and the latter."""
     rows = spring.rows.tocoo()
     row, node = rows.coords[0], rows.coords[1] // dim
     ends, index = np.unique(np.stack([row, node]), axis=1, return_inverse=True)

@@ -28,19 +28,19 @@ from fastcontact.mesh.mesh import Mesh
 
 Indices = NDArray[np.int64]
 Tables = tuple[Array, Array, Array]  # N, dN and weights at quadrature points
-# Element loops `add_stiffness` and `stress` by the number of coordinates.
+# Modules with the element loops `add_stiffness` and `stress`, by dimension.
 LOOPS = {2: element_2d_kernels, 3: element_3d_kernels}
 
 
 class Owners(NamedTuple):
-    """Division of the assembly into parts, one for each thread.
+    """Division of the assembly into parts, one per thread.
 
     Attributes
     ----------
     owner : ndarray of uint8 (n_points,)
         Number of the part that computes the rows of the matrix of each point.
     cells : list of (int, int)
-        First cell of each part, and the cell after its last one.
+        First cell of each part, and the number after its last cell.
     """
 
     owner: NDArray[np.uint8]
@@ -65,7 +65,7 @@ class Sparsity:
     _owners: dict[tuple[str, int], Owners] = field(default_factory=dict, init=False, repr=False)
 
     def owners(self, mesh: Mesh, name: str) -> Owners:
-        """Return the division of the assembly of an element type; it is stored for each number of parts."""
+        """Return the division of the assembly of an element type; results are cached by number of parts."""
         key = name, len(parallel.portions(*mesh.cells[name].shape))
         if key not in self._owners:
             self._owners[key] = owners(mesh.cells[name], mesh.n_points)
@@ -79,7 +79,7 @@ def sparsity(mesh: Mesh) -> Sparsity:
     isolated = np.flatnonzero(np.bincount(nodes, minlength=mesh.n_points) == 0)
     cell_sizes = (np.full(len(block), block.shape[1]) for block in blocks.values())
     sizes = np.concatenate([[0], *cell_sizes, np.ones_like(isolated)])
-    # SciPy preserves the type of index arrays, so that the indices of all matrices are 32-bit integers like the nodes.
+    # SciPy preserves the type of index arrays. The indices of all matrices are therefore 32-bit integers, like the nodes.
     nodes, first = np.concatenate([nodes, isolated.astype(np.int32)]), np.cumsum(sizes, dtype=np.int32)
     incidence = csr_array((np.ones(len(nodes), bool), nodes, first), shape=(len(sizes) - 1, mesh.n_points))
     pattern = csr_array(incidence.T @ incidence)
@@ -117,15 +117,15 @@ def stiffness(
     material : dict of str to ndarray of int (n_cells,) or (n_cells, n_q)
         Material number of each cell, or of each quadrature point, by solid element type.
     pattern : Sparsity, optional
-        From `sparsity`, to reuse it.
+        The result of `sparsity`, if it is already available.
     averaged : ndarray of bool or uint8 (n_materials,), optional
         Whether each material has a mean dilatation, see `dilatation`; or the codes of `MaterialField.treatment`, which also
-        state whether it has incompatible modes. By default no material has either.
+        state whether it has incompatible modes. By default, no material has either.
 
     Returns
     -------
     bsr_array (n_points * dim, n_points * dim)
-        Symmetric, blocks of dim x dim [force / length].
+        Symmetric matrix with blocks of dim x dim entries [force / length].
 
     Raises
     ------
@@ -137,9 +137,9 @@ def stiffness(
     isotropic = is_isotropic(moduli)
     for name, block in mesh.solids.items():
         split = dilatation.split(name, moduli, averaged)
-        of_element = moduli, isotropic, split, incompatible_modes.with_modes(name, averaged)
+        element_moduli = moduli, isotropic, split, incompatible_modes.with_modes(name, averaged)
         add_part = partial(
-            _add_part, mesh=mesh, name=name, material=material[name], moduli=of_element,
+            _add_part, mesh=mesh, name=name, material=material[name], moduli=element_moduli,
             axisymmetric=kinematics == "axisymmetric", pattern=pattern, data=data,
         )  # fmt: skip
         bad_cells = parallel.parallel_map(add_part, range(len(pattern.owners(mesh, name).cells)))
@@ -152,7 +152,7 @@ def stiffness(
 
 
 def is_isotropic(moduli: Array) -> Mask:
-    """Return which moduli (n_materials,) are isotropic up to round-off; the element loops in 3D are faster for these.
+    """Return a mask (n_materials,) of moduli that are isotropic up to round-off, with which loops in 3D are faster.
 
     Parameters
     ----------
@@ -168,18 +168,18 @@ def is_isotropic(moduli: Array) -> Mask:
 
 
 def of_cells(material: Numbers) -> Numbers:
-    """Return one material number for each cell, shape (n_cells,) of int.
+    """Return one material number for each cell (n_cells,).
 
-    The numbers `material` (n_cells,) of cells are returned unchanged; of numbers at quadrature points (n_cells, n_q), the
-    first one of each cell is returned.
+    If `material` (n_cells,) contains numbers of cells, it is returned unchanged. If it contains numbers of quadrature points
+    (n_cells, n_q), those of the first point of each cell are returned.
     """
     return material if material.ndim == 1 else np.ascontiguousarray(material[:, 0])
 
 
 def _passes(tables: Tables, material: Numbers) -> Iterator[tuple[Tables, Numbers]]:
-    """Yield quadrature tables, each with the material (n_cells,) at its points.
+    """Yield quadrature tables, each with the material numbers (n_cells,) at its points.
 
-    If the material varies within cells, there is one table for each quadrature point, otherwise one table of all points.
+    If the material varies within cells, there is a table for each quadrature point; otherwise, a single table for all points.
     """
     if material.ndim == 1:
         yield tables, material
@@ -195,8 +195,8 @@ def _add_part(
 ) -> int:  # fmt: skip
     """Add the stiffness of one element type to `data` (n_blocks, dim, dim), in the rows of part `number` of `Owners`.
 
-    The tuple `moduli` contains the moduli, a mask of the isotropic ones, their split, and a mask of those with modes.
-    Returns the number of the first cell with a Jacobian that is not positive, or -1.
+    The tuple `moduli` contains the moduli, a mask of the isotropic ones, their split, and a mask of those with incompatible
+    modes. Returns the number of the first cell whose Jacobian is not positive, or -1.
     """
     (D, isotropic, split, with_modes), tables = moduli, elements.get(name).tables
     owner, row_ranges = pattern.owners(mesh, name)
@@ -224,8 +224,8 @@ def owners(cells: Numbers, n_points: int) -> Owners:
     """Return the division of the assembly of `cells` (n_cells, n_nodes) into parts.
 
     The cells are divided into consecutive portions, and a point belongs to the first portion that contains it. A part
-    computes the cells of its portion and the cells of later portions at its points. The portions are chosen so that all parts
-    compute about the same number of cells.
+    computes the cells of its portion, and those cells of later portions that contain its points. The portions are chosen such
+    that all parts compute about the same number of cells.
     """
     portions = parallel.portions(*cells.shape)
     if len(portions) == 1:
@@ -238,10 +238,10 @@ def owners(cells: Numbers, n_points: int) -> Owners:
 
 
 def _owners(cells: Numbers, n_points: int, ends: Indices) -> tuple[Owners, Indices]:
-    """Return the owners for portions of the cells that begin and end at `ends`, and the number of cells of each part."""
-    owner = np.full(n_points, parallel.MOST, np.uint8)
+    """Return the owners for the portions of cells bounded by `ends`, and the number of cells that each part computes."""
+    owner = np.full(n_points, parallel.MAX_THREADS, np.uint8)
     last, work = np.zeros((2, len(ends) - 1), np.int64)
-    pattern_kernels.first_parts(cells, ends, parallel.MOST, owner, last, work)
+    pattern_kernels.first_parts(cells, ends, parallel.MAX_THREADS, owner, last, work)
     return Owners(owner, list(zip(ends[:-1].tolist(), np.maximum(last, ends[:-1]).tolist(), strict=True))), work
 
 
@@ -249,8 +249,8 @@ def rigid_modes(points: Array, kinematics: str) -> Array:
     """Return the rigid-body modes (n_points * dim, n_modes) at `points` (n_points, dim) [length].
 
     The columns are the translation along the axis in axisymmetry, two translations and one rotation in plane models, and
-    three translations and three rotations in 3D. The unit of translations is [-], and that of rotations, about the mean of
-    the points, [length].
+    three translations and three rotations in 3D. The unit of the translations is [-]. The rotations are about the mean of the
+    points, and their unit is [length].
     """
     (n, dim), x = points.shape, points - points.mean(axis=0)
     planes = [(0, 1)] if dim == 2 else [(1, 2), (2, 0), (0, 1)]

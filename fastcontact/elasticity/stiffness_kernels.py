@@ -26,8 +26,8 @@ def find_slots(cells, indptr, indices, slots):
 def first_parts(cells, ends, unowned, owner, last, work):
     """Fill `owner` (n_points,), initially `unowned`, with the first part of the cells that contains each point.
 
-    Part p consists of the cells ``ends[p]`` to ``ends[p + 1] - 1``. It owns a point of ``work[p]`` cells, all of which
-    precede cell ``last[p]``. `last` and `work` (n_parts,) are initially zero.
+    Part p consists of the cells ``ends[p]`` to ``ends[p + 1] - 1``. The points that it owns belong to ``work[p]`` cells, all
+    of which precede cell ``last[p]``. `last` and `work` (n_parts,) are initially zero.
     """
     for part in range(len(ends) - 1):
         for c in range(ends[part], ends[part + 1]):

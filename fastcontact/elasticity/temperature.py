@@ -32,13 +32,13 @@ class Temperature:
     groups : tuple of str or None
         Groups of solid cells; None means all solid cells.
     value : float, callable or ndarray (n_points,)
-        A number, a function of the position, or a value for each point of the mesh [temperature].
+        A number, a function of position, or a value for each point of the mesh [temperature].
     reference : float
-        Temperature without thermal strain [temperature].
+        Temperature at which there is no thermal strain [temperature].
     ramp : tuple, optional
-        Points (instant, multiplier) of the ramp of the temperature rise over the reference.
+        Points (instant, multiplier) of the ramp of the temperature rise above the reference.
     times : tuple of float
-        Instants of the history to which the temperature belongs; empty without a history.
+        Instants of the history to which the temperature belongs; empty if there is no history.
     instant : int
         Index of the instant of this temperature in `times`.
     """
@@ -75,7 +75,7 @@ class Temperature:
             raise ModelError(f"{self.name} is not finite at point {int(np.flatnonzero(~np.isfinite(self.value))[0])}")
 
     def rise(self, mesh: Mesh) -> Array:
-        """Return the rise over the reference (n_points,) [temperature] at multiplier 1, zero at all other points."""
+        """Return the rise above the reference (n_points,) [temperature] at multiplier 1, which is zero at other points."""
         points = solid_points(mesh, self.groups)
         rise = np.zeros(mesh.n_points)
         if isinstance(self.value, np.ndarray):
@@ -96,19 +96,19 @@ def histories(
     values : ndarray (n_instants, n_points)
         Temperatures [temperature].
     reference : float
-        Temperature without thermal strain [temperature].
+        Temperature at which there is no thermal strain [temperature].
     times : sequence of float
         Ascending load factors of the instants.
 
     Raises
     ------
     ModelError
-        If there are not as many times as instants, or they do not ascend.
+        If the number of times differs from that of instants, or if the times do not ascend.
     """
     factors, count = np.asarray(times, float), len(values)
     if factors.shape != (count,) or count < 2:
         raise ModelError(
-            f"the temperature has {count} instants, but {factors.size} times: give the load factor of each, at least two"
+            f"the temperature has {count} instants, but {factors.size} times: give one load factor per instant, at least two"
         )
     if not (np.isfinite(factors).all() and (np.diff(factors) > 0.0).all()):
         raise ModelError(f"the times of the temperature must ascend, not {factors.tolist()}")

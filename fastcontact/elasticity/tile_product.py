@@ -1,7 +1,8 @@
 """Products of small matrices by tiles of 4 x 4 numbers, with vector instructions.
 
-The compiler does not vectorise loops over the few nodes of a cell. Here a row of a tile is one vector, and the tile stays in
-registers: the product ``A.T B`` of two matrices (24, 8) takes 0.10 us instead of 0.50 us in scalar instructions.
+The compiler does not vectorise loops over the few nodes of a cell. Here, each row of a tile is one vector, and the tile
+remains in registers. The product ``A.T B`` of two matrices (24, 8) then takes 0.10 us instead of 0.50 us with scalar
+instructions.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ def tile_plain(
     left: Any, left_row: int, left_column: int, right: Any, right_row: int, column: int, n: int, out: Any, row: int,
     overwrite: bool,
 ) -> None:  # fmt: skip
-    """Add a 4 x 4 tile of ``left.T @ right`` to the tile of `out` that begins at (row, column), or overwrite the latter.
+    """Add a 4 x 4 tile of ``left.T @ right`` to the tile of `out` that begins at (row, column), or overwrite this tile.
 
     Parameters
     ----------
     left, right, out : ndarray (n_rows, n_columns)
-        In C order. Indices are not checked.
+        Arrays in C order. Indices are not checked.
     left_row, right_row : int
         First rows of the factors in `left` and in `right`.
     left_column, column : int

@@ -26,7 +26,7 @@ AXES = ("x", "y", "z", "radius")
 class Tabulated:
     """A piecewise linear function of one coordinate, given by a table and constant beyond both ends of the table.
 
-    It can be used for material constants, temperatures, pressures and all other quantities that may be functions of position.
+    It can be used for material constants, temperatures, pressures and other quantities that may be functions of position.
 
     Parameters
     ----------
@@ -94,9 +94,9 @@ class Cells:
         return sum(map(len, self.rows.values()))
 
     def samples(self) -> Iterator[tuple[str, Indices, Array]]:
-        """Yield the element type, the cells and the shape functions (n, n_nodes) [-] at points of the cells.
+        """Yield element types, numbers of cells and shape functions (n, n_nodes) [-] at points of the cells.
 
-        The points are first the centres of the cells, then their quadrature points.
+        The points are first the centres of the cells, then the quadrature points.
         """
         for shapes in (centre_weights, lambda name: elements.get(name).tables[0]):
             for name, rows in self.rows.items():
@@ -163,8 +163,8 @@ class Varying:
             )
         if not column and len(values) == mesh.n_points and len(values) in (cells.count, total):
             raise ModelError(
-                f"{self._name} has {len(values)} numbers, but there are as many cells as points: give numbers of cells as a "
-                "column, shape (n, 1), and those of points as a function"
+                f"{self._name} has {len(values)} numbers, but there are as many cells as points: give values of cells as a "
+                "column, shape (n, 1), and values of points as a function"
             )
         if not np.isfinite(values).all():
             raise ModelError(f"{self._name} is not finite at row {int(np.flatnonzero(~np.isfinite(values))[0])}")
@@ -273,5 +273,5 @@ def mapped(value: Any, function: Callable[[Any], Any]) -> Any:
 
 
 def varying(value: Any) -> list[Varying]:
-    """Return those of one constant, or of a tuple of constants, that vary with position."""
+    """Return, from a constant or a tuple of constants, those that vary with position."""
     return [v for v in (value if isinstance(value, tuple) else (value,)) if isinstance(v, Varying)]

@@ -34,7 +34,7 @@ class Conduction:
     number : mapping of str to ndarray of int (n_cells,)
         Material number of each cell, by solid element type.
     displacement : ndarray (n_points, dim), optional
-        Displacement [length] of the deformed configuration. Conductivities are evaluated at reference positions.
+        Displacement of the deformed configuration [length]. Conductivities are evaluated at reference positions.
     """
 
     mesh: Mesh
@@ -56,7 +56,7 @@ class Conduction:
     def matrix(self) -> csr_array:
         """Return the conduction matrix (n_points, n_points) [power / temperature]: integrals of ``grad N_a . k . grad N_b``.
 
-        Quadrature is exact for constant conductivities on cells that are affine images of the reference cell.
+        The quadrature is exact for constant conductivities in cells that are affine images of the reference cell.
         """
 
         def local(name: str, rows: Indices) -> Array:
@@ -67,7 +67,7 @@ class Conduction:
         return csr_array((values[:, 0], pattern.indices, pattern.indptr), shape=(self.mesh.n_points,) * 2)
 
     def flux(self, temperature: Array) -> Array:
-        """Return the mean heat flux (n_solids, dim) [power / area] of cells for a `temperature` (n_points,) [temperature]."""
+        """Return the mean heat flux (n_solids, dim) [power / area] in cells for a `temperature` (n_points,) [temperature]."""
         flux = []
         for name, rows in portions(self.mesh):
             gradient, k, volume = self._at(name, rows)
@@ -96,18 +96,18 @@ class Conduction:
         return gradient, k, volume
 
 
-def not_reached(body: AnyArray, determined: Mask, connections: AnyArray) -> Indices:
+def undetermined_bodies(body: AnyArray, determined: Mask, connections: AnyArray) -> Indices:
     """Return the numbers (n,) of the bodies whose steady temperature is undetermined, in ascending order.
 
-    These bodies are not connected, directly or through other bodies, with a prescribed temperature or a film.
+    These bodies are not connected, directly or through other bodies, to a point with a prescribed temperature or a film.
 
     Parameters
     ----------
     body : ndarray of int (n_points,)
-        Body of each point, -1 for points without a body.
-    held : ndarray of bool (n_points,)
-        True for points with a prescribed temperature or a film.
-    joined : ndarray of int (m, 2)
+        Number of the body of each point, or -1 for points without a body.
+    determined : ndarray of bool (n_points,)
+        Mask of the points with a prescribed temperature or a film.
+    connections : ndarray of int (m, 2)
         Pairs of points between which heat flows.
     """
     pairs = body[connections]

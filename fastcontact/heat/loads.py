@@ -1,7 +1,8 @@
-"""Heat loads of solid cells: prescribed temperatures, fluxes, films, sources and nodal heat.
+"""Heat loads of solid cells: prescribed temperatures, heat fluxes, films, heat sources and nodal heat flows.
 
-Fluxes, films and sources are multiplied by the shape functions and integrated, in axisymmetry over the full circle and in the
-plane per unit thickness. Areas and volumes are those of the `deformed` mesh, but values are evaluated at reference positions.
+Fluxes, films and sources are multiplied by the shape functions and integrated, over the full circle in axisymmetry and per
+unit thickness in plane models. Areas and volumes are those of the `deformed` mesh, but values are evaluated at reference
+positions.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ class TemporaryHeat(Load):
 
 @dataclass(frozen=True)
 class FixedTemperature(TemporaryHeat):
-    """A prescribed temperature [temperature] of the nodes of a group; ramps multiply its rise above the reference.
+    """A temperature [temperature] prescribed at the nodes of a group; ramps multiply its rise above the reference.
 
     If `begins` is finite, the rise starts from its value at this instant, `reached` (n_points,), and proceeds to the next
     point of the ramp.
@@ -82,7 +83,7 @@ class FixedTemperature(TemporaryHeat):
             )
 
     def history(self) -> tuple[Table | None, Table]:
-        """Return the ramps of the rises of `value` and `reached`; the second ends with zero at the next point of `ramp`."""
+        """Return the ramps of the rises of `value` and `reached`; the latter is zero from the next point of `ramp` on."""
         later = [point for point in self.ramp or () if point[0] > self.begins]
         if self.reached is None or not later:
             return self.ramp, ()
@@ -96,7 +97,7 @@ class Heating(Load):
     """A heat load that is independent of the temperature."""
 
     def power(self, mesh: Mesh, kinematics: str, deformed: Mesh) -> Array:
-        """Return the powers (n_points,) [power] into the nodes of the `deformed` mesh at multiplier 1."""
+        """Return the heat flows (n_points,) [power] into the nodes of the `deformed` mesh at multiplier 1."""
         total = np.zeros((mesh.n_points, 1))
         for element, cells in self.cells(mesh).items():
             x, N, _ = measured_points(mesh, element, cells, kinematics)
@@ -117,7 +118,7 @@ class HeatFlux(Heating):
 
 @dataclass(frozen=True)
 class HeatSource(VolumeLoad, Heating):
-    """Heat generation rate per volume [power / length^3] in groups of solid cells, or in all solid cells."""
+    """Heat generation per unit volume [power / length^3] in groups of solid cells, or in all solid cells."""
 
     KIND = "the heat source"
     groups: tuple[str, ...] | None
@@ -135,10 +136,10 @@ class NodalHeat(Heating):
     ramp: Table | None = None
 
     def _check_groups(self, mesh: Mesh, kinematics: str) -> None:
-        check_points(mesh, self.group, "nothing can heat it")
+        check_points(mesh, self.group, "no heat can be supplied to it")
 
     def power(self, mesh: Mesh, kinematics: str, deformed: Mesh) -> Array:
-        """Return the powers (n_points,) [power] at multiplier 1; see `Heating.power`."""
+        """Return the heat flows (n_points,) [power] at multiplier 1; see `Heating.power`."""
         total, nodes = np.zeros(mesh.n_points), mesh.points_of(self.group)
         total[nodes] = evaluated(self.value, mesh.points[nodes], self.name)
         return total
@@ -157,7 +158,7 @@ class Film(TemporaryHeat):
     ambient : float or callable
         Temperature of the surroundings [temperature]; the ramp multiplies its rise above the reference.
     ramp : sequence of (float, float), optional
-        Ramp of the ambient rise.
+        Ramp of this rise.
     begins, ends : float
         Instants between which the film acts.
     """
@@ -176,10 +177,10 @@ class Film(TemporaryHeat):
         return [self.coefficient, self.ambient]
 
     def exchange(self, mesh: Mesh, kinematics: str, deformed: Mesh, reference: float) -> tuple[csr_array, Array]:
-        """Return the matrix (n_points, n_points) [power / temperature] of the film and the powers (n_points,) [power].
+        """Return the matrix (n_points, n_points) [power / temperature] and the heat flows (n_points,) [power] of the film.
 
-        The powers are those of the ambient rise above `reference` [temperature] at multiplier 1. Raises ModelError if a
-        coefficient is negative.
+        The heat flows are due to the rise of the ambient temperature above `reference` [temperature] at multiplier 1. Raises
+        ModelError if a coefficient is negative.
         """
         blocks, powers = list[Blocks](), np.zeros((mesh.n_points, 1))
         for element, facets in self.cells(mesh).items():

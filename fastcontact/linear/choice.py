@@ -1,6 +1,6 @@
-"""Linear solvers by name, and the automatic choice of a solver by the size of the problem.
+"""Selection of linear solvers by name, and automatic choice of a solver according to the size of the problem.
 
-Each module of the package `solvers` defines a solver class as ``SOLVER``; the name of the solver is that of the module.
+Each module of the package `solvers` defines a solver class as ``SOLVER``. The name of the solver is that of the module.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from fastcontact.linear.factor_solver import AFFORDABLE
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 
 log = logging.getLogger("fastcontact")
-# Solvers that need an optional package: the name of the package, and the extra of fastcontact that installs it.
-OPTIONAL = {"cholmod": ("kvxopt", "cholmod")}
+# For each solver that needs an optional package, the name of the package and of the extra of fastcontact that installs it.
+PACKAGES = {"cholmod": ("kvxopt", "cholmod")}
 KNOWN = tuple(name for _, name, _ in pkgutil.iter_modules(solvers.__path__))
-SOLVERS = tuple(name for name in KNOWN if name not in OPTIONAL or importlib.util.find_spec(OPTIONAL[name][0]))
+SOLVERS = tuple(name for name in KNOWN if name not in PACKAGES or importlib.util.find_spec(PACKAGES[name][0]))
 # Largest admissible relative residual.
-LOOSEST = 1e-3
-# Number of unknowns, by dimension, above which a multigrid solution costs less than a factorisation (measured, see
-# bench/README.md). If constraints need columns of K^-1, the limit is AFFORDABLE, because multigrid needs one solution for
-# each column.
+MAX_TOLERANCE = 1e-3
+# Number of unknowns, by dimension, above which a solution by multigrid is cheaper than a factorisation (measured, see
+# bench/README.md). If constraints require columns of K^-1, the limit is AFFORDABLE, because multigrid solves one linear
+# system for each column.
 DIRECT_UP_TO = {2: AFFORDABLE[2], 3: 15_000}
 # The same limit in 3D for quadratic cells, with which multigrid takes about ten times as many iterations.
 QUADRATIC_UP_TO = 50_000
@@ -41,17 +41,17 @@ def make(
     name : str
         - ``"direct"``: Cholesky factorisation;
         - ``"cholmod"``: Cholesky factorisation by CHOLMOD, which needs an optional package;
-        - ``"amg"``: multigrid, which needs more iterations for thin parts and nearly incompressible materials;
+        - ``"amg"``: multigrid, which takes more iterations for thin parts and nearly incompressible materials;
         - ``"pyamg"``: the slower multigrid method of pyamg, for comparison;
         - ``"auto"``: ``"direct"`` for 2D problems and small 3D problems, otherwise ``"amg"``.
     dim, n_dofs : int
         Dimension and number of unknowns, for the choice by ``"auto"``.
     tolerance : float
-        Relative residual of iterative solvers, at most 0.001.
+        Relative residual at which iterative solvers stop; at most 0.001.
     precision : {"single", "double"}, optional
         Precision of the multigrid cycle, single by default. Direct solvers always use double precision.
     columns : bool
-        Whether there are constraints that cannot be eliminated and need columns of ``K^-1``, such as those with a full
+        Whether there are constraints that cannot be eliminated and require columns of ``K^-1``, such as those with a full
         compliance matrix; for the choice by ``"auto"``.
     quadratic : bool
         Whether there are quadratic cells in linear bodies; for the choice by ``"auto"``.
@@ -73,8 +73,8 @@ def make(
 
 def check_solver(name: str) -> None:
     """Raise a ModelError if the name of a linear solver is unknown, or if a package that it needs is missing."""
-    if name in OPTIONAL and name not in SOLVERS:
-        package, extra = OPTIONAL[name]
+    if name in PACKAGES and name not in SOLVERS:
+        package, extra = PACKAGES[name]
         raise ModelError(f"linear solver '{name}' needs the package {package}: pip install 'fastcontact[{extra}]'")
     if name not in (*SOLVERS, "auto"):
         raise ModelError(unknown("linear solver", name, [*SOLVERS, "auto"]))
@@ -82,11 +82,11 @@ def check_solver(name: str) -> None:
 
 def check_tolerance(tolerance: float) -> None:
     """Raise a ModelError if the tolerance of a linear solver is out of range."""
-    if not 0.0 < tolerance <= LOOSEST:
-        raise ModelError(f"linear_tolerance = {tolerance} must be positive and at most {LOOSEST}, such as 1e-10")
+    if not 0.0 < tolerance <= MAX_TOLERANCE:
+        raise ModelError(f"linear_tolerance = {tolerance} must be positive and at most {MAX_TOLERANCE}, such as 1e-10")
 
 
-def tight_enough(tolerance: float, relative: float) -> float:
+def limited_tolerance(tolerance: float, relative: float) -> float:
     """Return the smaller of a checked `tolerance` and the criterion `relative` on the residual force."""
     check_tolerance(tolerance)
     if tolerance > relative:
@@ -95,7 +95,7 @@ def tight_enough(tolerance: float, relative: float) -> float:
 
 
 def chosen(dim: int, n_dofs: int, columns: bool = False, quadratic: bool = False) -> tuple[str, str]:
-    """Return the name of the solver that ``"auto"`` selects, and the reason; for parameters see `make`."""
+    """Return the name of the solver that ``"auto"`` selects, and the reason for it; for parameters see `make`."""
     limit = (AFFORDABLE if columns else DIRECT_UP_TO)[dim]
     limit = max(limit, QUADRATIC_UP_TO) if quadratic and dim == 3 else limit
     if n_dofs <= limit:

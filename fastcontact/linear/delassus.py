@@ -1,10 +1,10 @@
 """Schur complement of linear constraints, the Delassus operator.
 
 A system ``K u = f + B.T multiplier`` with the constraints ``B u + C multiplier = c`` is reduced to
-``(B K^-1 B.T + C) multiplier = c - B K^-1 f``. The symbols are those of `linear.protocol`. The matrix ``B K^-1 B.T`` only
-depends on the rows and columns of ``K^-1`` that belong to degrees of freedom in B. They are computed when they are first
-needed, and stored. A new active set or pairing with the same degrees of freedom then takes a small dense solution and one
-solution with K.
+``(B K^-1 B.T + C) multiplier = c - B K^-1 f``. The symbols are those of `linear.protocol`. The matrix ``B K^-1 B.T`` depends
+only on the rows and columns of ``K^-1`` that belong to the degrees of freedom in B. They are computed when they are first
+needed, and stored. For a new active set or pairing with the same degrees of freedom, only a small dense system and one
+system with the matrix K are solved.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError, ConvergenceError
 from fastcontact.linear.field_compliance import FieldCompliance
 
-# Largest number of constraints whose Delassus operator is formed and factorised. A matrix of 20 000 rows takes 3.2 GB, and
-# its factorisation minutes. With friction, Newton's method factorises a nonsymmetric matrix several times for each pairing;
-# with 6 000 rows, one factorisation takes ten seconds.
+# Largest number of constraints whose Delassus operator is formed and factorised. A matrix with 20 000 rows occupies 3.2 GB,
+# and its factorisation takes minutes. With friction, Newton's method factorises a nonsymmetric matrix several times for each
+# pairing. With 6 000 rows, one factorisation takes ten seconds.
 MOST_ROWS, MOST_ROWS_WITH_FRICTION = 20_000, 6_000
 # Options of a contact pair whose constraints can be eliminated, so that the Delassus operator is not formed.
-CHEAP = 'formulation="mortar" with multipliers="dual"'
+ELIMINABLE = 'formulation="mortar" with multipliers="dual"'
 
 
 class TooManyColumnsError(ConvergenceError):
-    """Raised if an iterative solver would need more columns of the inverse than it may compute."""
+    """Raised if an iterative solver would have to compute too many columns of the inverse."""
 
     def __init__(self, count: int) -> None:
         super().__init__(
-            f"the contact needs {count} columns of the inverse stiffness, each of which takes a solution, since its "
-            "constraints cannot be eliminated, or its friction does not converge with eliminated constraints: use the direct "
-            f"solver, or {CHEAP} and pairs that share no node"
+            f"the contact requires {count} columns of the inverse stiffness matrix, each of which is the solution of a "
+            "linear system, since its constraints cannot be eliminated, or friction does not converge with eliminated "
+            f"constraints: use the direct solver, or {ELIMINABLE} and pairs that share no node"
         )
 
 
@@ -53,8 +53,8 @@ def check_rows(count: int, limit: int | None = None) -> None:
     if count > limit:
         raise ContactError(
             f"the contact needs the full compliance of {count} constraints, a matrix of {8e-9 * count**2:.1f} GB that is "
-            f"factorised repeatedly (at most {limit} constraints are accepted), since the solver is direct or since they "
-            f'cannot be eliminated: use {CHEAP}, with linear_solver="amg", or a coarser or smaller secondary side'
+            f"factorised repeatedly (at most {limit} constraints are accepted), since the solver is direct or they cannot be "
+            f'eliminated: use {ELIMINABLE}, with linear_solver="amg", or a coarser or smaller secondary side'
         )
 
 
@@ -74,8 +74,8 @@ class InverseColumns:
     Attributes
     ----------
     asked : list of ndarray of int
-        Degrees of freedom of each request. Their order matters, because round-off and the errors of iterative solutions
-        depend on it.
+        Degrees of freedom of each request. The order of the requests matters, because round-off and the errors of iterative
+        solutions depend on it.
     """
 
     def __init__(self, n: int, entries: Callable[[Indices, Indices], Array], limit: int | None = None) -> None:
@@ -85,9 +85,9 @@ class InverseColumns:
         self._position = np.full(n, -1, np.intp)  # of each degree of freedom in `_dofs`
         self._dofs = np.empty(0, np.intp)
         self._values = np.empty((0, 0))
-        self.asked: list[Indices] = []
+        self.requests: list[Indices] = []
 
-    def give(self, dofs: Indices, values: Array) -> None:
+    def store(self, dofs: Indices, values: Array) -> None:
         """Store the submatrix `values` (k, k) of ``K^-1`` for `dofs` (k,) [length / force], computed by the caller.
 
         This method must be called before any request.
@@ -105,21 +105,21 @@ class InverseColumns:
         return symmetric(np.asarray(rows @ (rows @ self._values).T))
 
     def put_back(self, requests: Sequence[Indices]) -> None:
-        """Restore the state after the given `requests`, in their order; solve only for columns that are not stored."""
-        pairs = zip(self.asked, requests, strict=False)
+        """Restore the state after the given `requests`, in this order; solve only for columns that are not stored."""
+        pairs = zip(self.requests, requests, strict=False)
         n_equal = next((i for i, (old, new) in enumerate(pairs) if not np.array_equal(old, new)), len(requests))
-        if n_discarded := sum(len(dofs) for dofs in self.asked[n_equal:]):
+        if n_discarded := sum(len(dofs) for dofs in self.requests[n_equal:]):
             self._position[self._dofs[-n_discarded:]] = -1
             self._dofs = self._dofs[:-n_discarded]
             self._values = self._values[:-n_discarded, :-n_discarded].copy()
-        del self.asked[n_equal:]
-        for dofs in requests[len(self.asked) :]:
+        del self.requests[n_equal:]
+        for dofs in requests[len(self.requests) :]:
             self._positions(dofs)
 
     def _positions(self, dofs: NDArray[np.integer]) -> Indices:
-        """Return the positions (k,) of `dofs` (k,) among the stored columns, after computing columns that are missing.
+        """Return the positions (k,) of `dofs` (k,) among the stored columns, after computing missing columns.
 
-        A degree of freedom may occur several times in `dofs`.
+        A degree of freedom may occur more than once in `dofs`.
         """
         new = np.unique(dofs[self._position[dofs] < 0]).astype(np.intp)
         if len(new):
@@ -131,7 +131,7 @@ class InverseColumns:
         old = len(self._dofs)
         if old + len(new) > self._limit:
             raise TooManyColumnsError(old + len(new))
-        self.asked.append(new)
+        self.requests.append(new)
         self._dofs = np.concatenate([self._dofs, new])
         self._position[new] = np.arange(old, len(self._dofs))
         entries = self._entries()
@@ -156,7 +156,7 @@ def inverse_entries(n: int, solve: Callable[[Array], Array], rows: Indices, colu
 def lu_solver(A: Array) -> Callable[[Array], Array]:
     """Return a function that solves systems with a matrix A (m, m), which is factorised once.
 
-    The functions of LAPACK are called directly, because those of `scipy.linalg` take longer than the solution of a small
+    LAPACK is called directly, because the overhead of the functions of `scipy.linalg` exceeds the cost of solving a small
     system.
 
     Raises
@@ -164,7 +164,7 @@ def lu_solver(A: Array) -> Callable[[Array], Array]:
     LinAlgError
         If A is singular up to round-off.
     """
-    lu, pivots, _ = dgetrf(A)  # `scipy.linalg.lu_factor` warns if a pivot is exactly zero, which is an error below
+    lu, pivots, _ = dgetrf(A)  # `scipy.linalg.lu_factor` would warn of a zero pivot, for which an error is raised below
     if not (np.abs(np.diag(lu)) > _round_off(A) * np.abs(A).max(axis=0)).all():
         raise LinAlgError("singular")
     return lambda right_side: dgetrs(lu, pivots, right_side)[0]
@@ -187,12 +187,12 @@ def solve_multipliers(delassus: Array, right: Array, C: Array | FieldCompliance 
     right : ndarray (m,)
         Right-hand side [length].
     C : ndarray (m, m) or (m,) or FieldCompliance, optional
-        Compliance of the constraints, or the diagonal of a diagonal one [length / force].
+        Compliance of the constraints, or the diagonal of a diagonal compliance matrix [length / force].
 
     Returns
     -------
     ndarray (m,)
-        [force].
+        Multipliers [force].
     """
     C = C.dense() if isinstance(C, FieldCompliance) else C
     if C is not None and C.ndim == 1:

@@ -1,7 +1,7 @@
-"""Common part of direct solvers: solutions with the factors of K, and constraints by the Schur complement.
+"""Common part of direct solvers: substitution with the factors of K, and constraints by the Schur complement.
 
-If a right-hand side is a linear combination of earlier ones, its solution is the same combination of the earlier solutions
-(`KnownLoads`).
+If a right-hand side is a linear combination of earlier ones, its solution is computed as the same combination of the earlier
+solutions (`KnownLoads`).
 """
 
 from __future__ import annotations
@@ -21,18 +21,19 @@ from fastcontact.linear.protocol import Counters, LinearSolver, Loaded, Monitor
 from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# Largest number of unknowns that are eliminated last. For more of them, the dense block of K^-1 costs more than it saves.
-LAST_UP_TO = 4000
-# Largest number of unknowns for which a factorisation is affordable, by the dimension.
+# Largest number of unknowns that are eliminated last. If there are more, computing the dense block of K^-1 costs more time
+# than it saves.
+MAX_LAST_UNKNOWNS = 4000
+# Largest number of unknowns for which a factorisation is affordable, by dimension.
 AFFORDABLE = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 # Relative residual that direct solutions attain.
-ATTAINABLE = ROUND_OFF / 100
-# Number of stored right-hand sides. Loads and supports seldom have more independent ramps.
+ATTAINABLE_RESIDUAL = ROUND_OFF / 100
+# Number of right-hand sides that are stored. Loads and supports seldom have more independent ramps.
 STORED_LOADS = 4
 
 
 class KnownLoads:
-    """The last right-hand sides and their solutions, for right-hand sides that are linear combinations of them."""
+    """The last right-hand sides and their solutions, from which those of linear combinations are computed."""
 
     def __init__(self, n: int) -> None:
         self._loads = self._solutions = np.empty((0, n))
@@ -80,29 +81,29 @@ class KnownLoads:
 class FactorSolver(LinearSolver):
     """Base class of direct solvers; subclasses implement the factorisation.
 
-    Unknowns that equations may involve, denoted by c, are eliminated last. With the factors ``K = L D L.T``, their block of
-    the inverse is ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, which takes no solution with K. Under contact forces, the
-    displacements of the other unknowns follow from those of the unknowns c by back substitution alone.
+    Unknowns that may occur in equations, denoted by c, are eliminated last. With the factors ``K = L D L.T``, their block of
+    the inverse is ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, for which no system with the matrix K is solved. Under contact
+    forces, the displacements of the other unknowns follow from those of the unknowns c by back substitution alone.
 
     Parameters
     ----------
     tolerance : float
-        Not used, because direct solutions are exact up to round-off.
+        Not used, because the solutions are exact up to round-off.
 
     Attributes
     ----------
     n : int
         Number of unknowns.
     last : ndarray of int (m,) or None
-        The unknowns that are eliminated last, if any.
+        The unknowns that are eliminated last; None if there are none.
     factors : SymmetricFactors
     """
 
     name: str
     iterative = False
 
-    def __init__(self, tolerance: float = ATTAINABLE) -> None:
-        self.tolerance = ATTAINABLE
+    def __init__(self, tolerance: float = ATTAINABLE_RESIDUAL) -> None:
+        self.tolerance = ATTAINABLE_RESIDUAL
         self.counters = Counters()
         self.n = 0
         self.factors: SymmetricFactors
@@ -126,14 +127,14 @@ class FactorSolver(LinearSolver):
             If K is singular.
         """
         self.n, self._K, self.refines = K.shape[0], K, False
-        last = np.empty(0, np.intp) if involved is None or len(involved) > LAST_UP_TO else involved
+        last = np.empty(0, np.intp) if involved is None or len(involved) > MAX_LAST_UNKNOWNS else involved
         self.factors = self._factorised(K, last)
         self.counters.setups += 1
         self.columns, self.known_loads = InverseColumns(self.n, self.factors.inverse_entries), KnownLoads(self.n)
         self.last = last if len(last) else None
         if self.last is not None:
             self.inverse = self.factors.last_inverse()
-            self.columns.give(self.last, self.inverse)
+            self.columns.store(self.last, self.inverse)
         return K
 
     @property
@@ -147,7 +148,7 @@ class FactorSolver(LinearSolver):
 
     def snapshot(self) -> dict[str, Any]:
         """Return the requested columns of ``K^-1`` and the stored right-hand sides; see `LinearSolver.snapshot`."""
-        state = {"asked": list(self.columns.asked), "loads": self.known_loads.snapshot()}
+        state = {"asked": list(self.columns.requests), "loads": self.known_loads.snapshot()}
         return {**state, "refines": True} if self.refines else state
 
     def put_back(self, snapshot: Mapping[str, Any]) -> None:
@@ -157,10 +158,10 @@ class FactorSolver(LinearSolver):
         self.known_loads.put_back(snapshot["loads"], self.factors.solve)
 
     def improve(self, excess: float) -> bool:
-        """Apply one step of iterative refinement in later solutions; see `LinearSolver.improve`."""
+        """Apply one step of iterative refinement from now on; see `LinearSolver.improve`."""
         if self.refines:
             return False
-        log.info("linear solver: forces are out of balance by %.1e times the bound, solutions are refined", excess)
+        log.info("linear solver: out-of-balance forces are %.1e times the bound; solutions will be refined", excess)
         self.refines = True
         return True
 
@@ -226,7 +227,7 @@ class LoadedFactor(Loaded):
 
 
 class CondensedProblem(Loaded):
-    """The system after static condensation to the k unknowns that equations may involve; see `linear.protocol.Loaded`.
+    """The system after static condensation to the k unknowns that may occur in equations; see `linear.protocol.Loaded`.
 
     All vectors have the length k.
 

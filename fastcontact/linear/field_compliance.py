@@ -1,17 +1,17 @@
 r"""Compliance of the point forces of a multiplier field, and equivalent equations for the values of the field.
 
-A multiplier field with the values p has the pressures ``P p`` at its integration points, whose areas are the diagonal
-matrix W. Let M be the mass matrix of the field, integrated with all points, and :math:`\rho` the constant of the augmented
-Lagrangian, see `contact.formulations._pressure_field`. Some of the points are closed, with the equations
-``B u + C force = c``. Forces that the field does not represent are compliant: :math:`C = (W^{-1} - P M^{-1} P^T) / \rho`.
+A multiplier field with the values p has the pressures ``P p`` at its integration points, whose areas form the diagonal
+matrix W. Let M be the mass matrix of the field, integrated with all points, and :math:`\rho` the parameter of the augmented
+Lagrangian, see `contact.formulations._pressure_field`. The closed points satisfy the equations ``B u + C force = c``. Only
+forces that the field does not represent have a compliance: :math:`C = (W^{-1} - P M^{-1} P^T) / \rho`.
 
-With the forces :math:`W (P p - \rho (B u - c))` the equations are equivalent to :math:`P^T W (B u - c) + E p = 0` for the
-field, and to springs of the stiffness :math:`\rho W` along the rows of B. E is the mass matrix over the other points,
-divided by :math:`\rho`. It vanishes except at the edge of the contact.
+With the forces :math:`W (P p - \rho (B u - c))`, the equations are equivalent to :math:`P^T W (B u - c) + E p = 0` for the
+field, combined with springs of the stiffness :math:`\rho W` and the elongations ``B u - c``. E is the mass matrix, integrated
+with the open points only and divided by :math:`\rho`. It vanishes except at the edge of the contact.
 
-If points have an additional compliance S, such as that of a penalty, their compliance is :math:`C + S`. In the equations of
-the field and in the springs, W is then replaced by :math:`W' = W / (1 + \rho W S)`, and E by :math:`E + P^T W W' S P`. All
-values of the field then have a compliance.
+If the points have an additional compliance S, such as that of a penalty, their compliance is :math:`C + S`. In the equations
+of the field and in the springs, W is then replaced by :math:`W' = W / (1 + \rho W S)`, and E by :math:`E + P^T W W' S P`. In
+this case, all values of the field have a compliance.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from fastcontact.arrays import Array, Indices, Mask
 
 @dataclass(frozen=True, eq=False)
 class FieldCompliance:
-    """Compliance of m equations at points of multiplier fields; for the symbols see the module.
+    """Compliance of m equations at points of multiplier fields. For the symbols, see the docstring of the module.
 
     Equations without compliance are represented by fields of one point each, without springs.
 
@@ -37,7 +37,7 @@ class FieldCompliance:
     P : csr_array (m, k)
         Map from the k values of the fields to the points of the equations [-].
     weights : ndarray (m,)
-        Areas W of the points, positive [area].
+        Areas W of the points, which are positive [area].
     stiffness : ndarray (m,)
         Stiffness rho W of the springs [force / length].
     others : csr_array (k, k)
@@ -45,8 +45,8 @@ class FieldCompliance:
     dense : callable
         Function without arguments that returns C (m, m) [length / force].
     bordered : bool
-        Whether values without compliance are not eliminated either. This is the case for quadratic facets, whose equations
-        are nearly linearly dependent.
+        Whether values without compliance are not eliminated either. This is the case on quadratic facets, whose equations are
+        nearly linearly dependent.
     """
 
     P: csr_array
@@ -58,7 +58,7 @@ class FieldCompliance:
 
     @classmethod
     def stacked(cls, compliances: Sequence[FieldCompliance], dense: Callable[[], Array]) -> FieldCompliance:
-        """Return the block-diagonal matrix of several compliances, with the function `dense` for all equations."""
+        """Return the block-diagonal combination of several compliances, whose matrix the function `dense` returns."""
         return cls(
             csr_array(block_diag([compliance.P for compliance in compliances], format="csr")),
             np.concatenate([compliance.weights for compliance in compliances]),
@@ -75,7 +75,7 @@ class FieldCompliance:
         return cls(identity, np.ones(m), np.zeros(m), csr_array((m, m)), lambda: np.zeros((m, m)))
 
     def softened(self, softness: Array, dense: Callable[[], Array]) -> FieldCompliance:
-        """Return the compliance with the diagonal compliance S, `softness` (m,), added [length / force].
+        """Return the sum of this compliance and the diagonal compliance S, `softness` (m,) [length / force].
 
         `dense` is the function that returns the sum as a matrix.
         """
@@ -92,8 +92,8 @@ class FieldCompliance:
         """
         PTW = csr_array(self.P.T @ diags_array(self.weights))
         area = np.asarray(abs(PTW).sum(axis=1))
-        values = np.flatnonzero(area > 0.0)  # that the equations involve
-        # Each equation is divided by its area, which may be small at the edge of the contact.
+        values = np.flatnonzero(area > 0.0)  # numbers of the values that occur in the equations
+        # Each equation is divided by the area of its value, which may be small at the edge of the contact.
         units = 1.0 / area[values]
         PTW = csr_array(diags_array(units) @ PTW[values])
         edge = (self.others.diagonal()[values] > 0.0) | self.bordered
@@ -102,9 +102,9 @@ class FieldCompliance:
         return FieldEquations(csr_array(PTW @ B), PTW @ c, P, edge, compliance, values[edge], units[edge])
 
     def _at_edge(self, values: Indices, units: Array) -> csr_array:
-        """Return E (e, e) for the numbers `values` (e,) of values, scaled by `units` (e,).
+        """Return E (e, e) for the values of the field with the numbers `values` (e,), scaled by `units` (e,).
 
-        Values of the field that no equation involves are eliminated from E.
+        Values that do not occur in any equation are eliminated from E.
         """
         unused = np.setdiff1d(np.flatnonzero(self.others.diagonal() > 0.0), values)
         E = csr_array(self.others[values][:, values])
@@ -122,25 +122,25 @@ class FieldCompliance:
 
 @dataclass(frozen=True, eq=False)
 class FieldEquations:
-    """Equations ``rows u + E p = right`` for the values p (l,) of a field that the equations at points involve.
+    """Equations ``rows u + E p = right`` for those values p (l,) of a field that occur in the equations at points.
 
     Attributes
     ----------
     rows : csr_array (l, n)
-        [-].
+        Matrix of the equations [-].
     right : ndarray (l,)
-        [length].
+        Right-hand sides [length].
     P : csr_array (m, l)
         Map from the values p to the pressures at the points.
     edge : ndarray of bool (l,)
-        The e values that are not eliminated: those with a compliance, at the edge of the contact or due to a penalty; or all
-        values, see `FieldCompliance.bordered`.
+        Mask of the e values that are not eliminated. These are the values with a compliance, which are those at the edge of
+        the contact or with a penalty, or all values, see `FieldCompliance.bordered`.
     compliance : csr_array (e, e)
-        E for these values.
-    at : ndarray of int (e,)
+        The matrix E for the values that are not eliminated.
+    edge_values : ndarray of int (e,)
         Numbers of these values in the field.
     units : ndarray (e,)
-        Their scaling factors.
+        Scaling factors of these values.
     """
 
     rows: csr_array
@@ -148,5 +148,5 @@ class FieldEquations:
     P: csr_array
     edge: Mask
     compliance: csr_array
-    at: Indices
+    edge_values: Indices
     units: Array

@@ -1,9 +1,9 @@
 """Protocols of linear solvers.
 
-A solver handles systems with n unknowns and m linear equations between them. K (n, n) is a stiffness matrix [force /
-length], u (n,) are displacements [length], and f (n,) forces [force]. The equations are ``B u + C multiplier = c`` with a
+A solver handles systems with n unknowns that are subject to m linear equations. K (n, n) is a stiffness matrix [force /
+length], u (n,) are displacements [length], and f (n,) are forces [force]. The equations are ``B u + C multiplier = c`` with a
 matrix B (m, n) [-], right-hand sides c (m,) [length], Lagrange multipliers (m,) [force] and a compliance C [length /
-force]. C is a matrix (m, m), or the diagonal (m,) of a diagonal matrix.
+force]. C is given as a matrix (m, m), or as the diagonal (m,) of a diagonal matrix.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from fastcontact.linear.springs import Springs
 
 # Default relative residual at which iterative solvers stop.
 TOLERANCE = 1e-10
-# Largest `LinearSolver.contrast` that needs no special treatment.
-MILD = 10.0
+# Largest `LinearSolver.contrast` that requires no special treatment.
+MILD_CONTRAST = 10.0
 # Function that returns whether to stop the iteration, given an unconverged solution u (n,), its multipliers (m,) and its
 # relative residual.
 Monitor = Callable[[Array, Array, float], bool]
 
 
 class Product(Protocol):
-    """Products with the matrix K (n, n) of a solver that has stored it in a different format."""
+    """Matrix K (n, n), as stored by a solver in a different format, for products with vectors."""
 
     def __matmul__(self, u: Array) -> Array:
         """Return ``K @ u`` (n,) [force]."""
@@ -40,14 +40,14 @@ class Product(Protocol):
 
 @dataclass
 class Counters:
-    """Work of a solver since `LinearSolver.prepare`.
+    """Work of a solver since `LinearSolver.prepare` was called.
 
     Attributes
     ----------
     setups : int
-        Number of factorisations, or of multigrid hierarchies.
+        Number of factorisations, or of multigrid hierarchies that were built.
     iterations : int
-        Number of solutions of a direct solver, or of iterations of an iterative one.
+        Number of right-hand sides for which a direct solver was used, or number of iterations of an iterative solver.
     """
 
     setups: int = 0
@@ -61,7 +61,7 @@ class Loaded(Protocol):
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Return (u, multiplier) with ``K u = f + B.T multiplier`` and ``B u + C multiplier = c``.
+        """Return u and the multipliers such that ``K u = f + B.T multiplier`` and ``B u + C multiplier = c``.
 
         Parameters
         ----------
@@ -76,16 +76,16 @@ class Loaded(Protocol):
         monitor : callable, optional
             `Monitor` that iterative solvers call regularly. If it returns True, they return the unconverged solution.
         tolerance : float, optional
-            Relative residual at which iterative solvers stop, if it is larger than their tolerance [-].
+            Relative residual at which iterative solvers stop. Values below their own tolerance have no effect [-].
         nodes : ndarray of int (m,), optional
-            The node of each equation, whose unknowns are preferred for elimination.
+            Node of each equation. The unknowns of this node are preferred for elimination.
 
         Returns
         -------
         u : ndarray (n,)
-            [length].
+            Displacements [length].
         multiplier : ndarray (m,)
-            [force].
+            Lagrange multipliers [force].
         """
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
@@ -100,8 +100,8 @@ class Loaded(Protocol):
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """Return ``K^-1 (f + force)`` (n,) [length], valid only at the `involved` unknowns of `LinearSolver.prepare`.
 
-        If computing the other unknowns takes additional work, a solver copies them from `elsewhere` (n,), if this is given.
-        Likewise, `solve` copies them from its `guess`.
+        If `elsewhere` (n,) is given, a solver for which the other unknowns require additional work copies them from
+        `elsewhere`. Likewise, `solve` copies them from its `guess`.
         """
         return self.full_solution(force)
 
@@ -116,14 +116,14 @@ class Loaded(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class FrictionTerms:
-    """Terms of sliding friction in the equilibrium, see `LoadedNonsymmetric.solve_nonsymmetric`.
+    """Terms of sliding friction in the equations of equilibrium, see `LoadedNonsymmetric.solve_nonsymmetric`.
 
     Attributes
     ----------
     rows : csr_array (m, n)
-        Matrix whose transpose maps the multipliers to forces on the unknowns, instead of the transpose of B [-].
+        Matrix whose transpose maps the multipliers to forces on the unknowns. It takes the place of B in the equilibrium [-].
     springs : Springs, optional
-        Springs that are added to K; S is their matrix (n, n) [force / length].
+        Springs that are added to K. Their stiffness matrix (n, n) is denoted by S [force / length].
     forces : ndarray (n,), optional
         Additional forces on the unknowns [force].
     """
@@ -137,7 +137,7 @@ class FrictionTerms:
 class LoadedNonsymmetric(Loaded, Protocol):
     """A `Loaded` that also solves the nonsymmetric systems of sliding friction.
 
-    In these systems the forces of the multipliers are ``rows.T @ multiplier`` with a matrix other than B.
+    In these systems, the multipliers exert the forces ``rows.T @ multiplier``, where `rows` differs from B.
     """
 
     @property
@@ -151,7 +151,7 @@ class LoadedNonsymmetric(Loaded, Protocol):
         self, B: csr_array, c: Array, nodes: Indices, guess: Array, tolerance: float,
         friction: FrictionTerms | None = None, C: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Return (u, multiplier) with ``B u + C multiplier = c`` and ``K u + S u = f + forces + rows.T multiplier``.
+        """Return u and multipliers with ``B u + C multiplier = c`` and ``K u + S u = f + forces + rows.T multiplier``.
 
         Parameters
         ----------
@@ -164,18 +164,18 @@ class LoadedNonsymmetric(Loaded, Protocol):
         guess : ndarray (n,)
             Initial guess of u [length].
         tolerance : float
-            Relative residual at which the iteration stops, if it is larger than the tolerance of the solver [-].
+            Relative residual at which the iteration stops. Values below the tolerance of the solver have no effect [-].
         friction : FrictionTerms, optional
-            S, `forces` and `rows`. By default S and `forces` are zero, and `rows` is B.
+            S, `forces` and `rows`. By default, S and `forces` are zero, and `rows` is B.
         C : ndarray (m,), optional
             Diagonal compliance; zero by default [length / force].
 
         Returns
         -------
         u : ndarray (n,)
-            [length].
+            Displacements [length].
         multiplier : ndarray (m,)
-            [force].
+            Lagrange multipliers [force].
 
         Raises
         ------
@@ -185,26 +185,26 @@ class LoadedNonsymmetric(Loaded, Protocol):
 
 
 class LinearSolver(Protocol):
-    """Solver of ``K u = f`` under linear equations, for one matrix K and many right-hand sides and sets of equations.
+    """Solver of ``K u = f`` subject to linear equations, for one matrix K and many right-hand sides and sets of equations.
 
     Attributes
     ----------
     tolerance : float
-        Relative residual of the solutions, which `improve` may reduce [-].
-    asked : float, optional
+        Relative residual of the solutions. The method `improve` may reduce it [-].
+    original_tolerance : float, optional
         The original tolerance, if `improve` has reduced it [-].
     counters : Counters
     replacement_reason : str
-        Reason why a different method has replaced this one; empty if none has.
+        The reason for which another method has replaced this one; empty if this has not happened.
     contrast : float
-        Largest ratio of the stiffnesses of a cell in different deformations, such as dilatation and shear of a nearly
-        incompressible material. Relative errors of displacements may exceed relative residuals by this factor, and the
-        tolerances of inexact solutions are divided by it [-].
+        Largest ratio of the stiffnesses of a cell in different modes of deformation, such as dilatation and shear of a nearly
+        incompressible material. Relative errors of displacements may exceed relative residuals by this factor. The
+        tolerances of inexact solutions are therefore divided by it [-].
     """
 
     tolerance: float
     counters: Counters
-    asked: float | None = None
+    original_tolerance: float | None = None
     replacement_reason: str = ""
     contrast: float = 1.0
 
@@ -229,10 +229,10 @@ class LinearSolver(Protocol):
         rigid_modes : ndarray (n, n_modes)
             Rigid-body modes, which span the near null space of K [length].
         involved : ndarray of int (k,), optional
-            Unknowns that equations may involve; solvers may use them to save work. By default all unknowns.
+            Unknowns that may occur in equations, which solvers may use to save work. By default, all unknowns may occur.
         release : bool
-            Whether a solver that stores K in a different format may release the memory of K and leave it empty. The returned
-            object then replaces K in products.
+            Whether a solver that stores K in a different format may release the memory of K, which is empty afterwards. The
+            returned object then replaces K in products.
 
         Returns
         -------
@@ -241,7 +241,7 @@ class LinearSolver(Protocol):
         """
 
     def near(self) -> Self:
-        """Return a copy of the solver that is to be prepared for a similar matrix of the same pattern, such as a tangent."""
+        """Return a copy of the solver, to be prepared for a similar matrix with the same pattern, such as a tangent."""
         return copy.copy(self)
 
     def load(self, f: Array) -> Loaded:
@@ -250,12 +250,12 @@ class LinearSolver(Protocol):
     def snapshot(self) -> dict[str, Any]:
         """Return all data on which later solutions depend, as numbers, strings and arrays.
 
-        The state of an analysis includes the snapshot, and a restart saves it. Its arrays must not be modified later.
+        The snapshot is part of the state of an analysis and is saved for restarts. Its arrays must not be modified.
         """
 
     def put_back(self, snapshot: Mapping[str, Any]) -> None:
         """Restore the data of a `snapshot` of this solver, or of a solver of the same class for the same matrix."""
 
     def improve(self, excess: float) -> bool:
-        """Reduce `tolerance`, as required by a residual that is `excess` times its bound; return whether this is possible."""
+        """Reduce `tolerance` because a residual is `excess` times its bound; return False if this is impossible."""
         return False

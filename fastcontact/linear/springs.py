@@ -13,39 +13,39 @@ from scipy.sparse import csr_array, vstack
 from fastcontact.arrays import AnyArray, Indices
 from fastcontact.linear.sparse_rows import entry_rows, scaled
 
-# Largest relative difference between two sets of springs, or between weights of eliminated unknowns, for which they have the
-# same preconditioner.
+# Largest relative difference between two sets of springs, or between the weights of eliminated unknowns, for which the same
+# preconditioner is used.
 ALIKE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """Springs with the forces ``-through.T @ (stiffness * (rows @ u))`` on n unknowns u.
+    """Springs with the forces ``-force_rows.T @ (stiffness * (rows @ u))`` on n unknowns u.
 
     Attributes
     ----------
     rows : csr_array (q, n)
         Derivatives of the elongations of q springs with respect to the unknowns [-].
     stiffness : ndarray (q,)
-        Stiffness of each spring, not negative [force / length].
-    through : csr_array (q, n), optional
+        Stiffness of each spring, which is not negative [force / length].
+    force_rows : csr_array (q, n), optional
         Matrix whose transpose maps the forces of the springs to the unknowns; `rows` by default [-].
     """
 
     rows: csr_array
     stiffness: AnyArray
-    through: csr_array | None = None
+    force_rows: csr_array | None = None
 
     @cached_property
     def _entry_springs(self) -> Indices:
-        """Springs (k,) of the entries of `rows`."""
+        """Spring (k,) to which each entry of `rows` belongs."""
         return entry_rows(self.rows)
 
     def subtract_forces(self, u: AnyArray, r: AnyArray, factor: float = 1.0) -> None:
         """Subtract `factor` times the product of the stiffness matrix of the springs and `u` (n,) from `r` (n,), in place."""
         R = self.rows
-        if self.through is not None:
-            r -= factor * (self.through.T @ (self.stiffness * (R @ u)))
+        if self.force_rows is not None:
+            r -= factor * (self.force_rows.T @ (self.stiffness * (R @ u)))
             return
         force = factor * self.stiffness * np.bincount(self._entry_springs, R.data * u[R.indices], len(self.stiffness))
         # If the precision is not that of r, `subtract.at` takes twenty times as long.
@@ -55,18 +55,18 @@ class Springs:
         """Return these springs together with `others`."""
         if others is None:
             return self
-        all_springs = (self, others)
-        rows = csr_array(vstack([springs.rows for springs in all_springs], format="csr"))
-        through = None
-        if self.through is not None or others.through is not None:
-            rows_of_forces = [springs.rows if springs.through is None else springs.through for springs in all_springs]
-            through = csr_array(vstack(rows_of_forces, format="csr"))
-        return Springs(rows, np.concatenate([springs.stiffness for springs in all_springs]), through)
+        both = (self, others)
+        rows = csr_array(vstack([springs.rows for springs in both], format="csr"))
+        force_rows = None
+        if self.force_rows is not None or others.force_rows is not None:
+            rows_of_forces = [springs.rows if springs.force_rows is None else springs.force_rows for springs in both]
+            force_rows = csr_array(vstack(rows_of_forces, format="csr"))
+        return Springs(rows, np.concatenate([springs.stiffness for springs in both]), force_rows)
 
     def reduced(self, pivots: Indices, weights: csr_array) -> Springs:
         """Return the springs after the elimination ``u[pivots] = weights @ u`` with weights (m, n).
 
-        Their rows are zero in the columns of the pivots. The springs must not have a separate matrix `through`.
+        The rows of the result are zero in the columns of the pivots. The springs must not have a matrix `force_rows`.
         """
         R, W, n = self.rows, weights, self.rows.shape[1]
         number = np.full(n, -1, np.int32)

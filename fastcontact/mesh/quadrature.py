@@ -250,9 +250,9 @@ def collapsed_tetrahedron(n: int) -> Rule:
 
 
 def determinants(J: Array) -> Array:
-    """Return the determinants (...) [length^dim] of Jacobians `J` (..., dim, dim) [length].
+    """Return the determinants (...) [unit of J^dim] of the Jacobians `J` (..., dim, dim) [unit of J].
 
-    Laplace's expansion is five times as fast as `numpy.linalg.det`.
+    They are computed by Laplace's expansion, which is five times as fast as `numpy.linalg.det`.
     """
     minor = J[..., -2, -2] * J[..., -1, -1] - J[..., -2, -1] * J[..., -1, -2]
     if J.shape[-1] == 2:

@@ -119,14 +119,14 @@ def initial_gaps(pair: Formulation) -> tuple[Array, Array]:
     Clearances are included where they increase the gap. Gaps are infinite at nodes that are unpaired or excluded, and in
     pairs of the kinds that admit penetration, tied and gap_only.
     """
-    if pair.options.tied or pair.options.gap_only:
+    if pair.options.kind in ("tied", "gap_only"):
         shape = len(pair.secondary.points), pair.points.shape[1]
         return np.full(shape[0], np.inf), np.zeros(shape)
     undeformed = Configuration.undeformed(pair.points)
     gap, normal = pair.nodal_gap(undeformed, with_clearance=False)
     if pair.options.clearance is not None or pair.options.clearance_primary is not None:
         gap = np.maximum(gap, pair.nodal_gap(undeformed)[0])
-    return np.where(pair.options.excluded_nodes(pair.secondary), np.inf, gap), normal
+    return np.where(pair.excluded[pair.secondary.points], np.inf, gap), normal
 
 
 def check_overlap(mesh: Mesh, kinematics: str, groups: Iterable[tuple[str, str]]) -> None:

@@ -15,6 +15,7 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import Pose
+from fastcontact.contact.pair_options import ALWAYS_CLOSED
 from fastcontact.contact.pairing import Candidates, gap_rows, rows_along
 from fastcontact.errors import ModelError
 from fastcontact.model.contact_pair import ContactPair, angle_at
@@ -85,7 +86,7 @@ def prescribed_overlap_warnings(pairs: Pairs, supports: Supports) -> list[str]:
 def _summary(contact: ContactPair, formulation: Formulation, overlap: Overlap) -> str:
     """Return the first part of a message: the number of nodes, the sides and the largest depth."""
     position = ", ".join(f"{x:.6g}" for x in formulation.points[overlap.point])
-    preposition = "off" if formulation.options.always_closed else "into"
+    preposition = "off" if formulation.options.kind in ALWAYS_CLOSED else "into"
     other = f"'{contact.primary}'" if contact.primary else "the rigid obstacle"
     return (
         f"supports push {overlap.count} of the {overlap.total} nodes of '{contact.secondary}' {preposition} {other}, contact "
@@ -97,13 +98,13 @@ def _overlaps(pairs: Pairs, supports: Supports) -> Iterator[tuple[ContactPair, F
     """Yield each pair with inadmissible overlap, its formulation, and its overlap at the instant of the largest depth."""
     for contact, formulation in pairs:
         side = formulation.secondary
-        usable = side.points[~formulation.options.excluded_nodes(side)]
+        usable = side.points[~formulation.excluded[side.points]]
         nodes = usable[supports.fixed[usable].any(axis=1)]
         if not len(nodes) or contact.force or formulation.options.penalty is not None:
             continue
         # Nodes without supports are included in the total, whether they face the other side or not.
         unsupported = len(usable) - len(nodes)
-        candidates = Candidates(nodes[:, None], np.ones((len(nodes), 1)))
+        candidates = Candidates.at(nodes)
         undeformed = Configuration.undeformed(formulation.points)
         gap0, _, _ = _gaps(formulation, candidates, undeformed, with_clearance=False)
         overlaps = [_overlap_at(contact, formulation, candidates, gap0, supports, t) for t in supports.instants()]
@@ -123,7 +124,7 @@ def _overlap_at(
     factor = 1.0 if contact.clearance_ramp is None else multiplier(contact.clearance_ramp, ramp, instant)
     pose = Pose(translation, angle_at(contact, ramp, instant))
     configuration = replace(Configuration.displaced(displacement), pose=pose, clearance_factor=factor)
-    if formulation.options.tied:
+    if formulation.options.kind == "tied":
         depth, paired = _jumps(formulation, candidates, displacement, supports.fixed)
     else:
         depth, paired = _depths(formulation, candidates, gap0, configuration, supports.fixed)
@@ -142,7 +143,7 @@ def _depths(
     subtracted. In contact that is always closed the depth is the change of the size of the gap.
     """
     gap, rows, paired = _gaps(formulation, candidates, configuration)
-    if formulation.options.always_closed:
+    if formulation.options.kind in ALWAYS_CLOSED:
         depth = np.abs(gap) - np.abs(gap0)
     else:
         depth = -gap - np.maximum(-gap0, 0.0)
@@ -157,8 +158,7 @@ def _gaps(
     rows, gap = gap_rows(candidates, pairing, formulation.primary, formulation.points)
     gap = gap + rows @ configuration.displacement.ravel()
     if with_clearance:
-        factor, reference = configuration.clearance_factor, formulation.points
-        gap = gap + formulation.options.added_gap(candidates, pairing, formulation.primary, reference, factor)
+        gap = gap + formulation.added_gap(candidates, pairing, configuration)
     return np.where(pairing.paired, gap, 0.0), rows, pairing.paired
 
 

@@ -310,7 +310,7 @@ SUPPORTS = [
             r"x = 0\.1 is prescribed at point \d+ on the axis of symmetry, where the radial displacement is zero: leave the points at x = 0 out of the group"),
     Mistake("a radial force on the axis of symmetry", lambda: on_axis(lambda model: model.add_force("TOP_LEFT", x=1.0)),
             fc.ModelError,
-            r"the nodal force on 'TOP_LEFT' has a radial component x on the axis of symmetry \(number of points: 1, first: point \d+\), where the circle that it acts along has no length: leave the points at x = 0 out"),
+            r"the nodal force on 'TOP_LEFT' has a radial component x on the axis of symmetry \(number of points: 1, first: point \d+\), where the circumference is zero: leave out the points at x = 0"),
 ]
 # fmt: on
 

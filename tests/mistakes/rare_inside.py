@@ -193,8 +193,8 @@ def unreadable(folder, patch):
 
 
 def repeated_equations(patch):
-    patch.setattr(pivot_order, "FULL_UP_TO", 0)
-    pivot_order.assigned(csr_array(np.array([[1.0, 0.0], [2.0, 0.0]])))
+    patch.setattr(pivot_order, "LARGEST_DENSE", 0)
+    pivot_order.matched_pivots(csr_array(np.array([[1.0, 0.0], [2.0, 0.0]])))
 
 
 CALLS = [
@@ -203,7 +203,7 @@ CALLS = [
     ("a result that may not be read", unreadable, fc.errors.FileError, r"a\.vtkhdf' is not readable: ask its owner for read permission"),
     ("equations on the same unknown", repeated_equations, pivot_order.RepeatedError, REPEATED),
     ("equations that are equal", lambda: pivot_order.block_inverse(csr_array(np.ones((2, 2)))), pivot_order.RepeatedError, REPEATED),
-    ("more equations than unknowns", lambda: pivot_order.assigned(csr_array(np.ones((2, 1)))), pivot_order.RepeatedError, REPEATED),
+    ("more equations than unknowns", lambda: pivot_order.matched_pivots(csr_array(np.ones((2, 1)))), pivot_order.RepeatedError, REPEATED),
     ("equations that are nearly equal", lambda: pivot_order.block_inverse(csr_array([[1.0, 1.0], [1.0, 1.0 + 1e-14]])), pivot_order.RepeatedError, REPEATED),
     ("forces out of balance", out_of_balance, fc.ConvergenceError, r"step 1: the out-of-balance force 1e\+09 stays above .* \(1e-06 of the largest force\): round-off allows no less if moduli or displacements differ by many orders of magnitude\. Put a rigid obstacle in the place of a stiff body"),
     ("springs that stay stretched", not_slack, fc.ConvergenceError, r"contact does not hold .*: after \d+ positions tried, a force of .* is still missing for equilibrium under a load of 10\. Add a support \(step 1 from 0 to 1; more load steps may help\)$"),

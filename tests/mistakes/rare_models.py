@@ -73,7 +73,7 @@ def view_without_pyvista(patch):
 
 
 def solver_without_package(patch):
-    name = next(iter(linear.OPTIONAL))
+    name = next(iter(linear.PACKAGES))
     patch.setattr(linear, "SOLVERS", tuple(other for other in linear.SOLVERS if other != name))
     linear.make(name, dim=2, n_dofs=10)
 
@@ -121,7 +121,7 @@ MISTAKES = [
             r"excluded = 3 of contact 'pair' must be a group or a list of groups"),
     Mistake("a spring on an empty group", spring_nowhere, fc.ModelError, r"group 'NONE' is empty: no spring can act on it"),
     Mistake("a spring along a line of no length", spring_without_length, fc.ModelError,
-            r"the spring between 'A' and 'B': points 0 and 9 coincide, and have no line between them: give x, y or z"),
+            r"the spring between 'A' and 'B': points 0 and 9 coincide, so that no line connects them: give x, y or z"),
     Mistake("moduli of unknown kinematics", lambda: fc.LinearElastic(E=1.0, nu=0.3).moduli("4d"), fc.ModelError,
             r"unknown kinematics '4d': expected one of 3d, "),
     Mistake("cells of broken numbers", lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 1.5]]}), fc.MeshError,

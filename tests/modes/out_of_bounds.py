@@ -3,7 +3,7 @@
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
-from fastcontact._jit.parallel import WORTHWHILE, parallel_for
+from fastcontact._jit.parallel import SINGLE_THREAD_WORK, parallel_for
 
 
 @kernel
@@ -13,7 +13,7 @@ def beyond(low, high, values, out):
 
 
 if __name__ == "__main__":
-    for work in (1, WORTHWHILE):
+    for work in (1, SINGLE_THREAD_WORK):
         try:
             parallel_for(beyond, 3, work, np.zeros(2), np.zeros(3))
             print("nothing")

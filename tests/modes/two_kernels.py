@@ -12,7 +12,7 @@ from fastcontact._jit import interpreting  # noqa: E402 - the log listens before
 from fastcontact.linear.cholesky import factorisation_kernels  # noqa: E402
 from fastcontact.linear.krylov import krylov_kernels  # noqa: E402
 
-interpreting.SECONDS = -1.0  # not Python in the place of a kernel
+interpreting.MAX_SECONDS = -1.0  # not Python in the place of a kernel
 a, b = np.arange(40.0), np.arange(40.0)
 krylov_kernels.turn(0, 40, 2.0, a, b)
 stats = [kernel.stats for kernel in (krylov_kernels.turn, factorisation_kernels.work_sizes.compiled)]

@@ -67,5 +67,5 @@ def found(steps: list[fc.StepResult]) -> dict[str, object]:
 
 
 if __name__ == "__main__":
-    parallel.WORTHWHILE = 0  # small meshes are shared by threads as large ones are
+    parallel.SINGLE_THREAD_WORK = 0  # small meshes are shared by threads as large ones are
     print(json.dumps({name: found(RUNS[name]()) for name in sys.argv[1:]}))

@@ -12,7 +12,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.linear import choice as linear
 from fastcontact.linear.elimination.elimination import eliminate
-from fastcontact.linear.multigrid.solver import RAISE, RAISES
+from fastcontact.linear.multigrid.solver import BOUND_FACTOR, MAX_RAISES
 
 # Over the largest entry.
 ROUNDING, SOLVED = 1e-14, 1e-9
@@ -89,7 +89,7 @@ def test_the_multigrid_cycle_is_symmetric_and_positive(recipe, tied, seed):
     if elimination is not None:
         for column in basis.T:
             elimination.move_forces(column)
-    for raised in range(RAISES + 1):
+    for raised in range(MAX_RAISES + 1):
         product = basis.T @ applied(amg, basis)
         size = np.abs(product).max()
         assert np.abs(product - product.T).max() <= 1e-10 * size
@@ -97,8 +97,8 @@ def test_the_multigrid_cycle_is_symmetric_and_positive(recipe, tied, seed):
         if spectrum[0] >= -1e-10 * spectrum[-1]:
             return
         assert elimination is not None  # without, the bounds of its smoothers are sure
-        assert raised < RAISES
-        amg.hierarchy.raise_bounds(RAISE)
+        assert raised < MAX_RAISES
+        amg.hierarchy.raise_bounds(BOUND_FACTOR)
 
 
 def applied(amg, basis):

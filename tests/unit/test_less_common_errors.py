@@ -254,9 +254,9 @@ def test_iterations_that_do_not_get_there_name_other_solvers(monkeypatch):
 def test_no_equations_have_no_pivots():
     from scipy.sparse import csr_array
 
-    from fastcontact.linear.elimination.pivot_order import chosen
+    from fastcontact.linear.elimination.pivot_order import choose_pivots
 
-    pivots, P = chosen(csr_array((0, 5)))
+    pivots, P = choose_pivots(csr_array((0, 5)))
     assert (pivots.shape, P.matrix.shape) == ((0,), (0, 0))
 
 

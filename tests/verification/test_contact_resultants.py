@@ -330,6 +330,21 @@ def test_the_worn_volume_does_not_depend_on_the_number_of_steps(formulation, str
     assert volumes[1:] == [pytest.approx(volumes[0], rel=0.01)] * 2
 
 
+@pytest.mark.parametrize("formulation", ["continuous", "mortar"])
+def test_wear_of_quadratic_facets_does_not_follow_the_scatter_of_pressures(formulation):
+    """Pressures are uneven near the edges; the depth is linear in facets, with the volume k times work over friction."""
+    model = elastic_model(block((2.0, 1.0), (8, 4), "quad8"), "plane_strain")
+    model.prescribe("TOP", y=-0.01, ramp=[(0, 0), (1, 1), (3, 1)])
+    model.prescribe("TOP", x=0.5, ramp=[(0, 0), (1, 0), (3, 1)])
+    plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    model.add_obstacle("sole", secondary="BOTTOM", obstacle=plane, friction=0.2, wear=1e-5, formulation=formulation)
+    last = fc.solve(model, [1.0, 2.0, 3.0])[-1]
+    contact = last.contact["sole"]
+    depth = contact.wear[np.argsort(contact.coordinates[:, 0])]
+    assert depth[1::2] == pytest.approx(0.5 * (depth[:-1:2] + depth[2::2]), rel=1e-12)
+    assert volume(contact) == pytest.approx(1e-5 * last.work["friction_work"] / 0.2, rel=1e-6)
+
+
 def test_a_flat_block_wears_evenly():
     """Under a uniform pressure: k p s to the last digit, and no change of the pressure."""
     model = shoe("node_to_segment", crown=0.0, wear=5e-6)

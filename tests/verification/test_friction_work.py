@@ -191,12 +191,12 @@ def test_works_that_do_not_add_up_are_told(count):
     assert abs(steps[-1].work["imbalance"]) < (0.1 if told else 0.005) * 0.5 * 300.0 * 0.5**2
 
 
-def ball_on_block(kinematics="axisymmetric", element="quad4", **changes):
+def ball_on_block(kinematics="axisymmetric", element="quad4", strain="small", **changes):
     """Return the model of a rigid ball that is pressed into a block."""
     solid = kinematics == "3d"
     size = {"contact_radius": 2.0, "contact_size": 0.35} if solid else {"contact_radius": 1.2, "contact_size": 0.1}
     mesh = fc.generate.graded_block(element, width=10.0, depth=10.0, **size)
-    model = elastic_model(mesh, kinematics)
+    model = elastic_model(mesh, kinematics, strain=strain)
     for side, axis in zip(("SYMMETRY_X", "SYMMETRY_Y"), "xy"[: mesh.dim - 1], strict=False):
         model.fix(side, axis)
     model.fix("BOTTOM", "xyz"[: mesh.dim])
@@ -270,6 +270,18 @@ def test_a_ball_that_a_force_drives_has_the_work_of_friction_of_many_steps():
     options = {"formulation": "mortar", "motion": None, "force": {"y": -60.0}}
     fine, few = (pressed_ball(steps=n, **options)[-1] for n in (12, 4))
     assert few.work["friction_work"] == pytest.approx(fine.work["friction_work"], rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*of the work of friction")
+def test_steps_in_finite_strain_are_halved_where_nodes_close_and_slide():
+    options = {"formulation": "mortar", "strain": "finite"}
+    fine, whole, few = (
+        pressed_ball(steps=n, friction_while_touching=fraction, **options)[-1].work["friction_work"]
+        for n, fraction in ((40, 1.0), (2, 1.0), (2, 0.1))
+    )
+    assert few == pytest.approx(fine, rel=0.05)
+    assert whole > 2.0 * fine
 
 
 @pytest.mark.filterwarnings("ignore:the largest equivalent strain", "ignore:the energy of these load steps")

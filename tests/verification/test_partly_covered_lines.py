@@ -60,28 +60,28 @@ def test_fields_are_as_rich_as_what_takes_part_determines(element, axisymmetric)
     model.add_contact("pair", secondary="L_TOP", primary="U_BOTTOM", formulation="mortar")
     side = model.bind(model.contact[0]).secondary
     whole = WholeFacets.of(side.blocks[0], model.mesh.points, axisymmetric)
-    k, rng = side.local.shape[1], np.random.default_rng(3)
+    k, rng = side.only_block.local.shape[1], np.random.default_rng(3)
     for _ in range(50):
         s, w = np.polynomial.legendre.leggauss(6)
         a, b = np.sort(rng.uniform(0.0, 1.0, 2))
-        mass = np.zeros((len(side.local), k, k))
-        for f, facet in enumerate(side.facets):
+        mass = np.zeros((len(side.only_block.local), k, k))
+        for f, facet in enumerate(side.only_block.facets):
             x = model.mesh.points[facet, 0]
             low, high = (np.clip(end, x[:2].min(), x[:2].max()) for end in (a, b))
             at = 0.5 * (low + high) + 0.5 * (high - low) * s
             xi = 2.0 * (at - x[0]) / (x[1] - x[0]) - 1.0
-            N = fc.mesh.elements.get(side.element).shape(xi[:, None])
+            N = fc.mesh.elements.get(side.only_block.element).shape(xi[:, None])
             dA = 0.5 * (high - low) * w * (2.0 * np.pi * at if axisymmetric else 1.0)
             mass[f] = (dA[:, None, None] * N[:, :, None] * N[:, None, :]).sum(axis=0)
         nodes, independent = independent_values(side, whole, mass, np.zeros(len(side.points), bool))
         total, reference = np.zeros((2, len(side.points), len(side.points)))
-        for one, full, local in zip(mass, whole.mass, side.local, strict=True):
+        for one, full, local in zip(mass, whole.mass, side.only_block.local, strict=True):
             total[np.ix_(local, local)] += one
             reference[np.ix_(local, local)] += full if one.any() else 0.0
         Z = nodes.toarray()
         values = np.linalg.eigvals(np.linalg.solve(Z.T @ reference @ Z, Z.T @ total @ Z)).real
         assert values.min() > 0.01 * DETERMINED
-        seen = np.unique(side.local[mass.any(axis=(1, 2))])
+        seen = np.unique(side.only_block.local[mass.any(axis=(1, 2))])
         assert Z[seen].sum(axis=1) == pytest.approx(1.0)
         assert np.array_equal(Z[independent], np.eye(len(independent)))
 

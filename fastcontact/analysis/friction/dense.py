@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fastcontact.analysis.criteria import HALVINGS, NOTABLE
 from fastcontact.analysis.friction.cone_newton import Law, newton
@@ -184,11 +185,12 @@ def _equations(law: Law, F: Array, y: Array, gaps: Array, rows: Indices, stickin
     return A.reshape(unknown.size, -1), D
 
 
-def response(F: Array, law: Law, forces: Forces) -> Callable[[Array], Array]:
+def response(F: Array, law: Law, forces: Forces, held_slips: Mask, Q: csr_array | None) -> Callable[[Array], Array]:
     """Return a function that computes the derivative of the solution `forces`.
 
-    The function returns the change (1 + k, m) of the forces due to a change (1 + k, m) of the gaps and slips without forces.
-    F and the constraints of `law` are those of `solve`.
+    The function returns the change ((1 + k) m,) of the forces due to a change ((1 + k) m,) of the gaps and slips without
+    forces. F and the constraints of `law` are those of `solve`. Q is the rotation of their tangents, if these are rotated.
+    Along the held tangents, `held_slips` (k, m), slips do not vary.
     """
     rows = np.flatnonzero(forces.closed)
     if not len(rows):
@@ -199,9 +201,12 @@ def response(F: Array, law: Law, forces: Forces) -> Callable[[Array], Array]:
     solve_dense = lu_solver(A)
 
     def force_change(gaps: Array) -> Array:
-        change, right_side = np.zeros_like(gaps), -np.einsum("abq,bq->aq", D, (gaps * unit)[:, rows])
+        values = (gaps if Q is None else Q @ gaps).reshape(forces.y.shape) * unit
+        values[1:][held_slips] = 0.0
+        change, right_side = np.zeros_like(values), -np.einsum("abq,bq->aq", D, values[:, rows])
         change[:, rows] = solve_dense(right_side.ravel()).reshape(right_side.shape)
-        return change * unit
+        change = (change * unit).ravel()
+        return change if Q is None else np.asarray(Q.T @ change)
 
     return force_change
 

@@ -21,8 +21,8 @@ from fastcontact.analysis.tolerances import RESIDUAL
 from fastcontact.arrays import Array, Indices, Mask, largest
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.choice import LOOSEST
-from fastcontact.linear.protocol import MILD, FrictionTerms, LoadedNonsymmetric
+from fastcontact.linear.choice import MAX_TOLERANCE
+from fastcontact.linear.protocol import MILD_CONTRAST, FrictionTerms, LoadedNonsymmetric
 from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
 from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF, TINY
@@ -32,9 +32,9 @@ from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF, TINY
 STIFFEST = 100.0
 # Estimated stiffness of a constraint relative to the stiffness that the diagonal of K gives it. It is smaller because
 # neighbouring nodes deform as well. Nearly incompressible cells resist the displacement of a single node far more than that
-# of a surface (`LinearSolver.contrast`). If this contrast exceeds MILD, the estimate is divided by the square root of their
-# ratio; otherwise Newton's method reverses a few slips repeatedly (with nu = 0.4999 and 161 442 unknowns, 588 iterations
-# did not converge; nu = 0.499 was not affected).
+# of a surface (`LinearSolver.contrast`). If this contrast exceeds MILD_CONTRAST, the estimate is divided by the square root
+# of their ratio; otherwise Newton's method reverses a few slips repeatedly (with nu = 0.4999 and 161 442 unknowns, 588
+# iterations did not converge; nu = 0.499 was not affected).
 STIFFNESS_ESTIMATE = 0.2
 # Tolerance of the residual of the friction law relative to the tolerance of the linear solutions, and the larger tolerance
 # that is accepted where it cannot be reached. If contact forces are a small fraction of all forces, they cannot be more
@@ -132,7 +132,7 @@ class Eliminated:
         self._rows = (rows[0], *slip_rows)
         self._free = np.vstack([free[0], np.where(held_slips & ~prescribed, 0.0, free[1:])])
         self._free_slips = ~held_slips | prescribed
-        normal, estimate = compliance[0, 0], STIFFNESS_ESTIMATE / np.sqrt(max(1.0, loaded.contrast / MILD))
+        normal, estimate = compliance[0, 0], STIFFNESS_ESTIMATE / np.sqrt(max(1.0, loaded.contrast / MILD_CONTRAST))
         self._unit = np.sqrt(1.0 / (np.where(normal > 0.0, normal, 1.0) / estimate + self._compliance[0]))
         self.law = cone_newton.Law(np.where(usable, mu, 0.0), constraints.equality & usable)
         self.u = u
@@ -198,14 +198,14 @@ class Eliminated:
     def _accuracy(self, y: Array, gaps: Array) -> float:
         """Return the relative residual to which the linear system of a step from forces `y` and `gaps` is solved.
 
-        It is proportional to the residual of the friction law, but at most LOOSEST: less accurate steps would change the
-        directions of small slips. The last step is solved to the full tolerance.
+        It is proportional to the residual of the friction law, but at most MAX_TOLERANCE: less accurate steps would change
+        the directions of small slips. The last step is solved to the full tolerance.
         """
         if not self._inexact:
             return self._tolerance
         force = float(np.abs(y).max(initial=0.0))
         residual = float(np.abs(self.law.residual(y, gaps)).max(initial=0.0))
-        return max(self._tolerance, min(RESIDUAL * residual / force, LOOSEST) if force else LOOSEST)
+        return max(self._tolerance, min(RESIDUAL * residual / force, MAX_TOLERANCE) if force else MAX_TOLERANCE)
 
     def finish(self) -> bool:
         """Use the full tolerance in further steps; return whether the last step was less accurate."""

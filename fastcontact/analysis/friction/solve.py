@@ -26,7 +26,7 @@ from fastcontact.analysis.friction.cone_newton import (
     compliance_of_each,
     held_tangents,
 )
-from fastcontact.analysis.solution import Accuracy, Forces, Path, Response, SlipSoFar, Solution, in_increments, response
+from fastcontact.analysis.solution import Accuracy, Forces, Path, SlipSoFar, Solution, in_increments, response
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import normals
@@ -150,7 +150,8 @@ def _with_included(
     rows = np.flatnonzero(included)
     k, m = len(constraints.tangents), len(constraints)
     check_rows((1 + k) * len(rows), MOST_ROWS_WITH_FRICTION)
-    R = csr_array(vstack([matrix[rows] for matrix in (constraints.B, *constraints.tangents)], format="csr"))
+    all_rows = csr_array(vstack([constraints.B, *constraints.tangents], format="csr"))
+    R = all_rows[(np.arange(1 + k)[:, None] * m + rows).ravel()]
     gaps_at_rest = constraints.gaps_at_rest()
     free, F = loaded.delassus(R)
     slips = np.arange(len(rows), len(F))
@@ -190,7 +191,7 @@ def _with_included(
         y, gaps_of_included = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ gaps_of_included.ravel()).reshape(y.shape)
     u = loaded.involved_solution(R.T @ y.ravel(), u)
     all_forces = np.zeros((1 + k, m))
-    gaps = gaps_at_rest + np.stack([matrix @ u for matrix in (constraints.B, *constraints.tangents)])
+    gaps = gaps_at_rest + (all_rows @ u).reshape(1 + k, m)
     all_forces[:, rows], gaps[:, rows] = y, gaps_of_included
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = result.closed, result.sticking
@@ -202,35 +203,8 @@ def _with_included(
         u, all_forces[0], gaps[0], active, active, result.settled, result.iterations, all_forces[1:].T, gaps[1:].T,
         sticking, result.residual, constraints.directions,
         slip_so_far=None if before is None else _slip_so_far(before, Q, rows, constraints),
-        response=partial(_response, loaded, (R, rows, Q), held_slips, (F, Law(mu, equations), at_end)),
+        response=lambda: response(loaded, R, rows, dense.response(F, Law(mu, equations), at_end, held_slips, Q)),
     )  # fmt: skip
-
-
-def _response(
-    loaded: Loaded, rows_and_rotation: tuple[csr_array, Indices, csr_array | None], held_slips: Mask,
-    forces: tuple[Array, Law, Forces],
-) -> Response:  # fmt: skip
-    """Return the linear response of a solution to additional forces and gaps.
-
-    Parameters
-    ----------
-    loaded : Loaded
-    rows_and_rotation : (csr_array ((1 + k) q, n), ndarray of int (q,), csr_array or None)
-        R, and the numbers of its q constraints; rotation Q of their tangents.
-    held_slips : ndarray of bool (k, q)
-        Held tangents, along which slips do not vary.
-    forces : tuple
-        Arguments of `dense.response`.
-    """
-    (R, rows, Q), force_change = rows_and_rotation, dense.response(*forces)
-
-    def forces_of(values: Array) -> Array:
-        values = (values if Q is None else Q @ values).reshape(1 + len(held_slips), len(rows))
-        values[1:][held_slips] = 0.0
-        change = force_change(values).ravel()
-        return change if Q is None else np.asarray(Q.T @ change)
-
-    return response(loaded, R, rows, forces_of)
 
 
 def _slip_so_far(
@@ -269,8 +243,16 @@ def _slip_so_far(
 def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
     """Add, in place, the compliance of the constraints `rows` (q,) to their Delassus operator F ((1 + k) q, (1 + k) q)."""
     if constraints.compliance is not None and len(rows):
-        frame = np.stack([direction[rows] for direction in constraints.coupled_directions or constraints.directions])
-        F += _componentwise(constraints.compliance.block(rows), frame)
+        # C couples force vectors. Their components along normals and tangents are coupled by the scalar products of these
+        # directions, which vary from one constraint to the next.
+        C, along = (
+            constraints.compliance.block(rows),
+            np.stack(constraints.coupled_directions or constraints.directions)[:, rows],
+        )
+        normal = normals(list(along))
+        normal[~along.any(axis=(0, 2)), 0] = 1.0  # any unit vector, for constraints without friction
+        frame = np.concatenate([normal[None], along]).reshape(-1, normal.shape[1])
+        F += np.tile(C, 2 * (1 + len(along),)) * (frame @ frame.T)
     if constraints.low_rank_compliance.size and len(rows):
         Z = constraints.low_rank_compliance[:, rows].reshape(len(F), -1)
         F += Z @ Z.T
@@ -291,23 +273,3 @@ def _increment(
     closed_of_all[rows], sticking[rows] = result.closed, result.sticking
     gaps = free + (F[:, unknown] @ result.y.ravel()).reshape(free.shape)
     return replace(result, y=y, gaps=gaps, closed=closed_of_all, sticking=sticking)
-
-
-def _componentwise(C: Array, along: Array) -> Array:
-    """Return a compliance ((1 + k) m, (1 + k) m) with respect to the components of forces along normals and tangents.
-
-    C couples force vectors. Their components along normals and tangents are coupled by the scalar products of these
-    directions, which vary from one constraint to the next.
-
-    Parameters
-    ----------
-    C : ndarray (m, m)
-        Compliance that couples the force vectors of constraints [length / force].
-    along : ndarray (k, m, dim)
-        Unit tangents; zero at constraints without friction.
-    """
-    normal = normals(list(along))
-    normal[~along.any(axis=(0, 2)), 0] = 1.0  # any unit vector, for constraints without friction
-    frame = np.concatenate([normal[None], along]).reshape(-1, normal.shape[1])
-    parts = len(along) + 1
-    return np.asarray(np.tile(C, (parts, parts)) * (frame @ frame.T))

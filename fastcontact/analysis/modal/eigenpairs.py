@@ -15,11 +15,11 @@ from scipy.sparse import bsr_array, csr_array, diags_array
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh, lobpcg
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.elasticity.constrained_system import System, supports_apart
+from fastcontact.elasticity.constrained_system import System, separate_supports
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.elimination.coupled_pivots import RepeatedError
 from fastcontact.linear.elimination.elimination import eliminate
-from fastcontact.linear.multigrid.hierarchy import COARSEST
+from fastcontact.linear.multigrid.hierarchy import COARSEST_SIZE
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS, Multigrid
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -58,7 +58,7 @@ def lowest(
         If the iteration does not converge.
     """
     K, M = matrices
-    if free.sum() < max(COARSEST, 3 * n):
+    if free.sum() < max(COARSEST_SIZE, 3 * n):
         return _dense_eigenpairs(K, M, np.flatnonzero(free), n, shift)
     shifted = bsr_array(K + shift * M)
     shifted.sort_indices()
@@ -168,7 +168,7 @@ class Reduced:
             projection = csr_array(diags_array(self.free.astype(float)) + at_pivots @ weights)
             K = csr_array(projection.T @ self.K.tocsr() @ projection).tobsr((size, size))
             K.sort_indices()
-            self.K, self._T = supports_apart(K, ~self.free)[0], csr_array(self._T @ projection)
+            self.K, self._T = separate_supports(K, ~self.free)[0], csr_array(self._T @ projection)
         self.M = csr_array(self._T.T @ mass.tocsr() @ self._T).tobsr((size, size))
 
     def displacement(self, v: Array) -> Array:

@@ -97,7 +97,7 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_
     for pair in model.contact:
         formulation = model.bind(pair, held, sectors_alike=False)
         contact = None if step is None else step.contact[pair.name]
-        if formulation.options.gap_only:
+        if formulation.options.kind == "gap_only":
             continue
         if formulation.options.cohesion is not None:
             raise ModelError(f"modes do not support cohesion or adhesion: tie contact '{pair.name}', or leave it out")

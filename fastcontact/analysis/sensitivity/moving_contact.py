@@ -192,7 +192,7 @@ class MovingContact:
             neighbours = neighbours + local @ side.near @ local.T
         moving = np.ones(len(self.constraints))
         for name, pair in self.problem.pairs.items():
-            if pair.options.tied:  # paired once, before any load
+            if pair.options.kind == "tied":  # paired once, before any load
                 moving[self.constraints.rows[name]] = 0.0
         dependence = csr_array((self._involved * moving[self.active, None]) @ neighbours)
         if (T := self.problem.system.T) is not None:

@@ -86,8 +86,12 @@ def _centroid(flat, count):
 
 
 @kernel
-def _clip(subject, count, window, n_window, spare):
-    """Clip `subject` in place by a convex, counter-clockwise `window`; return its number of corners."""
+def _clip(subject, count, window, n_window, spare, least):
+    """Clip `subject` in place by a convex, counter-clockwise `window`; return its number of corners.
+
+    Corners lie on a line of the window if their triangle with it has at most the area `least`. Without this tolerance, nearly
+    coincident lines would intersect at places that depend on round-off.
+    """
     for w in range(n_window):
         ax, ay = window[w, 0], window[w, 1]
         bx, by = window[(w + 1) % n_window, 0], window[(w + 1) % n_window, 1]
@@ -96,6 +100,8 @@ def _clip(subject, count, window, n_window, spare):
             m = (k + 1) % count
             this_side = (bx - ax) * (subject[k, 1] - ay) - (by - ay) * (subject[k, 0] - ax)
             next_side = (bx - ax) * (subject[m, 1] - ay) - (by - ay) * (subject[m, 0] - ax)
+            this_side = this_side if abs(this_side) > least else 0.0
+            next_side = next_side if abs(next_side) > least else 0.0
             if this_side >= 0.0:
                 spare[n_kept, 0], spare[n_kept, 1] = subject[k, 0], subject[k, 1]
                 n_kept += 1
@@ -116,12 +122,12 @@ def _clip(subject, count, window, n_window, spare):
 def _overlap(corners, count, others, n_others, origin, axes, subject, window, spare):
     """Fill `subject` with the overlap of two polygons; return its number of corners, 0 for none."""
     _flatten(corners, count, count, origin, axes, subject)
-    full_area = _area(subject, count)
+    least = ROUND_OFF * _area(subject, count)
     _flatten(others, n_others, n_others, origin, axes, spare)
     for k in range(n_others):  # facets that face each other have opposite orientations
         window[k, 0], window[k, 1] = spare[n_others - 1 - k, 0], spare[n_others - 1 - k, 1]
-    count = _clip(subject, count, window, n_others, spare)
-    if count < 3 or _area(subject, count) <= ROUND_OFF * full_area:
+    count = _clip(subject, count, window, n_others, spare, least)
+    if count < 3 or _area(subject, count) <= least:
         return 0
     return count
 

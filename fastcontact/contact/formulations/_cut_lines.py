@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.formulations._overlap import Coupling, Overlap, OverlapPoints
 from fastcontact.contact.pairing import FACING, Candidates, pair
-from fastcontact.contact.projection import CORNER, closest, facet_normals, nodal_normals
-from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
+from fastcontact.contact.projection import CORNER, closest, nodal_normals, normals_at_nodes
+from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
@@ -102,28 +102,22 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     side, near which points do not face the flank. It is unsuitable elsewhere: at a concave corner with a gap or an
     interference, the closest point jumps from one facet to the next as the bodies move.
     """
-    ends, first = np.unique(np.concatenate([lines.local[:, :2].ravel() for lines in primary.blocks]), return_index=True)
+    ends, first = np.unique(primary.ends, return_index=True)
     foot, normal = deformed[primary.points[ends]], normals[ends]
     opposite = closest(foot, deformed[block.facets])
     xi_0 = opposite.xi[:, 0]
     has_two_facets = primary.inner_ends.ravel()[first]
-    smooth = has_two_facets & ~_corners(primary, deformed, normals)[ends]
+    cosine = np.ones(len(primary.points))  # between the normals of facets and of nodes, small at corners
+    deviation = np.einsum("fad,fad->fa", normals_at_nodes(primary, deformed), normals[primary.all_local])
+    np.minimum.at(cosine, primary.all_local, np.where(primary.node_weights > 0.0, deviation, 1.0))
+    smooth = has_two_facets & ~(cosine < np.cos(np.radians(0.5 * CORNER)))[ends]
     in_facet = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(xi_0) < INSIDE) & ~smooth)
     rows = np.flatnonzero(has_two_facets)
-    facets = np.column_stack([opposite.facet[rows], line_neighbours(block.local)[opposite.facet[rows]]])
+    facets = np.column_stack([opposite.facet[rows], block.neighbours[opposite.facet[rows]]])
     distance = _signed_distances(deformed[block.facets[facets]], foot[rows][:, None], normal[rows][:, None])
     distance[facets < 0] = 1.0
     row, xi = _zeros(distance.reshape(-1, block.facets.shape[1]))
     return np.concatenate([opposite.facet[in_facet], facets.ravel()[row]]), np.concatenate([xi_0[in_facet], xi])
-
-
-def _corners(side: Surface, coordinates: Array, normals: Array) -> Mask:
-    """Return which nodes (m,) of a side are corners, where facet normals deviate strongly from the nodal `normals` (m, 2)."""
-    cosine = np.ones(len(side.points))
-    for block in side.blocks:
-        facet_normal = facet_normals(block, coordinates)
-        np.minimum.at(cosine, block.local, np.einsum("fad,fad->fa", facet_normal, normals[block.local]))
-    return np.asarray(cosine < np.cos(np.radians(0.5 * CORNER)))
 
 
 def _signed_distances(points: Array, foot: Array, normal: Array) -> Array:
@@ -141,8 +135,9 @@ def _opposite_ends(
     offset, facets, coordinates = 0, [], []
     for primary_block in primary.blocks:
         shape = elements.get(primary_block.element).shape
-        for end, s in [(end, sign * position) for end, sign in ((0, -1.0), (1, 1.0)) for position in ends]:
-            free = np.flatnonzero(~primary.inner_ends[offset : offset + len(primary_block.facets), end])
+        inner_ends = primary.inner_ends[offset : offset + len(primary_block.facets)]
+        for end, s in zip(np.repeat([0, 1], len(ends)), np.outer([-1.0, 1.0], ends).ravel(), strict=True):
+            free = np.flatnonzero(~inner_ends[:, end])
             weights = shape(np.array([[s]]))[0]
             foot = np.einsum("k,fkd->fd", weights, deformed[primary_block.facets[free]])
             normal = np.einsum("k,fkd->fd", weights, normals[primary_block.local[free]])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,8 +15,16 @@ from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.cohesive_layer import cohesive_rows
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.constraints import Compliance, Constraints, Geometry, Linearised
-from fastcontact.contact.held_motions import SAME_DIRECTION, HeldMotions, deflate, direction_fields, eigenspaces
+from fastcontact.contact.constraints import Compliance, Constraints, Linearised
+from fastcontact.contact.held_motions import (
+    LEANING,
+    SAME_DIRECTION,
+    HeldMotions,
+    deflate,
+    direction_fields,
+    eigenspaces,
+    symmetry_planes,
+)
 from fastcontact.contact.linearised_geometry import (
     Closing,
     InterpolatedNormals,
@@ -27,7 +35,7 @@ from fastcontact.contact.linearised_geometry import (
 )
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
-from fastcontact.contact.pair_options import PairOptions
+from fastcontact.contact.pair_options import ALWAYS_CLOSED, PairOptions
 from fastcontact.contact.pairing import (
     OVERHANG,
     Candidates,
@@ -43,7 +51,6 @@ from fastcontact.contact.pairing import (
 )
 from fastcontact.contact.projection import (
     BESIDE,
-    at_nodes_of_facets,
     interpolate,
     nodal_normals,
     places,
@@ -57,9 +64,6 @@ from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 SLIPS = ("symmetric", "primary")
-# Sine of the largest angle between the normal of a surface and a plane of symmetry at which the surface of the full model has
-# no corner at the plane. Octagons, with an angle of 22.5 degrees, have corners there irrespective of round-off.
-LEANING = float(np.sin(np.radians(21.0)))
 
 
 @dataclass(eq=False)
@@ -119,6 +123,10 @@ class Formulation(ABC):
     surface_smoothing: bool = False
     options: PairOptions = field(default_factory=PairOptions, repr=False)
     held: HeldMotions | None = field(default=None, repr=False)
+    # Points (n_points,) that are excluded from contact.
+    excluded: Mask = field(init=False, repr=False)
+    # Whether the constraints need tangents, for friction, tying or cohesion.
+    has_tangents: bool = field(init=False, repr=False)
 
     name: ClassVar[str]
     # Whether the primary side may be a rigid obstacle.
@@ -143,21 +151,30 @@ class Formulation(ABC):
         if self.friction:
             self.secondary = self._reflected(self.secondary)
             self.primary = self._reflected(self.primary) if isinstance(self.primary, Surface) else self.primary
+        excluded, cohesion = self.options.excluded, self.options.cohesion
+        self.excluded = np.zeros(len(self.points), bool) if excluded is None else excluded
+        slips = cohesion is not None and not cohesion.reversible
+        self.has_tangents = bool(self.friction) or self.options.kind == "tied" or slips
 
     @cached_property
     def smoothing(self) -> Smoothing | None:
         """The smooth surfaces of both sides; None without smoothing, for flat sides, and with a constant normal."""
-        if not self.surface_smoothing or self.options.tied or not isinstance(self.primary, Surface):
+        if not self.surface_smoothing or self.options.kind == "tied" or not isinstance(self.primary, Surface):
             return None
         if not isinstance(self.normals, str):
             return None
         return Smoothing.of(self.secondary, self.primary, self.points)
 
-    @property
-    def has_tangents(self) -> bool:
-        """Whether the constraints need tangents, for friction, tying or cohesion."""
-        cohesion = self.options.cohesion
-        return bool(self.friction) or self.options.tied or not (cohesion is None or cohesion.reversible)
+    @cached_property
+    def symmetry_planes(self) -> list[tuple[Array, Indices]]:
+        """The planes of symmetry at the ends of the secondary surface, see `held_motions.symmetry_planes`."""
+        opposite = self.points[self.primary.points]
+        return [] if self.held is None else symmetry_planes(self.held, self.secondary, self.points, opposite)
+
+    @cached_property
+    def at_nodes(self) -> Candidates:
+        """The secondary nodes as candidates."""
+        return Candidates.nodes_of(self.secondary)
 
     @property
     def eliminable(self) -> bool:
@@ -169,7 +186,7 @@ class Formulation(ABC):
 
     def alternates(self, constraints: Constraints) -> bool:
         """Return whether pairings like `constraints` may alternate, because points lie between facets with other normals."""
-        return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
+        return isinstance(self.primary, Surface) and self.normals == "facet" and self.options.kind != "tied"
 
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:
@@ -204,13 +221,14 @@ class Formulation(ABC):
         if self.tied is not None:
             return self.tied.constraints()
         constraints = self.unilateral(config)
-        if self.options.cohesion is None:
+        has_penalty = self.options.penalty is not None or self.options.tangential_penalty is not None
+        if has_penalty and self.options.cohesion is None:
             constraints = self._with_penalties(constraints, config)
         if config.elastic_slip is not None and constraints.tangents:
             previous_slip = _values_at(config.elastic_slip, constraints.positions)
-            elastic_slip = np.stack([-np.einsum("md,md->m", t, previous_slip) for t in constraints.directions])
+            elastic_slip = -np.einsum("kmd,md->km", np.stack(constraints.directions), previous_slip)
             constraints = replace(constraints, elastic_slip=elastic_slip)
-        if self.options.gap_only:
+        if self.options.kind == "gap_only":
             return constraints.without(np.ones(len(constraints), bool))
         if self.options.search_distance is not None:
             # A constraint is ignored only if the sides are also far apart at the beginning of the step. Otherwise,
@@ -232,10 +250,8 @@ class Formulation(ABC):
         return with_fluid_pressure(constraints, config, areas, self.options.source[self.secondary.points])
 
     def _with_penalties(self, constraints: Constraints, config: Configuration) -> Constraints:
-        """Return the constraints with the compliances of normal and tangential penalties, if the pair has any."""
+        """Return the constraints with the compliances of normal and tangential penalties."""
         normal, tangential, areas = self.options.penalty, self.options.tangential_penalty, constraints.areas
-        if normal is None and tangential is None:
-            return constraints
         if areas is None:
             raise ContactError(f"formulation '{self.name}' supports no penalty: leave out the option")
         if isinstance(normal, OverclosureLaw):
@@ -265,7 +281,7 @@ class Formulation(ABC):
     @cached_property
     def tied(self) -> TiedPair | None:
         """The equations of a tied pair, for the undeformed bodies; None for other pairs."""
-        if not self.options.tied:
+        if self.options.kind != "tied":
             return None
         constraints = self.unilateral(Configuration.undeformed(self.points))
         if isinstance(self.primary, Surface) and constraints.tangents:
@@ -300,8 +316,9 @@ class Formulation(ABC):
 
     def never_opening(self, positions: Array, config: Configuration) -> Mask:
         """Return which constraints (m,) cannot open, given their reference positions (m, dim) [length]."""
-        if self.options.always_closed or config.never_opening is None:
-            return np.full(len(positions), self.options.always_closed)
+        always = self.options.kind in ALWAYS_CLOSED
+        if always or config.never_opening is None:
+            return np.full(len(positions), always)
         return np.asarray(_values_at(config.never_opening, positions))
 
     def facing(self, candidates: Candidates, config: Configuration, tolerance: float | None = None) -> Pairing:
@@ -319,11 +336,16 @@ class Formulation(ABC):
             return pairing
         return with_secondary_normals(pairing, self._secondary_normals(candidates, deformed))
 
+    @cached_property
+    def _local(self) -> Indices:
+        """Number (n_points,) of each secondary node on its side; zero for other points."""
+        local = np.zeros(len(self.points), np.intp)
+        local[self.secondary.points] = np.arange(len(self.secondary.points))
+        return local
+
     def _secondary_normals(self, candidates: Candidates, deformed: Array) -> Array:
         """Return averaged unit normals (n, dim) of the secondary side at candidates."""
-        local = np.zeros(len(deformed), np.intp)
-        local[self.secondary.points] = np.arange(len(self.secondary.points))
-        at_nodes = nodal_normals(self.secondary, deformed)[local[candidates.nodes]]
+        at_nodes = nodal_normals(self.secondary, deformed)[self._local[candidates.nodes]]
         normal = np.einsum("nk,nkd->nd", candidates.shape, at_nodes)
         return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), TINY))
 
@@ -335,64 +357,56 @@ class Formulation(ABC):
         `compliance` couples the constraints, see `Constraints.compliance`.
         """
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
-        gap0 += self.added_gap(candidates, pairing, config) - self.smoothing_overlap(candidates, pairing, config)
-        positions = candidates.positions(self.points)
-        if not self.has_tangents:
-            geometry = self._linearised_geometry(candidates, pairing, config)
-            return Constraints(B, gap0, positions, compliance, geometry=geometry)
-        axes = tangents(pairing.normal, self._held_directions(candidates))
-        friction, directions, slip_axes = self.options.friction_axes(self.friction, axes, candidates)
-        slip_rows, slip0 = self.slips(candidates, pairing, slip_axes, config)
-        geometry = self._linearised_geometry(candidates, pairing, config, directions)
-        return Constraints(B, gap0, positions, compliance, slip_rows, directions, friction, slip0, geometry=geometry)
+        added = self.added_gap(candidates, pairing, config)
+        gap0 += added if self.smoothing is None else added - self.smoothing_overlap(candidates, pairing, config)
+        constraints, directions = (
+            Constraints(B, gap0, candidates.positions(self.points), compliance),
+            tuple[Array, ...](),
+        )
+        if self.has_tangents:
+            projectors = None
+            if self.friction and self.held is not None and len(self.held.nodes):
+                # Projectors onto the directions in which all nodes of a candidate are held.
+                held = np.einsum("nk,nkde->nde", candidates.shape, self.held.at(candidates.nodes))
+                projectors = eigenspaces(held, 1.0 - LENGTH_ROUND_OFF)
+            axes = tangents(pairing.normal, projectors)
+            friction, directions, slip_axes = self.options.friction_axes(self.friction, axes, candidates)
+            rows, slip0 = self.slips(candidates, pairing, slip_axes, config)
+            constraints = replace(constraints, tangents=rows, directions=directions, friction=friction, slip0=slip0)
+        if self.normals == "secondary":  # derivatives are not implemented
+            return constraints
+        return replace(constraints, geometry=partial(self._linearised_points, candidates, pairing, config, directions))
 
-    def _held_directions(self, candidates: Candidates) -> Array | None:
-        """Return projectors (n, dim, dim) onto the directions in which all nodes of a candidate are held.
-
-        None without friction, or if no node is held.
-        """
-        if self.held is None or not len(self.held.nodes) or not self.friction:
-            return None
-        held = np.einsum("nk,nkde->nde", candidates.shape, self.held.at(candidates.nodes))
-        return eigenspaces(held, 1.0 - LENGTH_ROUND_OFF)
-
-    def _linearised_geometry(
-        self, candidates: Candidates, pairing: Pairing, config: Configuration, directions: Sequence[Array] = ()
-    ) -> Geometry | None:
+    def _linearised_points(
+        self, candidates: Candidates, pairing: Pairing, config: Configuration, directions: Sequence[Array],
+        multiplier: Array, tangential: Array, displacement: Array,
+    ) -> Linearised:  # fmt: skip
         """Return the derivatives of the gaps of paired candidates, and of their slips along k tangents (n, dim).
 
-        None if normals are those of the secondary side, for which derivatives are not implemented.
+        The last three arguments are those of `Geometry`.
         """
-        if self.normals == "secondary":
-            return None
-        coordinates = self.points + config.displacement
-
-        def linearised(multiplier: Array, tangential: Array, displacement: Array) -> Linearised:
-            rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
-            rise = self.smoothing_slope(candidates, pairing, rows, coordinates)
-            points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, config.pose, rise=rise)
-            at_rows = rows, len(multiplier)
-            forces = LinearisedPoints(self.secondary, points, None, points.normal, multiplier[rows], place=at_rows)
-            if not directions:
-                return forces
-            moved = replace(config, displacement=displacement)
-            slips = self._load_step_slips(points.motion, np.stack(directions)[:, rows], tangential[rows], moved)
-            if not isinstance(self.primary, Surface) or self.slip != "symmetric":
-                return replace(forces, slips=slips)
-            averaged, smooth = points.averaged, None
-            if averaged is None:
-                place = pairing.places(self.primary, rows)
-                averaged = InterpolatedNormals.smooth(self.primary, coordinates, pairing.facet[rows], place)
-                smooth = averaged, averaged.bend(place.gradient)
-            local = np.zeros(len(coordinates), np.intp)
-            local[self.secondary.points] = np.arange(len(self.secondary.points))
-            nodal = NodalNormals(self.secondary, coordinates)
-            opposite = InterpolatedNormals(nodal, local[candidates.nodes[rows]], candidates.shape[rows])
-            closing = Closing.of(averaged.normal, opposite, points.motion @ slips.start)
-            slips = replace(slips, total=slips.total + closing.vector, closing=closing)
-            return replace(forces, slips=slips, smooth=smooth)
-
-        return linearised
+        coordinates, rows = self.points + config.displacement, np.flatnonzero(pairing.paired & (multiplier != 0.0))
+        rise = None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, coordinates)
+        points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, config.pose, rise=rise)
+        at_rows = rows, len(multiplier)
+        forces = LinearisedPoints(self.secondary, points, None, points.normal, multiplier[rows], place=at_rows)
+        if not directions:
+            return forces
+        moved = replace(config, displacement=displacement)
+        slips = self._load_step_slips(points.motion, np.stack(directions)[:, rows], tangential[rows], moved)
+        if not isinstance(self.primary, Surface) or self.slip != "symmetric":
+            return replace(forces, slips=slips)
+        averaged, smooth = points.averaged, None
+        if averaged is None:
+            place = pairing.places(self.primary, rows)
+            averaged = InterpolatedNormals.smooth(self.primary, coordinates, pairing.facet[rows], place)
+            smooth = averaged, averaged.bend(place.gradient)
+        nodal, local = NodalNormals(self.secondary, coordinates), self._local[candidates.nodes[rows]]
+        closing = Closing.of(
+            averaged.normal, InterpolatedNormals(nodal, local, candidates.shape[rows]), points.motion @ slips.start
+        )
+        slips = replace(slips, total=slips.total + closing.vector, closing=closing)
+        return replace(forces, slips=slips, smooth=smooth)
 
     def _load_step_slips(self, mean: csr_array, directions: Array, tangential: Array, config: Configuration) -> Slips:
         """Return the slips of the load step along tangents (k, m, dim).
@@ -432,33 +446,36 @@ class Formulation(ABC):
             Minus the motion of a rigid primary side in the step; between two bodies, minus the tangential displacement that
             closes the gap, if `slip` is ``"symmetric"`` [length].
         """
-        rows = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
-        slip0 = np.zeros((len(rows), len(pairing.paired)))
+        rows, slip0 = list[csr_array](), np.zeros((len(directions), len(pairing.paired)))
+        for tangent in directions:
+            rows.append(rows_along(tangent, candidates, pairing, self.primary, self.points.size))
         if isinstance(self.primary, RigidSide):
             obstacle_motion = self.rigid_motion(candidates, config)
             slip0 = -np.stack([np.einsum("nd,nd->n", t, obstacle_motion) for t in directions])
         elif self.slip == "symmetric":
             slip0 = self._closing_slip(candidates, pairing, directions, config)
-        return rows, slip0
+        return tuple(rows), slip0
 
     def added_gap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
         """Return the contribution (n,) of clearances and wear to the gaps of candidates; zero if unpaired [length]."""
-        clearance = self.options.added_gap(candidates, pairing, self.primary, self.points, config.clearance_factor)
-        if config.worn is None:
-            return clearance
-        return clearance + np.where(
-            pairing.paired, np.einsum("nk,nk->n", candidates.shape, config.worn[candidates.nodes]), 0.0
-        )
+        added, rows, options = np.zeros(len(candidates.nodes)), np.flatnonzero(pairing.paired), self.options
+        nodes, shape = candidates.nodes[rows], candidates.shape[rows]
+        if options.clearance is not None and len(rows):
+            added[rows] += options.clearance(np.einsum("nk,nkd->nd", shape, self.points[nodes]))
+        if options.clearance_primary is not None and isinstance(self.primary, Surface) and len(rows):
+            feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
+            added[rows] += options.clearance_primary(np.einsum("nk,nkd->nd", feet.shape, self.points[feet.nodes]))
+        added *= config.clearance_factor
+        if config.worn is not None:
+            added[rows] += np.einsum("nk,nk->n", shape, config.worn[nodes])
+        return added
 
     def smoothing_overlap(self, candidates: Candidates, pairing: Pairing, config: Configuration) -> Array:
         """Return the lengths (n,) by which smooth surfaces reduce the gaps of candidates, compared with facets [length]."""
         overlap, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
-        if (
-            self.smoothing is None
-            or candidates.facet is None
-            or candidates.xi is None
-            or not isinstance(self.primary, Surface)
-        ):
+        assert self.smoothing is not None
+        assert isinstance(self.primary, Surface)
+        if candidates.facet is None or candidates.xi is None:
             return overlap
         deformed = self.points + config.displacement
         axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
@@ -467,12 +484,14 @@ class Formulation(ABC):
         return overlap
 
     def smoothing_slope(self, candidates: Candidates, pairing: Pairing, rows: Indices, deformed: Array) -> Array | None:
-        """Return the derivatives (n, dim - 1) of `smoothing_overlap` along primary facets [length]; None without smoothing.
+        """Return the derivatives (n, dim - 1) of `smoothing_overlap` along primary facets [length].
 
         `rows` (n,) are numbers of candidates, and `deformed` (n_points, dim) the current coordinates. The derivatives are
         zero on the straight extensions of facets.
         """
-        if self.smoothing is None or candidates.facet is None or not isinstance(self.primary, Surface):
+        assert self.smoothing is not None
+        assert isinstance(self.primary, Surface)
+        if candidates.facet is None:
             return None
         axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
         factor = self.smoothing.shared(candidates.facet[rows], pairing.facet[rows], axes)[:, 1:]
@@ -496,7 +515,7 @@ class Formulation(ABC):
         The directions are given by projectors (n, dim, dim), interpolated between the nodes of the opposite facets.
         """
         assert self.held is not None
-        candidates = Candidates(self.secondary.points[nodes][:, None], np.ones((len(nodes), 1)))
+        candidates = Candidates.at(self.secondary.points[nodes])
         pairing = self.facing(candidates, config, max(self.projection_tolerance or 0.0, BESIDE))
         held_primary = np.zeros((len(nodes), *2 * self.points.shape[1:]))
         if isinstance(self.primary, Surface):
@@ -520,16 +539,16 @@ class Formulation(ABC):
         of other primary nodes, but not on those of secondary nodes, and the constraints are nearly redundant.
         """
         across = np.zeros(len(self.secondary.points), bool)
-        if self.held is None or self.options.tied or not isinstance(self.primary, Surface):
+        if self.held is None or self.options.kind == "tied" or not isinstance(self.primary, Surface):
             return across
         nodes = np.flatnonzero(np.isin(self.secondary.points, self.held.restrained))
         if len(nodes):
-            candidates = Candidates(self.secondary.points[nodes][:, None], np.ones((len(nodes), 1)))
+            candidates = Candidates.at(self.secondary.points[nodes])
             pairing = self.facing(candidates, config, max(self.projection_tolerance or 0.0, BESIDE))
             rows = rows_along(pairing.normal, candidates, pairing, self.primary, self.points.size)
             size, remaining = ((matrix**2).sum(axis=1) for matrix in (rows, rows @ self.held.motion))
             across[nodes] = pairing.paired & (remaining < 0.25 * size)
-        return across & ~self.options.excluded_nodes(self.secondary)
+        return across & ~self.excluded[self.secondary.points]
 
     def undetermined(self, config: Configuration) -> Mask:
         """Return which nodes (n_nodes,) belong to facets whose traction is undetermined.
@@ -543,7 +562,7 @@ class Formulation(ABC):
             return np.zeros(len(held_both), bool)
         along = deflate(held_both, nodal_normals(self.secondary, self.points + config.displacement), np.sqrt(0.5))
         across = held_both - along
-        if not self.options.tied:
+        if self.options.kind != "tied":
             since_begin = replace(config, start=np.zeros_like(config.displacement))
             along = self._held_without_motion(since_begin) if self.friction else np.zeros_like(held_both)
         elsewhere = np.eye(held_both.shape[1]) - eigenspaces(along.mean(axis=0)[None], 1.0 - LENGTH_ROUND_OFF)[0]
@@ -574,7 +593,7 @@ class Formulation(ABC):
         points = self.secondary.points[nodes]
         common, slip = self.held.at(points), (config.displacement - config.start)[points]
         if isinstance(self.primary, RigidSide):
-            slip = slip - self.rigid_motion(Candidates(points[:, None], np.ones((len(nodes), 1))), config)
+            slip = slip - self.rigid_motion(Candidates.at(points), config)
         else:
             rows = np.flatnonzero(pairing.paired)
             feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
@@ -626,8 +645,7 @@ class Formulation(ABC):
         rows = np.flatnonzero(pairing.paired)
         feet = places(self.primary, pairing.facet[rows], pairing.xi[rows])
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
-        primary_normals = at_nodes_of_facets(smooth_normals(self.primary, deformed))[pairing.facet[rows]]
-        primary_normals = interpolate(primary_normals, feet)
+        primary_normals = interpolate(smooth_normals(self.primary, deformed)[pairing.facet[rows]], feet)
         mean = primary_normals - self._secondary_normals(Candidates(nodes, shape), deformed)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > LENGTH_ROUND_OFF)
@@ -671,10 +689,11 @@ class Formulation(ABC):
         normal : ndarray (n_nodes, dim)
             Unit normals of the primary side [-].
         """
-        nodes = Candidates.nodes_of(self.secondary)
+        nodes = self.at_nodes
         pairing = self.facing(nodes, config, max(self.projection_tolerance or 0.0, BESIDE))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
-        gap0 -= self.smoothing_overlap(nodes, pairing, config)
+        if self.smoothing is not None:
+            gap0 -= self.smoothing_overlap(nodes, pairing, config)
         if with_clearance:
             gap0 += self.added_gap(nodes, pairing, config)
         u = config.displacement if displacement is None else displacement
@@ -685,13 +704,13 @@ class Formulation(ABC):
 
         It includes nodes beyond the end of the other side, which may carry pressure because parts of their facets face it.
         """
-        nodes = Candidates.nodes_of(self.secondary)
+        nodes = self.at_nodes
         pairing = self.facing(nodes, config, np.inf)
         directions = tangents(pairing.normal)
         rows, slip0 = self.slips(nodes, pairing, directions, config)
-        components = np.stack([row @ (config.displacement - config.start).ravel() for row in rows])
-        components += slip0
-        slip = np.einsum("kn,knd->nd", components, np.stack(directions))
+        slip, displacement = np.zeros_like(pairing.normal), (config.displacement - config.start).ravel()
+        for row, constant, direction in zip(rows, slip0, directions, strict=True):
+            slip += (row @ displacement + constant)[:, None] * direction
         return np.where(pairing.paired[:, None], slip, 0.0)
 
 

@@ -91,7 +91,7 @@ class PressureField(NodalField):
     @classmethod
     def of_points(
         cls, points: tuple[Indices, Array], areas: tuple[Array, Array], rho: float,
-        field: tuple[csr_array, Indices], renewed: bool,
+        field: tuple[csr_array, Indices], renewed: bool, eliminable: bool = False, quadratic: bool = False,
     ) -> PressureField:  # fmt: skip
         """Return the pressure field of m integration points.
 
@@ -105,31 +105,27 @@ class PressureField(NodalField):
             The constant of the augmented Lagrangian [pressure / length].
         field : (csr_array (n_nodes, k), ndarray of int (k,))
             `nodes` and `independent`.
-        renewed : bool
+        renewed, eliminable, quadratic : bool
+            See `PressureField` and `Projection`.
         """
         (around, shape), (nodes, independent), (usable_areas, full_areas) = points, field, areas
         P = shapes_at(shape, around, nodes.shape[0])
         covered, total = P.T @ usable_areas, P.T @ full_areas
         P = csr_array(P @ nodes)
         mass = splu((P.T @ diags_array(usable_areas) @ P).tocsc()) if len(independent) else None
-        projection = Projection(P, usable_areas, rho, mass)
+        projection = Projection(P, usable_areas, rho, mass, eliminable, quadratic)
         return cls(projection, nodes, independent, around, shape, renewed, total, covered)
 
-    @property
-    def areas(self) -> Array:
-        """Areas (m,) of the integration points; infinite for points that cannot carry forces [area]."""
-        return np.where(self.projection.areas > 0, self.projection.areas, np.inf)
-
     def pressure(self, force: Array) -> Array:
-        """Return the field (n_nodes,) at the nodes [pressure]; it may be slightly negative beyond the edge of the contact."""
+        """Return the field (n_nodes, ...) at the nodes [pressure]; it may be slightly negative outside the contact."""
         return self.nodes @ self.projection.field(force)
 
     def traction(self, force: Array) -> Array:
         """Return nodal tractions (n_nodes, dim) for point forces (m, dim); see `NodalField`."""
         if self.axes is None:
-            return super().traction(force)
+            return self.pressure(force)
         at_points, at_nodes = self.axes
-        return np.einsum("nde,ne->nd", at_nodes, super().traction(np.einsum("mde,md->me", at_points, force)))
+        return np.einsum("nde,ne->nd", at_nodes, self.pressure(np.einsum("mde,md->me", at_points, force)))
 
     @property
     def covered(self) -> Array:
@@ -234,21 +230,19 @@ class PressureFieldFormulation(Formulation):
 
         They are excluded or `held_across`. Values on facets of which all nodes are held remain independent.
         """
-        held, dependent = self.held_across(config), self.options.excluded_nodes(self.secondary)
+        held, dependent = self.held_across(config), self.excluded[self.secondary.points]
         on_held_facets = np.zeros_like(held)
         for block in self.secondary.blocks:
             on_held_facets[block.local[held[block.local].all(axis=1)]] = True
         return dependent | (held & ~on_held_facets)
 
-    def repeated(self, field: tuple[csr_array, Indices]) -> tuple[csr_array, Indices]:
+    def repeated(self, field: tuple[csr_array, Indices], same: Indices) -> tuple[csr_array, Indices]:
         """Return a pressure field in which coincident nodes have a common value.
 
         Both `field` and the result consist of the map (n_nodes, k) from independent to nodal values, and the nodes (k,) of
-        the independent values.
+        the independent values. `same` (n_points,) is `PairOptions.same_place`.
         """
-        same, (values, nodes) = self.options.same_place, field
-        if same is None:
-            return field
+        values, nodes = field
         first, column = np.unique(same[self.secondary.points[nodes]], return_inverse=True)
         independent = np.empty(len(first), np.intp)
         independent[column] = nodes
@@ -269,7 +263,7 @@ class PressureFieldFormulation(Formulation):
         self, candidates: Candidates, pairing: Pairing, field: PressureField, config: Configuration
     ) -> Constraints:
         """Return the constraints of paired integration points, with the compliance C of the pressure field."""
-        projection = replace(field.projection, eliminable=self.eliminable, quadratic=self.secondary.order > 1)
+        projection = field.projection
         constraints = self.assembled(candidates, pairing, projection, config)
         directions, turning = constraints.directions, self.options.turning
         if constraints.tangents and turning is not None:
@@ -279,9 +273,8 @@ class PressureFieldFormulation(Formulation):
         if constraints.tangents and constraints.geometry is not None:
             constraints = replace(constraints, geometry=partial(_elastic, constraints.geometry, projection, field.axes))
         Z = self._tractions_at_supports(field, constraints, directions, config) if self.friction else np.empty(0)
-        return replace(
-            constraints, low_rank_compliance=Z, areas=field.areas, nodal=field, coupled_directions=directions
-        )  # fmt: skip
+        areas = np.where(projection.areas > 0, projection.areas, np.inf)
+        return replace(constraints, low_rank_compliance=Z, areas=areas, nodal=field, coupled_directions=directions)
 
     def _tractions_at_supports(
         self, field: PressureField, constraints: Constraints, directions: tuple[Array, ...], config: Configuration
@@ -327,7 +320,7 @@ def _elastic(
     def elastic(force: Array) -> Array:
         forces = np.zeros((count, force.shape[1]))
         forces[rows] = force if axes is None else np.einsum("mde,md->me", axes[0][rows], force)
-        displacements = np.column_stack([projection.apply(component) for component in forces.T])[rows]
+        displacements = projection.apply(forces)[rows]
         return displacements if axes is None else np.einsum("mde,me->md", axes[0][rows], displacements)
 
     return replace(linearised, compliance=elastic)

@@ -33,12 +33,20 @@ from fastcontact.contact.formulations._dual_basis import COVERED, LEAST, dual_fu
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.integration import NO_AREA, areas_of_rule, nodal_areas
-from fastcontact.contact.linearised_geometry import Closing, Differences, LinearisedPoints, NodalNormals, Points, faced
+from fastcontact.contact.linearised_geometry import (
+    Closing,
+    Differences,
+    LinearisedPoints,
+    NodalNormals,
+    Points,
+    Substitution,
+    faced,
+)
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import FACING, Candidates, Normals, padded, pair, tangents
-from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
+from fastcontact.contact.pairing import FACING, Candidates, Normals, pair, tangents
+from fastcontact.contact.projection import nodal_normals, normals_at_nodes, smooth_normals
 from fastcontact.contact.search.limits import BEYOND
-from fastcontact.contact.surface import Surface
+from fastcontact.contact.surface import Surface, padded
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Blocks, assembled, rows_of, scaled
 from fastcontact.mesh import elements
@@ -98,6 +106,24 @@ class Means(NamedTuple):
     normal: Array
 
 
+class SlipData(NamedTuple):
+    """Data of the slips of nodes.
+
+    Attributes
+    ----------
+    tangents : ndarray (k, m, dim)
+        Unit tangents [-].
+    length : ndarray (m,)
+        Lengths by which gaps close in the step [length].
+    substitutions : list of (Substitution, Coverage)
+        Additional slips in directions in which supports hold both sides, and the coverage without the held nodes.
+    """
+
+    tangents: Array
+    length: Array
+    substitutions: list[tuple[Substitution, Coverage]]
+
+
 @dataclass(eq=False)
 class WeightedMortar(Formulation):
     """Mortar contact with weighted gaps at nodes. The parameters of `Formulation` apply as well.
@@ -154,7 +180,9 @@ class WeightedMortar(Formulation):
         """See `Formulation`; a node with dual functions and a small overlap may have a gap in every other pairing."""
         covered = np.zeros(1) if constraints.nodal is None else np.asarray(constraints.nodal.covered)
         small = (
-            self.multipliers == "dual" and not self.options.tied and bool(((covered > 0.0) & (covered < LEAST)).any())
+            self.multipliers == "dual"
+            and self.options.kind != "tied"
+            and bool(((covered > 0.0) & (covered < LEAST)).any())
         )
         return small or super().alternates(constraints)
 
@@ -162,17 +190,16 @@ class WeightedMortar(Formulation):
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
         means = self._means(self.points + config.displacement, config)
         # Tied pairs have separate equations for the directions in which both sides are held.
-        held = self.without_slip(config) if self.has_tangents and not self.options.tied else []
+        held = self.without_slip(config) if self.has_tangents and self.options.kind != "tied" else []
         constraints, slip_data = self._weighted_gaps(config, means, held)
         return replace(constraints, geometry=partial(self._linearised, config, means, held, constraints, slip_data))
 
     def _weighted_gaps(
         self, config: Configuration, means: Means, held: list[tuple[Array, Mask]]
-    ) -> tuple[Constraints, tuple[Array, Array] | None]:
+    ) -> tuple[Constraints, SlipData | None]:
         """Return the constraints without their derivatives, and the data of their slips.
 
-        `held` are the directions `without_slip`. The data are the tangents (k, m, dim) and the lengths (m,) by which gaps
-        close, or None without tangents.
+        `held` are the directions `without_slip`. The data are None without tangents.
         """
         coverage, rows, across, weight, mean, closer, normal = means
         B = rows_of(mean, normal)
@@ -190,12 +217,13 @@ class WeightedMortar(Formulation):
         constraints = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=pressures)
         if not self.has_tangents:
             return constraints, None
-        candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
         projectors = np.zeros((*normal.shape, normal.shape[1]))
         for axis, nodes_held in held:
             projectors[nodes_held] += axis[nodes_held, :, None] * axis[nodes_held, None, :]
-        mu, directions, slip_axes = self.options.friction_axes(self.friction, tangents(normal, projectors), candidates)
-        slips, additional = self._slips(slip_axes, held, coverage, mean, rows, weight)
+        mu, directions, slip_axes = self.options.friction_axes(
+            self.friction, tangents(normal, projectors), self.at_nodes
+        )
+        slips, substitutions = self._slips(slip_axes, held, coverage, mean, rows, weight)
         length, closing_direction = self._closing_motion(constraints, normal, config)
         closing = length[:, None] * closing_direction
         # Part of the relative motion that is not slip: that of a rigid obstacle, or minus the motion that closes the gap.
@@ -205,12 +233,10 @@ class WeightedMortar(Formulation):
             current, before = (mean @ (self.points + u) for u in (config.displacement, config.start))
             non_slip = self.primary.rigid_motion(current, before, config.pose, config.pose_start)
         slip0 = -np.stack([np.einsum("nd,nd->n", t, non_slip) for t in slip_axes])
-        for axis, is_held, motion in additional:
-            transverse = closing - np.where(is_held, np.einsum("md,md->m", closing, axis), 0.0)[:, None] * axis
-            apparent_slip = np.einsum("md,md->m", motion @ transverse, axis)
-            slip0 += np.stack([np.einsum("md,md->m", t, axis) * apparent_slip for t in slip_axes])
+        for substitution, _ in substitutions:
+            slip0 += np.stack([np.einsum("nd,nd->n", t, substitution.closing(closing)) for t in slip_axes])
         constraints = replace(constraints, tangents=slips, directions=directions, friction=mu, slip0=slip0)
-        return constraints, (np.stack(slip_axes), length)
+        return constraints, SlipData(np.stack(slip_axes), length, substitutions)
 
     def _means(self, deformed: Array, config: Configuration, like: Coverage | None = None) -> Means:
         """Return the mean relative motions of nodes at the coordinates `deformed` (n_points, dim) [length].
@@ -226,7 +252,7 @@ class WeightedMortar(Formulation):
             coverage = self._coverage(overlap, weights, like.with_gap, like.values)
         rows, across, closer = self._weighted_integrals(coverage)
         # The gap of an excluded node is omitted, but the functions of its neighbours are not extended over its area.
-        sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
+        sums = np.where(self.excluded[self.secondary.points], 0.0, np.asarray(rows.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         mean = scaled(csr_array(rows - across), 1.0 / weight)
         normal = self._mean_normals(overlap, deformed, config.pose)
@@ -234,7 +260,7 @@ class WeightedMortar(Formulation):
 
     def _linearised(
         self, config: Configuration, means: Means, held: list[tuple[Array, Mask]], constraints: Constraints,
-        slip_data: tuple[Array, Array] | None, multiplier: Array, tangential: Array, displacement: Array,
+        slip_data: SlipData | None, multiplier: Array, tangential: Array, displacement: Array,
     ) -> Linearised:  # fmt: skip
         """Return the linearisation of contact forces, mean gaps and slips; see `linearised_geometry`.
 
@@ -252,15 +278,20 @@ class WeightedMortar(Formulation):
             step = DIFFERENCES**1.5 * float(np.ptp(self.points[sides], axis=0).max())
             return Differences(constraints, constraints_after, (multiplier, tangential), motions, sides, step)
         config, deformed = replace(config, displacement=displacement), self.points + displacement
-        linearised = self._at_points(config, means, multiplier)
+        covers = [] if slip_data is None else [cover for _, cover in slip_data.substitutions]
+        linearised, functions = self._at_points(config, means, multiplier, covers)
         if slip_data is None:
             return linearised
-        directions, length = slip_data
-        slips = self._load_step_slips(means.motion, directions, tangential, config)
-        if not isinstance(self.primary, RigidSide) and self.slip == "symmetric":
+        slips = self._load_step_slips(means.motion, slip_data.tangents, tangential, config)
+        is_rigid = isinstance(self.primary, RigidSide)
+        symmetric = self.slip == "symmetric" and not is_rigid
+        if symmetric or covers:
             opening = means.motion @ slips.start - means.closer
-            closing = Closing.of(means.normal, NodalNormals(self.secondary, deformed), opening, length)
-            slips = replace(slips, total=slips.total + closing.vector, closing=closing)
+            secondary = None if is_rigid else NodalNormals(self.secondary, deformed)
+            closing = Closing.of(means.normal, secondary, opening, slip_data.length)
+            slips = replace(slips, total=slips.total + symmetric * closing.vector, closing=closing, symmetric=symmetric)
+            for (substitution, _), weights in zip(slip_data.substitutions, functions, strict=True):
+                slips = slips.with_substitution(replace(substitution, functions=weights), linearised.points.motion)
         return replace(linearised, slips=slips)
 
     def _ends_within(self, config: Configuration, multiplier: Array) -> bool:
@@ -270,24 +301,28 @@ class WeightedMortar(Formulation):
         ends = ((b.local, facets_at_ends(b, self.primary, deformed, tolerance)) for b in self.secondary.blocks)
         return any(multiplier[local[facets]].any() for local, facets in ends)
 
-    def _at_points(self, config: Configuration, means: Means, multiplier: Array) -> LinearisedPoints:
+    def _at_points(
+        self, config: Configuration, means: Means, multiplier: Array, covers: Sequence[Coverage]
+    ) -> tuple[LinearisedPoints, list[csr_array]]:
         """Return the linearisation of contact forces and mean gaps, with the projections of the integration points.
 
-        The segments are kept constant. The variation of a cut has no effect if the integrand is continuous across it, which
-        is the case except at ends of the primary side.
+        The second result contains the weights of the points in `covers` minus those in `means`. The segments are kept
+        constant. The variation of a cut has no effect if the integrand is continuous across it, which is the case except at
+        ends of the primary side.
         """
         deformed, overlap, values = self.points + config.displacement, means.coverage.overlap, means.coverage.values
-        is_loaded = values @ multiplier != 0.0
-        functions, tests, n_points, facet_offset = list[Blocks](), list[Blocks](), 0, 0
+        is_loaded, coverages = values @ multiplier != 0.0, (means.coverage, *covers)
+        functions, tests, n_points, facet_offset = [list[Blocks]() for _ in coverages], list[Blocks](), 0, 0
         nodes, shapes, facets = [], [], []
-        of_blocks = zip(self.secondary.blocks, self._test, means.coverage.functions, overlap.points, strict=True)
-        for block, T, (psi, _), quadrature_points in of_blocks:
+        of_blocks = zip(self.secondary.blocks, self._test, overlap.points, strict=True)
+        for number, (block, T, quadrature_points) in enumerate(of_blocks):
             selected = is_loaded[block.local].any(axis=1)[quadrature_points.facet]
             facet, shape, area = (values[selected] for values in quadrature_points)
             columns = n_points + np.arange(len(facet))[:, None]
-            local, psi_at = block.local[facet], np.einsum("qak,qk,q->qa", psi[facet], shape, area)
-            functions.append((local, columns, psi_at[:, :, None]))
-            tests.append((local, columns, (area[:, None] * (shape @ T.T))[:, :, None]))
+            local, weighted = block.local[facet], (area[:, None] * shape)[:, :, None]
+            tests.append((local, columns, T @ weighted))
+            for entries, coverage in zip(functions, coverages, strict=True):
+                entries.append((local, columns, coverage.functions[number][0][facet] @ weighted))
             nodes.append(block.facets[facet])
             shapes.append(shape)
             facets.append(facet_offset + facet)
@@ -296,18 +331,22 @@ class WeightedMortar(Formulation):
         pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", config.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), n_points)
         normals = "facet" if self.normals == "secondary" else self.normals
-        rise = self.smoothing_slope(candidates, pairing, rows, deformed)
+        rise = None if self.smoothing is None else self.smoothing_slope(candidates, pairing, rows, deformed)
         points = faced(candidates, pairing, rows, self.primary, deformed, normals, config.pose, True, rise)
-        weighted = scaled(csr_array(values.T @ assembled(functions, size)[:, rows]), 1.0 / means.weight)
+        weights, *others = (
+            scaled(csr_array(values.T @ assembled(entries, size)[:, rows]), 1.0 / means.weight) for entries in functions
+        )
         mean = csr_array(assembled(tests, size)[:, rows])
         separate_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
         if isinstance(self.primary, RigidSide):
-            column = self.secondary.points[:, None]
-            at_nodes, all_nodes = Candidates(column, np.ones(column.shape)), np.arange(len(column))
-            separate_normals = faced(at_nodes, pairing, all_nodes, self.primary, deformed, self.normals, config.pose)
+            all_nodes = np.arange(len(self.secondary.points))
+            separate_normals = faced(
+                self.at_nodes, pairing, all_nodes, self.primary, deformed, self.normals, config.pose
+            )
         elif self.normals == "secondary":
             separate_normals = NodalNormals(self.secondary, deformed)
-        return LinearisedPoints(self.secondary, points, weighted, means.normal, multiplier, mean, separate_normals)
+        arguments = points, weights, means.normal, multiplier, mean, separate_normals
+        return LinearisedPoints(self.secondary, *arguments), [csr_array(other - weights) for other in others]
 
     @cached_property
     def _whole_side(self) -> tuple[Array, Array, list[Any], Mask]:
@@ -341,16 +380,15 @@ class WeightedMortar(Formulation):
     def _slips(
         self, directions: Sequence[Array], without_slip: list[tuple[Array, Mask]], coverage: Coverage, mean: csr_array,
         base: csr_array, weight: Array,
-    ) -> tuple[tuple[csr_array, ...], list[tuple[Array, Mask, csr_array]]]:  # fmt: skip
-        """Return the rows (m, n_dofs) of the slips along tangents (m, dim), and additional motions in held directions.
+    ) -> tuple[tuple[csr_array, ...], list[tuple[Substitution, Coverage]]]:  # fmt: skip
+        """Return the rows (m, n_dofs) of the slips along tangents (m, dim), and the additional slips in held directions.
 
         Usually the rows are those of the `mean` relative motion. If both sides are held at a node in a direction, as in a
         plane of symmetry, the mean in this direction would contain only the motion of the other side near the plane. The
-        functions of neighbouring nodes then replace that of the node, see `Formulation.without_slip`. On curved sides, these
-        neighbours close their gaps along other normals. Therefore, the second result contains the matrix (m, m) of the
-        additional motion of the secondary nodes for each of these directions (m, dim).
+        functions of neighbouring nodes then replace that of the node, see `Formulation.without_slip`. The coverage with these
+        functions follows each `Substitution`.
         """
-        rows, additional = [rows_of(mean, direction) for direction in directions], []
+        rows, substitutions = [rows_of(mean, direction) for direction in directions], []
         held = np.zeros((len(weight), *2 * self.points.shape[1:]))
         for axis, nodes in without_slip:
             if not (nodes & coverage.with_gap).any():
@@ -362,13 +400,13 @@ class WeightedMortar(Formulation):
             for k, direction in enumerate(directions):
                 slip = np.einsum("md,md->m", direction, axis)
                 rows[k] = csr_array(rows[k] + rows_of(difference, slip[:, None] * axis))
-            additional.append(
-                (axis, nodes, csr_array(scaled(csr_array(substitute - base), 1.0 / weight)[:, self.secondary.points]))
-            )
+            secondary = csr_array(scaled(csr_array(substitute - base), 1.0 / weight)[:, self.secondary.points])
+            substitutions.append((Substitution(axis, nodes, secondary, difference), cover))
             held[nodes] += np.einsum("md,me->mde", axis[nodes], axis[nodes])
         # Slip is computed along tangents whose component that supports do not hold is longer than FACING.
         free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FACING**2 for t in directions]
-        return tuple(scaled(row, np.where(slips, 1.0, 0.0)) for row, slips in zip(rows, free, strict=True)), additional
+        rows = [scaled(row, np.where(slips, 1.0, 0.0)) for row, slips in zip(rows, free, strict=True)]
+        return tuple(rows), substitutions
 
     def _weighted_integrals(self, coverage: Coverage) -> tuple[csr_array, csr_array, Array]:
         """Return the integrals of psi times the secondary and times the primary shape functions, (m, n_points) each [area].
@@ -457,14 +495,14 @@ class WeightedMortar(Formulation):
         if not isinstance(self.normals, str):
             return np.tile(np.array(self.normals), (len(self.secondary.points), 1))
         mean = np.zeros((len(self.secondary.points), deformed.shape[1]))
-        normals_of = {
-            block.element: facet_normals(block, deformed) if self.normals == "facet" else smooth
-            for block, smooth in zip(self.primary.blocks, smooth_normals(self.primary, deformed), strict=True)
-        }
+        normals = (normals_at_nodes if self.normals == "facet" else smooth_normals)(self.primary, deformed)
+        of_blocks = np.split(normals, np.cumsum(self.primary.sizes)[:-1])
+        normals_of = dict(zip((block.element for block in self.primary.blocks), of_blocks, strict=True))
         tests = dict(zip((block.element for block in self.secondary.blocks), self._test, strict=True))
         for coupling in overlap.couplings:
             secondary_facet, primary_facet = coupling.pairs.T
-            integral = coupling.integrals @ normals_of[coupling.primary.element][primary_facet]
+            at_nodes = normals_of[coupling.primary.element][primary_facet, : coupling.primary.facets.shape[1]]
+            integral = coupling.integrals @ at_nodes
             np.add.at(mean, coupling.secondary.local[secondary_facet], tests[coupling.secondary.element] @ integral)
         self.secondary.add_across_ends(mean)
         length, overall = np.linalg.norm(mean, axis=1, keepdims=True), mean.sum(axis=0)

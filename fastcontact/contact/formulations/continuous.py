@@ -80,12 +80,14 @@ class Continuous(PressureFieldFormulation):
         self._candidates = Candidates.inside(self.secondary, rules)
         rho = self.augmentation * self.modulus / shortest
         all_areas = np.concatenate(areas)
-        areas_of_points = np.where(self.options.excludes(self._candidates), 0.0, all_areas)
+        areas_of_points = np.where(self._candidates.belonging_to(self.excluded), 0.0, all_areas)
         nodes = padded(local)
         P = shapes_at(self._candidates.shape, nodes, len(self.secondary.points))
-        field = self.repeated(self._independent_values(P, areas_of_points))
-        points = nodes, self._candidates.shape
-        self._field = PressureField.of_points(points, (areas_of_points, all_areas), float(rho), field, renewed=False)
+        field = self._independent_values(P, areas_of_points)
+        field = field if self.options.same_place is None else self.repeated(field, self.options.same_place)
+        points, areas_of_all = (nodes, self._candidates.shape), (areas_of_points, all_areas)
+        kind = {"renewed": False, "eliminable": self.eliminable, "quadratic": self.secondary.order > 1}
+        self._field = PressureField.of_points(points, areas_of_all, float(rho), field, **kind)
 
     def _rule(self, element: str) -> quadrature.Rule:
         """Return the integration points and weights on the reference facet of an element type."""
@@ -168,7 +170,7 @@ class Continuous(PressureFieldFormulation):
         areas = self._field.projection.areas
         if self.integration != "node" or not self.axisymmetric or self.options.penalty is not None:
             return np.zeros(len(areas), bool)
-        return (areas == 0.0) & ~self.options.excludes(self._candidates)
+        return (areas == 0.0) & ~self._candidates.belonging_to(self.excluded)
 
 
 def _simpson(element: str) -> quadrature.Rule:

@@ -182,10 +182,10 @@ class SegmentMortar(PressureFieldFormulation):
         super().__post_init__()
         if self.n_gauss is not None and self.n_gauss < 2:
             raise ContactError(f"n_gauss = {self.n_gauss} points per piece do not integrate it exactly: use at least 2")
-        facets, element = self.secondary.facets, self.secondary.element
-        xi, weights = quadrature.gauss_line(3)
-        lengths = facet_measure(facets, element, self.points, xi, False) @ weights
-        self._whole = WholeFacets.of(self.secondary.blocks[0], self.points, self.axisymmetric)
+        block, (xi, weights) = self.secondary.only_block, quadrature.gauss_line(3)
+        lengths = facet_measure(block.facets, block.element, self.points, xi, False) @ weights
+        self._borders = _excluded_borders(block, self.excluded)
+        self._whole = WholeFacets.of(block, self.points, self.axisymmetric)
         self._rho = self.augmentation * self.modulus / float(lengths.min())
 
     @classmethod
@@ -198,25 +198,39 @@ class SegmentMortar(PressureFieldFormulation):
         """Intersect the facets on the deformed configuration, and return one constraint per integration point."""
         deformed = self.points + config.displacement
         assert isinstance(self.primary, Surface)
-        block, borders = self.secondary.blocks[0], self.options.borders(self.secondary)
+        block = self.secondary.blocks[0]
         n_gauss = block.facets.shape[1] + 1 if self.n_gauss is None else self.n_gauss
-        options = self.axisymmetric, n_gauss, self.projection_tolerance, borders
+        options = self.axisymmetric, n_gauss, self.projection_tolerance, self._borders
         points = line_points(block, self.primary, self.points, deformed, *options)
         facet, shape, area = points.facet, points.shape, points.area
-        candidates = Candidates(self.secondary.facets[facet], shape, facet, points.xi[:, None])
+        candidates = Candidates(block.facets[facet], shape, facet, points.xi[:, None])
         pairing_of_points = self.facing(candidates, config)
         paired = np.repeat(pairing_of_points.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
         covered = np.bincount(facet, weights=np.where(paired, area, 0.0))
-        usable = paired & (covered > NO_AREA * total)[facet] & (area > 0) & ~self.options.excludes(candidates)
+        usable = paired & (covered > NO_AREA * total)[facet] & (area > 0)
+        if self.excluded.any():
+            usable &= ~candidates.belonging_to(self.excluded)
         pairing = replace(pairing_of_points, paired=usable)
-        usable_area, (n, k) = np.where(usable, area, 0.0), self.secondary.facets.shape
+        usable_area, (n, k) = np.where(usable, area, 0.0), block.facets.shape
         mass = np.zeros((n, k, k))
         np.add.at(mass, facet, usable_area[:, None, None] * shape[:, :, None] * shape[:, None, :])
         values = independent_values(self.secondary, self._whole, mass, self.dependent_nodes(config))
-        samples = self.secondary.local[facet], shape
-        field = PressureField.of_points(samples, (usable_area, area), self._rho, self.repeated(values), renewed=True)
+        values = values if self.options.same_place is None else self.repeated(values, self.options.same_place)
+        samples = block.local[facet], shape
+        field = PressureField.of_points(samples, (usable_area, area), self._rho, values, renewed=True)
         return self.of_points(candidates, pairing, field, config)
+
+
+def _excluded_borders(block: FacetBlock, excluded: Mask) -> tuple[Indices, Array]:
+    """Return the ends of the part `excluded` (n_points,) of a line, as facets (n,) and reference coordinates xi (n,)."""
+    order = np.argsort(elements.get(block.element).nodes[:, 0])
+    excluded = excluded[block.facets[:, order]]
+    # The border lies where the shape functions of two adjacent nodes are equal: at 0 on linear lines, and at -2/3 and 2/3
+    # on quadratic lines.
+    crossover = np.linspace(-2 / 3, 2 / 3, 2) if len(order) == 3 else np.zeros(1)
+    facet, edge = np.nonzero(excluded[:, 1:] != excluded[:, :-1])
+    return facet, crossover[edge]
 
 
 FORMULATION = SegmentMortar

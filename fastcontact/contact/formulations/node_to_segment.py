@@ -11,7 +11,7 @@ quadrangles are tensile. Secondary sides with such facets are rejected.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -48,7 +48,6 @@ class NodeToSegment(Formulation):
     opposite: str = "facet"
 
     name: ClassVar[str] = "node_to_segment"
-    _candidates: Candidates = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -65,7 +64,6 @@ class NodeToSegment(Formulation):
                     f"node_to_segment cannot have facets of {block.element} on its secondary side '{self.secondary.group}', "
                     f"whose corner nodes carry no pressure: use formulation 'continuous' or 'mortar'{swap}"
                 )
-        self._candidates = Candidates.nodes_of(self.secondary)
 
     def facing(self, candidates: Candidates, config: Configuration, tolerance: float | None = None) -> Pairing:
         """Return the pairing of candidates with facets or, if `opposite` is ``"node"``, with the nearest primary nodes."""
@@ -84,11 +82,11 @@ class NodeToSegment(Formulation):
 
     def unilateral(self, config: Configuration) -> Constraints:
         """Pair the nodes on the deformed configuration, and return one constraint per secondary node."""
-        pairing = self.facing(self._candidates, config)
-        pairing.paired[self.options.excludes(self._candidates)] = False
+        pairing = self.facing(self.at_nodes, config)
+        pairing.paired[self.excluded[self.secondary.points]] = False
         areas = self._nodal.nodal_areas
         usable = np.where(areas > ROUND_OFF * areas.max(), areas, np.inf)
-        constraints = self.assembled(self._candidates, pairing, None, config)
+        constraints = self.assembled(self.at_nodes, pairing, None, config)
         if self.opposite == "node":
             constraints = replace(constraints, geometry=None)
         return replace(constraints, areas=usable, nodes=self.secondary.points.astype(np.intp), nodal=self._nodal)

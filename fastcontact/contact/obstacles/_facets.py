@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.projection import at_nodes_of_facets, facet_normals, nodal_normals, smooth_normals
+from fastcontact.contact.projection import facet_normals, nodal_normals, normals_at_nodes, smooth_normals
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
@@ -26,7 +26,7 @@ class SurfaceFacets(NamedTuple):
 
     The smooth normal of a facet at a node is the mean over the facets at this node whose angle to the facet is at most the
     crease angle, weighted by the angles of the facets (Thuermer and Wuethrich, 1998). k is the largest number of nodes of a
-    facet, see `at_nodes_of_facets`.
+    facet, see `Surface.all_facets`.
     """
 
     side: Surface
@@ -43,10 +43,8 @@ def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> Surface
     form an orientable surface.
     """
     side, numbers = _oriented(mesh, group, flip)
-    normals = [facet_normals(block, mesh.points) for block in side.blocks]
-    smooth, border = smooth_normals(side, mesh.points, crease), _border(mesh, side, numbers)
-    at_nodes = nodal_normals(side, mesh.points)
-    return SurfaceFacets(side, at_nodes_of_facets(normals), at_nodes_of_facets(smooth), at_nodes, border)
+    normals, smooth = normals_at_nodes(side, mesh.points), smooth_normals(side, mesh.points, crease)
+    return SurfaceFacets(side, normals, smooth, nodal_normals(side, mesh.points), _border(mesh, side, numbers))
 
 
 def _oriented(mesh: Mesh, group: str, flip: bool) -> tuple[Surface, Indices]:

@@ -2,8 +2,8 @@
 """Structure of the Cholesky factor of a sparse symmetric matrix: elimination tree, column counts, supernodes.
 
 The matrix A (n, n) is given by columns, with both triangles: ``start`` (n + 1,) and ``rows`` (nnz,). In its elimination tree,
-the parent of a column is the row of the first entry below the diagonal in this column of the factor, -1 for roots (Liu,
-1990).
+the parent of a column is the row of the first entry below the diagonal in this column of the factor. Roots have the parent -1
+(Liu, 1990).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ Offsets = NDArray[np.int64]
 def tree_and_counts(start: Numbers, rows: Numbers, parent: Numbers, count: Numbers) -> None:
     """Fill `parent` (n,) with the elimination tree, and `count` (n,) with the number of entries of each column of the factor.
 
-    Row i of the factor consists of the paths in the tree from the entries of row i of A to i (Davis, 2006, section 4.5).
-    The number includes the diagonal.
+    The entries of row i of the factor are in the columns on the paths in the tree from the entries of row i of A to i (Davis,
+    2006, section 4.5). The number of entries of a column includes the diagonal.
     """
     visited = np.empty(len(parent), np.int32)  # the last row whose paths contain a column
     for i in range(len(parent)):
@@ -39,9 +39,9 @@ def tree_and_counts(start: Numbers, rows: Numbers, parent: Numbers, count: Numbe
 
 @interpretable_kernel
 def postordered(parent: Numbers, position: Numbers) -> None:
-    """Fill `position` (n,) with the places in a postorder: columns of each subtree are contiguous, with the parent last."""
+    """Fill `position` (n,) with positions in a postorder: the columns of each subtree are contiguous, with its root last."""
     n = len(parent)
-    # Columns of a subtree that have no place yet are before `end` of its root; the last entry is for the roots themselves.
+    # Columns of a subtree without a position will be placed before `end` of its root. The last entry is for the roots.
     size, end = np.ones(n, np.int32), np.empty(n + 1, np.int32)
     for j in range(n):
         if parent[j] != -1:
@@ -55,29 +55,30 @@ def postordered(parent: Numbers, position: Numbers) -> None:
 
 @interpretable_kernel
 def supernodes(
-    parent: Numbers, count: Numbers, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets
+    parent: Numbers, count: Numbers, marked: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets
 ) -> int:
-    """Find supernodes, which are sequences of columns with nearly the same rows below them; return their number.
+    """Find supernodes, which are sequences of columns with nearly the same rows below them, and return their number.
 
     Parameters
     ----------
     parent, count : ndarray of int (n,)
         Tree, and number of entries of each column, for columns numbered in postorder.
-    given : ndarray of bool (n,)
+    marked : ndarray of bool (n,)
         Marked columns, which do not share supernodes with columns that are not marked.
     widths : ndarray (k,), shares : ndarray (k + 1,)
-        Adjacent supernodes are merged if the fraction of explicit zeros in the result is at most ``shares[i]``, i the
-        first of the ascending `widths` not smaller than the width of the result. The last share applies to all wider ones.
+        Adjacent supernodes are merged if the fraction of explicit zeros in the result is at most ``shares[i]``, where
+        ``widths[i]`` is the first of the ascending `widths` that is not smaller than the width of the result. The last share
+        applies to all wider supernodes.
     first, below : ndarray of int (n + 1,)
-        Filled with the first column of each supernode, followed by n, and with the number of rows below each supernode.
+        The first column of each supernode, followed by n, and the number of rows below each supernode; filled here.
     """
     n, top = len(parent), -1
     entries = np.empty(n, np.int64)
     for j in range(n + 1):
-        continues = 0 < j < n and parent[j - 1] == j and count[j - 1] == count[j] + 1 and given[j - 1] == given[j]
+        continues = 0 < j < n and parent[j - 1] == j and count[j - 1] == count[j] + 1 and marked[j - 1] == marked[j]
         if not continues:
             if top >= 0:
-                top = _merged(parent, given, widths, shares, first, below, entries, top, j)
+                top = _merged(parent, marked, widths, shares, first, below, entries, top, j)
             top += 1
             first[top] = j
             if j < n:
@@ -90,11 +91,11 @@ def supernodes(
 
 @inlined_kernel
 def _merged(
-    parent: Numbers, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets, entries: Offsets,
+    parent: Numbers, marked: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets, entries: Offsets,
     top: int, end: int,
 ) -> int:  # fmt: skip
-    """Merge the supernode `top`, which ends before column `end`, with its predecessors as long as this adds few zeros."""
-    while top > 0 and first[top] <= parent[first[top] - 1] < end and given[first[top] - 1] == given[first[top]]:
+    """Merge the supernode `top`, which ends before column `end`, with its predecessors while this adds few zeros."""
+    while top > 0 and first[top] <= parent[first[top] - 1] < end and marked[first[top] - 1] == marked[first[top]]:
         width = end - first[top - 1]
         all_entries = width * (width + 1) // 2 + width * below[top]
         k = 0
@@ -113,7 +114,7 @@ def rows_below(
     start: Numbers, rows: Numbers, order: Numbers, position: Numbers, parent: Numbers, first: Offsets, row_start: Offsets,
     row_indices: Numbers,
 ) -> None:  # fmt: skip
-    """Fill `row_indices` with the rows below each supernode s in ascending order, from ``row_start[s]``.
+    """Fill `row_indices` with the rows below each supernode s in ascending order, beginning at ``row_start[s]``.
 
     The matrix has its original numbering. In all other arrays columns are numbered in postorder: column k of the factor is
     column ``order[k]`` of the matrix, and `position` is the inverse of `order`.

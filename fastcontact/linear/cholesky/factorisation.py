@@ -1,6 +1,6 @@
 """Sparse Cholesky factorisation: elimination order, symbolic factorisation, and numeric factorisation.
 
-Unknowns that contact constraints involve are eliminated last, see `linear.factor_solver`.
+The unknowns that may occur in contact constraints are eliminated last, see `linear.factor_solver`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fastcontact.linear.cholesky import elimination_tree_kernels, factorisation_
 from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Largest fraction of explicit zeros in merged supernodes, by SHARES for widths up to each of WIDTHS and for larger widths.
+# Largest fractions of explicit zeros in merged supernodes (SHARES), for widths up to each of WIDTHS and for larger widths.
 WIDTHS, SHARES = np.array([4, 16, 48]), np.array([0.8, 0.5, 0.1, 0.05])
 
 
@@ -31,10 +31,10 @@ def singular() -> ModelError:
 def fill_reducing(K: bsr_array, last: Indices, connected: bool = False) -> Indices:
     """Return the unknowns (n,) of K in a fill-reducing elimination order, with the unknowns `last` (m,) at the end.
 
-    With `connected`, the order takes into account that the unknowns `last` are coupled with each other after the elimination
-    of all others. Nodes are ordered by the minimum degree algorithm for the pattern of K (Liu, 1985). SciPy only provides
-    this order as a part of the factorisations of SuperLU. An incomplete factorisation, which drops all entries, takes little
-    more time than the ordering.
+    If `connected` is true, the order takes into account that the unknowns `last` are coupled with each other after the
+    elimination of all others. Nodes are ordered by the minimum degree algorithm for the pattern of K (Liu, 1985). SciPy
+    provides this order only as part of a factorisation by SuperLU. Therefore, an incomplete factorisation is computed that
+    drops all entries, which takes little more time than the ordering alone.
     """
     size = K.blocksize[0]
     n = K.shape[0] // size
@@ -42,7 +42,7 @@ def fill_reducing(K: bsr_array, last: Indices, connected: bool = False) -> Indic
     if connected:
         pairs = np.stack(np.meshgrid(nodes := np.unique(last // size), nodes)).reshape(2, -1)
         pattern = pattern + coo_array((np.ones(pairs.shape[1]), pairs), shape=(n, n))
-    # A dominant diagonal prevents pivoting. Panels of one column suffice, because almost nothing is computed.
+    # A dominant diagonal prevents pivoting. Panels of a single column suffice, because almost nothing is computed.
     pattern = csc_array(pattern + 2.0 * n * eye_array(n))
     incomplete = spilu(
         pattern, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1,
@@ -57,7 +57,7 @@ def fill_reducing(K: bsr_array, last: Indices, connected: bool = False) -> Indic
 def reordered(K: bsr_array, order: Indices) -> csc_array:
     """Return the symmetric matrix K (n, n) with its unknowns in the order `order` (n,)."""
     rows = K.tocsr()[order][:, order]
-    return csc_array((rows.data, rows.indices, rows.indptr), shape=K.shape)  # symmetric: rows are columns
+    return csc_array((rows.data, rows.indices, rows.indptr), shape=K.shape)  # K is symmetric: its rows are its columns
 
 
 class Previous(NamedTuple):
@@ -84,18 +84,17 @@ NO_FACTORS = np.empty(0), np.empty(0), np.empty(0)
 class SymbolicFactors:
     """Symbolic factorisation of symmetric matrices with the same pattern.
 
-    From the second matrix on, parts of the last factors are reused if the entries of the matrix on which they depend have
-    not changed, for example in the elastic region around a plastic zone. The result is bitwise equal to that of a complete
-    factorisation.
+    From the second matrix on, those parts of the last factors are reused that depend only on unchanged entries of the matrix,
+    for example in the elastic region around a plastic zone. The result is bitwise equal to that of a complete factorisation.
 
     Parameters
     ----------
     K : bsr_array (n, n)
-        A matrix with this pattern.
+        A matrix with the common pattern.
     last : ndarray of int (m,)
         Unknowns that are eliminated last.
     repeated : bool, optional
-        Whether many matrices will be factorised, so that it pays off to compute two orders and choose the better one.
+        Whether many matrices will be factorised. In this case, two orders are compared, and the better one is used.
     """
 
     def __init__(self, K: bsr_array, last: Indices, repeated: bool = False) -> None:
@@ -159,7 +158,8 @@ class SymbolicFactors:
     def _in_elimination_order(self, K: bsr_array) -> tuple[csc_array, Numbers, Numbers]:
         """Return K, its columns in the order of elimination, and the inverse; see `factorisation_kernels.factorise`.
 
-        From the second matrix on, only the lower triangle in this order is returned, by the cached positions of its entries.
+        From the second matrix on, only the lower triangle in this order is returned, for which the positions of the entries
+        are cached.
         """
         if self._first is not None:
             A, self._first = self._first, None
@@ -222,7 +222,7 @@ def elimination_tree(A: csc_array) -> Tree:
 
 
 def supernodes(A: csc_array, tree: Tree, is_last: Mask) -> Supernodes:
-    """Return the supernodes of A (n, n), none of which mixes columns that `is_last` (n,) marks with others."""
+    """Return the supernodes of A (n, n); columns marked in `is_last` (n,) do not share supernodes with other columns."""
     n = A.shape[0]
     first, below = np.empty(n + 1, np.int64), np.empty(n + 1, np.int64)
     count = elimination_tree_kernels.supernodes(tree.parent, tree.entries, is_last, WIDTHS, SHARES, first, below)

@@ -1,11 +1,11 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Multifrontal factorisation ``L D L.T`` of a sparse symmetric positive definite matrix (Duff and Reid, 1983).
 
-Every supernode assembles a dense frontal matrix from its own columns of the matrix and the update matrices of its children in
-the elimination tree. The columns of the supernode are eliminated in this front, and the remaining update matrix is passed to
-the parent. Fronts are symmetric, and only their upper triangles are used, so that row j of a front becomes column j of L.
-Subtrees in which the matrix has not changed since the last factorisation keep their columns of L and the update matrix of
-their root.
+For each supernode, a dense frontal matrix is assembled from the columns of the supernode and the update matrices of its
+children in the elimination tree. The columns of the supernode are eliminated in this front, and the remaining update matrix
+is passed to the parent. Fronts are symmetric, and only their upper triangles are used, so that row j of a front becomes
+column j of L. In subtrees in which the matrix has not changed since the last factorisation, the columns of L and the update
+matrix of the root are reused.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ BLAS_THRESHOLD = 20_000
 
 @interpretable_kernel
 def work_sizes(parent: Numbers, first: Offsets, row_start: Offsets) -> tuple[int, int]:
-    """Return the numbers of entries of the largest front, and of the stack of update matrices at its peak."""
+    """Return the number of entries of the largest front, and that of the stack of update matrices at its largest."""
     count = len(first) - 1
     largest_front = peak = used = top = 0
     stack_supernodes = np.empty(count, np.int64)  # supernodes whose update matrix is on the stack
@@ -47,7 +47,7 @@ def plan(
     start: Numbers, values: Array, previous: Array, order: Numbers, supernode_parent: Offsets, first: Offsets,
     row_start: Offsets, previous_offsets: Offsets, reused_offsets: Offsets, saved_offsets: Offsets,
 ) -> int:  # fmt: skip
-    """Plan the factorisation of a matrix whose pattern is that of the previous one; return the size of the updates to keep.
+    """Plan the factorisation of a matrix with the pattern of the previous one; return the size of the updates to save.
 
     Parameters
     ----------
@@ -56,15 +56,15 @@ def plan(
     values, previous : ndarray
         Entries of the new and of the previous matrix.
     supernode_parent : ndarray of int (n_supernodes,)
-        Parents of supernodes, or -1.
+        Parent of each supernode, or -1.
     previous_offsets : ndarray of int (n_supernodes,)
-        Offsets of the update matrices that were kept from the previous factorisation, or -1.
+        Offsets of the update matrices that were saved in the previous factorisation, or -1.
     reused_offsets : ndarray of int (n_supernodes,)
-        Filled with -1 for supernodes that are factorised. In subtrees that keep their columns, the root is assigned the
-        offset of its update matrix, and the other supernodes -2.
+        Filled with -1 for supernodes that are factorised. In subtrees that are reused, the root is assigned the offset of
+        its update matrix, and the other supernodes are assigned -2.
     saved_offsets : ndarray of int (n_supernodes,)
-        Filled with the offsets of the update matrices to keep, which are those of the roots of the largest subtrees without
-        a change, or -1.
+        Filled with the offsets of the update matrices to save, or -1. These are the update matrices of the roots of the
+        largest subtrees without changes.
     """
     count, size = len(supernode_parent), 0
     changed = np.zeros(count, np.bool_)
@@ -93,13 +93,13 @@ def factorise(
     row_start: Offsets, below: Numbers, sizes: tuple[int, int], column_start: Offsets,
     reused_offsets: Offsets, previous: tuple[Array, Array, Array], saved_offsets: Offsets, updates: Array, L: Array, d: Array,
 ) -> int:  # fmt: skip
-    """Fill L and `d` (n,); return -1, or the first column with a pivot that is not positive, which is then in `d`.
+    """Fill L and `d` (n,); return -1, or the first column whose pivot is not positive, with this pivot stored in `d`.
 
     Parameters
     ----------
     start, rows, values
-        The matrix by columns, at least its lower triangle in the order of elimination. All other arguments are numbered
-        in the postorder of `elimination_tree_kernels.postordered`.
+        The matrix by columns, at least its lower triangle in the order of elimination. All other arguments are numbered in
+        the postorder of `elimination_tree_kernels.postordered`.
     order, position : ndarray of int (n,)
         Columns of the matrix in the order of elimination, and the inverse.
     parent : ndarray of int (n,)
@@ -115,7 +115,7 @@ def factorise(
     previous : (ndarray, ndarray, ndarray)
         L, `d` and `updates` of the previous factorisation.
     updates : ndarray
-        Filled with the update matrices to keep.
+        Filled with the update matrices to save.
     L : ndarray
         Filled column by column, the unit diagonal first.
     d : ndarray (n,)
@@ -124,7 +124,7 @@ def factorise(
     count = len(first) - 1
     front, stack = np.empty(sizes[0]), np.empty(sizes[1])
     local, stack_supernodes = np.empty(len(order), np.int64), np.empty(count, np.int64)
-    # Work space for a panel, the panel multiplied by its pivots, and the product of both.
+    # Work arrays for a panel, for the panel multiplied by its pivots, and for the product of both.
     widest = 0
     for s in range(count):
         widest = max(widest, first[s + 1] - first[s] + row_start[s + 1] - row_start[s])
@@ -207,7 +207,7 @@ def _store(F: Array, low: int, width: int, column_start: Offsets, L: Array, d: A
 
 @kernel
 def _add(update: Array, rows: Numbers, local: Offsets, F: Array) -> None:
-    """Add the update matrix `update` of a front, with `rows` (m,), to the parent's front (extend-add)."""
+    """Add an `update` matrix (m, m) with the rows `rows` (m,) to the front F of the parent (extend-add operation)."""
     m = len(rows)
     for i in range(m):
         target, source = F[local[rows[i]]], update[i]
@@ -217,9 +217,9 @@ def _add(update: Array, rows: Numbers, local: Offsets, F: Array) -> None:
 
 @kernel
 def _eliminate_columns(F: Array, width: int, panel: Array, scaled_panel: Array, product: Array) -> int:
-    """Eliminate the first `width` columns of a front; return -1, or the first without a positive pivot.
+    """Eliminate the first `width` columns of a front; return -1, or the first column whose pivot is not positive.
 
-    The pivots remain on the diagonal, and the columns of L are stored to the right of it.
+    The pivots remain on the diagonal, and the columns of L are stored to the right of the diagonal.
     """
     size = len(F)
     for begin in range(0, width, PANEL):
@@ -248,7 +248,7 @@ def _eliminate_columns(F: Array, width: int, panel: Array, scaled_panel: Array, 
 def _subtract(F: Array, low: int, high: int, begin: int, end: int, scaled: bool) -> None:
     """Subtract the contribution of the columns `low` to ``high - 1`` of L from the rows `begin` to ``end - 1`` of a front.
 
-    `scaled` is true if these columns have been divided by their pivots. One pass subtracts `COLUMNS_PER_PASS` columns.
+    `scaled` is true if these columns have been divided by their pivots. One pass subtracts COLUMNS_PER_PASS columns.
     """
     size = len(F)
     for i in range(begin, end):

@@ -1,4 +1,4 @@
-"""Factors ``P K P.T = L D L.T`` of a symmetric positive definite matrix: solution, and condensation onto last unknowns."""
+"""Factors ``P K P.T = L D L.T`` of a symmetric positive definite matrix: substitution, and static condensation."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from fastcontact._jit.parallel import on_one_blas_thread
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.linear.cholesky import triangular_kernels
 
-# Largest number of right-hand sides that are solved for together.
+# Largest number of right-hand sides for which systems are solved simultaneously.
 BATCH = 128
 
 
 class LowerTriangle(NamedTuple):
-    """L (n, n), stored by columns, with common row indices for the columns of a supernode; see `triangular_kernels`."""
+    """Matrix L (n, n), stored by columns, with common row indices in each supernode; see `triangular_kernels`."""
 
     start: NDArray[np.int64]
     values: Array
@@ -45,13 +45,13 @@ class SymmetricFactors:
         self.n = len(d)
         self.nnz = len(L.values)
         self._L, self._d, self._position, self._last = L, d, position, last
-        self._given = np.zeros(self.n, bool)
-        self._given[position[last]] = True  # positions of the unknowns `last`
+        self._is_last = np.zeros(self.n, bool)
+        self._is_last[position[last]] = True  # positions of the unknowns `last`
 
     @property
     def nbytes(self) -> int:
         """Memory of the factors [bytes]."""
-        return sum(array.nbytes for array in (*self._L, self._d, self._position, self._given))
+        return sum(array.nbytes for array in (*self._L, self._d, self._position, self._is_last))
 
     def solve(self, f: Array) -> Array:
         """Return ``K^-1 f`` (n,) for a right-hand side (n,) [force]."""
@@ -64,7 +64,7 @@ class SymmetricFactors:
 
     @on_one_blas_thread
     def inverse_entries(self, rows: Indices, columns: Indices) -> Array:
-        """Return the entries of ``K^-1`` in some `rows` (m,) and `columns` (k,), shape (m, k) [length / force]."""
+        """Return the entries (m, k) of ``K^-1`` in `rows` (m,) and `columns` (k,) [length / force]."""
         at_rows, at_columns = self._position[rows], self._position[columns]
         # Neighbouring columns of the factors have common ancestors in the elimination tree.
         entries, order = np.empty((len(rows), len(columns))), np.argsort(at_columns)
@@ -79,20 +79,20 @@ class SymmetricFactors:
 
     @on_one_blas_thread
     def last_inverse(self) -> Array:
-        """Return the rows and columns `last` of ``K^-1``, shape (m, m) [length / force], in the order of `last`."""
+        """Return the block (m, m) of ``K^-1`` for the unknowns `last` (m,), in this order [length / force]."""
         at = np.sort(self._position[self._last])
         index, trailing = np.full(self.n, -1), np.zeros((len(at), len(at)))
         index[at] = np.arange(len(at))
         triangular_kernels.copy_block(*self._L, index, trailing)
-        # The last block of L D^1/2 is the Cholesky factor of the Schur complement, whose inverse is that block of K^-1.
+        # The last block of L D^1/2 is the Cholesky factor of the Schur complement, whose inverse is the block of K^-1.
         inverse, _ = dpotri(trailing * np.sqrt(self._d[at]), lower=True)
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         order = np.searchsorted(at, self._position[self._last])
         return np.ascontiguousarray(inverse[np.ix_(order, order)])
 
     def harmonic_extension(self, u: Array) -> Array:
-        """Return the displacements (n,) that equal u (m,) at the unknowns `last`, with zero forces on all others [length]."""
+        """Return displacements (n,) equal to u (m,) at the unknowns `last`, without forces on the other unknowns [length]."""
         x = np.zeros(self.n)
         x[self._position[self._last]] = u
-        triangular_kernels.backward(*self._L, self._given, x)
+        triangular_kernels.backward(*self._L, self._is_last, x)
         return x[self._position]

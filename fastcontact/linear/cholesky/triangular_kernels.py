@@ -1,9 +1,9 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Forward and backward substitution with the supernodal factors ``L D L.T`` of a symmetric matrix.
 
-L (n, n) is lower triangular with a unit diagonal and stored by columns: column j is ``values[start[j] : start[j + 1]]``,
-with the diagonal first. The columns ``first[s]`` to ``first[s + 1] - 1`` of supernode s share the rows
-``rows[row_start[s] : row_start[s + 1]]`` below them; their diagonal block is full.
+L (n, n) is lower triangular with a unit diagonal. It is stored by columns: column j is ``values[start[j] : start[j + 1]]``,
+beginning with the diagonal. The columns ``first[s]`` to ``first[s + 1] - 1`` of supernode s have the same rows
+``rows[row_start[s] : row_start[s + 1]]`` below their common diagonal block, which is full.
 """
 
 from __future__ import annotations
@@ -68,17 +68,17 @@ def forward(start: Offsets, values: Array, first: Offsets, row_start: Offsets, r
 
 @summing_kernel
 def backward(
-    start: Offsets, values: Array, first: Offsets, row_start: Offsets, rows: Numbers, given: Mask, x: Array
+    start: Offsets, values: Array, first: Offsets, row_start: Offsets, rows: Numbers, prescribed: Mask, x: Array
 ) -> None:
-    """Replace x (n,) by the solution of ``L.T y = x`` in which the entries `given` (n,) keep their values.
+    """Replace x (n,) by the solution of ``L.T y = x`` in which the entries `prescribed` (n,) keep their values.
 
-    If entry j is given, all entries in the rows of column j must be given.
+    If entry j is prescribed, all entries in the rows of column j must be prescribed.
     """
     gathered = np.empty(len(x))
     for s in range(len(first) - 2, -1, -1):
         low, high = first[s], first[s + 1]
         j = high - 1
-        while j >= low and given[j]:
+        while j >= low and prescribed[j]:
             j -= 1
         if j < low:
             continue
@@ -114,9 +114,9 @@ def solve_together(
 ) -> None:  # fmt: skip
     """Replace the rows `required` of X (n, k) by those of ``(L D L.T)^-1 X``, for all k columns simultaneously.
 
-    Only the rows `loaded` (n,) of X may have nonzero entries; d (n,) is the diagonal of D. The forward substitution skips
-    supernodes that the rows `loaded` do not affect, and the backward substitution those that do not affect the rows
-    `required` (n,); see `_affected`. Both masks are overwritten, and the other rows of X are undefined afterwards.
+    Only the rows `loaded` (n,) of X may have nonzero entries, and d (n,) is the diagonal of D. The forward substitution skips
+    supernodes that are not affected by the rows `loaded`, and the backward substitution skips those that do not affect the
+    rows `required` (n,); see `_affected`. Both masks are overwritten, and the other rows of X are undefined afterwards.
     """
     max_rows = 0
     for s in range(len(first) - 1):
@@ -152,7 +152,7 @@ def solve_together(
 def _affected(first: Offsets, row_start: Offsets, rows: Numbers, marked: Mask) -> Mask:
     """Return which supernodes (n_supernodes,) contain `marked` columns (n,), or have descendants that do.
 
-    Descendants and ancestors are those in the elimination tree. All ancestors of marked columns are marked as well.
+    Descendants and ancestors refer to the elimination tree. All ancestors of marked columns are marked as well.
     """
     affected = np.zeros(len(first) - 1, np.bool_)
     for s in range(len(affected)):
@@ -167,9 +167,9 @@ def _affected(first: Offsets, row_start: Offsets, rows: Numbers, marked: Mask) -
 def _pack(
     start: Offsets, values: Array, low: int, high: int, end: int, rows_below: Numbers, panel: Array, below: Offsets
 ) -> int:
-    """Copy columns `low` to ``high - 1`` of L, from row `high` on, to `panel` one by one; return their length.
+    """Copy columns `low` to ``high - 1`` of L, from row `high` on, to `panel` one after the other; return their length.
 
-    The numbers of these rows are written to `below`: `high` to ``end - 1`` in the same supernode, then `rows_below`.
+    The row numbers are written to `below`. They are `high` to ``end - 1`` in the same supernode, followed by `rows_below`.
     """
     size = end - high + len(rows_below)
     for j in range(low, high):

@@ -1,12 +1,13 @@
 """Inverse of the matrix P of the pivot columns, by small independent blocks or, if many nodes are coupled, by LU factors.
 
-Weighted gaps with standard multipliers are coupled by a mass matrix of the secondary surface, whose inverse is a full
-matrix. Its factors, however, are sparse, so that a solution with them costs little compared with a product with the
-stiffness matrix. Preconditioners need sparse weights. They use a sparse approximation of the inverse, with one block per
+With standard multipliers, weighted gaps are coupled by the mass matrix of the secondary surface, whose inverse is a full
+matrix. Its factors, however, are sparse, so that forward and back substitution cost little compared with a product with the
+stiffness matrix. Preconditioners require sparse weights. They use a sparse approximation of the inverse, with one block per
 node, that is exact for translations in the directions of the pivots of the node.
 
-A nearly singular matrix is detected by an estimate of its condition number, which takes a few solutions (`condition`). The
-diagonal of the triangular factors is not sufficient: if two of many rows are equal, all its entries may be large.
+A nearly singular matrix is detected by an estimate of its condition number, for which a few systems are solved (see
+`condition`). The diagonal of the triangular factors is not sufficient for this purpose: if two of many rows are equal, all
+its entries may be large.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
-# Smallest admissible ratio of the sums of absolute values of a row after and before its entries are lumped into nodal blocks.
-LUMPED = 0.3
+# Smallest admissible ratio of the sum of the absolute values in a row after lumping into nodal blocks to that before lumping.
+SMALLEST_LUMPED_RATIO = 0.3
 Apply = Callable[[Array], Array]
 
 
@@ -40,7 +41,7 @@ class RepeatedError(ConvergenceError):
 
 
 class CoupledError(RepeatedError):
-    """Raised if equations of many nodes involve the same unknowns and cannot be eliminated."""
+    """Raised if the equations of many nodes involve the same unknowns and cannot be eliminated."""
 
     def __init__(self) -> None:
         ConvergenceError.__init__(
@@ -52,7 +53,7 @@ class CoupledError(RepeatedError):
 
 @dataclass(frozen=True, eq=False)
 class SparseInverse:
-    """The inverse of P, if it is a sparse matrix.
+    """Inverse of P as a sparse matrix.
 
     Attributes
     ----------
@@ -64,7 +65,7 @@ class SparseInverse:
 
     @property
     def sparse(self) -> SparseInverse:
-        """The inverse itself; `CoupledPivots.sparse` is an approximation."""
+        """The inverse itself, whereas `CoupledPivots.sparse` is an approximation."""
         return self
 
     def solve(self, b: Array) -> Array:
@@ -77,7 +78,7 @@ class SparseInverse:
 
 
 class CoupledPivots:
-    """The LU factors of P (m, m), if its inverse is a full matrix.
+    """LU factors of P (m, m), for a matrix whose inverse is full.
 
     Parameters
     ----------
@@ -104,7 +105,7 @@ class CoupledPivots:
     def __init__(self, P: csr_array, pivots: Indices, size: int) -> None:
         L = lumped(P, pivots, size)
         ratio = np.asarray(abs(L).sum(axis=1)) / np.asarray(abs(P).sum(axis=1))
-        if not ratio.min() >= LUMPED:
+        if not ratio.min() >= SMALLEST_LUMPED_RATIO:
             raise CoupledError()
         self.sparse = SparseInverse(block_inverse(L))
         try:
@@ -130,8 +131,8 @@ def lumped(P: csr_array, pivots: Indices, size: int) -> csr_array:
     """Return P (m, m) with the entries of each row summed, for each direction, into the diagonal block of its node.
 
     Entries in directions in which the node of the row has no pivot are omitted. In the other directions, the product with a
-    translation of all pivots does not change. `pivots` (m,) are the unknowns of the columns, and `size` is the number of
-    unknowns of a node.
+    translation of all pivots does not change. `pivots` (m,) contains the unknown of each column, and `size` is the number of
+    unknowns per node.
     """
     node, direction = pivots // size, pivots % size
     column = np.full((node.max() + 1) * size, -1, np.intp)
@@ -143,7 +144,7 @@ def lumped(P: csr_array, pivots: Indices, size: int) -> csr_array:
 
 
 def block_inverse(A: csr_array) -> csr_array:
-    """Return the inverse of a sparse matrix (m, m) that consists of small independent blocks after a permutation.
+    """Return the inverse of a sparse matrix (m, m) that is block diagonal with small blocks after a permutation.
 
     Raises
     ------
@@ -189,8 +190,8 @@ def condition(P: csr_array, solve: Apply, solve_transposed: Apply) -> float:
     """Return an estimate of the componentwise condition number of P (m, m) (Skeel, 1979).
 
     The condition number is the largest component of ``abs(P^-1) @ abs(P) @ ones`` and does not depend on the scaling of the
-    rows. The estimate is a lower bound, which is seldom less than a third of it (Hager, 1984; Higham, 1988), or NaN if
-    products overflow.
+    rows. The estimate is a lower bound, which is seldom less than a third of the exact value (Hager, 1984; Higham, 1988). It
+    is NaN if products overflow.
 
     Parameters
     ----------

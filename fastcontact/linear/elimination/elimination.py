@@ -24,9 +24,9 @@ NO_INVERSE = SparseInverse(csr_array((0, 0)))
 class Elimination:
     """Elimination of m unknowns by m equations among n unknowns.
 
-    The eliminated unknowns are ``u[pivots] = weights @ u + offset``. If pivots are coupled, so that P^-1 is a full matrix,
-    they are ``u[pivots] = P^-1 (weights @ u) + offset`` instead. The multipliers of the equations exert the forces
-    ``F.T @ multiplier`` on the unknowns; F is B unless `eliminate` is called with `force_rows`.
+    The eliminated unknowns are ``u[pivots] = weights @ u + offset``. If the pivots are coupled, so that P^-1 is a full
+    matrix, they are ``u[pivots] = P^-1 (weights @ u) + offset`` instead. The multipliers of the equations exert the forces
+    ``F.T @ multiplier`` on the unknowns. F equals B unless `eliminate` is called with `force_rows`.
 
     Attributes
     ----------
@@ -38,11 +38,11 @@ class Elimination:
         Values of the pivots if all other unknowns are zero [length].
     force_weights : csr_array (m, n)
         Fractions of the force at each pivot that act on the other unknowns after the elimination; equal to `weights` if F
-        is B [-].
+        equals B [-].
     inverse : SparseInverse or CoupledPivots
         Inverse of the columns of F that belong to the pivots.
     pivot_inverse : SparseInverse or CoupledPivots
-        P^-1, the inverse of the columns of B that belong to the pivots; equal to `inverse` if F is B.
+        P^-1, the inverse of the columns of B that belong to the pivots; equal to `inverse` if F equals B.
     compliance : ndarray (m,), optional
         Compliance of the equations, ``B u + compliance * multiplier = c`` [length / force].
     """
@@ -57,7 +57,7 @@ class Elimination:
 
     @property
     def coupled(self) -> bool:
-        """Whether pivots are coupled: equations of many nodes involve each other's pivots."""
+        """Whether the pivots are coupled, that is, whether the equations of many nodes involve each other's pivots."""
         return isinstance(self.pivot_inverse, CoupledPivots)
 
     @cached_property
@@ -67,7 +67,7 @@ class Elimination:
         return rows, rows if self.force_weights is self.weights else entry_rows(self.force_weights)
 
     def multiplier(self, forces: Array) -> Array:
-        """Return the multipliers (m,) [force], given their `forces` (m,) at the pivots, ``(K u - f)[pivots]`` [force]."""
+        """Return the multipliers (m,) [force], given the `forces` (m,) ``(K u - f)[pivots]`` that they exert [force]."""
         return self.inverse.solve_transposed(forces)
 
     def complete(self, x: Array, offset: Array | None = None) -> None:
@@ -80,7 +80,7 @@ class Elimination:
             x[self.pivots] += offset
 
     def move_forces(self, r: Array) -> None:
-        """Move the forces `r` (n,), in place, from the pivots to the other unknowns; at the pivots they become zero."""
+        """Move the forces `r` (n,) from the pivots, where they become zero, to the other unknowns, in place."""
         W = self.force_weights
         if isinstance(self.inverse, CoupledPivots):
             r[self.pivots] = self.inverse.solve_transposed(r[self.pivots])
@@ -88,7 +88,7 @@ class Elimination:
         np.add.at(r, W.indices, W.data * forces[self._entry_equations[1]])
 
     def full_weights(self) -> csr_array:
-        """Return the matrix W (m, n) with ``u[pivots] = W @ u + offset``; if pivots are coupled, it has many entries."""
+        """Return the matrix W (m, n) with ``u[pivots] = W @ u + offset``, which has many entries if pivots are coupled."""
         if not self.coupled:
             return self.weights
         columns = np.unique(self.weights.indices)
@@ -96,7 +96,7 @@ class Elimination:
         return csr_array((full.data, columns[full.indices], full.indptr), shape=self.weights.shape)
 
     def with_sparse_weights(self) -> Elimination:
-        """Return an elimination with sparse weights for a preconditioner: an approximation if pivots are coupled."""
+        """Return an elimination with sparse weights for a preconditioner, which are approximate if pivots are coupled."""
         if not self.coupled:
             return self
         weights = _sparse_weights(self.pivot_inverse.sparse, self.weights)
@@ -115,7 +115,7 @@ def eliminate(
     c : ndarray (m,)
         Right-hand sides [length].
     force_rows : csr_array (m, n), optional
-        Matrix F of the equilibrium ``K u = f + F.T multiplier``; B by default [-].
+        Matrix F in the equations of equilibrium, ``K u = f + F.T multiplier``; B by default [-].
     nodes : ndarray of int (m,), optional
         Node of each equation. Equations of the same node may involve the same unknowns.
     size : int
@@ -130,11 +130,11 @@ def eliminate(
     if not B.has_canonical_format:
         B.sum_duplicates()
     B.eliminate_zeros()
-    pivots, inverse = pivot_order.chosen(B, nodes, size)
+    pivots, inverse = pivot_order.choose_pivots(B, nodes, size)
     weights, offset = _weights(B, pivots, inverse), inverse.solve(c)
     if force_rows is None:
         return Elimination(pivots, weights, offset, weights, inverse, inverse)
-    force_inverse = pivot_order.inverse_of(force_rows, pivots, size)
+    force_inverse = pivot_order.column_inverse(force_rows, pivots, size)
     return Elimination(pivots, weights, offset, _weights(force_rows, pivots, force_inverse), force_inverse, inverse)
 
 

@@ -1,4 +1,4 @@
-"""Common part of iterative solvers: solution under linear equations, which are eliminated if possible, and tolerances."""
+"""Common part of iterative solvers: elimination of linear equations where this is possible, and tolerances."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fastcontact.linear.protocol import LinearSolver, Loaded, Monitor
 from fastcontact.round_off import SUM_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# Ratio of a reduced tolerance to the tolerance at which the residual is expected to reach its bound.
+# Ratio of the reduced tolerance to the tolerance at which the residual is expected to reach its bound.
 REDUCTION = 0.1
 
 
@@ -29,9 +29,9 @@ class LoadedIteration(Loaded):
     Parameters
     ----------
     solver : object
-        The solver. It has an attribute ``columns``, the `InverseColumns` of K, and two methods, which take an `Elimination`
-        or None: ``solution(f, elimination, guess, monitor, tolerance)`` returns u (n,) [length], and
-        ``multiplier(elimination, u, f)`` returns the multipliers (m,) of the equations [force].
+        The solver. It must have an attribute ``columns``, the `InverseColumns` of K, and two methods, whose argument
+        ``elimination`` is an `Elimination` or None: ``solution(f, elimination, guess, monitor, tolerance)`` returns u (n,)
+        [length], and ``multiplier(elimination, u, f)`` returns the multipliers (m,) of the equations [force].
     f : ndarray (n,)
         Right-hand side [force].
     """
@@ -48,17 +48,17 @@ class LoadedIteration(Loaded):
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Return the solution and the multipliers, see `Loaded.solve`.
+        """Return the displacements and the multipliers, see `Loaded.solve`.
 
-        If equations are linearly dependent or have a compliance, they are not eliminated. The Delassus operator is formed
-        from columns of K^-1 instead.
+        Equations that are linearly dependent or have a compliance are not eliminated. Instead, the Delassus operator is
+        formed from columns of K^-1.
         """
         solver = self._solver
         if C is None or not B.shape[0]:
             try:
                 elimination = eliminate(B, c, None, nodes, solver.K.blocksize[0]) if B.shape[0] else None
             except RepeatedError as repeated:
-                log.info("%s: their compliance is formed", repeated)
+                log.info("%s (the Delassus operator is formed instead)", repeated)
             else:
                 u = solver.solution(self._f, elimination, guess, monitor, tolerance)
                 return u, solver.multiplier(elimination, u, self._f)
@@ -77,24 +77,24 @@ class LoadedIteration(Loaded):
 
 
 def tighten(solver: LinearSolver, excess: float) -> bool:
-    """Reduce the tolerance of `solver`, whose residual exceeds its bound by the factor `excess`; return whether it changed.
+    """Reduce the tolerance of `solver`, whose residual exceeds its bound by the factor `excess`.
 
-    It does not change if it is already as small as round-off permits.
+    Return False if the tolerance is already as small as round-off permits, and is therefore not changed.
     """
     tolerance = max(solver.tolerance * REDUCTION / excess, SUM_ROUND_OFF)
     if not tolerance < solver.tolerance:
         return False
     log.info(
-        "linear solver: forces are out of balance by %.1e times the bound, its tolerance falls from %.1e to %.1e",
+        "linear solver: out-of-balance forces are %.1e times the bound; the tolerance is reduced from %.1e to %.1e",
         excess, solver.tolerance, tolerance,
     )  # fmt: skip
-    solver.asked = solver.tolerance if solver.asked is None else solver.asked
+    solver.original_tolerance = solver.original_tolerance or solver.tolerance
     solver.tolerance = tolerance
     return True
 
 
-def put_back_tolerance(solver: LinearSolver, snapshot: Mapping[str, Any]) -> None:
+def restore_tolerance(solver: LinearSolver, snapshot: Mapping[str, Any]) -> None:
     """Restore the tolerance that `solver` had at the time of a `snapshot`, see `linear.protocol.LinearSolver`."""
-    requested = solver.tolerance if solver.asked is None else solver.asked
+    requested = solver.original_tolerance or solver.tolerance
     solver.tolerance = snapshot.get("tolerance", requested)
-    solver.asked = None if solver.tolerance == requested else requested
+    solver.original_tolerance = None if solver.tolerance == requested else requested

@@ -1,11 +1,13 @@
 """Choice of the pivot of each linear equation, the unknown to be eliminated, and inverse of the pivot columns.
 
-Equations are grouped by nodes, or each equation is a group. Pivots are chosen by the first of these rules that succeeds:
+Equations are grouped by nodes, or each equation is a group. Pivots are chosen by the first of the following rules that
+succeeds:
 
-1. unknowns that no other group involves, or no other group of the same and later layers (`of_groups`);
-2. sufficiently large entries among the unknowns of the node of an equation (`of_nodes`);
-3. the unknowns of rule 1 as far as they suffice, and a matching for the remaining equations (`of_most_groups`);
-4. a matching of all equations with unknowns (`assigned`).
+1. unknowns that no other group involves, or no other group of the same layer or of later layers (`pivots_of_groups`);
+2. among the unknowns of the node of an equation, those with sufficiently large entries (`pivots_of_nodes`);
+3. the unknowns of rule 1 where there are enough of them, and a matching for the remaining equations
+   (`pivots_of_most_groups`);
+4. a matching of all equations and unknowns (`matched_pivots`).
 
 The matrix of the pivot columns is inverted block by block if it is block diagonal or block triangular with small blocks.
 Otherwise, it is factorised (`coupled_pivots`).
@@ -31,15 +33,15 @@ from fastcontact.linear.sparse_rows import entry_rows
 
 # Smallest ratio of a pivot to the largest entry of its equation.
 SMALLEST_PIVOT = 0.25
-# Largest size of a block that is inverted instead of factorised, and largest size of a block that is inverted if it cannot be
-# factorised (`test_many_coupled_equations_are_assigned_unknowns`). The latter is also the largest number of equations whose
-# pivots are chosen by a dense QR factorisation.
-LARGEST_BLOCK, FULL_UP_TO = 64, 500
-# Largest number of layers of equations. The inverse is a sum of as many products of sparse matrices.
+# Largest size of a block that is inverted instead of being factorised, and largest size of a block that is inverted if it
+# cannot be factorised (`test_many_coupled_equations_are_assigned_unknowns`). The latter is also the largest number of
+# equations whose pivots are chosen by a dense QR factorisation.
+LARGEST_BLOCK, LARGEST_DENSE = 64, 500
+# Largest number of layers of equations. The inverse is a sum with one product of sparse matrices for each layer.
 MOST_LAYERS = 4
 
 
-def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[Indices, Inverse]:
+def choose_pivots(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[Indices, Inverse]:
     """Return the pivot of each equation, and the inverse of the pivot columns.
 
     Parameters
@@ -65,18 +67,19 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
     """
     if not B.shape[0]:
         return np.empty(0, np.intp), SparseInverse(csr_array((0, 0)))
-    pivots = of_groups(B, np.arange(B.shape[0]) if nodes is None else nodes)
+    pivots = pivots_of_groups(B, np.arange(B.shape[0]) if nodes is None else nodes)
     if pivots is None and nodes is not None:
-        pivots = of_nodes(B, nodes, size)
-        pivots = of_most_groups(B, nodes) if pivots is None else pivots
-    pivots = assigned(B) if pivots is None else pivots
-    return pivots, inverse_of(B, pivots, size)
+        pivots = pivots_of_nodes(B, nodes, size)
+        pivots = pivots_of_most_groups(B, nodes) if pivots is None else pivots
+    pivots = matched_pivots(B) if pivots is None else pivots
+    return pivots, column_inverse(B, pivots, size)
 
 
-def inverse_of(B: csr_array, pivots: Indices, size: int) -> Inverse:
-    """Return the inverse of ``B[:, pivots]`` (m, m), as a sparse matrix or by LU factors.
+def column_inverse(B: csr_array, pivots: Indices, size: int) -> Inverse:
+    """Return the inverse of ``B[:, pivots]`` (m, m) as a sparse matrix, or its LU factors.
 
-    B (m, n) are the equations, `pivots` (m,) the chosen unknowns, and `size` is the number of unknowns of a node.
+    B (m, n) is the matrix of the equations, `pivots` (m,) are the eliminated unknowns, and `size` is the number of unknowns
+    per node.
 
     Raises
     ------
@@ -91,9 +94,9 @@ def inverse_of(B: csr_array, pivots: Indices, size: int) -> Inverse:
         try:
             return CoupledPivots(P, pivots, size)
         except CoupledError:
-            if (inverse := _triangular_inverse(P, FULL_UP_TO, 2 * MOST_LAYERS)) is not None:
+            if (inverse := _triangular_inverse(P, LARGEST_DENSE, 2 * MOST_LAYERS)) is not None:
                 return inverse
-            if largest > FULL_UP_TO:
+            if largest > LARGEST_DENSE:
                 raise
     return SparseInverse(block_inverse(P))
 
@@ -121,7 +124,7 @@ def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInvers
     return None
 
 
-def of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indices | None:
+def pivots_of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indices | None:
     """Return the pivots (m,), chosen among the exclusive unknowns of groups; None if a group has too few of them.
 
     An unknown is exclusive to a group if no other group of the same or of a later layer involves it. The first layer
@@ -143,11 +146,12 @@ def of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indic
     return pivots if (pivots >= 0).all() else None
 
 
-def of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
-    """Return the pivots (m,), chosen as by `of_groups` where possible, and by `assigned` for the remaining equations.
+def pivots_of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
+    """Return the pivots (m,), chosen as by `pivots_of_groups` where possible, and for the other equations by a matching.
 
-    For example, slips at supported nodes that stick to a moving side have no exclusive unknowns. The result is None if no
-    group has enough exclusive unknowns, or if more than FULL_UP_TO equations remain. For the parameters see `of_groups`.
+    For example, the equations for the slip at supported nodes that stick to a moving side have no exclusive unknowns. The
+    result is None if no group has enough exclusive unknowns, or if more than LARGEST_DENSE equations remain. For the
+    parameters see `pivots_of_groups`.
     """
     pivots = _in_layers(B, groups, MOST_LAYERS)
     remaining = np.flatnonzero(pivots < 0)
@@ -156,15 +160,15 @@ def of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
     # A single equation may have an exclusive unknown although its group has too few of them.
     pivots[remaining] = _in_layers(csr_array(B[remaining]), np.arange(len(remaining)), layers=1)
     remaining = remaining[pivots[remaining] < 0]
-    if len(remaining) > FULL_UP_TO:
+    if len(remaining) > LARGEST_DENSE:
         return None
     if len(remaining):
-        pivots[remaining] = assigned(csr_array(B[remaining]))
+        pivots[remaining] = matched_pivots(csr_array(B[remaining]))
     return pivots
 
 
 def _in_layers(B: csr_array, groups: Indices, layers: int) -> Indices:
-    """Return the pivots (m,) in up to `layers` layers, -1 for equations without one; see `of_groups`."""
+    """Return the pivots (m,), chosen in up to `layers` layers, and -1 for equations without pivot; see `pivots_of_groups`."""
     m, n = B.shape
     group, row = np.unique(groups, return_inverse=True)[1], entry_rows(B)
     pivots = np.full(m, -1, np.intp)
@@ -180,7 +184,7 @@ def _in_layers(B: csr_array, groups: Indices, layers: int) -> Indices:
     return pivots
 
 
-def of_nodes(B: csr_array, nodes: Indices, size: int) -> Indices | None:
+def pivots_of_nodes(B: csr_array, nodes: Indices, size: int) -> Indices | None:
     """Return the pivots (m,), chosen among the unknowns of the node of each equation; None if a pivot is too small."""
     row = entry_rows(B)
     pivots = _pivots_in_groups(B, np.unique(nodes, return_inverse=True)[1], B.indices // size == nodes[row])
@@ -190,8 +194,8 @@ def of_nodes(B: csr_array, nodes: Indices, size: int) -> Indices | None:
 def _pivots_in_groups(B: csr_array, group: Indices, eligible: Mask) -> Indices:
     """Return the pivots (m,) by complete pivoting within each group, in all groups simultaneously.
 
-    A pivot must be at least SMALLEST_PIVOT times the largest entry of its row. If a group has fewer pivots than rows, all its
-    rows get -1.
+    A pivot must be at least SMALLEST_PIVOT times the largest entry of its row. If a group has fewer pivots than rows, the
+    result is -1 for all its rows.
 
     Parameters
     ----------
@@ -200,7 +204,7 @@ def _pivots_in_groups(B: csr_array, group: Indices, eligible: Mask) -> Indices:
     group : ndarray of int (m,)
         Number of the group of each equation.
     eligible : ndarray of bool (nnz,)
-        Entries of B that may be pivots. Each of their columns must have such entries in one group only.
+        Mask of the entries of B that may be pivots. The eligible entries of a column must belong to a single group.
     """
     m, n = B.shape
     row, entries = entry_rows(B), np.flatnonzero(eligible)
@@ -242,18 +246,18 @@ def _rank_in_group(group: Indices) -> Indices:
     return position
 
 
-def assigned(B: csr_array) -> Indices:
-    """Return pivots (m,) of the equations B (m, n) such that the matrix of the pivot columns is well conditioned.
+def matched_pivots(B: csr_array) -> Indices:
+    """Return pivots (m,) of the equations B (m, n) for which the matrix of the pivot columns is well conditioned.
 
-    They are chosen by a QR factorisation with column pivoting or, for more than FULL_UP_TO equations, by the bipartite
-    matching with the largest product of entries.
+    The pivots are chosen by a QR factorisation with column pivoting. For more than LARGEST_DENSE equations, they are chosen
+    by the bipartite matching of equations and unknowns with the largest product of entries.
 
     Raises
     ------
     RepeatedError
         If there are no m different pivots.
     """
-    if B.shape[0] <= FULL_UP_TO:
+    if B.shape[0] <= LARGEST_DENSE:
         columns = np.unique(B.indices)
         if len(columns) < B.shape[0]:
             raise RepeatedError()

@@ -1,7 +1,7 @@
 """Conjugate gradient method and conjugate residual method, with compiled vector kernels.
 
-Both methods update an iterate x and its residual r one step at a time, so that the caller can examine the iterate, stop, or
-modify the problem slightly and continue.
+Both methods update an iterate x and its residual r one step at a time. Between two steps, the caller can examine the iterate,
+stop, or modify the problem slightly and continue.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from fastcontact.linear.krylov.krylov_kernels import CHUNK, WORK_OF_NUMBER
 # with an approximation of ``A^-1 r``, given the 2-norm of r.
 Multiply = Callable[[Array, Array], None]
 Precondition = Callable[[Array, float, Array], None]
-# Number of search directions that the conjugate residual method stores; their images are orthogonal to that of a new one.
+# Number of search directions that the conjugate residual method stores. The image of a new direction is made orthogonal to
+# their images.
 STORED_DIRECTIONS = 20
-# A step of the conjugate residual method has failed (stagnation) if the norm of the residual stays above this fraction of
+# A step of the conjugate residual method has failed (stagnation) if the norm of the residual remains above this fraction of
 # the previous norm.
 FAILED_REDUCTION = 0.98
 
@@ -131,7 +132,8 @@ class ConjugateResiduals(Iteration):
     """Preconditioned, truncated generalised conjugate residuals (Eisenstat, Elman and Schultz, 1983); see `Iteration`.
 
     The matrix may be nonsymmetric, and the preconditioner may vary. Each iteration minimises the norm of the residual along a
-    new search direction, whose image is made orthogonal to the stored images, so that the norm never increases.
+    new search direction, whose image, the product with the matrix, is made orthogonal to the stored images. Therefore, the
+    norm never increases.
     """
 
     def __init__(self, n: int) -> None:
@@ -155,7 +157,7 @@ class ConjugateResiduals(Iteration):
         self._failed = False
 
     def step(self, multiply: Multiply, precondition: Precondition) -> bool:
-        """Perform one iteration; return False if the new image depends linearly on the stored ones, up to round-off.
+        """Perform one iteration; return False if the new image depends linearly on the stored images, up to round-off.
 
         After a failed step, the preconditioner is applied to the last image instead of the residual.
         """

@@ -15,7 +15,7 @@ WORK_OF_NUMBER = 0.5
 
 @kernel
 def stretch_dot(a, b, low, high):
-    """Return the dot product of the entries `low` to ``high - 1``, in four independent sums."""
+    """Return the dot product of the entries `low` to ``high - 1``, computed as four independent partial sums."""
     s0 = s1 = s2 = s3 = 0.0
     unrolled_end = low + (high - low) // 4 * 4
     for i in range(low, unrolled_end, 4):
@@ -30,7 +30,7 @@ def stretch_dot(a, b, low, high):
 
 @kernel
 def total(sums):
-    """Return the sum of the `sums` of the chunks, added in ascending order."""
+    """Return the total of the `sums` of the chunks, which are added in ascending order."""
     total = 0.0
     for k in range(sums.shape[0]):
         total += sums[k]

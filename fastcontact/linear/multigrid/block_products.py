@@ -1,14 +1,14 @@
-"""Products of small blocks with vectors and with each other, written in vector instructions.
+"""Products of small blocks with vectors and with each other, implemented with vector instructions.
 
-The compiler turns a plain loop over the nine numbers of a 3 x 3 block into nine scalar products, because it cannot see that
-positions from an index array are contiguous. Here a row of a block is one vector instruction. This halves the time of a
-product with a matrix (16.7 to 8.5 ns per unknown in single precision, 311 469 unknowns, one thread). With plain compiled
-loops instead of the four functions, whose sizes are known to the compiler, an analysis takes 3.1 instead of 2.5 s of
-processor time (sphere on a block, 28 833 unknowns, three steps). With plain loops instead of `add_product` and
-`add_transposed` alone, it takes 3.7 to 4.4 instead of 3.0 to 3.4 s (279 447 unknowns, one step).
+The compiler translates a plain loop over the nine numbers of a 3 x 3 block into nine scalar products, because it cannot
+deduce that the positions given by an index array are contiguous. Here, a row of a block is processed by one vector
+instruction. This halves the time of a product with a matrix from 16.7 to 8.5 ns per unknown (single precision, 311 469
+unknowns, one thread). Plain compiled loops in place of the four functions increase the processor time of an analysis from
+2.5 to 3.1 s (sphere on a block, 28 833 unknowns, three steps). Plain loops in place of `add_product` and `add_transposed`
+alone increase it from 3.0 to 3.4 s to 3.7 to 4.4 s (279 447 unknowns, one step).
 
-`block_products_llvm` generates the instructions. The functions `..._plain` are their equivalents in NumPy, which are used if
-kernels are not compiled, and with which tests compare the instructions. Indices are not checked.
+`block_products_llvm` generates the instructions. The functions `..._plain` are their equivalents in NumPy. They are used if
+kernels are not compiled, and in tests of the instructions. Indices are not checked.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def row_times_plain(
     indices : ndarray of int (n_blocks,)
         Block columns.
     numbers : tuple of ndarray (n_blocks * m * n,)
-        The blocks, one after the other, split or not: see `symmetric_storage_kernels`.
+        The numbers of the blocks, one block after the other. They may be split, see `symmetric_storage_kernels`.
     x : ndarray (n_columns * n,)
     begin, end : int
         The blocks of the row are those from `begin` to ``end - 1``.
@@ -51,18 +51,20 @@ def row_times_both_ways_plain(
     indices: Any, numbers: tuple[Any, ...], x: Any, begin: int, end: int, row: int, factor: Any, y: Any,
     rows: tuple[int, ...],
 ) -> tuple[Any, ...]:  # fmt: skip
-    """Return the product of blocks of a row with x, and add the product of the transposed blocks with x in the row to y.
+    """Return the product of the blocks of a row with x, and add the products of the transposed blocks with x to y.
+
+    The first product uses the entries of x in the block columns, the others use those in the block row.
 
     Parameters
     ----------
     indices, numbers, x, begin, end
-        As in `row_times_plain`; square blocks, all of different columns.
+        As in `row_times_plain`. The blocks are square, and no two of them are in the same column.
     row : int
         Number of the block row.
     factor : float
-        Factor of the product that is added to y.
+        Factor of the products that are added to y.
     y : ndarray (n_columns * m,)
-        Changed in place at the columns of the blocks; must not share memory with x.
+        Changed in place at the columns of the blocks. It must not share memory with x.
     rows : tuple
         Tuple of m zeros.
     """
@@ -80,11 +82,11 @@ def add_product_plain(
     Parameters
     ----------
     to : ndarray, at : int
-        Array that is changed in place, from number `at` on.
+        Array that is changed in place, beginning at the position `at`.
     left : tuple of ndarray, first : int
-        A (m, k), split or not, begins at number `first`.
+        Numbers of A (m, k), which may be split, and the position of the first one.
     right : ndarray, second : int
-        B (k, n) begins at number `second`.
+        Numbers of B (k, n), and the position of the first one.
     sizes : tuple of tuples
         Tuples of m, k and n zeros.
     """
@@ -103,7 +105,7 @@ def add_transposed_plain(
 
 
 def _kernel(vectorised: Any, plain: Any) -> Any:
-    """Return the function that kernels call: an intrinsic of vector instructions, or `plain` if nothing is compiled."""
+    """Return the function that kernels call: an intrinsic that generates `vectorised`, or `plain` without compilation."""
     return numba.extending.intrinsic(vectorised) if compiled() else plain
 
 

@@ -1,7 +1,7 @@
 """Numba intrinsics for `block_products`, which generate LLVM code while Numba compiles a kernel.
 
-Each public function implements the function of the same name in `block_products`. Numba calls it during compilation with the
-types of the arguments; it returns the signature and a code generator.
+Each public function implements the function with the same name in `block_products`. Numba calls it during compilation with
+the types of the arguments. The function returns the signature and a code generator.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ WIDTH = 4
 
 
 class Piece(NamedTuple):
-    """A part of a row of a block: `used` numbers from `column` on, which are loaded as a vector of `width` numbers."""
+    """A part of a row of a block: `used` numbers, beginning at `column`, that are loaded as a vector of `width` numbers."""
 
     column: int
     width: int
@@ -65,7 +65,10 @@ def add_transposed(_context: Any, to: Any, at: Any, left: Any, first: Any, right
 
 
 def _product_adder(index: Callable[[int, int, int, int], int], to: Any, left: Any, right: Any, sizes: Any) -> Any:
-    """Return the signature and the code generator of an added product; `index` locates (row, inner) in the left factor."""
+    """Return the signature and the code generator of a function that adds a product.
+
+    ``index(row, inner, m, k)`` is the position of an entry in the left factor.
+    """
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         m, k, n = (len(size) for size in sizes)
@@ -112,7 +115,7 @@ class _Writer:
         return self.builder.bitcast(first, self.kind(start.type.pointee, width).as_pointer())
 
     def numbers(self, starts: list[Any], at: Any, column: int, width: int) -> Any:
-        """Return the vector that begins at number ``at + column``, the sum of the high and low parts if they are split."""
+        """Return the vector that begins at number ``at + column``; high and low parts of split numbers are added."""
         parts = [
             self.builder.load(
                 self.address(start, at, column, width), align=4 if start.type.pointee == ir.FloatType() else 8
@@ -126,8 +129,8 @@ class _Writer:
     def multiply_add(self, total: Any, a: Any, b: Any) -> Any:
         """Return ``total + a * b``, as a fused multiply-add if the processor has one.
 
-        If the compiler chose whether to fuse, this would depend on the surrounding code, and copies of a kernel would differ
-        in the last bit.
+        If the decision were left to the compiler, it would depend on the surrounding code, and the results of copies of a
+        kernel would differ in the last bit.
         """
         if not self.fused:
             return self.builder.fadd(total, self.builder.fmul(a, b))
@@ -168,8 +171,8 @@ class _Writer:
 class _Row(_Writer):
     """Generator of the body of the loop over the blocks of a row, with a sum for each row of the blocks and each vector lane.
 
-    With three columns, a vector of four also reads a neighbour of the row: the number after it or, in the last row of a
-    block, the number before it, so that nothing outside the block is read.
+    In blocks with three columns, a vector of four numbers also contains a neighbour of the row. This is the number after the
+    row or, in the last row of a block, the number before it, so that no memory outside the block is read.
     """
 
     def __init__(self, context: Any, builder: Any, signature: Any, args: Any, m: int, n: int) -> None:
@@ -205,7 +208,7 @@ class _Row(_Writer):
         self.finish(j)
 
     def process(self, r: int, p: int, numbers: Any, last: bool) -> None:
-        """Process the numbers of row r and piece p of a block; `last` if they begin one number before the row."""
+        """Process the numbers of row r and piece p of a block; `last` is true if they begin one number before the row."""
 
     def finish(self, j: Any) -> None:
         """Finish a block whose first column is j."""
@@ -229,13 +232,13 @@ class _Row(_Writer):
         return partial
 
     def _triple(self, j: Any) -> list[Any]:
-        """Return the three numbers of x from j on and an arbitrary fourth, without reading beyond them."""
+        """Return the three numbers of x from j on and an arbitrary fourth one, without reading beyond them."""
         pair = self.shuffled(self.numbers([self.x], j, 0, 2), [0, 1, 0, 1])
         return [self.builder.insert_element(pair, self.numbers([self.x], j, 2, 1), self.lane(2))]
 
 
 class _RowBothWays(_Row):
-    """Generator like `_Row` that also adds `factor` times the product of the transposed blocks and x in the row to y."""
+    """Generator like `_Row` that also adds `factor` times the products of the transposed blocks with x to y."""
 
     def __init__(self, context: Any, builder: Any, signature: Any, args: Any, m: int, n: int) -> None:
         super().__init__(context, builder, signature, args, m, n)
@@ -245,7 +248,7 @@ class _RowBothWays(_Row):
         self.added: list[Any] = []
 
     def process(self, r: int, p: int, numbers: Any, last: bool) -> None:
-        """Add row r of the block times `factor` and the entry of x in block row and row r."""
+        """Add row r of the block, times `factor` and the entry of x in row r of the block row."""
         if last:
             numbers = self.shuffled(numbers, [1, 2, 3, 3])
         width = self.pieces[p].width

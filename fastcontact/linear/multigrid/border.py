@@ -38,13 +38,13 @@ class Border:
         return len(self.right)
 
     def prepare(self, diagonal: Array) -> None:
-        """Factorise the preconditioner of the multipliers, given the diagonal (n,) of A [force / length]."""
+        """Factorise the preconditioner for the multipliers, given the diagonal (n,) of A [force / length]."""
         inverse_diagonal = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         S = self.compliance + self.rows @ diags_array(inverse_diagonal) @ self.rows.T
         diagonal_of_S = S.diagonal()
         # Factors that convert the residuals of the equations to forces.
         self.stiffness = 1.0 / diagonal_of_S
-        # A small shift keeps the matrix regular if equations are linearly dependent.
+        # A small shift keeps the matrix nonsingular if equations are linearly dependent.
         self._factors = splu(csc_array(S + diags_array(ROUND_OFF * diagonal_of_S)))
 
     def multiply(self, multiply: Multiply, move_forces: Callable[[Array], None]) -> Multiply:

@@ -1,9 +1,9 @@
-"""Multigrid hierarchy under eliminated equations, by local changes of its levels that can be undone.
+"""Multigrid hierarchy for eliminated equations, obtained by local changes of its levels that can be undone.
 
-The prolongators are those without equations, except for the rows of the eliminated unknowns, the pivots. Therefore, only
-the blocks of the Galerkin products near pivots change. These changes are stored separately, and the matrices of the levels
-are not modified. On the finest level only the changes of diagonal blocks are computed, for the smoother; products
-with the matrix move displacements and forces between the pivots and the other unknowns instead.
+The prolongators differ from those without equations only in the rows of the eliminated unknowns, called pivots. Therefore,
+only the blocks of the Galerkin products near pivots change. These changes are stored separately, and the matrices of the
+levels are not modified. On the finest level, only the changes of diagonal blocks are computed, which the smoother uses.
+Products with the matrix of the finest level transfer displacements and forces between the pivots and the other unknowns.
 
 Springs between unknowns, such as penalties and the springs of sliding contact, are added on all levels, because they
 are much stiffer than the bodies for the smooth displacements that coarser levels correct.
@@ -26,7 +26,7 @@ from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, composed, 
 from fastcontact.linear.springs import Springs
 
 # Smallest stiffening factor of a node for which the smoother and the coarser levels are corrected, see `stiffened_nodes`.
-STIFFENED = 4.0
+SMALLEST_STIFFENING = 4.0
 
 
 class ConstrainedHierarchy:
@@ -41,8 +41,8 @@ class ConstrainedHierarchy:
     Attributes
     ----------
     stiffening : float
-        Largest factor by which equations stiffen a node [-]. It is large if pivots belong to a much stiffer body than the
-        unknowns that they follow. The prolongators of the hierarchy are then unsuitable.
+        Largest factor by which equations stiffen a node [-]. It is large if the body of the pivots is much stiffer than the
+        body of the unknowns on which the pivots depend. The prolongators of the hierarchy are then unsuitable.
     """
 
     def __init__(self, hierarchy: Hierarchy, A: BlockMatrix) -> None:
@@ -69,12 +69,12 @@ class ConstrainedHierarchy:
             self.hierarchy.set_bounds()
             return
         self._change_levels(elimination, reduced)
-        # Equations and springs widen the spectra of all levels. A bound of the finest level that is too low by a tenth makes
-        # blocks with nu = 0.45 take three times the iterations.
+        # Equations and springs widen the spectra of all levels. If the bound of the finest level is too low by a tenth, an
+        # analysis of blocks with nu = 0.45 takes three times as many iterations.
         self.hierarchy.set_bounds(estimated=True)
 
     def _change_levels(self, elimination: Elimination | None, springs: Springs | None) -> None:
-        """Change all levels for the equations, and for springs after the elimination."""
+        """Change all levels for the equations, and for springs to which the elimination has been applied."""
         finest = self.hierarchy.levels[0]
         dtype = finest.b.dtype
         changes = []
@@ -112,28 +112,28 @@ class ConstrainedHierarchy:
             level.followers = level.free_motions = None
 
     def _stiffened(self, change: LocalChange, elimination: Elimination) -> Indices:
-        """Return the nodes without pivots that equations stiffen by more than the factor STIFFENED, and set `stiffening`.
+        """Return the nodes without pivots that equations stiffen by more than SMALLEST_STIFFENING, and set `stiffening`.
 
-        `change` is the change of the diagonal blocks by the equations.
+        `change` is the change of the diagonal blocks due to the equations.
         """
         size = change.size
         before = self.hierarchy.levels[0].diagonal.reshape(-1, size * size)[change.nodes]
         trace, added = (np.einsum("kii->k", blocks.reshape(-1, size, size)) for blocks in (before, change.diagonal()))
         factors = np.divide(added, trace, out=np.zeros(len(added)), where=trace > 0.0)
         self.stiffening = float(factors.max(initial=0.0))
-        return change.nodes[(factors > STIFFENED) & ~np.isin(change.nodes, elimination.pivots // size)]
+        return change.nodes[(factors > SMALLEST_STIFFENING) & ~np.isin(change.nodes, elimination.pivots // size)]
 
     def _exchange_roles(
-        self, elimination: Elimination, springs: Springs | None, stiffened: Indices, by_springs: list[LocalChange]
+        self, elimination: Elimination, springs: Springs | None, nodes: Indices, spring_changes: list[LocalChange]
     ) -> list[SymmetricChange]:
         """Make stiffened nodes follow the pivots in corrections from coarser levels, and return the changes of these levels.
 
-        `stiffened` (k,) are the numbers of the nodes, and `by_springs` the changes of diagonal blocks by springs. See
-        `stiffened_nodes`.
+        `nodes` (k,) contains the numbers of the stiffened nodes, and `spring_changes` the changes of diagonal blocks due to
+        springs. See `stiffened_nodes`.
         """
         finest, size = self.hierarchy.levels[0], len(self.A.rows)
-        finest.free_motions = FreeMotions(elimination.weights, stiffened, self._inverse_blocks(stiffened, by_springs))
-        following = followers(elimination, stiffened, size)
+        finest.free_motions = FreeMotions(elimination.weights, nodes, self._inverse_blocks(nodes, spring_changes))
+        following = followers(elimination, nodes, size)
         rounded = following.weights.astype(finest.b.dtype)
         finest.followers = replace(following, weights=rounded, force_weights=rounded)
         changes = [SymmetricChange.of_equations(self.A, *composed(elimination, following))]
@@ -141,7 +141,7 @@ class ConstrainedHierarchy:
             changes.append(SymmetricChange.of_springs(springs.reduced(following.pivots, following.weights), size))
         return changes
 
-    def _inverse_blocks(self, nodes: Indices, by_springs: list[LocalChange]) -> Array:
+    def _inverse_blocks(self, nodes: Indices, spring_changes: list[LocalChange]) -> Array:
         """Return the inverses (k, size, size) of the diagonal blocks of `nodes` (k,) on the finest level.
 
         The blocks include springs, but not the effect of equations.
@@ -149,14 +149,14 @@ class ConstrainedHierarchy:
         size = len(self.A.rows)
         blocks = np.zeros((self.hierarchy.n // size, size**2))
         blocks[nodes] = self.hierarchy.levels[0].diagonal.reshape(-1, size**2)[nodes]
-        for change in by_springs:
+        for change in spring_changes:
             blocks[change.nodes] += change.diagonal().reshape(-1, size**2)
         inverses = np.empty(len(nodes) * size**2)
         cycle_kernels.invert_blocks(blocks[nodes].ravel(), size, inverses)
         return inverses.reshape(-1, size, size)
 
     def _change_diagonal(self, level: Level, change: LocalChange) -> None:
-        """Add the diagonal blocks of a change to those that the smoother of a level inverts; save the old inverses."""
+        """Add the diagonal blocks of `change` to those of a level, update their inverses, and save the old inverses."""
         size, nodes = len(level.A.rows), change.nodes
         blocks = level.diagonal.reshape(-1, size**2)[nodes].astype(float).ravel() + change.diagonal()
         inverse = np.empty(blocks.size, level.inverse.dtype)

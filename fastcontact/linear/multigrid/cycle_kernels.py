@@ -32,7 +32,7 @@ def multiply(low, high, indptr, indices, numbers, x, factor, z_factor, z, y, row
 
 @kernel
 def relax(low, high, inverse, r, first, second, d, x, rows, begin):
-    """Make one step of a Chebyshev iteration: ``d = first * d + second * D^-1 r`` and ``x = x + d``, with the residual r.
+    """Perform a step of the Chebyshev iteration, ``d = first * d + second * D^-1 r`` and ``x = x + d``, with the residual r.
 
     `inverse` (n_rows * m * m,) contains the inverses of the diagonal blocks D. If `first` is zero, d need not be initialised.
     If `begin` is true, the iteration starts at x = 0, and x need not be initialised (Saad, Iterative Methods for Sparse
@@ -72,7 +72,7 @@ def subtract_rows(low, high, numbers, indptr, indices, data, x, y, rows):
 def invert_blocks(blocks, size, out):
     """Fill `out` (n * size * size,) with the inverses of symmetric positive semidefinite `blocks` (n * size * size,).
 
-    Gauss-Jordan elimination skips unknowns without stiffness, whose rows and columns of the inverse are set to zero.
+    Gauss-Jordan elimination skips unknowns without stiffness. Their rows and columns of the inverse are set to zero.
     """
     a = np.empty((size, 2 * size))
     for i in range(blocks.shape[0] // (size * size)):

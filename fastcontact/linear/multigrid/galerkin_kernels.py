@@ -1,9 +1,12 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Set-up of a multigrid hierarchy: smoothed prolongators and Galerkin products.
 
-Block matrices are given by arrays, see `matrix.BlockMatrix`, and block sizes m and n by tuples of zeros, `rows` and `cols`.
-Numbers that may be split are tuples, and `storage` defines which blocks of the symmetric matrix A are stored, see
-`symmetric_storage_kernels`. Kernels compute rows `low` to ``high - 1`` in ascending order.
+Block matrices are given by arrays, see `matrix.BlockMatrix`, and the block size (m, n) by two tuples of zeros, `rows` and
+`cols`. Numbers that may be split are passed as tuples, and `storage` defines which blocks of the symmetric matrix A are
+stored, see `symmetric_storage_kernels`. Kernels compute the rows `low` to ``high - 1`` in ascending order.
+
+The transpose of a prolongator P is given by its row pointers `tstart`, its columns `torigin`, which are rows of P, and the
+numbers `tslot` of its blocks in P.
 """
 
 import numpy as np
@@ -19,7 +22,8 @@ def smooth_prolongator(
 ):
     """Fill the blocks `out` of ``(I - omega D^-1 A) T``, with the row pointers `start` and the sorted `columns`.
 
-    `tentative` (n_nodes * m * n,) is the block of T in each node's own aggregate; `aggregate` is -1 for nodes in none.
+    `aggregate` (n_nodes,) contains the number of the aggregate of each node, or -1 if it has none, and `tentative` (n_nodes *
+    m * n,) the block of T for the node and its aggregate.
     """
     m, n, widest = len(rows), len(cols), 0
     for i in range(low, high):
@@ -55,10 +59,10 @@ def smooth_prolongator(
 def _neighbours_of_row(
     row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, coarse_neighbours
 ):
-    """Find the fine nodes and the coarse nodes that a coarse row of ``P.T A P`` involves; return both counts.
+    """Find the fine nodes and the coarse nodes that a row of ``P.T A P`` involves, and return both counts.
 
-    `near` receives the neighbours in A of the fine nodes of the row, and `coarse_neighbours` their coarse nodes. `seen` and
-    `seen_coarse` contain the last row that involved each node.
+    `near` is filled with the neighbours in A of the fine nodes of the row, and `coarse_neighbours` with their coarse nodes.
+    `seen` and `seen_coarse` contain the last row that involved each node.
     """
     n_near = n_coarse_neighbours = 0
     for e in range(tstart[row], tstart[row + 1]):
@@ -97,7 +101,7 @@ def _galerkin_row(
     row, near, n_near, position, products, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot, first,
     coarse_position, out, rows, cols,
 ):  # fmt: skip
-    """Compute one row: first ``Z = A P_I`` for the fine nodes near it, then ``Z.T P``, since A is symmetric."""
+    """Compute a row I of ``P.T A P`` as ``Z.T P``, where ``Z = A P_I`` is stored in `products`, since A is symmetric."""
     m, n = len(rows), len(cols)
     for e in range(n_near):
         position[near[e]] = e
@@ -124,9 +128,9 @@ def galerkin(
     low, high, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot, into, largest, out_columns, out,
     rows, cols,
 ):  # fmt: skip
-    """Fill the columns and blocks of ``P.T A P``, A symmetric; `into` are its row pointers, `out` holds zeros.
+    """Fill `out_columns` and `out`, initially zero, with the columns and blocks of ``P.T A P`` for a symmetric matrix A.
 
-    `largest` is the largest number of fine nodes in the sum of a coarse row.
+    `into` contains the row pointers of the product. `largest` is the largest number of fine nodes that a row involves.
     """
     n, n_coarse = indptr.shape[0] - 1, tstart.shape[0] - 1
     seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)

@@ -1,10 +1,11 @@
 """Smoothed-aggregation multigrid: hierarchy and V-cycle.
 
-Neighbouring nodes form aggregates. The tentative prolongator of an aggregate consists of the rigid-body modes, restricted
-to its nodes. One step of the block Jacobi method smooths it (Vanek, Mandel and Brezina, 1996), and the coarse matrix is the
-Galerkin product. The levels are smoothed by a Chebyshev iteration (`level`).
+Neighbouring nodes form aggregates. The columns of the tentative prolongator that belong to an aggregate are the rigid-body
+modes, restricted to its nodes. The tentative prolongator is smoothed by one step of the block Jacobi method (Vanek, Mandel
+and Brezina, 1996), and the coarse matrix is the Galerkin product. On each level, a Chebyshev iteration is the smoother (see
+`level`).
 
-Two functions come from pyamg: `standard_aggregation` forms the aggregates, and `fit_candidates` computes an orthonormal
+Two functions of pyamg are used: `standard_aggregation` forms the aggregates, and `fit_candidates` computes an orthonormal
 basis of the rigid-body modes of each aggregate. For comparison, `linear.solvers.pyamg` uses the complete multigrid method of
 pyamg.
 """
@@ -23,14 +24,14 @@ from fastcontact._jit.parallel import parallel_for
 from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.level import (
-    COARSEST,
-    SAFETY,
+    COARSEST_SIZE,
+    SAFETY_FACTOR,
     CoarseLevel,
     Level,
     chebyshev,
     largest_eigenvalue,
 )
-from fastcontact.linear.multigrid.matrix import ALL, BlockMatrix, pointers
+from fastcontact.linear.multigrid.matrix import ALL_BLOCKS, BlockMatrix, pointers
 
 
 class Hierarchy:
@@ -39,7 +40,7 @@ class Hierarchy:
     Parameters
     ----------
     A : BlockMatrix
-        Matrix (n, n) of square blocks. The precision of its `data` is that of the cycle. The set-up uses double precision.
+        Matrix (n, n) of square blocks. The cycle has the precision of its `data`; the set-up uses double precision.
     modes : ndarray (n, n_modes)
         Rigid-body modes, which span the near null space; zero at supported unknowns.
 
@@ -60,7 +61,7 @@ class Hierarchy:
         while True:
             level = self._level(A)
             self.levels.append(level)
-            coarser = self._coarsened(A, level, modes) if level.n > COARSEST else None
+            coarser = self._coarsened(A, level, modes) if level.n > COARSEST_SIZE else None
             if coarser is None:
                 break
             level.P, level.R, A, modes = coarser
@@ -70,10 +71,10 @@ class Hierarchy:
         self.set_bounds()
 
     def renewed(self, A: BlockMatrix) -> Hierarchy | None:
-        """Return a hierarchy whose finest level is that of a matrix A of the same pattern, with the coarser levels kept.
+        """Return a hierarchy for a matrix A with the same pattern that reuses the coarser levels.
 
         It is a symmetric preconditioner of A, and its set-up costs a fifth of that of a new hierarchy. The result is None if
-        there are no coarser levels, or if A has another precision.
+        there are no coarser levels, or if A has a different precision.
         """
         if len(self.levels) == 1 or A.data.dtype != self.dtype:
             return None
@@ -93,7 +94,7 @@ class Hierarchy:
         inverse = np.empty_like(diagonal)
         cycle_kernels.invert_blocks(diagonal, size, inverse)
         level = Level(matrix, diagonal, inverse, 1.0)
-        level.bound = SAFETY * largest_eigenvalue(level)
+        level.bound = SAFETY_FACTOR * largest_eigenvalue(level)
         return level
 
     def _coarsened(
@@ -115,7 +116,7 @@ class Hierarchy:
         tentative = np.zeros((n, size * n_modes))
         tentative[member] = T.data.reshape(len(member), -1)
         del T
-        omega = 4.0 / 3.0 / (level.bound / SAFETY)
+        omega = 4.0 / 3.0 / (level.bound / SAFETY_FACTOR)
         cols = (0,) * n_modes
         neighbours = csr_matrix((np.ones(len(A.indices), bool), A.indices, A.indptr), shape=(n, n))
         pattern = neighbours @ aggregates.astype(bool)
@@ -165,15 +166,15 @@ class Hierarchy:
     def set_bounds(self, estimated: bool = False) -> None:
         """Set the bounds of the smoothers to those without equations and springs.
 
-        If `estimated`, bounds are also estimated for the current matrices, and used if larger.
+        If `estimated` is true, bounds are also estimated for the current matrices, and used if they are larger.
         """
         self.bounds = [
-            max(bound, SAFETY * largest_eigenvalue(level)) if estimated and level.P is not None else bound
+            max(bound, SAFETY_FACTOR * largest_eigenvalue(level)) if estimated and level.P is not None else bound
             for level, bound in zip(self.levels, self._free_bounds, strict=True)
         ]
 
     def cycle(self, number: int = 0) -> None:
-        """Apply one V-cycle, beginning at a level and with a zero initial guess.
+        """Apply one V-cycle, beginning at the level `number`, with a zero initial guess.
 
         The right-hand side is ``levels[number].b``, and the result is stored in ``levels[number].x``.
         """
@@ -197,8 +198,8 @@ class Hierarchy:
 
 
 def graph(A: BlockMatrix) -> csr_matrix:
-    """Return the graph (n, n) of a symmetric A, with positive numbers at the off-diagonal blocks that are not zero."""
-    n, (start, columns) = len(A.indptr) - 1, (A.indptr, A.indices) if A.storage is ALL else A.storage[:3:2]
+    """Return the graph (n, n) of a symmetric matrix A, with positive entries for its nonzero off-diagonal blocks."""
+    n, (start, columns) = len(A.indptr) - 1, (A.indptr, A.indices) if A.storage is ALL_BLOCKS else A.storage[:3:2]
     rows = np.repeat(np.arange(n), np.diff(start))
     coupled = A.data.reshape(-1, len(A.rows) ** 2).any(axis=1) & (columns != rows)
     stored = csr_matrix((np.ones(int(coupled.sum()), np.int8), (rows[coupled], columns[coupled])), shape=(n, n))
@@ -206,7 +207,7 @@ def graph(A: BlockMatrix) -> csr_matrix:
 
 
 def by_columns(P: BlockMatrix, n: int) -> tuple[Numbers, Numbers, Numbers]:
-    """Return the blocks of P by columns.
+    """Return the pattern of P by columns.
 
     Returns
     -------

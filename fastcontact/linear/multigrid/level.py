@@ -2,11 +2,11 @@
 
 Let A be the matrix of a level, D its diagonal blocks, and `bound` an upper bound of the eigenvalues of ``D^-1 A``. The
 smoother is a Chebyshev iteration, preconditioned by D, that reduces the components of the error that belong to eigenvalues
-between ``SMOOTHED * bound`` and `bound` (Adams, Brezina, Hu and Tuminaro, 2003). Unlike with the Gauss-Seidel method, results
-do not depend on the number of threads. `Level.relax` makes one step.
+between ``SMOOTHED_FRACTION * bound`` and `bound` (Adams, Brezina, Hu and Tuminaro, 2003). Unlike those of the Gauss-Seidel
+method, its results do not depend on the number of threads. `Level.relax` performs one step.
 
-The matrix of the coarsest level has a dense inverse or, if it is large because aggregation stopped early, sparse factors by
-SuperLU.
+On the coarsest level, the inverse of the matrix is computed. If the matrix is large because aggregation stopped early, it is
+factorised by SuperLU instead.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from fastcontact.round_off import ROUND_OFF
 
 # Number of Lanczos steps for the largest eigenvalue, and safety factor of its estimate.
 LANCZOS_STEPS = 8
-SAFETY = 1.08
+SAFETY_FACTOR = 1.08
 # Ratio of the lower to the upper end of the interval of eigenvalues that is smoothed, and number of Chebyshev steps.
-SMOOTHED = 1 / 24
+SMOOTHED_FRACTION = 1 / 24
 DEGREE = 3
-# Number of unknowns up to which a level is not coarsened, and has a dense inverse.
-COARSEST = 200
+# Largest number of unknowns of a level that is not coarsened further and whose inverse is computed.
+COARSEST_SIZE = 200
 
 
 @dataclass(eq=False)
@@ -101,7 +101,7 @@ class Level:
         return Level(self.A, self.diagonal, inverse, self.bound, self.P, self.R)
 
     def relax(self, r: AnyArray, first: float, second: float, begin: bool = False) -> None:
-        """Change `x` by a Chebyshev step for the residual r (n,), see `cycle_kernels.relax`, then its eliminated unknowns."""
+        """Update `x` by a Chebyshev step (`cycle_kernels.relax`) for the residual r (n,), and set its eliminated unknowns."""
         real = r.dtype.type
         self.chebyshev_step(r, real(first), real(second), self.d, self.x, begin)
         if self.free_motions is not None:
@@ -160,11 +160,11 @@ class Level:
 
 
 def chebyshev(bound: float, degree: int = DEGREE) -> list[tuple[float, float]]:
-    """Return the coefficients of `degree` Chebyshev steps for eigenvalues between ``SMOOTHED * bound`` and `bound`.
+    """Return the coefficients of `degree` Chebyshev steps for eigenvalues between ``SMOOTHED_FRACTION * bound`` and `bound`.
 
     The coefficients of a step multiply the last step and the preconditioned residual, see `cycle_kernels.relax`.
     """
-    centre, half_width = 0.5 * (1 + SMOOTHED) * bound, 0.5 * (1 - SMOOTHED) * bound
+    centre, half_width = 0.5 * (1 + SMOOTHED_FRACTION) * bound, 0.5 * (1 - SMOOTHED_FRACTION) * bound
     factors = [(0.0, 1.0 / centre)]
     rho = half_width / centre
     for _ in range(1, degree):
@@ -227,7 +227,7 @@ class CoarseLevel:
     def __init__(self, A: csc_array) -> None:
         self.n, self.matrix = A.shape[0], A
         self._lu: Any = None
-        self._inverse = np.empty((self.n, self.n) if self.n <= COARSEST else 0)
+        self._inverse = np.empty((self.n, self.n) if self.n <= COARSEST_SIZE else 0)
         self._changed = True
         self.set(None)
 
@@ -242,7 +242,7 @@ class CoarseLevel:
             return
         self._changed = change is not None
         A = self.matrix if change is None else csc_array(self.matrix + change)
-        if self.n <= COARSEST:
+        if self.n <= COARSEST_SIZE:
             cycle_kernels.invert_blocks(A.toarray().ravel(), self.n, self._inverse.reshape(-1))
             return
         diagonal = A.diagonal()

@@ -1,8 +1,8 @@
-"""Multigrid solution under linear equations, some of which have a compliance.
+"""Solution by multigrid subject to linear equations, some of which have a compliance.
 
-An equation with a compliance is equivalent to a spring along its row. Springs that are not much stiffer than the bodies are
-added to the matrix and to the hierarchy. Equations with stiffer springs are eliminated like equations without compliance, see
-`reduced`.
+An equation with a compliance is equivalent to a spring with the elongation ``B u - c``. Springs that are not much stiffer
+than the bodies are added to the matrix and to the hierarchy. Equations with stiffer springs are eliminated like equations
+without compliance, see `reduced`.
 """
 
 from __future__ import annotations
@@ -20,28 +20,28 @@ from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.elimination.pivot_order import RepeatedError
 from fastcontact.linear.field_compliance import FieldCompliance, FieldEquations
 from fastcontact.linear.multigrid.border import Border
-from fastcontact.linear.protocol import MILD, FrictionTerms, Monitor
+from fastcontact.linear.protocol import MILD_CONTRAST, FrictionTerms, Monitor
 from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
-# Equations with a compliance are eliminated if they are stiffer than their unknowns by more than this factor. As springs
-# they need 1.5 times as many iterations at this ratio, and for larger ratios the number increases with the square root of
-# the ratio.
-STIFF = MILD
+# Equations with a compliance are eliminated if they are stiffer than their unknowns by more than this factor. With springs
+# instead, the number of iterations would be 1.5 times as large at this ratio of stiffnesses, and beyond it proportional to
+# the square root of the ratio.
+LARGEST_STIFFNESS_RATIO = MILD_CONTRAST
 
 
 class LoadedMultigrid(LoadedIteration):
     """A matrix prepared by a `Multigrid` solver, with a right-hand side; see `LoadedIteration`."""
 
-    # Values of the pressure field at the edge of the contact in the last solution, the initial guess of the next one.
+    # Values of the pressure field at the edge of the contact in the last solution, as an initial guess for the next one.
     _at_edge: Array = np.empty(0)
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Return the solution and the multipliers, see `Loaded.solve`.
+        """Return the displacements and the multipliers, see `Loaded.solve`.
 
         If equations are linearly dependent or have a full compliance matrix, the Delassus operator is formed.
         """
@@ -53,7 +53,7 @@ class LoadedMultigrid(LoadedIteration):
                 else:
                     parts = self._parts(B, c, C, nodes)
             except RepeatedError as repeated:
-                log.info("%s: their compliance is formed", repeated)
+                log.info("%s (the Delassus operator is formed instead)", repeated)
         if parts is None:
             return super().solve(B, c, C, guess, monitor, tolerance, nodes)
         return self._solution(parts, c, guess, monitor, tolerance)
@@ -85,7 +85,7 @@ class LoadedMultigrid(LoadedIteration):
     def _solution(
         self, parts: _Parts, c: Array, guess: Array | None, monitor: Monitor | None, tolerance: float | None
     ) -> tuple[Array, Array]:
-        """Return u (n,) [length] and the multipliers (m,) [force] under equations without friction."""
+        """Return u (n,) [length] and the multipliers (m,) [force] of equations without friction."""
         solver, elimination, springs = self._solver, parts.elimination, parts.springs
         f, at_edge = parts.with_spring_forces(self._f, c), np.empty(0)
 
@@ -110,18 +110,18 @@ class LoadedMultigrid(LoadedIteration):
         if guess is not None and len(self._at_edge) == len(start):
             start = self._at_edge
         u, at_edge = self._solver.bordered_solution(
-            f, parts.elimination, parts.springs, border, guess, start[field.at] / field.units, tolerance
+            f, parts.elimination, parts.springs, border, guess, start[field.edge_values] / field.units, tolerance
         )
         self._at_edge = np.zeros(len(start))
-        self._at_edge[field.at] = field.units * at_edge
+        self._at_edge[field.edge_values] = field.units * at_edge
         return u, at_edge
 
     def _parts(
-        self, B: csr_array, c: Array, C: Array | None, nodes: Indices | None, through: csr_array | None = None
+        self, B: csr_array, c: Array, C: Array | None, nodes: Indices | None, force_rows: csr_array | None = None
     ) -> _Parts:
         """Return the equations, divided into eliminated ones and springs.
 
-        `through` (m, n) is the matrix F of the forces ``F.T @ multiplier`` on the unknowns; B by default.
+        `force_rows` (m, n) is the matrix F of the forces ``F.T @ multiplier`` on the unknowns; B by default.
 
         Raises
         ------
@@ -130,14 +130,14 @@ class LoadedMultigrid(LoadedIteration):
         """
         size = self._solver.K.blocksize[0]
         if C is None or not C.any():
-            return _Parts.of(B, c, np.zeros(len(c)), np.ones(len(c), bool), nodes, size, through)
+            return _Parts.of(B, c, np.zeros(len(c)), np.ones(len(c), bool), nodes, size, force_rows)
         diagonal = self._solver.diagonal()
         flexibility = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         softness = B.multiply(B) @ flexibility
         try:
-            return _Parts.of(B, c, C, softness > STIFF * C, nodes, size, through)
+            return _Parts.of(B, c, C, softness > LARGEST_STIFFNESS_RATIO * C, nodes, size, force_rows)
         except RepeatedError:
-            return _Parts.of(B, c, C, C == 0.0, nodes, size, through)
+            return _Parts.of(B, c, C, C == 0.0, nodes, size, force_rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,29 +161,29 @@ class _Parts:
     @classmethod
     def of(
         cls, B: csr_array, c: Array, C: Array, stiff: Mask, nodes: Indices | None, size: int,
-        through: csr_array | None,
+        force_rows: csr_array | None,
     ) -> _Parts:  # fmt: skip
         """Return the equations ``B u + C multiplier = c``, of which those marked in `stiff` (m,) are eliminated.
 
-        For parameters see `eliminate` and `LoadedMultigrid._parts`. A RepeatedError is raised if the eliminated ones are
+        For parameters see `eliminate` and `LoadedMultigrid._parts`. A RepeatedError is raised if the eliminated equations are
         linearly dependent.
         """
         rows, elimination = np.flatnonzero(stiff), None
         if len(rows):
-            force_rows, nodes_of_rows = (None if a is None else taken(a, rows) for a in (through, nodes))
-            elimination = eliminate(taken(B, rows), c[rows], force_rows, nodes_of_rows, size)
+            stiff_force_rows, nodes_of_rows = (None if a is None else taken(a, rows) for a in (force_rows, nodes))
+            elimination = eliminate(taken(B, rows), c[rows], stiff_force_rows, nodes_of_rows, size)
             if C[rows].any():
                 elimination = dataclasses.replace(elimination, compliance=C[rows])
         if stiff.all():
             return cls(stiff, elimination, None)
-        force_rows = None if through is None else csr_array(through[~stiff])
-        return cls(stiff, elimination, Springs(csr_array(B[~stiff]), 1.0 / C[~stiff], force_rows))
+        spring_force_rows = None if force_rows is None else csr_array(force_rows[~stiff])
+        return cls(stiff, elimination, Springs(csr_array(B[~stiff]), 1.0 / C[~stiff], spring_force_rows))
 
     def with_spring_forces(self, f: Array, c: Array) -> Array:
         """Return f (n,) plus the forces of the springs at u = 0 [force]; c (m,) are the right-hand sides."""
         if self.springs is None:
             return f
-        force_rows = self.springs.rows if self.springs.through is None else self.springs.through
+        force_rows = self.springs.rows if self.springs.force_rows is None else self.springs.force_rows
         return f + force_rows.T @ (self.springs.stiffness * c[~self.stiff])
 
     def multiplier(self, u: Array, eliminated: Array, c: Array) -> Array:
@@ -198,10 +198,10 @@ class _Parts:
 
 @dataclass(frozen=True, eq=False)
 class _FieldParts(_Parts):
-    """Equations of m points as equations of a pressure field, and springs; see `field_compliance`.
+    """Equations at m points in the form of equations for a pressure field, and of springs; see `field_compliance`.
 
-    None of the equations of points is eliminated, but those of the field that are not at the edge of the contact are. The
-    springs at the points are for the part of the compliance that the field does not represent.
+    The equations for the field are eliminated, except at the edge of the contact; those at the points are not. Springs at the
+    points account for forces that the field does not represent.
 
     Attributes
     ----------
@@ -216,9 +216,9 @@ class _FieldParts(_Parts):
 
     @classmethod
     def of_points(cls, B: csr_array, c: Array, C: FieldCompliance, size: int) -> _FieldParts:
-        """Return the equations ``B u + C multiplier = c`` of the points.
+        """Return the equations ``B u + C multiplier = c`` at the points.
 
-        `size` is the number of unknowns of a node. A RepeatedError is raised if equations are linearly dependent.
+        `size` is the number of unknowns per node. A RepeatedError is raised if equations are linearly dependent.
         """
         field, elimination = C.of_field(B, c), None
         if not field.edge.all():
@@ -233,9 +233,9 @@ class _FieldParts(_Parts):
         return Border(csr_array(field.rows[field.edge]), field.right[field.edge], field.compliance)
 
     def multiplier(self, u: Array, eliminated: Array, c: Array) -> Array:
-        """Return the forces (m,) of the points [force].
+        """Return the forces (m,) at the points [force].
 
-        `eliminated` contains the multipliers of the eliminated equations of the field, then of those at the edge.
+        `eliminated` contains the multipliers of the eliminated equations of the field, followed by those at the edge.
         """
         p = np.empty(len(eliminated))
         p[np.argsort(self.field.edge, kind="stable")] = eliminated

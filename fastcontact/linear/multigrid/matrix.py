@@ -20,16 +20,17 @@ from fastcontact.linear.multigrid import cycle_kernels, symmetric_storage_kernel
 
 Storage = tuple[Numbers, Numbers, Numbers, int]
 
-# Every block is stored.
-ALL: Storage = (np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, np.int32), 0)
-# Number of parts into which the rows of a symmetric matrix are divided, and their smallest number of rows. The parts suffice
-# for many threads, and their results stay in the cache. With more parts, more blocks would be stored twice.
-PARTS, SHORTEST = 32, 1024
+# Storage in which every block of the pattern is stored.
+ALL_BLOCKS: Storage = (np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, np.int32), 0)
+# Largest number of parts into which the rows of a symmetric matrix are divided, and smallest number of rows of a part. This
+# number of parts suffices for many threads, and the results of a part remain in the cache. With more parts, more blocks would
+# be stored twice.
+MAX_PARTS, MIN_ROWS = 32, 1024
 
 
 @dataclass(eq=False)
 class BlockMatrix:
-    """A sparse matrix of dense blocks of the same size, stored by block rows.
+    """Sparse matrix of dense blocks of equal size, stored by block rows.
 
     Attributes
     ----------
@@ -40,12 +41,12 @@ class BlockMatrix:
     data : ndarray (n_blocks * len(rows) * len(cols),)
         The blocks, one after the other, in single or double precision.
     rows, cols : tuple of zeros
-        Their lengths are the size of a block, because compiled kernels know the length of a tuple at compile time.
+        Tuples whose lengths are the block size. The length of a tuple is known when a kernel is compiled.
     low : ndarray, optional
-        Low parts, in single precision, where `data` are the high parts of a split matrix.
+        Low parts of the numbers of a split matrix, in single precision; `data` then contains the high parts.
     storage : tuple
-        Stored blocks of the pattern `indptr`, `indices`, and their order, for a symmetric matrix of which only a part is
-        stored: see `symmetric_storage_kernels`.
+        If only a part of a symmetric matrix is stored, the blocks of the pattern `indptr`, `indices` that are stored, and
+        their order: see `symmetric_storage_kernels`.
     """
 
     indptr: Numbers
@@ -54,7 +55,7 @@ class BlockMatrix:
     rows: tuple[int, ...]
     cols: tuple[int, ...]
     low: AnyArray | None = None
-    storage: Storage = ALL
+    storage: Storage = ALL_BLOCKS
 
     @property
     def exact(self) -> tuple[AnyArray, ...]:
@@ -74,7 +75,7 @@ class BlockMatrix:
         """Fill `y` with ``z_factor * z + factor * A @ x``, in the precision of x; x and y must be different arrays."""
         real = x.dtype.type
         numbers = (self.data,) if x.dtype == self.data.dtype else self.exact
-        if self.storage is not ALL:
+        if self.storage is not ALL_BLOCKS:
             length, n = self.storage[3], len(self.indptr) - 1
             parallel_for(
                 symmetric_storage_kernels.multiply, -(-n // length), self.work_of_row * length, self.storage, numbers, x,
@@ -100,7 +101,7 @@ class BlockMatrix:
     def diagonal_part(self, data: AnyArray) -> AnyArray:
         """Return the diagonal blocks (n_rows * size * size,) of a square matrix, from the high or the low part."""
         size = len(self.rows)
-        if self.storage is ALL:
+        if self.storage is ALL_BLOCKS:
             return diagonal_blocks(self.indptr, self.indices, data, size)
         return data.reshape(-1, size * size)[self.storage[1] - 1].ravel()
 
@@ -126,7 +127,7 @@ class BlockMatrix:
         return rows
 
     def to_scipy(self) -> bsr_array:
-        """Return a square matrix as a SciPy matrix, in double precision."""
+        """Return a square matrix as a SciPy array, in double precision."""
         size, n = len(self.rows), len(self.indptr) - 1
         data = np.empty(len(self.indices) * size * size)
         arrays = self.indptr, self.indices, self.storage, self.exact
@@ -149,7 +150,7 @@ def block_matrix(K: bsr_array) -> BlockMatrix:
 
 
 class ScaledMatrix:
-    """The stiffness matrix K, stored times a power of two; products are those with K, in double precision.
+    """The stiffness matrix K, multiplied by a power of two for storage. Products are those with K, in double precision.
 
     Parameters
     ----------
@@ -158,38 +159,38 @@ class ScaledMatrix:
     precision : {"single", "double"}
         Precision of the multigrid cycle. For "single", numbers are split into a high and a low part.
     release : bool
-        Whether the low parts may overwrite K's numbers, so that K and its parts are never in memory at the same time,
-        which saves a tenth of the peak with a million unknowns. K is empty afterwards.
-    near : ScaledMatrix, optional
-        Matrix whose unit and, for the same pattern, storage are used again. By default, the unit is such that the largest
-        stiffness is about one.
+        Whether the low parts may overwrite the numbers of K, which is empty afterwards. K and its parts are then never in
+        memory at the same time, which reduces the peak memory with a million unknowns by a tenth.
+    like : ScaledMatrix, optional
+        Matrix whose unit is reused, and also its storage if the pattern is the same. By default, the unit is chosen such that
+        the largest stiffness is about one.
 
     Attributes
     ----------
     scaled : BlockMatrix
-        ``unit K``. With a largest stiffness of about one, numbers in any system of units are within the range
-        of single precision.
+        ``unit K``. Since the largest stiffness is about one, the numbers are within the range of single precision in any
+        system of units.
     unit : float
         Scaling factor, a power of two, which is exact.
     shape, blocksize : (int, int)
     """
 
-    def __init__(self, K: bsr_array, precision: str, release: bool = False, near: ScaledMatrix | None = None) -> None:
+    def __init__(self, K: bsr_array, precision: str, release: bool = False, like: ScaledMatrix | None = None) -> None:
         self.shape, self.blocksize = K.shape, K.blocksize
-        self._store(K, precision, release, near)
+        self._store(K, precision, release, like)
 
-    def _store(self, K: bsr_array, precision: str, release: bool, near: ScaledMatrix | None = None) -> None:
+    def _store(self, K: bsr_array, precision: str, release: bool, like: ScaledMatrix | None = None) -> None:
         self.unit = 1.0
         if precision == "double":
             self.scaled = block_matrix(K)
             return
-        if near is None:
+        if like is None:
             size = range(K.blocksize[0])
             largest = block_matrix(K).diagonal_blocks()[:, size, size].max()
             self.unit = float(0.5 ** np.round(np.log2(largest)))
         else:
-            self.unit = near.unit
-        self.scaled = _split_matrix(K, self.unit, release, None if near is None else near.scaled)
+            self.unit = like.unit
+        self.scaled = _split_matrix(K, self.unit, release, None if like is None else like.scaled)
 
     def change(self, precision: str) -> None:
         """Store the numbers for a cycle in another precision."""
@@ -224,43 +225,43 @@ class ScaledMatrix:
         return self.scaled.absolute_product(u) / self.unit
 
 
-def _split_matrix(K: bsr_array, unit: float, release: bool, near: BlockMatrix | None) -> BlockMatrix:
+def _split_matrix(K: bsr_array, unit: float, release: bool, like: BlockMatrix | None) -> BlockMatrix:
     """Return ``unit K``, split into high and low parts; see `ScaledMatrix` for `release`.
 
-    The storage of the matrix `near` is used if it has the same pattern.
+    The storage of the matrix `like` is used if it has the same pattern.
     """
     indptr, indices = (array.astype(np.int32, copy=False) for array in (K.indptr, K.indices))
     size, numbers = K.blocksize[0], K.data if K.data.base is None else K.data.base
     if release and numbers.size == K.data.size and numbers.flags.owndata and numbers.flags.c_contiguous:
-        # Every number is read before it is overwritten. K's numbers are then invalid, and are removed.
+        # Every number is read before it is overwritten. The numbers of K are invalid afterwards, and are therefore removed.
         K.indptr, K.indices, K.data = np.zeros_like(indptr), indices[:0], np.empty((0, *K.blocksize))
     else:
         numbers = K.data.copy()
-    storage = ALL if near is None else near.storage
-    if near is None or not (np.array_equal(indptr, near.indptr) and np.array_equal(indices, near.indices)):
+    storage = ALL_BLOCKS if like is None else like.storage
+    if like is None or not (np.array_equal(indptr, like.indptr) and np.array_equal(indices, like.indices)):
         storage = symmetric_storage(indptr, indices)
-    n = numbers.size if storage is ALL else len(storage[2]) * size * size
+    n = numbers.size if storage is ALL_BLOCKS else len(storage[2]) * size * size
     high = np.empty(n, np.float32)
-    _store(indptr, indices, storage, unit, numbers.reshape(-1), size * size, high)
+    _store_parts(indptr, indices, storage, unit, numbers.reshape(-1), size * size, high)
     with contextlib.suppress(ValueError):  # another array references the memory, which then stays allocated
         numbers.resize(((n + 1) // 2,))
     low = numbers.reshape(-1).view(np.float32)[:n]
     return BlockMatrix(indptr, indices, high, (0,) * size, (0,) * size, low, storage)
 
 
-def _store(
+def _store_parts(
     indptr: Numbers, indices: Numbers, storage: Storage, unit: float, numbers: AnyArray, block_size: int, high: AnyArray
 ) -> None:
-    """Fill the high parts of the stored blocks, of `block_size` numbers, times `unit`.
+    """Fill `high` with the high parts of the stored blocks, of `block_size` numbers each, times `unit`.
 
-    The low parts overwrite the beginning of the `numbers` of all blocks.
+    `numbers` contains the numbers of all blocks. Its beginning is overwritten by the low parts.
     """
-    start, low = indptr if storage is ALL else storage[0], numbers.view(np.float32)
+    start, low = indptr if storage is ALL_BLOCKS else storage[0], numbers.view(np.float32)
     end, n, max_blocks = 0, len(indptr) - 1, int(np.diff(indptr).max(initial=0))
-    while end < n:  # up to `safe_end`, low parts overwrite only numbers that were read
+    while end < n:  # Up to row `safe_end`, low parts overwrite only numbers that have been read.
         first = end
         safe_end = int(np.searchsorted(start, 2 * int(indptr[first]), side="right")) - 1
-        end = max(min(n, safe_end), min(n, first + SHORTEST))
+        end = max(min(n, safe_end), min(n, first + MIN_ROWS))
         work = len(indices) / n if end == safe_end else 0
         parallel_for(
             symmetric_storage_kernels.store_rows, end - first, work, first, max_blocks, indptr, indices, storage, unit,
@@ -271,10 +272,10 @@ def _store(
 def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
     """Return the storage of a symmetric matrix.
 
-    The storage is `ALL` if the pattern is not sorted, lacks a diagonal block, or is not symmetric within the parts.
+    The storage is `ALL_BLOCKS` if the pattern is not sorted, lacks a diagonal block, or is not symmetric within the parts.
     """
     n = len(indptr) - 1
-    length = max(SHORTEST, -(-n // PARTS))
+    length = max(MIN_ROWS, -(-n // MAX_PARTS))
     row = np.repeat(np.arange(n, dtype=np.int32), np.diff(indptr))
     same_part = row // length == indices // length
     below, above, diagonal = same_part & (indices < row), same_part & (indices > row), indices == row
@@ -282,7 +283,7 @@ def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
     transposed = np.sort(indices[below].astype(np.int64) * n + row[below])
     symmetric = np.array_equal(transposed, row[above].astype(np.int64) * n + indices[above])
     if not (symmetric and ascending.all() and diagonal.sum() == n):
-        return ALL
+        return ALL_BLOCKS
     stored = ~below
     rows, rank = row[stored], (diagonal + np.int32(2) * above)[stored]
     columns = indices[stored][np.argsort(np.int64(3) * rows + rank, kind="stable")]

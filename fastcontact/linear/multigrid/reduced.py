@@ -3,8 +3,8 @@
 Equations ``B u + C multiplier = c`` with a diagonal compliance C are eliminated like equations without compliance. Their
 violation ``s = B u - c = -C multiplier``, called excess, adds the displacement ``P^-1 s`` to the pivots, where P contains the
 columns of B that belong to the pivots. The excess is an unknown with the stiffness ``1 / C``, which replaces the pivot in the
-vectors of the iteration. Since the preconditioner treats it separately, a large stiffness impairs neither accuracy nor
-convergence: the stiffer an equation, the weaker is the coupling of its excess with the other unknowns.
+vectors of the iteration. The preconditioner treats it separately. Therefore, a large stiffness impairs neither accuracy nor
+convergence: the stiffer an equation, the weaker the coupling of its excess to the other unknowns.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fastcontact.linear.multigrid.matrix import ScaledMatrix
 from fastcontact.linear.springs import Springs
 
 
-class Reduced:
+class ReducedOperator:
     """Operator of the iteration: the sum of K and springs, after the elimination of equations.
 
     Parameters
@@ -47,12 +47,12 @@ class Reduced:
         self._excess = None
         if elimination is not None and elimination.compliance is not None:
             assert diagonal is not None
-            self._excess = _Excess(diagonal, elimination, elimination.compliance)
+            self._excess = _Excesses(diagonal, elimination, elimination.compliance)
 
     def begin(self, x: Array, f: Array, r: Array) -> None:
-        """Convert displacements x (n,) [length], in place, to a vector of the iteration, and fill r (n,) with its residual.
+        """Convert displacements x (n,) [length] in place to a vector of the iteration, and fill r (n,) with its residual.
 
-        f (n,) is the right-hand side [force].
+        The right-hand side is f (n,) [force].
         """
         if self._excess is not None:
             self._excess.begin(x, self.multiplier(x, f) if x.any() else None)
@@ -67,8 +67,8 @@ class Reduced:
     def displacement(self, x: Array, increment: bool = False) -> Array:
         """Return the displacements (n,) of a vector x (n,) of the iteration [length].
 
-        If x is an `increment`, the offsets of the pivots are not added. The result may be x itself or an array that the next
-        call overwrites.
+        If `increment` is true, x is an increment, to which the offsets of the pivots are not added. The result may be x
+        itself or an array that the next call overwrites.
         """
         if self._excess is None:
             return x
@@ -103,8 +103,8 @@ class Reduced:
     def _reduce(self, x: Array, r: Array, sign: float) -> None:
         """Move the forces r (n,) from the pivots to the other unknowns, in place.
 
-        The entries of the pivots of compliant equations become the forces on the excesses, including `sign` times the forces
-        of the stiffness of the excesses x.
+        At the pivots of compliant equations, the entries become the forces on the excesses, including `sign` times the
+        product of the stiffness and the excesses in x.
         """
         if self._excess is not None:
             self._excess.reduce(x, r, sign)
@@ -125,8 +125,8 @@ def multiplier(K: ScaledMatrix, elimination: Elimination | None, springs: Spring
     return elimination.multiplier(K.forces_at(elimination.pivots, u, f))
 
 
-class _Excess:
-    """The excesses of compliant equations, which replace the pivots as unknowns; parameters as in `Reduced`."""
+class _Excesses:
+    """Excesses of compliant equations, which replace the pivots as unknowns; for parameters see `ReducedOperator`."""
 
     def __init__(self, diagonal: Array, elimination: Elimination, compliance: Array) -> None:
         self._elimination, self._pivots = elimination, elimination.pivots
@@ -151,13 +151,13 @@ class _Excess:
         return u
 
     def reduce(self, x: Array, r: Array, sign: float) -> None:
-        """See `Reduced._reduce`."""
+        """See `ReducedOperator._reduce`."""
         multiplier = self._elimination.multiplier(r[self._pivots]) + sign * self._stiffness * x[self._pivots]
         self._elimination.move_forces(r)
         r[self._pivots] = np.where(self._compliant, multiplier, 0.0)
 
     def precondition(self, r: Array, norm: float, z: Array, cycle: Callable[[Array, float, Array], None]) -> None:
-        """See `Reduced.precondition`; excesses are preconditioned by their diagonal."""
+        """See `ReducedOperator.precondition`; excesses are preconditioned by their diagonal."""
         residual = r[self._pivots]
         r[self._pivots] = 0.0
         cycle(r, norm, z)

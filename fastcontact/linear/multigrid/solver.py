@@ -1,8 +1,8 @@
-"""Krylov methods with multigrid as preconditioner, for systems with linear equations.
+"""Krylov methods with multigrid as preconditioner, for systems subject to linear equations.
 
-The aggregates and prolongators of the stiffness matrix K are used in the complete analysis. Equations ``B u = c`` are
-eliminated: the iterates satisfy them, the forces at the eliminated unknowns, the pivots, are moved to the other unknowns,
-and the multigrid hierarchy is changed near the pivots.
+The aggregates and prolongators of the stiffness matrix K are used throughout the analysis. Equations ``B u = c`` are
+eliminated, so that all iterates satisfy them. The eliminated unknowns are called pivots. The forces at the pivots are moved
+to the other unknowns, and the multigrid hierarchy is changed near the pivots.
 """
 
 from __future__ import annotations
@@ -31,32 +31,35 @@ from fastcontact.linear.multigrid.border import Border
 from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierarchy
 from fastcontact.linear.multigrid.hierarchy import Hierarchy
 from fastcontact.linear.multigrid.matrix import ScaledMatrix
-from fastcontact.linear.multigrid.reduced import Reduced, multiplier
-from fastcontact.linear.protocol import MILD, TOLERANCE, Counters, Monitor
+from fastcontact.linear.multigrid.reduced import ReducedOperator, multiplier
+from fastcontact.linear.protocol import MILD_CONTRAST, TOLERANCE, Counters, Monitor
 from fastcontact.linear.springs import ALIKE, Springs
 
 log = logging.getLogger("fastcontact")
 MAX_ITERATIONS = 1000
-# Largest number of columns of K^-1, each of which takes one solution, before a factorisation costs less.
+# Largest number of columns of K^-1 that are computed, each as the solution of one linear system. For more columns, a
+# factorisation is cheaper.
 MOST_COLUMNS = 300
 # Number of iterations between two calls of a monitor.
 MONITOR_INTERVAL = 2
-# Number of iterations before the first call of a monitor if `_contrast` is large, because errors of soft parts are not yet
-# known: row "nu 0.499" takes 123 iterations, and 132 with the first call after two.
-FIRST_MONITOR_CONTRAST = 6
-# Largest estimated error of displacements, relative to the largest one, over the tolerance of the residual. It is reached
-# only if bodies differ in stiffness: forces in the stiff body dominate the residual, and the soft body converges later.
+# Number of iterations before the first call of a monitor if `_contrast` is large, because the errors of soft parts are not
+# known earlier. The benchmark "nu 0.499" takes 123 iterations, and 132 with the first call after two iterations.
+FIRST_MONITOR_WITH_CONTRAST = 6
+# Largest admissible ratio of the estimated relative error of the displacements to the tolerance of the residual. It is
+# exceeded only if bodies differ in stiffness: forces in the stiff body then dominate the residual, and the soft body
+# converges later.
 DISPLACEMENT_ERROR = 3e3
-# Cost of a change of the hierarchy, including the elimination of equations, in iterations. A new hierarchy costs about as
-# much.
-CHANGE = 15
-# A nonsymmetric solution whose initial guess is accurate already is iterated further: until the residual has fallen by the
-# factor WARM, or to WARM_LEAST times its tolerance, with at most MOST_WARM iterations after the tolerance is reached. If
-# equations stiffen nodes strongly, the latter number is doubled, up to STORED_DIRECTIONS, each time that the
-# residual at the next start is larger than WARM times the residual at the last start.
-WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
-# If the smoother amplifies a vector, the upper bounds of the eigenvalues are multiplied by RAISE, at most RAISES times.
-RAISE, RAISES = 1.3, 4
+# Cost of changing the hierarchy, including the elimination of equations, in units of one iteration. Building a new hierarchy
+# costs about as much.
+COST_OF_CHANGE = 15
+# Even if the initial guess of a nonsymmetric system satisfies the tolerance, the iteration continues until the residual has
+# fallen by the factor WARM_REDUCTION, or to WARM_RESIDUAL times the tolerance. At most MAX_WARM_ITERATIONS are performed
+# after the tolerance has been reached. If equations stiffen nodes strongly, this number is doubled, up to STORED_DIRECTIONS,
+# each time the residual of an initial guess exceeds WARM_REDUCTION times that of the previous initial guess.
+WARM_REDUCTION, WARM_RESIDUAL, MAX_WARM_ITERATIONS = 0.05, 1e-3, 10
+# If the smoother amplifies a vector, the upper bounds of the eigenvalues are multiplied by BOUND_FACTOR, at most MAX_RAISES
+# times.
+BOUND_FACTOR, MAX_RAISES = 1.3, 4
 
 
 class StallError(ConvergenceError):
@@ -64,7 +67,7 @@ class StallError(ConvergenceError):
 
 
 class TooManyIterationsError(StallError):
-    """Raised if the iterations cost more than is allowed, so that a different solution method is cheaper."""
+    """Raised if the iterations exceed the work limit, above which another solution method is cheaper."""
 
 
 class Multigrid:
@@ -84,8 +87,8 @@ class Multigrid:
     contrast : float
         See `LinearSolver`.
     work : int
-        Number of iterations so far, plus CHANGE for each change of the hierarchy.
-    allowed : int, optional
+        Number of iterations so far, plus COST_OF_CHANGE for each change of the hierarchy.
+    work_limit : int, optional
         Largest `work`; None means unlimited.
 
     Raises
@@ -103,18 +106,18 @@ class Multigrid:
         self.counters = Counters()
         self.contrast = 1.0
         self.work = 0
-        self.allowed: int | None = None
-        # Hierarchy of an earlier matrix, whose coarser levels the next one takes over, and whether the current hierarchy has
-        # taken over coarser levels.
-        self._near: Hierarchy | None = None
-        self._renewed = False
-        # Whether coarser levels may be taken over; shared by all copies.
+        self.work_limit: int | None = None
+        # Hierarchy of an earlier matrix, whose coarser levels the next hierarchy reuses, and whether the current hierarchy
+        # reuses coarser levels.
+        self._earlier_hierarchy: Hierarchy | None = None
+        self._reuses_coarse_levels = False
+        # Whether coarser levels may be reused; the list is shared by all copies.
         self._reuses_levels = [True]
         self.begin()
 
     def begin(self) -> None:
         """Reset the statistics of warm starts for a new load step."""
-        self._most_warm, self._unfinished_norm = MOST_WARM, np.inf
+        self._max_warm_iterations, self._unfinished_norm = MAX_WARM_ITERATIONS, np.inf
         self._change_rate = np.inf  # change of displacements in an iteration, divided by the decrease of the residual
 
     @property
@@ -124,41 +127,41 @@ class Multigrid:
 
     def build(self, K: bsr_array, rigid_modes: Array, release: bool = False) -> None:
         """Build the hierarchy of K (n, n); see `LinearSolver.prepare`."""
-        n, near = K.shape[0], self._near
-        self.K = ScaledMatrix(K, self.precision, release, None if near is None else self.K)
+        n, earlier = K.shape[0], self._earlier_hierarchy
+        self.K = ScaledMatrix(K, self.precision, release, None if earlier is None else self.K)
         self._modes = rigid_modes.astype(np.float32)  # for `build_in`; single precision suffices
         self._cg = ConjugateGradients(n)
         self._residuals: ConjugateResiduals | None = None
         self._diagonal: Array | None = None
-        self._build(rigid_modes, near)
+        self._build(rigid_modes, earlier)
         self.columns = InverseColumns(n, self._inverse_entries, MOST_COLUMNS)
 
     def near(self) -> Self:
-        """Return a copy that is to be prepared for a similar matrix, whose hierarchy takes over the coarser levels.
+        """Return a copy, to be prepared for a similar matrix, whose hierarchy will reuse the coarser levels.
 
-        If convergence is slow with them in one solution, all hierarchies are built anew from then on.
+        Once the iteration converges slowly with reused levels, all hierarchies are built anew.
         """
         new = copy.copy(self)
-        new._near = self.hierarchy if self._reuses_levels[0] else None
+        new._earlier_hierarchy = self.hierarchy if self._reuses_levels[0] else None
         return new
 
-    def _build(self, rigid_modes: Array, near: Hierarchy | None = None) -> None:
-        """Build the hierarchy of the stored matrix, if possible with the coarser levels of the hierarchy `near`."""
-        renewed, self._near = None if near is None else near.renewed(self.K.scaled), None
-        self._renewed = renewed is not None
+    def _build(self, rigid_modes: Array, earlier: Hierarchy | None = None) -> None:
+        """Build the hierarchy of the stored matrix, if possible with the coarser levels of an `earlier` hierarchy."""
+        renewed, self._earlier_hierarchy = None if earlier is None else earlier.renewed(self.K.scaled), None
+        self._reuses_coarse_levels = renewed is not None
         self.hierarchy = Hierarchy(self.K.scaled, rigid_modes) if renewed is None else renewed
         self._constrained = ConstrainedHierarchy(self.hierarchy, self.K.scaled)
-        # Current equations and springs of the iteration; then the equations and springs for which the hierarchy was changed.
-        self._reduced = Reduced(self.K, None)
+        # Equations and springs of the current iteration, and those for which the hierarchy was last changed.
+        self._reduced = ReducedOperator(self.K, None)
         self._hierarchy_equations: Elimination | None = None
         self._hierarchy_springs: Springs | None = None
         self.counters.setups += 1
 
     def _build_anew(self) -> None:
-        """Build all levels of the hierarchy, here and from now on for all matrices."""
+        """Build all levels of the hierarchy, now and for all later matrices."""
         self._reuses_levels[0], reduced = False, self._reduced
         self._build(self._modes.astype(float))
-        self._add_work(CHANGE)
+        self._add_work(COST_OF_CHANGE)
         self.constrain(reduced.elimination, reduced.springs)
 
     def build_in(self, precision: str) -> None:
@@ -173,10 +176,10 @@ class Multigrid:
         return inverse_entries(self.K.shape[0], lambda f: self.solution(f, None, None), rows, columns)
 
     def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
-        """Set the equations and springs of the iteration, and change the hierarchy for them.
+        """Set the equations and springs of the iteration, and change the hierarchy accordingly.
 
-        If the pivots are the same and the weights nearly so, the hierarchy is kept, because it is an equally good
-        preconditioner. For coupled pivots the hierarchy uses sparse weights, see `Elimination.with_sparse_weights`.
+        If the pivots are the same and the weights nearly the same, the hierarchy is kept, because it is an equally good
+        preconditioner. For coupled pivots, the hierarchy uses sparse weights, see `Elimination.with_sparse_weights`.
         """
         if elimination is not self._reduced.elimination or springs is not self._reduced.springs:
             sparse = elimination and elimination.with_sparse_weights()
@@ -184,9 +187,9 @@ class Multigrid:
             same_springs = old_springs is None if springs is None else springs.alike(old_springs)
             if not (same_springs and _nearly_equal(sparse, self._hierarchy_equations, self._constrained.stiffening)):
                 self._change_hierarchy(sparse, springs)
-                self._add_work(CHANGE)
+                self._add_work(COST_OF_CHANGE)
             compliant = elimination is not None and elimination.compliance is not None
-            self._reduced = Reduced(self.K, elimination, springs, self.diagonal() if compliant else None)
+            self._reduced = ReducedOperator(self.K, elimination, springs, self.diagonal() if compliant else None)
 
     def _change_hierarchy(self, sparse: Elimination | None, springs: Springs | None) -> None:
         """Change the hierarchy for equations with sparse weights, and for springs."""
@@ -197,7 +200,7 @@ class Multigrid:
         self, f: Array, elimination: Elimination | None, guess: Array | None, monitor: Monitor | None = None,
         tolerance: float | None = None, springs: Springs | None = None,
     ) -> Array:  # fmt: skip
-        """Return the solution (n,) [length] of ``(K + S) u = f`` under the equations of `elimination`.
+        """Return the solution (n,) [length] of ``(K + S) u = f`` subject to the equations of `elimination`.
 
         Parameters
         ----------
@@ -209,7 +212,7 @@ class Multigrid:
         monitor : callable, optional
             See `linear.protocol.Monitor`.
         tolerance : float, optional
-            Relative residual at which the iteration stops, if it is larger than that of the solver [-].
+            Relative residual at which the iteration stops. Values below the tolerance of the solver have no effect [-].
         springs : Springs, optional
             Springs with the matrix S (n, n); none by default.
 
@@ -227,13 +230,13 @@ class Multigrid:
         self._begin(cg, f)
         limit = self._stopping_residual(tolerance or 0.0)
         count, attempts = 0, 0
-        first_monitor = MONITOR_INTERVAL if self._contrast <= MILD else FIRST_MONITOR_CONTRAST
+        first_monitor = MONITOR_INTERVAL if self._contrast <= MILD_CONTRAST else FIRST_MONITOR_WITH_CONTRAST
         while not self._done(cg, limit, scale):
-            if self._renewed and count >= CHANGE:
+            if self._reuses_coarse_levels and count >= COST_OF_CHANGE:
                 self._build_anew()
                 self._begin(cg, f)
             unconverged = cg.norm > limit * scale
-            if count >= MAX_ITERATIONS or attempts > RAISES:
+            if count >= MAX_ITERATIONS or attempts > MAX_RAISES:
                 if not unconverged:
                     break
                 raise StallError(
@@ -258,29 +261,29 @@ class Multigrid:
     ) -> Array:
         """Return the solution u (n,) [length] of ``K u + S u = f + F.T multiplier`` and ``B u = c``.
 
-        In sliding contact the gap stays closed, but the contact force also has a tangential component, so that F differs
-        from B. The pivots are eliminated as without friction, but the forces at the pivots are moved to the other unknowns
-        according to F. The reduced matrix is therefore not symmetric. The preconditioner is the hierarchy for F = B.
+        In sliding contact, the gap stays closed, but the contact force also has a tangential component, so that F differs
+        from B. The pivots are eliminated as in frictionless contact, but the forces at the pivots are moved to the other
+        unknowns according to F. Therefore, the reduced matrix is not symmetric. The hierarchy for F = B preconditions it.
 
         Parameters
         ----------
         f : ndarray (n,)
             Right-hand side [force].
         elimination : Elimination or None
-            Elimination of the equations B, with force weights according to F.
+            Elimination of the equations ``B u = c``, with force weights according to F.
         springs : Springs or None
             Springs with the matrix S (n, n).
         guess : ndarray (n,)
             Initial guess [length].
         tolerance : float
-            Relative residual at which the iteration stops, if it is larger than that of the solver [-].
+            Relative residual at which the iteration stops. Values below the tolerance of the solver have no effect [-].
 
         Raises
         ------
         StallError
             If the residual does not fall below the tolerance.
         """
-        if self._renewed:
+        if self._reuses_coarse_levels:
             self._build_anew()
         if self._residuals is None:
             self._residuals = ConjugateResiduals(len(f))
@@ -290,8 +293,8 @@ class Multigrid:
         limit = self._stopping_residual(tolerance)
         iteration.x[:] = guess
         self._begin(iteration, f)
-        # If some parts are much stiffer than others, the tolerance of the solver leaves errors in the soft parts. Later
-        # pairings would reduce them only slowly.
+        # If some parts are much stiffer than others, the tolerance of the solver permits large errors in the soft parts,
+        # which later pairings would reduce only slowly.
         aim = tolerance / self._contrast * scale
         self._reduce(iteration, limit, scale, self._reduced.multiply, self.precondition, aim)
         return self._reduced.displacement(iteration.x).copy()
@@ -300,21 +303,21 @@ class Multigrid:
         self, f: Array, elimination: Elimination | None, springs: Springs | None, border: Border,
         guess: Array | None, start: Array, tolerance: float | None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Solve ``K u + S u = f + G.T multiplier`` and ``G u + C multiplier = d`` under the equations of `elimination`.
+        """Solve ``K u + S u = f + G.T multiplier``, ``G u + C multiplier = d`` and the equations of `elimination`.
 
         Parameters
         ----------
         f, elimination, springs, guess, tolerance
             See `solution`.
         border : Border
-            The equations with G (e, n), C (e, e) and d (e,), which are not eliminated.
+            The equations that are not eliminated, with G (e, n), C (e, e) and d (e,).
         start : ndarray (e,)
-            Initial guess of their multipliers [force].
+            Initial guess of the multipliers of the border [force].
 
         Returns
         -------
         u : ndarray (n,)
-            [length].
+            Displacements [length].
         multiplier : ndarray (e,)
             Multipliers of the equations of the border [force].
 
@@ -323,7 +326,7 @@ class Multigrid:
         StallError
             If the residual does not fall below the tolerance.
         """
-        if self._renewed:
+        if self._reuses_coarse_levels:
             self._build_anew()
         n = len(f)
         iteration = ConjugateResiduals(n + len(border))
@@ -352,17 +355,18 @@ class Multigrid:
     ) -> None:  # fmt: skip
         """Iterate until the residual is at most the `tolerance` times `scale` [force].
 
-        An initial guess may satisfy this tolerance although the forces of a small contact are still inaccurate. The iteration
-        therefore continues for some iterations, see WARM, or until the norm of the residual is `aim`, if that is smaller.
+        An initial guess may satisfy this tolerance although the forces in a small contact area are still inaccurate. Some
+        further iterations are therefore performed, see WARM_REDUCTION. They continue until the norm of the residual is
+        `aim`, if this is smaller.
         """
         limit = tolerance * scale
-        count, target = 0, max(min(limit, WARM * iteration.norm, aim), WARM_LEAST * limit)
+        count, target = 0, max(min(limit, WARM_REDUCTION * iteration.norm, aim), WARM_RESIDUAL * limit)
         initial_norm = iteration.norm
-        if initial_norm > WARM * self._unfinished_norm and self._constrained.stiffening > MILD:
-            self._most_warm = min(2 * self._most_warm, STORED_DIRECTIONS)
+        if initial_norm > WARM_REDUCTION * self._unfinished_norm and self._constrained.stiffening > MILD_CONTRAST:
+            self._max_warm_iterations = min(2 * self._max_warm_iterations, STORED_DIRECTIONS)
         self._unfinished_norm = np.inf
         while not (done := self._done(iteration, tolerance, scale)) or iteration.norm > target:
-            if done and count >= self._most_warm:
+            if done and count >= self._max_warm_iterations:
                 self._unfinished_norm = initial_norm
                 return
             if count >= MAX_ITERATIONS or not iteration.step(multiply, precondition):
@@ -374,10 +378,10 @@ class Multigrid:
             self._count()
 
     def _done(self, iteration: Iteration, tolerance: float, scale: float) -> bool:
-        """Return whether the residual is at most `tolerance` times `scale`, and final displacements have converged.
+        """Return whether the residual is at most `tolerance` times `scale`, and whether the displacements have converged.
 
-        A small residual alone does not suffice: if it is small relative to the forces in a stiff body, it may still exceed
-        all forces in a soft one.
+        The displacements are examined only at the tolerance of the solver. A residual that is small relative to the forces in
+        a stiff body may exceed all forces in a soft body.
         """
         if iteration.norm > tolerance * scale:
             return False
@@ -393,10 +397,10 @@ class Multigrid:
         self._add_work(1)
 
     def _add_work(self, iterations: int) -> None:
-        """Add a number of iterations to `work`; raise TooManyIterationsError if it exceeds `allowed`."""
+        """Add a number of iterations to `work`; raise TooManyIterationsError if it exceeds `work_limit`."""
         self.work += iterations
-        if self.allowed is not None and self.work > self.allowed:
-            raise TooManyIterationsError(f"the iterations exceed the work limit of {self.allowed}")
+        if self.work_limit is not None and self.work > self.work_limit:
+            raise TooManyIterationsError(f"the iterations exceed the work limit of {self.work_limit}")
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of K [force / length]."""
@@ -405,14 +409,14 @@ class Multigrid:
         return self._diagonal
 
     def _strengthen(self, times: int) -> None:
-        """Make the preconditioner positive definite, by larger bounds or, at the last attempt, by double precision."""
-        if self._renewed:
+        """Make the preconditioner positive definite, by larger bounds or, in the last attempt, by double precision."""
+        if self._reuses_coarse_levels:
             self._build_anew()
             return
-        if times < RAISES or self.precision == "double":
-            self.hierarchy.raise_bounds(RAISE)
+        if times < MAX_RAISES or self.precision == "double":
+            self.hierarchy.raise_bounds(BOUND_FACTOR)
             return
-        log.info("multigrid: single precision is not enough for this matrix, the cycle continues in double precision")
+        log.info("multigrid: single precision is insufficient for this matrix; the cycle continues in double precision")
         reduced = self._reduced
         self.build_in("double")
         self.constrain(reduced.elimination, reduced.springs)
@@ -433,9 +437,9 @@ class Multigrid:
         return float(np.sqrt(square))
 
     def _stopping_residual(self, tolerance: float) -> float:
-        """Return the relative residual [-] at which the iteration stops if `tolerance` is requested.
+        """Return the relative residual [-] at which the iteration stops if the caller requests `tolerance`.
 
-        It is at least the tolerance of the solver.
+        The result is not smaller than the tolerance of the solver.
         """
         return max(self.tolerance, tolerance / self._contrast)
 
@@ -443,12 +447,12 @@ class Multigrid:
     def _contrast(self) -> float:
         """Factor by which relative errors of displacements may exceed relative residuals [-].
 
-        It includes the stiffening of soft bodies by equations, and the contrast within cells, see `LinearSolver`.
+        This factor is due to the stiffening of soft bodies by equations and to the contrast within cells, see `LinearSolver`.
         """
-        return max(1.0, self._constrained.stiffening) * (self.contrast if self.contrast > MILD else 1.0)
+        return max(1.0, self._constrained.stiffening) * (self.contrast if self.contrast > MILD_CONTRAST else 1.0)
 
     def precondition(self, r: Array, norm: float, z: Array) -> None:
-        """Fill z (n,) with an approximate solution for r (n,), of 2-norm `norm`, that satisfies the equations."""
+        """Fill z (n,) with an approximate solution for r (n,) that satisfies the equations; `norm` is the 2-norm of r."""
         self._reduced.precondition(r, norm, z, self._cycle)
 
     def _cycle(self, r: Array, norm: float, z: Array) -> None:
@@ -466,8 +470,8 @@ class Multigrid:
 def _nearly_equal(new: Elimination | None, old: Elimination | None, stiffening: float) -> bool:
     """Return whether two eliminations have the same pivots and nearly the same weights.
 
-    If the pivots belong to a body that is stiffer by the factor `stiffening`, a difference d of the weights increases the
-    energy of displacements of the softer body by the factor ``stiffening d^2``.
+    If the body of the pivots is stiffer than the other body by the factor `stiffening`, a difference d of the weights
+    increases the energy of displacements of the softer body by the factor ``stiffening d^2``.
     """
     if new is None or old is None or not np.array_equal(new.pivots, old.pivots):
         return new is old

@@ -5,10 +5,10 @@ pivots is much stiffer, the nodes of the other side get its stiffness. This has 
 
 - Motions of these nodes that move no pivot are as soft as their body, but the smoother treats them as stiff. `FreeMotions`
   corrects them with the stiffness of their body alone.
-- Aggregates of these nodes and their softer neighbours would move the stiff body. Such motions have far too much energy, so
-  that coarse levels would correct neither side. In corrections from coarser levels the roles are therefore exchanged: the
-  unknowns of the stiffened nodes follow the pivots, ``u = S u`` (`followers`), and the pivots then follow these unknowns as
-  usual. With the prolongator P, the coarse matrices are Galerkin products with ``T S P`` (`composed`).
+- Motions of aggregates of these nodes and their softer neighbours would move the stiff body, and would have far too much
+  energy. Therefore, coarse levels would correct neither side. In corrections from coarser levels, the roles are exchanged:
+  the unknowns of the stiffened nodes follow the pivots, ``u = S u`` (`followers`), and the pivots then follow these unknowns
+  as usual. With the prolongator P, the coarse matrices are Galerkin products with ``T S P`` (`composed`).
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.round_off import SINGLE_PRECISION
 
-# Smallest mean displacement of the pivots due to a unit translation of the other side for which an unknown of this side
-# follows the pivots of its equations.
-LEAST_MOTION = 0.3
+# An unknown of the other side follows the pivots of its equations only if a unit translation of that side displaces these
+# pivots by at least this amount on average.
+SMALLEST_MOTION = 0.3
 
 
 class FreeMotions:
@@ -52,7 +52,7 @@ class FreeMotions:
         self._inverse_WT = csr_array(self._inverse @ W.T)
         self._W_inverse = csr_array(self._inverse_WT.T)  # stored by rows for fast products
         compliance = csr_array(W @ self._inverse_WT)
-        # Rows of W may be linearly dependent in the precision of the cycle; a small shift keeps the matrix regular.
+        # Rows of W may be linearly dependent in the precision of the cycle. A small shift keeps the matrix nonsingular.
         shifted = compliance + diags_array(SINGLE_PRECISION * compliance.diagonal(), format="csr")
         self._factors = splu(csc_array(shifted), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
@@ -68,8 +68,8 @@ class FreeMotions:
 def followers(elimination: Elimination, nodes: Indices, size: int) -> Elimination:
     """Return the transformation S by which the unknowns of stiffened nodes follow the pivots.
 
-    Each unknown satisfies the mean of its equations, weighted with its coefficients in them. The other unknowns of its side
-    are assumed to have the same displacement, so that common translations of both sides are preserved.
+    Each of these unknowns satisfies the mean of its equations, weighted with its coefficients in them. The other unknowns of
+    its side are assumed to have the same displacement, so that common translations of both sides are preserved.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def followers(elimination: Elimination, nodes: Indices, size: int) -> Eliminatio
     # Displacement of each pivot due to unit translations of the opposite side along each direction.
     translation = csr_array((W.data[is_opposite], (W.row[is_opposite], direction[is_opposite])), shape=(m, size))
     pivot_motion = np.asarray((mean @ translation).toarray())
-    couples = pivot_motion[np.arange(len(unknowns)), unknowns % size] >= LEAST_MOTION * np.asarray(mean.sum(axis=1))
+    couples = pivot_motion[np.arange(len(unknowns)), unknowns % size] >= SMALLEST_MOTION * np.asarray(mean.sum(axis=1))
     unknowns, mean, pivot_motion = unknowns[couples], csr_array(mean[couples]), pivot_motion[couples]
     pivot_terms = csr_array((-W.data[~is_opposite], (W.row[~is_opposite], W.col[~is_opposite])), shape=(m, n))
     pivot_terms = pivot_terms + csr_array((np.ones(m), pivots, np.arange(m + 1)), shape=(m, n))
@@ -111,7 +111,7 @@ def composed(elimination: Elimination, following: Elimination) -> tuple[Indices,
     elimination : Elimination
         T, with m pivots.
     following : Elimination
-        S, with q unknowns that follow.
+        S, for the q unknowns that follow the pivots.
 
     Returns
     -------

@@ -1,9 +1,9 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Symmetric matrices of which most blocks are stored once.
+"""Symmetric matrices, most blocks of which are stored only once.
 
-Block rows are divided into parts of equal length, of which the last one may be shorter. A block whose row and column lie in
-the same part is stored once, in the upper triangle. A block between two parts is stored in both rows, so that the product of
-a part with a vector only changes entries of this part. If parts contain several planes of a mesh, 55 to 65 % of all blocks
+Block rows are divided into parts of equal length; the last part may be shorter. A block whose row and column lie in the same
+part is stored once, in the upper triangle. A block that couples two parts is stored in both rows, so that the product of a
+part with a vector only changes entries of this part. If each part contains several planes of a mesh, 55 to 65 % of all blocks
 are stored.
 
 The storage is a tuple ``storage = (start, upper, columns, length)``. The stored blocks of row i are ``start[i]`` to
@@ -24,7 +24,7 @@ from fastcontact.linear.multigrid.block_products import row_times, row_times_bot
 
 @innermost_kernel
 def part_of(storage, i):
-    """Return the first row of the part of row i, and the row after the part; (0, 0) if every block is stored."""
+    """Return the first row of the part of row i, and the row after its last one; (0, 0) if every block is stored."""
     length = storage[3]
     if length == 0:
         return 0, 0
@@ -36,7 +36,7 @@ def part_of(storage, i):
 def slot_of(storage, part, i, j, k):
     """Return the slot of block (i, j), the `k`-th of the pattern, and whether its transpose is stored there.
 
-    `part` is ``part_of(storage, i)``. The slot is -1 if the block is not stored, which happens only if the pattern is not
+    `part` is ``part_of(storage, i)``. The slot is -1 if the block is not stored, which occurs only if the pattern is not
     symmetric.
     """
     if part[1] == 0:
@@ -64,7 +64,7 @@ def slot_of(storage, part, i, j, k):
 
 @innermost_kernel
 def entry_of(numbers, slot, a, b, size):
-    """Return entry (a, b) of a block in double precision; `slot` is the result of `slot_of`."""
+    """Return the entry (a, b) of a block in double precision; `slot` is the result of `slot_of`."""
     k = (slot[0] * size + b) * size + a if slot[1] else (slot[0] * size + a) * size + b
     if len(numbers) == 2:
         return np.float64(numbers[0][k]) + np.float64(numbers[-1][k])
@@ -88,8 +88,9 @@ def store_rows(
 ):
     """Store the high and low parts of the numbers of rows ``shift + begin`` to ``shift + end - 1``, times `factor`.
 
-    Rows have up to `max_blocks` blocks of `block_size` numbers. `low_parts` may share the memory of the beginning of
-    `numbers`: a row is read before its memory is overwritten. Columns ascend within a row, unless every block is stored.
+    Rows have up to `max_blocks` blocks of `block_size` numbers. `low_parts` may share memory with the beginning of
+    `numbers`, since each row is read before its memory is overwritten. Columns must ascend within each row, unless every
+    block is stored.
     """
     row = np.empty(max_blocks * block_size)
     for i in range(shift + begin, shift + end):

@@ -1,12 +1,12 @@
 """Multigrid as a linear solver, and the factorisation that replaces it if multigrid does not converge.
 
 Constraint equations ``B u = c`` are eliminated (`multigrid.solver`). Those with a diagonal compliance are eliminated or
-replaced by springs (`multigrid.loaded`). Equations with a full compliance matrix cannot be eliminated. They need columns of
-K^-1, each of which requires the solution of one linear system; they are stored for the complete analysis.
+replaced by springs (`multigrid.loaded`). Equations with a full compliance matrix cannot be eliminated. For them, columns of
+K^-1 are computed, each as the solution of one linear system, and stored for the rest of the analysis.
 
-A factorisation replaces multigrid for the rest of the analysis if too many columns are needed, if the iteration stalls on
-thin or nearly incompressible parts, or if a load step has taken more work than a factorisation. Very large matrices are not
-factorised.
+A factorisation replaces multigrid for the rest of the analysis if too many columns are needed, if the iteration stalls
+because of thin or nearly incompressible parts, or if a load step has taken more work than a factorisation. Very large
+matrices are not factorised.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import TooManyColumnsError
 from fastcontact.linear.elimination.elimination import Elimination
-from fastcontact.linear.elimination.loaded import put_back_tolerance, tighten
+from fastcontact.linear.elimination.loaded import restore_tolerance, tighten
 from fastcontact.linear.factor_solver import AFFORDABLE
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
-from fastcontact.linear.multigrid.reduced import Reduced
+from fastcontact.linear.multigrid.reduced import ReducedOperator
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS, Multigrid, StallError, TooManyIterationsError
 from fastcontact.linear.protocol import TOLERANCE, FrictionTerms, LinearSolver, Loaded, Product
 from fastcontact.linear.solvers.direct import Direct
@@ -35,9 +35,9 @@ from fastcontact.round_off import ROUND_OFF
 
 log = logging.getLogger("fastcontact")
 # A factorisation is cheaper if one load step takes more iterations than MAX_ITERATIONS plus this number for each unknown. The
-# keys are the numbers of components per node. In 3D, a factorisation and a load step with it cost as much as 300 iterations
-# plus 0.04 per unknown for two bodies in contact, and three times as much in stacks with friction (measured, see
-# bench/README.md).
+# keys are the numbers of unknowns per node. For two bodies in contact in 3D, a factorisation and a load step with it cost as
+# much as 300 iterations plus 0.04 iterations per unknown. In stacks with friction, they cost three times as much (measured,
+# see bench/README.md).
 ITERATIONS_PER_UNKNOWN = {1: 0.0, 2: 0.0, 3: 0.08}
 
 
@@ -69,7 +69,7 @@ class Amg(Multigrid, LinearSolver):
 
     @property
     def iterative(self) -> bool:
-        """Whether a solution with a larger tolerance costs less: True until a factorisation has replaced multigrid."""
+        """Whether a solution with a larger tolerance costs less; true until a factorisation has replaced multigrid."""
         return self.replacement is None
 
     def prepare(
@@ -83,11 +83,11 @@ class Amg(Multigrid, LinearSolver):
     def load(self, f: Array) -> Loaded:
         """Return the prepared matrix with the right-hand side `f` (n,) [force], and reset the work limit."""
         self.begin()
-        self.allowed = self.work + self.affordable if self._may_factorise else None
+        self.work_limit = self.work + self.iteration_limit if self._may_factorise else None
         return _Loaded(self, f)
 
     @property
-    def affordable(self) -> int:
+    def iteration_limit(self) -> int:
         """Number of iterations in one load step above which a factorisation is cheaper."""
         n, size = self.K.shape[0], self.K.blocksize[0]
         return MAX_ITERATIONS + int(ITERATIONS_PER_UNKNOWN[size] * n)
@@ -112,12 +112,12 @@ class Amg(Multigrid, LinearSolver):
         instead = None if self.replacement is None else {"why": self.replacement_reason, **self.replacement.snapshot()}
         return {
             "precision": self.precision, "tolerance": self.tolerance, "bounds": self.hierarchy.bounds,
-            "asked": list(self.columns.asked), **self._constrained_by(), "instead": instead,
+            "asked": list(self.columns.requests), **self._constrained_by(), "instead": instead,
             "lasting": self._reuses_levels[0],
         }  # fmt: skip
 
     def _constrained_by(self) -> dict[str, Any]:
-        """Return the equations and springs that the hierarchy contains, as arrays; each is None if there are none."""
+        """Return the equations and the springs for which the hierarchy was changed, as arrays, or None if there are none."""
         equations, springs, tied = self._hierarchy_equations, self._hierarchy_springs, None
         if equations is not None:
             rows = equations.weights
@@ -129,10 +129,10 @@ class Amg(Multigrid, LinearSolver):
         if (instead := snapshot.get("instead")) is not None:
             (self.replacement or self._factorise(instead["why"])).put_back(instead)
             return
-        if self.replacement is not None:  # The factorisation replaced multigrid after the time of the snapshot.
+        if self.replacement is not None:  # The factorisation replaced multigrid after the snapshot was taken.
             self._factor_solver, self.replacement, self.replacement_reason = self.replacement, None, ""
         self._reuses_levels[0] = snapshot.get("lasting", True)
-        put_back_tolerance(self, snapshot)
+        restore_tolerance(self, snapshot)
         if snapshot["precision"] != self.precision:
             self.build_in(snapshot["precision"])
         self.columns.put_back(snapshot["asked"])
@@ -140,7 +140,7 @@ class Amg(Multigrid, LinearSolver):
         if not all(_equal(current[name], saved[name]) for name in saved):
             n = self.hierarchy.n
             equations, springs = saved["tied"], saved["springs"]
-            self._reduced = Reduced(self.K, None)
+            self._reduced = ReducedOperator(self.K, None)
             equations, springs = equations and _elimination(equations, n), springs and Springs.from_dict(springs, n)
             self._change_hierarchy(equations, springs)
         self.hierarchy.bounds = snapshot["bounds"]
@@ -157,8 +157,8 @@ class Amg(Multigrid, LinearSolver):
             raise stalled
         if isinstance(stalled, TooManyIterationsError):
             why = (
-                f"multigrid gave up and a factorisation replaced it, which costs more memory: {self.affordable} iterations "
-                f"in one load step take longer than a factorisation of {self.K.shape[0]} unknowns"
+                f"multigrid gave up and a factorisation replaced it, which costs more memory: {self.iteration_limit} "
+                f"iterations in one load step take longer than a factorisation of {self.K.shape[0]} unknowns"
             )
         else:
             why = f"multigrid gave up and a factorisation replaced it, which costs more time and memory: {stalled}"
@@ -170,7 +170,7 @@ class Amg(Multigrid, LinearSolver):
         return bool(self.K.shape[0] <= AFFORDABLE[self.K.blocksize[0]])
 
     def _factorise(self, why: str) -> Direct:
-        """Replace multigrid by a factorisation for the reason `why`, and return the direct solver."""
+        """Replace multigrid by a factorisation, for the reason `why`, and return the direct solver."""
         if self._factor_solver is None:
             log.warning("%s", why)
             self._factor_solver = Direct()
@@ -180,7 +180,7 @@ class Amg(Multigrid, LinearSolver):
             self._factor_solver.put_back({"asked": [], "loads": []})
         self.replacement_reason, self.replacement = why, self._factor_solver
         # From now on the tolerance is that of the direct solver.
-        self.asked = self.tolerance if self.asked is None else self.asked
+        self.original_tolerance = self.tolerance if self.original_tolerance is None else self.original_tolerance
         self.tolerance = self.replacement.tolerance
         return self.replacement
 

@@ -1,6 +1,7 @@
 """Direct solver by the supernodal Cholesky factorisation of CHOLMOD, from the optional package kvxopt.
 
-For 59 000 unknowns in 3D, including columns of K^-1, it is 10 to 25 % faster than ``"direct"`` and needs twice the memory.
+For 59 000 unknowns in 3D, including the computation of columns of K^-1, it is 10 to 25 % faster than ``"direct"`` and needs
+twice the memory.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ class Cholmod(FactorSolver):
     def _factorised(self, K: bsr_array, last: Indices) -> SymmetricFactors:
         from kvxopt import cholmod, matrix
 
-        factor = factorised(lower_triangle(K.tocsr()), matrix(fill_reducing(K, last)))  # rows of K are its columns
-        # CHOLMOD may reorder independent branches of the elimination tree, which changes no dependencies.
+        factor = factorised(lower_triangle(K.tocsr()), matrix(fill_reducing(K, last)))  # rows are columns
+        # CHOLMOD may reorder independent branches of the elimination tree, which does not affect the factors.
         position = np.empty(self.n, np.intp)
         position[_elimination_order(factor, self.n)] = np.arange(self.n)
         start, rows, values = (np.asarray(array).ravel() for array in cholmod.getfactor(factor).CCS)
@@ -36,11 +37,11 @@ class Cholmod(FactorSolver):
 
 
 def by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Array) -> LowerTriangle:
-    """Return a Cholesky factor, given by columns with ascending rows, with the rows once per supernode.
+    """Return a Cholesky factor with the row indices stored once per supernode, given its columns with ascending rows.
 
     Column j + 1 belongs to the supernode of column j if j + 1 is the first row of column j below the diagonal, and if column
-    j + 1 has one entry fewer. Below their diagonals both then have the same rows from j + 2 on, since the rows of a column
-    without its diagonal are contained in those of its parent, the column of its first row below the diagonal.
+    j + 1 has one entry fewer. Both columns then have the same rows from j + 2 on. The reason is that the rows of a column
+    below the diagonal are contained in those of its parent, the column of its first row below the diagonal.
     """
     entries = np.diff(start)
     continues = np.zeros(len(entries), bool)
@@ -89,8 +90,8 @@ def _elimination_order(factor: Any, n: int) -> Indices:
 
     numbers = matrix(np.arange(n, dtype=float))
     try:
-        cholmod.solve(factor, numbers, sys=7)  # only permutes to the order of elimination
-    except ArithmeticError as error:  # For small matrices CHOLMOD detects a zero pivot only in a solution.
+        cholmod.solve(factor, numbers, sys=7)  # only permutes `numbers` to the order of elimination
+    except ArithmeticError as error:  # For small matrices, CHOLMOD detects a zero pivot only when it solves a system.
         raise singular() from error
     return np.array(numbers).ravel().astype(np.intp)
 

@@ -9,7 +9,7 @@ from scipy.sparse import bsr_array
 from fastcontact.arrays import Indices
 from fastcontact.linear.cholesky.factorisation import SymbolicFactors
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
-from fastcontact.linear.factor_solver import ATTAINABLE, FactorSolver
+from fastcontact.linear.factor_solver import ATTAINABLE_RESIDUAL, FactorSolver
 
 
 class Direct(FactorSolver):
@@ -18,9 +18,10 @@ class Direct(FactorSolver):
     name = "direct"
     _of_tangents = False
 
-    def __init__(self, tolerance: float = ATTAINABLE) -> None:
+    def __init__(self, tolerance: float = ATTAINABLE_RESIDUAL) -> None:
         super().__init__(tolerance)
-        # Symbolic factorisations of tangents (True), which the solvers of all tangents share, and of other matrices (False).
+        # Symbolic factorisation of tangents (True), which is shared by the solvers of all tangents, and that of other
+        # matrices (False).
         self._symbolic: dict[bool, SymbolicFactors] = {}
 
     def __repr__(self) -> str:

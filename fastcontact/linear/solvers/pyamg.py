@@ -1,8 +1,8 @@
-"""Reference solver: conjugate gradients of SciPy, preconditioned by the smoothed aggregation of pyamg.
+"""Reference solver: conjugate gradients of SciPy, preconditioned by the smoothed aggregation multigrid of pyamg.
 
 This solver is simple and slow. Except for the choice of pivots, it consists only of calls to pyamg and SciPy, so that the
-solver "amg" can be verified against it. Equations are eliminated, ``u = T v + t``, and each set of equations requires a new
-hierarchy for the matrix ``T.T K T``.
+solver "amg" can be verified against it. Equations are eliminated by the transformation ``u = T v + t``, and each set of
+equations requires a new hierarchy for the matrix ``T.T K T``.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import InverseColumns, inverse_entries
 from fastcontact.linear.elimination.elimination import Elimination
-from fastcontact.linear.elimination.loaded import LoadedIteration, put_back_tolerance, tighten
+from fastcontact.linear.elimination.loaded import LoadedIteration, restore_tolerance, tighten
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS
 from fastcontact.linear.protocol import TOLERANCE, Counters, LinearSolver, Monitor
 
 # As in "amg", all connections are treated as strong. The near-nullspace candidates are not improved, because rigid-body modes
-# need no improvement. Of the smoothers, the one with the shortest solution time is used.
+# need no improvement. The smoother is the one with the shortest solution time.
 SMOOTHER = ("chebyshev", {"degree": 2, "iterations": 1})
 OPTIONS: dict[str, Any] = {
     "strength": ("symmetric", {"theta": 0.0}), "max_coarse": 200, "improve_candidates": None,
@@ -37,7 +37,7 @@ class Pyamg(LinearSolver):
     Parameters
     ----------
     tolerance : float
-        The residual is reduced below this fraction of the right-hand side (2-norms).
+        Tolerance of the 2-norm of the residual, relative to the 2-norm of the right-hand side [-].
     """
 
     name = "pyamg"
@@ -87,7 +87,7 @@ class Pyamg(LinearSolver):
         self, f: Array, elimination: Elimination | None, guess: Array | None, monitor: Monitor | None = None,
         tolerance: float | None = None,
     ) -> Array:  # fmt: skip
-        """Solve ``K u = f`` under the equations of `elimination` to the solver's tolerance, or `tolerance` if larger.
+        """Solve ``K u = f`` subject to the equations of `elimination`; parameters as in `Multigrid.solution`.
 
         Raises
         ------
@@ -129,12 +129,12 @@ class Pyamg(LinearSolver):
         return tighten(self, excess)
 
     def snapshot(self) -> dict[str, Any]:
-        """See `LinearSolver.snapshot`: requested columns of ``K^-1``, and the tolerance."""
-        return {"asked": list(self.columns.asked), "tolerance": self.tolerance}
+        """Return the requested columns of ``K^-1`` and the tolerance; see `LinearSolver.snapshot`."""
+        return {"asked": list(self.columns.requests), "tolerance": self.tolerance}
 
     def put_back(self, snapshot: Mapping[str, Any]) -> None:
         """See `LinearSolver.put_back`."""
-        put_back_tolerance(self, snapshot)
+        restore_tolerance(self, snapshot)
         self.columns.put_back(snapshot["asked"])
 
 

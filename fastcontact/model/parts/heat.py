@@ -14,7 +14,7 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.conductance import Conductance
 from fastcontact.elasticity.loads import Value, evaluated
 from fastcontact.errors import ModelError
-from fastcontact.heat.conduction import Conduction, not_reached
+from fastcontact.heat.conduction import Conduction, undetermined_bodies
 from fastcontact.heat.loads import Film, FixedTemperature, HeatFlux, Heating, HeatSource, NodalHeat
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.parts.base import ModelBase, group_names
@@ -248,7 +248,7 @@ class ModelHeat(ModelBase):
             elif pair.options.get("conductance") is not None:
                 ends = np.concatenate([self.mesh.points_of(pair.secondary), self.mesh.points_of(pair.primary)])
                 links.append(np.stack([np.full(len(ends), ends[0]), ends], axis=1))
-        undetermined = not_reached(body, determined, np.concatenate(links))
+        undetermined = undetermined_bodies(body, determined, np.concatenate(links))
         if len(undetermined):
             raise ModelError(
                 f"nothing determines the temperature of body {body_name(self.mesh, body, undetermined[0])}: fix a "

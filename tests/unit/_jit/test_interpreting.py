@@ -135,7 +135,7 @@ from fastcontact.linear.cholesky.factorisation_kernels import work_sizes as kern
 
 front = np.array([-1], np.int32), np.array([0, 3]), np.array([0, 0])  # one supernode of three columns
 answers = [*kernel(*front), len(kernel.compiled.signatures), compiling.count]
-interpreting.SECONDS = -1.0
+interpreting.MAX_SECONDS = -1.0
 answers += [*kernel(*front), len(kernel.compiled.signatures), type(answers[0]).__name__]
 print(*answers)
 """
@@ -148,8 +148,8 @@ def test_python_runs_a_kernel_until_it_has_taken_its_time_and_never_one_that_is_
 
 def test_the_time_of_earlier_runs_counts(tmp_path):
     """In the first run Python has spent nothing yet; in the second one more than it may."""
-    short = ASK.partition("interpreting.SECONDS = ")[0] + "print(answers[2])"
-    short = short.replace("answers = [", "interpreting.SECONDS_OF_RUNS = 1e-9\nanswers = [", 1)
+    short = ASK.partition("interpreting.MAX_SECONDS = ")[0] + "print(answers[2])"
+    short = short.replace("answers = [", "interpreting.MAX_SECONDS_OF_RUNS = 1e-9\nanswers = [", 1)
 
     def ask():
         return printed(short, NUMBA_CACHE_DIR=tmp_path, NUMBA_DISABLE_JIT=0)

@@ -276,7 +276,7 @@ import numpy as np
 from fastcontact._jit import interpreting
 from fastcontact.contact.formulations._cut_faces_kernels import planes
 
-interpreting.SECONDS = -1.0  # not Python in the place of the kernel
+interpreting.MAX_SECONDS = -1.0  # not Python in the place of the kernel
 a, b = np.meshgrid(np.linspace(0.0, 0.2, 22), np.linspace(0.0, 0.2, 22), indexing="ij")
 points = np.stack([np.sin(a), 1.0 - np.cos(a) * np.cos(b), np.cos(a) * np.sin(b)], axis=-1)
 corners = np.stack([points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]], axis=2).reshape(-1, 4, 3).copy()

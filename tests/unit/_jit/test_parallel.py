@@ -19,7 +19,7 @@ from fastcontact.elasticity import constrained_system, stiffness
 @pytest.fixture
 def threads(monkeypatch):
     def use(count):
-        monkeypatch.setattr(parallel, "WORTHWHILE", 0)
+        monkeypatch.setattr(parallel, "SINGLE_THREAD_WORK", 0)
         monkeypatch.setattr(_jit, "threads", lambda: count)
 
     return use
@@ -58,7 +58,7 @@ def test_patterns_and_supports_taken_out_are_those_of_one_thread(threads, count)
         threads(number)
         pattern = stiffness.sparsity(mesh)
         K = bsr_array((data.copy(), pattern.indices, pattern.indptr))
-        left, taken = constrained_system.supports_apart(K, supported)
+        left, taken = constrained_system.separate_supports(K, supported)
         found.append((pattern.indptr, pattern.indices, pattern.slots["hex8"], left.data, taken.indptr, taken.data))
     for one, other in zip(*found, strict=True):
         np.testing.assert_array_equal(one, other)
@@ -79,13 +79,13 @@ def test_parts_work_on_equally_many_cells(threads, element):
 
 
 def test_little_work_is_not_shared():
-    little = parallel.WORTHWHILE // parallel.NODES
+    little = parallel.SINGLE_THREAD_WORK // parallel.NODES
     assert parallel.portions(little) == [(0, little)]
 
 
 def test_a_fifth_of_the_cells_is_worthwhile_with_five_times_the_nodes(monkeypatch):
     monkeypatch.setattr(_jit, "threads", lambda: 2)
-    little = parallel.WORTHWHILE // (5 * parallel.NODES)
+    little = parallel.SINGLE_THREAD_WORK // (5 * parallel.NODES)
     assert len(parallel.portions(little, 5 * parallel.NODES)) == 1
     assert len(parallel.portions(little + 1, 5 * parallel.NODES)) == 2
 

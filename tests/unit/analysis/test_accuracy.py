@@ -257,7 +257,7 @@ def test_contacts_smaller_than_a_facet_have_inaccurate_forces():
     force, (text,) = pushed_nose(12, formulation="mortar", multipliers="dual", friction=0.0)
     other, (plain,) = pushed_nose(12, formulation="continuous")
     assert (
-        "with less than 2 the force and its direction may be inaccurate, too; refine 'BOTTOM', or use formulation 'con"
+        "with fewer than 2 the force and its direction may be inaccurate, too; refine 'BOTTOM', or use formulation 'con"
         in text
     )
     assert plain.endswith("refine 'BOTTOM'")

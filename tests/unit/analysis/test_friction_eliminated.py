@@ -62,7 +62,7 @@ def test_elimination_and_compliance_agree_and_no_column_is_asked_for(formulation
         )
         slid += int((b.active & ~b.sticking).sum())
     assert slid > 5
-    assert analysis.solver.columns.asked == []
+    assert analysis.solver.columns.requests == []
 
 
 def test_what_fails_on_eliminated_constraints_is_solved_on_their_compliance(monkeypatch, caplog):

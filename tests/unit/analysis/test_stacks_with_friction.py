@@ -78,7 +78,7 @@ def test_forces_that_cannot_be_more_accurate_settle_without_a_compliance(accepta
     monkeypatch.setattr(eliminated, "ACCEPTABLE", acceptable)
     model = light_contact_beside_a_large_force(6e-4)
     (solver, step), exact = solved(model, "amg"), solved(model, "direct")[1].contact["c"]
-    assert bool(solver.columns.asked) == (acceptable == 0.0)
+    assert bool(solver.columns.requests) == (acceptable == 0.0)
     found = step.contact["c"]
     assert np.abs(found.force - exact.force).max() < 1e-6 * np.abs(exact.force).max()
     assert found.active.sum() > found.sticking.sum()

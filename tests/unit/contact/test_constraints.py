@@ -106,7 +106,7 @@ def sides(request):
 
 def test_only_the_first_and_the_last_end_of_an_open_line_meet_no_other(sides):
     _, side, _ = sides
-    corners = side.facets[:, :2]
+    corners = side.only_block.facets[:, :2]
     outer = corners[~side.inner_ends]
     times = np.bincount(corners.ravel())
     np.testing.assert_array_equal(np.sort(outer), np.flatnonzero(times == 1))
@@ -121,8 +121,8 @@ def test_rows_are_sums_over_both_sides(sides):
     pairing = Pairing(facet, xi, rng.normal(size=(n, 2)), rng.random(n) < 0.7)
     direction, u = rng.normal(size=(n, 2)), rng.normal(size=mesh.points.shape)
     found = rows_along(direction, nodes, pairing, primary, u.size)
-    shape = elements.get(primary.element).shape(xi)
-    theirs = np.einsum("nk,nkd->nd", shape, u[primary.facets[facet]])
+    shape = elements.get(primary.only_block.element).shape(xi)
+    theirs = np.einsum("nk,nkd->nd", shape, u[primary.only_block.facets[facet]])
     moved = np.einsum("nd,nd->n", direction, u[secondary.points] - theirs)
     np.testing.assert_allclose(found @ u.ravel(), np.where(pairing.paired, moved, 0.0), atol=1e-13)
     np.testing.assert_array_equal(np.diff(found.indptr) == 0, ~pairing.paired)
@@ -144,8 +144,8 @@ def test_places_on_one_kind_of_facets_are_those_of_its_element(sides):
     _, side, _ = sides
     rng = np.random.default_rng(4)
     facet, xi = rng.integers(0, side.n_facets, 9), rng.uniform(-1, 1, (9, 1))
-    at, element = places(side, facet, xi), elements.get(side.element)
-    np.testing.assert_array_equal(at.nodes, side.facets[facet])
+    at, element = places(side, facet, xi), elements.get(side.only_block.element)
+    np.testing.assert_array_equal(at.nodes, side.only_block.facets[facet])
     np.testing.assert_array_equal(side.points[at.local], at.nodes)
     np.testing.assert_array_equal(at.shape, element.shape(xi))
     np.testing.assert_array_equal(at.gradient, element.gradient(xi))

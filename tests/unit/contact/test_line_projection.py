@@ -11,7 +11,6 @@ from fastcontact.contact.pairing import pair
 from fastcontact.contact.projection import (
     along_line_normals,
     along_normals,
-    at_nodes_of_facets,
     closest_of_kinds,
     facet_normals,
     interpolate,
@@ -35,7 +34,7 @@ def wavy(element, n=8):
 
 def projected(candidates, side, points, project=along_normals):
     """Return the normals at the nodes of facets, the closest points, and the projection along the normals."""
-    normals = at_nodes_of_facets(smooth_normals(side, points))
+    normals = smooth_normals(side, points)
     start = closest_of_kinds(candidates, side.corners(points))
     return normals, start, project(candidates, side, points, normals, start)
 
@@ -53,7 +52,7 @@ def cross(a, b):
 def test_against_a_plain_root_on_every_facet(element):
     """Height over the surface is small, so that each point has one projection: that of a bracketed root."""
     mesh, side = wavy(element)
-    reference = elements.get(side.element)
+    reference = elements.get(side.only_block.element)
     rng = np.random.default_rng(5)
     x = rng.uniform(0.1, 3.9, 60)
     candidates = np.column_stack([x, 1.0 + 0.3 * np.sin(2.5 * x) + rng.uniform(0.0, 0.1, 60)])
@@ -62,7 +61,7 @@ def test_against_a_plain_root_on_every_facet(element):
 
         def aside(s, f, point=point):
             N = reference.shape(np.array([[s]]))[0]
-            return float(cross(point - N @ mesh.points[side.facets[f]], N @ normals[f]))
+            return float(cross(point - N @ mesh.points[side.only_block.facets[f]], N @ normals[f]))
 
         roots = [
             (f, brentq(aside, -1.0, 1.0, args=(f,), xtol=1e-14))
@@ -236,7 +235,7 @@ def test_corners_are_taken_one_by_one():
     side = surface(mesh.replace(cell_groups={**mesh.cell_groups, "ALL": np.concatenate(
         [mesh.cell_groups[name] for name in ("XMIN", "XMAX", "YMIN", "YMAX", "ZMIN", "ZMAX")]
     )}), "ALL")  # fmt: skip
-    (normals,) = smooth_normals(side, mesh.points)
+    normals = smooth_normals(side, mesh.points)
     assert normals == pytest.approx(facet_normals(side.blocks[0], mesh.points), abs=1e-15)
 
 

@@ -10,7 +10,7 @@ from fastcontact.contact.formulations.continuous import Continuous
 from fastcontact.contact.formulations.node_to_segment import NodeToSegment
 from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule, mass_matrix, nodal_areas
 from fastcontact.contact.pairing import Candidates, gap_rows, pair
-from fastcontact.contact.projection import at_nodes_of_facets, interpolate, nodal_normals, places, smooth_normals
+from fastcontact.contact.projection import interpolate, nodal_normals, places, smooth_normals
 from fastcontact.contact.surface import surface
 from fastcontact.mesh import quadrature
 from fastcontact.mesh.generate import box, merge_points, sphere_octant, union
@@ -32,7 +32,7 @@ def test_areas_and_normals_of_a_sphere(element):
     side = surface(mesh, "CONT_SPHERE")
     facet = np.arange(side.n_facets)
     normals, quadratic = nodal_normals(side, mesh.points), side.order == 2
-    smooth = at_nodes_of_facets(smooth_normals(side, mesh.points))
+    smooth = smooth_normals(side, mesh.points)
     outward = (mesh.points[side.points] - [0, 2, 0]) / 2.0
     assert np.abs(normals - outward).max() < (2e-2 if quadratic else 0.2)
     inner = np.linalg.norm(outward[:, [0, 2]], axis=1) < 0.5
@@ -44,10 +44,10 @@ def test_areas_and_normals_of_a_sphere(element):
     area = 4.0 * np.pi / 6.0
     tolerance = 1e-4 if quadratic else 2e-2
     assert nodal_areas(side, mesh.points, False).sum() == pytest.approx(area, rel=tolerance)
-    xi, weights = fine_rule(side.element)
-    assert (facet_measure(side.facets, side.element, mesh.points, xi, False) @ weights).sum() == pytest.approx(
-        area, rel=tolerance
-    )
+    xi, weights = fine_rule(side.only_block.element)
+    block = side.only_block
+    sizes = facet_measure(block.facets, block.element, mesh.points, xi, False) @ weights
+    assert sizes.sum() == pytest.approx(area, rel=tolerance)
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -70,7 +70,7 @@ def test_a_surface_may_mix_triangles_and_quadrangles(order):
         foot = np.einsum("nk,nkd->nd", at.shape, mesh.points[at.nodes])
         assert foot[:, :2] == pytest.approx(positions[:, :2], abs=1e-12)
     with pytest.raises(fc.ContactError, match=r"'ZMAX' mixes facets of .*use 'continuous' or 'node_to_segment'"):
-        _ = side.facets
+        _ = side.only_block.facets
 
 
 def folded(n=6, depth=0.15):

@@ -33,7 +33,7 @@ def test_circles_are_met_from_both_sides_and_up_to_their_ends(element, tolerance
         side = surface(mesh, group)
         smooth = smooth_side(side, mesh.points)
         xi = np.full((side.n_facets, 1), 0.4)
-        place = elements.get(side.element).shape(xi[:1])[0] @ mesh.points[side.facets]
+        place = elements.get(side.only_block.element).shape(xi[:1])[0] @ mesh.points[side.only_block.facets]
         exact = 50.0 - np.linalg.norm(place, axis=1)
         assert smooth.at(np.arange(side.n_facets), xi) == pytest.approx(sign * exact, rel=tolerance)
         assert smooth.curvature.ravel() == pytest.approx(sign / 50.0, rel=2e-4)
@@ -51,8 +51,8 @@ def test_cylinders_and_spheres_are_met(element, divisions, tolerance, double):
     mesh = bent(element, divisions, 2.0, double, shift=0.2)
     side = surface(mesh, "ZMAX")
     smooth, facets = smooth_side(side, mesh.points), np.arange(side.n_facets)
-    xi = np.tile(elements.get(side.element).nodes[:3].mean(axis=0)[None] + [0.1, 0.05], (side.n_facets, 1))
-    place = elements.get(side.element).shape(xi[:1])[0] @ mesh.points[side.facets]
+    xi = np.tile(elements.get(side.only_block.element).nodes[:3].mean(axis=0)[None] + [0.1, 0.05], (side.n_facets, 1))
+    place = elements.get(side.only_block.element).shape(xi[:1])[0] @ mesh.points[side.only_block.facets]
     place += [0.2, 0.0, 0.0]
     exact = 2.0 - np.linalg.norm(place if double else place[:, [0, 2]], axis=1)
     assert np.abs(smooth.at(facets, xi) - exact).max() < tolerance * np.abs(exact).max()
@@ -79,7 +79,7 @@ def test_flats_stay_flat_beside_fillets_and_up_to_corners():
     points = np.column_stack([np.minimum(x, 1.0) + (1 + y) * np.sin(angle), (1 + y) * np.cos(angle)])
     side = surface(mesh, "TOP")
     smooth = smooth_side(side, points)
-    middle = points[side.facets].mean(axis=1)
+    middle = points[side.only_block.facets].mean(axis=1)
     height = smooth.at(np.arange(20), np.zeros((20, 1)))
     assert np.abs(height[middle[:, 0] < 1.0]).max() < 0.25 * 0.12**2 / 8
     assert height[middle[:, 0] > 1.2] == pytest.approx(1.2 * (1 - np.cos(0.05)), rel=1e-3)

@@ -139,7 +139,7 @@ def test_patch_test_through_the_solver(name, linear_solver):
 
 @pytest.mark.parametrize(("name", "kinematics"), [("quad4", "axisymmetric"), ("hex8", "3d"), ("tet10", "3d")])
 def test_any_number_of_threads_gives_the_same_bits(name, kinematics, monkeypatch):
-    monkeypatch.setattr(parallel, "WORTHWHILE", 1)
+    monkeypatch.setattr(parallel, "SINGLE_THREAD_WORK", 1)
     mesh, before, found = patch(name, 4), threads(), []
     u = np.random.default_rng(2).normal(size=mesh.points.shape)
     for count in (1, 2):

@@ -107,7 +107,7 @@ def test_threads_do_not_change_bits(law: str, monkeypatch: pytest.MonkeyPatch) -
     u = 0.02 * np.random.default_rng(0).normal(size=mesh.points.shape)
     found = []
     for count in (1, 2, 3):
-        monkeypatch.setattr(parallel, "WORTHWHILE", 1)
+        monkeypatch.setattr(parallel, "SINGLE_THREAD_WORK", 1)
         monkeypatch.setattr(parallel.decorators, "threads", lambda count=count: count)
         bodies = NonlinearBodies(mesh, "3d", strain, model.material_field())
         here = bodies.at(u, bodies.beginning)

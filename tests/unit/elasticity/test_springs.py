@@ -10,7 +10,7 @@ from models import elastic_model, supported
 from scipy.sparse import bsr_array
 
 import fastcontact as fc
-from fastcontact.elasticity.constrained_system import supports_apart
+from fastcontact.elasticity.constrained_system import separate_supports
 
 E, WIDTH, HEIGHT, PRESSURE = 1000.0, 2.0, 3.0, 10.0
 
@@ -218,7 +218,7 @@ def test_the_parts_make_the_whole(size, seed, n, share):
     rng = np.random.default_rng(seed)
     K, full = matrix(rng, n, size)
     fixed = rng.random(n * size) < share
-    left, taken = supports_apart(K, fixed)
+    left, taken = separate_supports(K, fixed)
     expected = full.copy()
     expected[fixed], expected[:, fixed] = 0.0, 0.0
     diagonal = full.diagonal()

@@ -325,7 +325,7 @@ def test_as_many_cells_as_points_is_no_array():
         assert model.materials[0][0].E.varies_within_cells == (n == 9)
     lone = fc.Mesh([*ring, [0, 0], [5.0, 0.0]], {"tri3": [*cells, [0, 9, 1], [0, 7, 9]]})
     model = fc.Model(lone, "plane_strain")
-    with pytest.raises(fc.ModelError, match="10 numbers, but there are as many cells as points: give numbers of cells"):
+    with pytest.raises(fc.ModelError, match="10 numbers, but there are as many cells as points: give values of cells"):
         model.add_material(fc.LinearElastic(np.ones(10), 0.3))
     model.add_material(fc.LinearElastic(np.ones((10, 1)), 0.3))
     assert not model.materials[0][0].E.varies_within_cells

@@ -7,7 +7,7 @@ from models import supported, united
 import fastcontact as fc
 from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import prepare
-from fastcontact.elasticity.constrained_system import supports_apart
+from fastcontact.elasticity.constrained_system import separate_supports
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 
 
@@ -34,7 +34,7 @@ def box(divisions=(7, 6, 5), E=10.0):
     moduli = np.asarray([fc.LinearElastic(E=E, nu=0.3).moduli("3d")])
     K = stiffness(mesh, "3d", moduli, {"hex8": np.zeros(len(mesh.cells["hex8"]), np.int64)})
     fixed = np.repeat(mesh.points[:, 1] == 0, 3)
-    return supports_apart(K, fixed)[0], np.where(fixed[:, None], 0.0, rigid_modes(mesh.points, "3d")), fixed
+    return separate_supports(K, fixed)[0], np.where(fixed[:, None], 0.0, rigid_modes(mesh.points, "3d")), fixed
 
 
 def solved(model, name, steps=1):
@@ -50,7 +50,7 @@ def assert_agree(model, most, within=1e-8):
     """Multigrid finds what factors find, without columns or factors, in `most` iterations."""
     solver, step = solved(model, "amg")
     assert not solver.replacement_reason
-    assert not solver.columns.asked
+    assert not solver.columns.requests
     assert solver.counters.iterations <= most
     found, exact = step.contact["c"], solved(model, "direct")[1].contact["c"]
     size = np.abs(exact.force_vectors).max()

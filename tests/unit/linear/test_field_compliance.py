@@ -55,7 +55,7 @@ def test_the_equations_of_the_field_are_those_of_the_points(closed):
     among = projection.among(rows)
     assert isinstance(among, FieldCompliance)
     u, forces = solver.load(f).solve(B, c, among)
-    assert not solver.columns.asked
+    assert not solver.columns.requests
     for found, exact in ((u, expected[: len(f)]), (forces, expected[len(f) :])):
         assert found == pytest.approx(exact, abs=1e-8 * np.abs(found).max())
     # As factors and columns take it.
@@ -75,7 +75,7 @@ def test_softer_points_have_the_compliance_of_both():
     solver = Amg(1e-11)
     solver.prepare(K, modes)
     u, forces = solver.load(f).solve(B, c, projection.among(rows).softened(softness, lambda: dense))
-    assert not solver.columns.asked
+    assert not solver.columns.requests
     for found, exact in ((u, expected[: len(f)]), (forces, expected[len(f) :])):
         assert found == pytest.approx(exact, abs=1e-8 * np.abs(found).max())
 

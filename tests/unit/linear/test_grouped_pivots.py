@@ -14,7 +14,7 @@ from fastcontact.linear.delassus import TooManyColumnsError
 from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, block_inverse, lumped
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
-from fastcontact.linear.elimination.pivot_order import chosen, inverse_of, of_groups, of_most_groups
+from fastcontact.linear.elimination.pivot_order import choose_pivots, column_inverse, pivots_of_most_groups
 from fastcontact.linear.solvers import amg
 
 
@@ -32,7 +32,7 @@ def grouped(rng, n=60, groups=6):
 @pytest.mark.parametrize("seed", range(5))
 def test_pivots_of_groups_are_their_own_and_well_conditioned(seed):
     B, label = grouped(np.random.default_rng(seed))
-    pivots = pivot_order.of_groups(B, label)
+    pivots = pivot_order.pivots_of_groups(B, label)
     assert len(set(pivots)) == len(pivots)
     taken = np.abs(B[:, pivots].toarray()) > 0
     assert not taken[label[:, None] != label[None]].any()
@@ -48,11 +48,11 @@ def test_pivots_of_groups_are_their_own_and_well_conditioned(seed):
 
 def test_groups_without_unknowns_of_their_own_are_told():
     B = csr_array(np.ones((2, 3)))
-    assert pivot_order.of_groups(B, np.arange(2)) is None
-    assert pivot_order.of_groups(B, np.zeros(2, np.intp)) is None  # two equal equations of one group
+    assert pivot_order.pivots_of_groups(B, np.arange(2)) is None
+    assert pivot_order.pivots_of_groups(B, np.zeros(2, np.intp)) is None  # two equal equations of one group
     weak = csr_array(np.array([[0.1, 0.0, 1.0], [0.0, 0.1, 1.0]]))  # no group has a pivot that is large enough
-    assert pivot_order.of_groups(weak, np.arange(2)) is None
-    assert pivot_order.of_nodes(weak, np.arange(2), 1) is None
+    assert pivot_order.pivots_of_groups(weak, np.arange(2)) is None
+    assert pivot_order.pivots_of_nodes(weak, np.arange(2), 1) is None
 
 
 def test_forces_move_along_the_rows_that_multipliers_act_through():
@@ -75,7 +75,7 @@ def test_forces_move_along_the_rows_that_multipliers_act_through():
 
 def layered(B):
     """Return the pivots of equations that are groups of their own."""
-    return of_groups(csr_array(B), np.arange(B.shape[0]))
+    return pivot_order.pivots_of_groups(csr_array(B), np.arange(B.shape[0]))
 
 
 def in_layers(seed, sizes=(5, 4, 3), n_others=6):
@@ -98,7 +98,7 @@ def test_the_inverse_is_exact(seed):
     B = in_layers(seed)
     pivots = layered(B)
     assert pivots is not None
-    inverse = inverse_of(csr_array(B), pivots, 1)
+    inverse = column_inverse(csr_array(B), pivots, 1)
     assert len(set(pivots.tolist())) == len(B)
     assert inverse.solve(B[:, pivots]) == pytest.approx(np.eye(len(B)), abs=1e-13)
 
@@ -128,15 +128,15 @@ def nodes_in_layers(rng, corners=40, middles=60):
 def test_nodes_in_layers_have_a_sparse_inverse(seed):
     B, nodes = nodes_in_layers(np.random.default_rng(seed))
     assert layered(B) is None  # three equations of a node share its three unknowns
-    assert of_groups(B, nodes, layers=1) is None
-    pivots, inverse = chosen(B, nodes, 3)
-    assert np.array_equal(pivots, of_groups(B, nodes))
+    assert pivot_order.pivots_of_groups(B, nodes, layers=1) is None
+    pivots, inverse = choose_pivots(B, nodes, 3)
+    assert np.array_equal(pivots, pivot_order.pivots_of_groups(B, nodes))
     P = B[:, pivots].toarray()
     assert inverse.solve(P) == pytest.approx(np.eye(len(P)), abs=1e-10)
     assert inverse.matrix.nnz < 12 * len(P)
     # Forces act through other rows of the same pattern.
     through = B + csr_array((0.1 * np.cos(np.arange(B.nnz)) * B.data, B.indices, B.indptr), shape=B.shape)
-    inverse = inverse_of(csr_array(through), pivots, 3)
+    inverse = column_inverse(csr_array(through), pivots, 3)
     assert inverse.solve(through[:, pivots].toarray()) == pytest.approx(np.eye(len(P)), abs=1e-9)
     assert inverse.matrix.nnz < 12 * len(P)
 
@@ -144,7 +144,7 @@ def test_nodes_in_layers_have_a_sparse_inverse(seed):
 def test_a_chain_of_more_layers_is_no_sum_of_few_products():
     m = 80
     B = csr_array(np.eye(m) + 0.5 * np.eye(m, k=1))
-    inverse = inverse_of(B, np.arange(m), 1)
+    inverse = column_inverse(B, np.arange(m), 1)
     assert isinstance(inverse, CoupledPivots)
     assert inverse.solve(B @ np.ones(m)) == pytest.approx(np.ones(m))
 
@@ -163,12 +163,12 @@ def held_along_a_line(n):
 def test_equations_without_unknowns_of_their_own_leave_those_of_the_others_alone(n):
     """Slips of nodes that a support holds, but not what they stick to."""
     B, nodes = held_along_a_line(n)
-    assert of_groups(B, nodes) is None
+    assert pivot_order.pivots_of_groups(B, nodes) is None
     gaps, slips = np.arange(0, 2 * n, 2), np.arange(1, 2 * n, 2)
-    pivots = of_most_groups(B, nodes)
+    pivots = pivots_of_most_groups(B, nodes)
     assert (pivots[gaps] < 2 * n + 2).all()
     assert (pivots[slips] >= 2 * n + 2).all()
-    pivots, inverse = chosen(B, nodes, 1)
+    pivots, inverse = choose_pivots(B, nodes, 1)
     P = B[:, pivots].toarray()
     inverted = inverse.solve(P)
     assert inverted == pytest.approx(np.eye(2 * n), abs=1e-8)
@@ -295,7 +295,7 @@ def test_an_elimination_takes_weights_of_pivots_themselves(kind):
 def test_standard_multipliers_over_a_whole_interface_cost_multigrid_what_dual_ones_do(friction):
     solver, step = solved(pressed(10, friction=friction, multipliers="standard"), "amg")
     assert not solver.replacement_reason
-    assert not solver.columns.asked
+    assert not solver.columns.requests
     dual = solved(pressed(10, friction=friction, multipliers="dual"), "amg")[0]
     assert solver.counters.iterations <= 2 * dual.counters.iterations
     factors = solved(pressed(10, friction=friction, multipliers="standard"), "direct")[1].contact["c"]
@@ -315,10 +315,10 @@ def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_man
 ):
     monkeypatch.setattr("fastcontact.linear.multigrid.solver.MOST_COLUMNS", 20)
     monkeypatch.setattr("fastcontact.linear.elimination.pivot_order.LARGEST_BLOCK", 8)
-    monkeypatch.setattr("fastcontact.linear.elimination.pivot_order.FULL_UP_TO", 8)
+    monkeypatch.setattr("fastcontact.linear.elimination.pivot_order.LARGEST_DENSE", 8)
     model = pressed(5, element, **options)
     solver, step = solved(model, "amg")
-    assert "columns of the inverse stiffness" in solver.replacement_reason
+    assert "columns of the inverse stiffness matrix" in solver.replacement_reason
     assert "dual" in solver.replacement_reason
     force = solved(model, "direct")[1].contact["c"].force
     assert step.contact["c"].force == pytest.approx(force, abs=1e-9)
@@ -348,6 +348,6 @@ def test_a_full_compliance_that_would_take_hours_is_refused_with_the_alternative
 
 def test_one_layer_is_a_diagonal():
     B = np.array([[2.0, 0.0, 1.0], [0.0, -4.0, 1.0]])
-    pivots, inverse = chosen(csr_array(B))
+    pivots, inverse = choose_pivots(csr_array(B))
     assert pivots.tolist() == [0, 1]
     assert inverse.matrix.toarray().tolist() == [[0.5, 0.0], [0.0, -0.25]]

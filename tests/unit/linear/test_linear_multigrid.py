@@ -400,8 +400,8 @@ def test_pyamg_finds_the_same_and_takes_as_many_iterations(equations):
 def test_bits_do_not_depend_on_the_number_of_threads(monkeypatch):
     found = []
     before = threads()
-    monkeypatch.setattr(parallel, "WORTHWHILE", 1000)
-    monkeypatch.setattr(matrices, "SHORTEST", 64)
+    monkeypatch.setattr(parallel, "SINGLE_THREAD_WORK", 1000)
+    monkeypatch.setattr(matrices, "MIN_ROWS", 64)
     for count in (1, 2, 3):
         set_threads(count)
         solver, f, fixed = prepared()

@@ -10,7 +10,7 @@ from pressed_blocks import assert_agree, box, pressed, solved
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 import fastcontact as fc
-from fastcontact.elasticity.constrained_system import supports_apart
+from fastcontact.elasticity.constrained_system import separate_supports
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.linear.multigrid import loaded
 from fastcontact.linear.protocol import FrictionTerms
@@ -64,7 +64,7 @@ def test_equations_give_way_as_much_as_they_should(kind, rigid):
     expected, forces = exactly(K, f, B, c, C)
     assert u == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
     assert multiplier == pytest.approx(forces, abs=1e-9 * np.abs(forces).max())
-    assert not solver.columns.asked
+    assert not solver.columns.requests
     # The same from a start where some of the equations held, without any more at the solution itself.
     before = solver.counters.iterations
     again = solver.load(f).solve(B, c, C, guess=u)[0]
@@ -102,13 +102,13 @@ def test_equations_that_give_way_may_repeat_each_other():
     solver = prepared(K, modes)
     u, multiplier = solver.load(f).solve(B, c, C)
     expected, forces = exactly(K, f, B, c, C)
-    assert not solver.columns.asked
+    assert not solver.columns.requests
     assert u == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
     assert multiplier == pytest.approx(forces, abs=1e-7 * np.abs(forces).max())
     # Rigid ones that do have no multipliers of their own: their compliance is formed.
     C[:2] = 0.0
     u, multiplier = solver.load(f).solve(B, c, C)
-    assert solver.columns.asked
+    assert solver.columns.requests
     assert np.abs(B @ u + C * multiplier - c).max() < 1e-9
 
 
@@ -195,7 +195,7 @@ def test_a_pair_with_a_penalty_beside_one_without(friction):
 
 def test_springs_that_are_far_too_stiff_for_the_cycle_are_eliminated(monkeypatch):
     eliminated = solved(pressed(penalty=1e4, **DUAL), "amg")[0].counters.iterations
-    monkeypatch.setattr(loaded, "STIFF", np.inf)
+    monkeypatch.setattr(loaded, "LARGEST_STIFFNESS_RATIO", np.inf)
     assert solved(pressed(penalty=1e4, **DUAL), "amg")[0].counters.iterations > 3 * eliminated
 
 
@@ -207,7 +207,7 @@ def test_springs_alone_precondition_the_matrix_that_they_are_part_of(kind):
         moduli = np.asarray([fc.LinearElastic(E=10.0, nu=0.3).moduli("3d")])
         K = stiffness(mesh, "3d", moduli, {"hex8": np.zeros(8, np.int64)})
         fixed = np.repeat(mesh.points[:, 1] == 0, 3)
-        K, modes = supports_apart(K, fixed)[0], np.where(fixed[:, None], 0.0, rigid_modes(mesh.points, "3d"))
+        K, modes = separate_supports(K, fixed)[0], np.where(fixed[:, None], 0.0, rigid_modes(mesh.points, "3d"))
     B, c = equations(fixed, 6)
     f = np.where(fixed, 0.0, 1.0)
     solver = prepared(K, modes, "double")

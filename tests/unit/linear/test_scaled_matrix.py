@@ -10,7 +10,7 @@ from stepping import Stepping
 import fastcontact as fc
 from fastcontact.linear import choice as linear
 from fastcontact.linear.multigrid import matrix as matrices
-from fastcontact.linear.multigrid.matrix import ALL, ScaledMatrix, symmetric_storage
+from fastcontact.linear.multigrid.matrix import ALL_BLOCKS, ScaledMatrix, symmetric_storage
 
 EXACT = 2.0**-47  # of split numbers, in units of the largest number of a row
 
@@ -33,12 +33,12 @@ def matrix(n, size, scale=1.0, seed=0):
 @pytest.mark.parametrize(("n", "size", "shortest"), [(7, 1, 1024), (600, 2, 100), (1300, 1, 200)])
 def test_the_parts_of_stored_blocks_may_take_the_place_of_all(n, size, shortest, every, monkeypatch):
     """The high part is the nearest number, the low part the rest."""
-    monkeypatch.setattr(matrices, "SHORTEST", shortest)
+    monkeypatch.setattr(matrices, "MIN_ROWS", shortest)
     K = matrix(n, size)
-    storage, square = ALL if every else symmetric_storage(K.indptr, K.indices), size * size
+    storage, square = ALL_BLOCKS if every else symmetric_storage(K.indptr, K.indices), size * size
     start, columns = (K.indptr, K.indices) if every else (storage[0], storage[2])
     numbers, high = K.data.reshape(-1).copy(), np.empty(len(columns) * square, np.float32)
-    matrices._store(K.indptr, K.indices, storage, 0.25, numbers, square, high)
+    matrices._store_parts(K.indptr, K.indices, storage, 0.25, numbers, square, high)
     dense = K.toarray().reshape(n, size, n, size)
     expected = 0.25 * dense[np.repeat(np.arange(n), np.diff(start)), :, columns].ravel()
     low = numbers.view(np.float32)[: len(high)]
@@ -51,7 +51,7 @@ def test_the_parts_of_stored_blocks_may_take_the_place_of_all(n, size, shortest,
 @pytest.mark.parametrize("precision", ["single", "double"])
 @pytest.mark.parametrize(("n", "size"), [(7, 1), (40, 2), (30, 3), (110, 3)])
 def test_products_are_those_of_the_matrix(n, size, precision, release, monkeypatch):
-    monkeypatch.setattr(matrices, "SHORTEST", 100)  # the largest is multiplied in parts
+    monkeypatch.setattr(matrices, "MIN_ROWS", 100)  # the largest is multiplied in parts
     K = matrix(n, size, scale=3e7)
     dense, rng = K.toarray(), np.random.default_rng(3)
     given = ScaledMatrix(K.copy(), precision, release)
@@ -105,8 +105,8 @@ def test_numbers_that_somebody_else_holds_stay_where_they_are():
 @pytest.mark.parametrize("length", [3, 7, 40])
 def test_blocks_stored_once_multiply_as_if_all_were(size, length, monkeypatch):
     """Parts of few rows, the last one shorter, or one part."""
-    monkeypatch.setattr(matrices, "SHORTEST", length)
-    monkeypatch.setattr(matrices, "PARTS", 40)
+    monkeypatch.setattr(matrices, "MIN_ROWS", length)
+    monkeypatch.setattr(matrices, "MAX_PARTS", 40)
     K = matrix(40, size)
     A, rng = ScaledMatrix(K, "single").scaled, np.random.default_rng(7)
     dense = A.to_scipy().toarray()
@@ -131,18 +131,18 @@ def test_blocks_stored_once_multiply_as_if_all_were(size, length, monkeypatch):
 
 def test_a_pattern_that_is_not_symmetric_is_stored_whole():
     K = matrix(30, 2)
-    assert symmetric_storage(K.indptr, K.indices) is not ALL
+    assert symmetric_storage(K.indptr, K.indices) is not ALL_BLOCKS
     asymmetric = K.indices.copy()
     row = next(i for i in range(30) if K.indptr[i + 1] - K.indptr[i] < 29 and K.indices[K.indptr[i]] == 0 and i > 1)
     absent = np.setdiff1d(np.arange(30), K.indices[K.indptr[row] : K.indptr[row + 1]])
     asymmetric[K.indptr[row]] = absent[0]
     asymmetric[K.indptr[row] : K.indptr[row + 1]].sort()
-    assert symmetric_storage(K.indptr, asymmetric) is ALL
+    assert symmetric_storage(K.indptr, asymmetric) is ALL_BLOCKS
     unsorted = K.indices.copy()
     unsorted[[0, 1]] = unsorted[[1, 0]]
-    assert symmetric_storage(K.indptr, unsorted) is ALL
+    assert symmetric_storage(K.indptr, unsorted) is ALL_BLOCKS
     # Equal numbers of rows and columns, none on the diagonal of the first two.
-    assert symmetric_storage(np.array([0, 1, 2], np.int32), np.array([1, 0], np.int32)) is ALL
+    assert symmetric_storage(np.array([0, 1, 2], np.int32), np.array([1, 0], np.int32)) is ALL_BLOCKS
     wrong = bsr_array((K.data, asymmetric, K.indptr), shape=K.shape)
     u = np.random.default_rng(0).normal(size=60)
     given = ScaledMatrix(wrong, "single")

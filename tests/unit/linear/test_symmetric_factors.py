@@ -8,7 +8,7 @@ from scipy.sparse.linalg import splu
 from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.elasticity.constrained_system import supports_apart
+from fastcontact.elasticity.constrained_system import separate_supports
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.linear import choice as linear
 from fastcontact.linear.cholesky import symmetric_factors, triangular_kernels
@@ -30,7 +30,7 @@ def supported(n=3):
     model = elastic_model(mesh, "3d", E=7.0)
     fixed = np.repeat(mesh.points[:, 2] == 0.0, 3)
     top = np.flatnonzero(np.repeat(mesh.points[:, 2] == 1.0, 3))
-    return supports_apart(stiffness(mesh, "3d", *model.material_numbers()), fixed)[0], top
+    return separate_supports(stiffness(mesh, "3d", *model.material_numbers()), fixed)[0], top
 
 
 def prepared(name="direct", last=True):
