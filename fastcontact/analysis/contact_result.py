@@ -403,12 +403,16 @@ def _stretch(contact: ContactResult, displacement: Array, before: Array, after: 
 
 
 def _with_periodic_nodes(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
-    """Return contact results in which both nodes of a periodic pair have the same traction and contact status."""
+    """Return contact results in which both nodes of a periodic pair have the same traction and contact status.
+
+    If only one of the nodes has an opposite facet, because the sides slide past the ends, both have its gap.
+    """
     merged_results = dict(results)
     for name, contact in results.items():
         pair = problem.pairs[name]
         areas = lumped_areas(pair.secondary, pair.points, pair.axisymmetric)
         pressure, shear, active = contact.pressure.copy(), contact.shear.copy(), contact.active.copy()
+        gap = contact.gap.copy()
         for interface in problem.model.periodic_interfaces:
             a, b = _common_rows(problem, contact, interface)
             weight = areas[a] / (areas[a] + areas[b])
@@ -417,7 +421,8 @@ def _with_periodic_nodes(problem: Problem, results: dict[str, ContactResult]) ->
             shear[a] = weight[:, None] * shear[a] + (1.0 - weight[:, None]) * (shear[b] @ rotation)
             shear[b] = shear[a] @ rotation.T
             active[a] = active[b] = active[a] | active[b]
-        merged_results[name] = replace(contact, pressure=pressure, shear=shear, active=active)
+            gap[a], gap[b] = np.where(np.isinf(gap[a]), gap[b], gap[a]), np.where(np.isinf(gap[b]), gap[a], gap[b])
+        merged_results[name] = replace(contact, pressure=pressure, shear=shear, active=active, gap=gap)
     return merged_results
 
 

@@ -118,8 +118,8 @@ def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, fric
     gaps : ndarray (m, k)
         Changes of the gaps in each free motion, which show whether contact hardly resists one of the motions [-].
     """
-    if len(bodies.names) > 1:
-        (weakest,), ratio = least_held(bodies.motions, gaps)
+    if len(bodies.dofs) > 1:
+        weakest, ratio = least_held(bodies.motions, gaps)
         if ratio < NOTABLE:
             return (
                 f"contact hardly resists one motion, {weakest}, which changes the gaps {ratio:.1g} times as much as other "

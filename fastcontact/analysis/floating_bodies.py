@@ -224,7 +224,7 @@ class FloatingBodies:
     Attributes
     ----------
     names : list of str
-        Names of the free rigid-body modes.
+        Motions of bodies in the free rigid-body modes.
     dofs : ndarray of int (k,)
         Displacement component to which each spring is attached.
     motions : FreeMotions
@@ -291,7 +291,7 @@ class FloatingBodies:
     def report(self, rigid: RigidPosition, load: float) -> dict[str, Any]:
         """Return a report of the regularisation, as a dict of numbers and strings.
 
-        Its keys are ``motions``, the names of the free rigid-body modes; ``springs``, the components to which springs are
+        Its keys are ``motions``, the free motions of bodies; ``springs``, the components to which springs are
         attached; ``spring_stiffness`` [force / length]; ``force_left``, the remaining force of each spring [force];
         ``relative_to_load``, the largest of these forces divided by `load` [-]; and ``positions``, the number of positions.
         The load step adds ``undetermined``, the result of the method of this name.
@@ -346,9 +346,9 @@ class FloatingBodies:
         return motions.labels[int(np.argmax(np.abs(motions.parts[:, column])))].body
 
     def moving(self, rigid: RigidPosition) -> list[str]:
-        """Return the names of the free rigid-body modes with the largest generalised forces of the springs."""
+        """Return the motions of bodies in the free rigid-body modes with the largest generalised forces of the springs."""
         work = np.abs(self._values_at_springs.T @ rigid.spring_force)
-        return [name for name, w in zip(self.names, work, strict=True) if w > 0.1 * work.max()]
+        return self.motions.combined(self._values_at_springs[:, work > 0.1 * work.max()]).names()
 
     def settle(
         self, solve_at: Callable[[Array], Solution], position_response: Callable[[Response], PositionResponse] | None,

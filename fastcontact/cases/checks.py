@@ -83,6 +83,11 @@ OF_PROBES: dict[str, tuple[str, Callable[[StepResult, int], Any]]] = {
 }  # fmt: skip
 
 
+def kind_of_unit(quantity: str) -> str | None:
+    """Return the kind of the unit of a quantity such as ``"PAIR.force"`` or ``"PROBE.stress.yy"``; None if it is unknown."""
+    return {**OF_PROBES, **OF_PAIRS}.get(quantity.partition(".")[2], (None,))[0]
+
+
 @dataclass(frozen=True)
 class Check:
     """Comparison of a quantity of the last step with a theory or a documented value.
@@ -126,7 +131,7 @@ class Check:
     @property
     def unit(self) -> str:
         """Kind of unit: ``"pressure"``, ``"force"``, ``"moment"``, ``"length"``, ``"power"`` or ``"temperature"``."""
-        return {**OF_PROBES, **OF_PAIRS}[self.quantity.partition(".")[2]][0]
+        return kind_of_unit(self.quantity) or ""
 
     def target(self, theory: Any) -> float:
         """Return the target; `theory` is the theory of the pair, or None for a documented value."""
@@ -184,12 +189,16 @@ def read_check(
 
 
 def _check_quantity(where: str, field: str, allowed: Collection[str], kinematics: str) -> None:
-    """Raise CaseError unless `field` is allowed and defined by the kinematics; plane models have no force along z."""
-    if kinematics != "3d":
-        allowed = [name for name in allowed if name not in ONLY_IN_SPACE]
+    """Raise CaseError unless `field` is allowed and defined by the kinematics."""
+    check_known(f"quantity in {where}", field, defined(allowed, kinematics), CaseError)
+
+
+def defined(names: Collection[str], kinematics: str) -> list[str]:
+    """Return those `names` of quantities that the kinematics define; plane models have no force along z."""
+    omitted: tuple[str, ...] = () if kinematics == "3d" else ONLY_IN_SPACE
     if kinematics == "axisymmetric":  # moments and radial forces cancel over the circle
-        allowed = [name for name in allowed if name not in ("moment.z", "force.x")]
-    check_known(f"quantity in {where}", field, allowed, CaseError)
+        omitted = (*ONLY_IN_SPACE, "moment.z", "force.x")
+    return [name for name in names if name not in omitted]
 
 
 def check_target(where: str, check: Check, theory: Any) -> None:
@@ -204,16 +213,16 @@ def check_target(where: str, check: Check, theory: Any) -> None:
         raise CaseError(f"{where}: the theory's {check.of} is {target:g}, so the relative deviation is undefined")
 
 
-def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float:
-    """Return the quantity of a check in a step, times its factor; NaN if it is undefined, such as wear without contact."""
-    owner, _, field = check.quantity.partition(".")
+def measured(quantity: str, step: StepResult, probes: Mapping[str, int]) -> float:
+    """Return a quantity, such as ``"PAIR.force"``, in a step; NaN if it is undefined, such as wear without contact."""
+    owner, _, field = quantity.partition(".")
     if owner in probes:
         value = OF_PROBES[field][1](step, probes[owner])
     elif field == "heat":
         value = step.heat.get("contacts", {}).get(owner)
     else:
         value = OF_PAIRS[field][1](step.contact[owner])
-    return math.nan if value is None else check.factor * float(value)
+    return math.nan if value is None else float(value)
 
 
 def evaluated(check: Check, step: StepResult, probes: Mapping[str, int], theories: Mapping[str, Any]) -> dict[str, Any]:
@@ -223,7 +232,7 @@ def evaluated(check: Check, step: StepResult, probes: Mapping[str, int], theorie
     deviation of this solution from the theory.
     """
     theory = theories[check.theory] if check.theory else {}
-    value, target = measured(check, step, probes), check.target(theory.get("theory"))
+    value, target = check.factor * measured(check.quantity, step, probes), check.target(theory.get("theory"))
     solution = theory.get("mesh_converged")
     converged = check.target(solution) if hasattr(solution, check.of) else None
     return {

@@ -73,8 +73,8 @@ class FreeMotions:
         return replace(self, displacement=self.displacement @ coefficients, parts=self.parts @ coefficients)
 
     def names(self) -> list[str]:
-        """Return a description of each motion: the bodies and elementary motions that it combines."""
-        return ["; ".join(f"{body}: {motion}" for body, motion in self._body_terms(column)) for column in self.parts.T]
+        """Return the motions of all bodies, each with the name of its body; see `by_body`."""
+        return [f"{body}: {motion}" for body, motions in self.by_body().items() for motion in motions]
 
     def by_body(self) -> dict[str, list[str]]:
         """Return the names of the motions of each body, without repetition.
@@ -147,19 +147,29 @@ def _vector_text(values: Array) -> str:
 def body_name(mesh: Mesh, body: AnyArray, number: int) -> str:
     """Return the name of body `number` for messages, from the `body` (n_points,) of each point.
 
-    It is the name of a cell group that has exactly the nodes of the body, otherwise its number and its centre.
+    It is the name of a cell group that has exactly the nodes of the body; otherwise its centre, and the name of the smallest
+    group that contains it and not all bodies, such as that of a bolt with a cut, or its number.
     """
     members = np.flatnonzero(body == number)
-    return _group_of(mesh, members) or f"number {number + 1} (around {mesh.points[members].mean(axis=0)})"
+    group, size = _group_of(mesh, members)
+    if size == len(members):
+        return group
+    centre = mesh.points[members].mean(axis=0)
+    return f"{group}, the part around {_vector_text(centre)}" if group else f"number {number + 1} (around {centre})"
 
 
-def _group_of(mesh: Mesh, members: Indices) -> str:
-    """Return the quoted name of the cell group whose solid cells have exactly the nodes `members`; empty if there is none."""
+def _group_of(mesh: Mesh, members: Indices) -> tuple[str, int]:
+    """Return the quoted name of the smallest cell group with all nodes `members`, and the number of nodes of its solid cells.
+
+    A group that has other nodes as well must not contain all bodies. Without such a group, the results are empty and zero.
+    """
+    containing, all_solid = dict[str, int](), np.count_nonzero(bodies(mesh)[1] >= 0)
     for group in mesh.cell_groups:
         blocks = mesh.cells_of(group, dim=mesh.dim)
-        if blocks and np.array_equal(np.unique(np.concatenate([block.ravel() for block in blocks.values()])), members):
-            return f"'{group}'"
-    return ""
+        nodes = np.unique(np.concatenate([block.ravel() for block in blocks.values()])) if blocks else np.empty(0)
+        if np.isin(members, nodes).all() and (len(nodes) == len(members) or len(nodes) < all_solid):
+            containing[f"'{group}'"] = len(nodes)
+    return min(containing.items(), key=lambda item: item[1], default=("", 0))
 
 
 def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array | None = None) -> FreeMotions:
@@ -254,7 +264,8 @@ def _part_name(mesh: Mesh, rigid: RigidParts, number: int) -> str:
     name = f"body {body_name(mesh, body, int(body[members[0]]))}"
     if not len(hinges):
         return name
-    part = _group_of(mesh, members) or f"around {mesh.points[members].mean(axis=0)}"
+    group, size = _group_of(mesh, members)
+    part = group if size == len(members) else f"around {mesh.points[members].mean(axis=0)}"
     return f"{name}, the part {part} that is connected at {node_at(mesh, hinges[0])}"
 
 
@@ -326,13 +337,13 @@ def mechanisms(gaps: Array, works: Array) -> Array:
     return np.empty((k, 0))
 
 
-def least_held(motions: FreeMotions, gaps: Array) -> tuple[list[str], float]:
+def least_held(motions: FreeMotions, gaps: Array) -> tuple[str, float]:
     """Return the name of the motion that changes the gaps least, and the ratio of its change to the largest one [-].
 
     `gaps` (m, k) are the changes of m gaps for each of the k motions.
     """
     _, values, right = np.linalg.svd(gaps, full_matrices=False)
-    return motions.combined(right[-1:].T).names(), float(values[-1] / values[0]) if values[0] else 1.0
+    return "; ".join(motions.combined(right[-1:].T).names()), float(values[-1] / values[0]) if values[0] else 1.0
 
 
 def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | None:
@@ -378,7 +389,8 @@ def needed_friction(
     def slide(factor: float) -> Array:
         rows, gap0 = cone_rows(constraints, factor)
         stop = _farthest(rows @ motions.displacement, gap0 + rows @ u, work, size)
-        return np.where(np.abs(stop) > 0.99 * FAR, stop, 0.0)
+        # Unbounded motions are of the order of FAR, and those that a gap stops of the order of 1.
+        return np.where(np.abs(stop) > np.sqrt(FAR), stop, 0.0) * (np.abs(stop).max() > 0.99 * FAR)
 
     sliding = slide(low)
     if not sliding.any() or slide(high).any():

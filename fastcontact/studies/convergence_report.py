@@ -16,7 +16,7 @@ from fastcontact.arrays import AnyArray, Array
 from fastcontact.cases.summary import finite
 from fastcontact.results.units import axis_label
 from fastcontact.studies.fit import CONFIDENCE, Limit
-from fastcontact.studies.quantities import column, title
+from fastcontact.studies.quantities import RATIOS, column, title
 from fastcontact.studies.report import Report, Rows, frame, marker, message, number, panels, percent, rows_from_columns
 from fastcontact.studies.series import Series, Split
 
@@ -41,8 +41,9 @@ def _quantity_sentences(series: Series, quantity: str) -> list[str]:
     """Return the sentences on a quantity with a limit."""
     split, name = series.split(quantity), title(quantity)
     if split is None:
-        error = percent(series.errors(quantity)[-1])
-        text = f"{series.combination}: the mesh error of the {name} is {error} on the finest mesh."
+        text = (
+            f"{series.combination}: the mesh error of the {name} is {_errors(series, quantity)[-1]} on the finest mesh."
+        )
         return [text, *_convergence_sentences(series, quantity, name)]
     start = f"{series.combination}: " + ("" if series.exact_theory else f"{series.compared} ") + f"the {name}"
     bar, mesh_error = f"+- {100 * split.uncertainty:.2g} %", f"{percent(split.mesh)} is mesh error on the finest mesh"
@@ -66,6 +67,18 @@ def _quantity_sentences(series: Series, quantity: str) -> list[str]:
         text = f"{start} agrees with theory within the error bar of its limit, {model_error}; {mesh_error}."
     texts = [text, *_convergence_sentences(series, quantity, name)]
     return texts + _cancellation_sentences(series, quantity, split) + _reference_sentences(series, quantity)
+
+
+def _errors(series: Series, quantity: str) -> list[str]:
+    """Return the errors of all levels as text: percentages of the limit, or numbers in the unit of the quantity.
+
+    The latter are for quantities that are relative errors themselves, and for limits that are zero within their error bar.
+    """
+    limit = series.limits.get(quantity)
+    if limit is None or not (quantity in RATIOS or limit.contains(0.0)):
+        return list(map(percent, series.errors(quantity)))
+    differences = (value - limit.value for value in series.values(quantity))
+    return [f"{difference:+.3g}" if math.isfinite(difference) else "-" for difference in differences]
 
 
 def _convergence_sentences(series: Series, quantity: str, name: str) -> list[str]:
@@ -147,7 +160,7 @@ def level_rows(series: Series, units: Mapping[str, str]) -> Rows:
     for name in series.shown(TABLE_QUANTITIES):
         orders = [f"{order:.2f}" if math.isfinite(order) else "-" for order in series.orders(name)]
         columns.append((column(name, name, units), [number(value, 8) for value in series.values(name)]))
-        columns += [("error", list(map(percent, series.errors(name)))), ("order", orders)]
+        columns += [("error", _errors(series, name)), ("order", orders)]
     return rows_from_columns(columns)
 
 
@@ -186,7 +199,7 @@ def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
         "order alone": order,
         "theory": number(series.theory.get(quantity, math.nan), 8),
         "model error": percent(split.model if split and series.has_model_error(quantity) else None),
-        "mesh error": percent(series.mesh_error(quantity)),
+        "mesh error": percent(split.mesh) if split else _errors(series, quantity)[-1],
         "at equal force": percent(at_force.model if at_force else None),
     }
     return [texts[name] for name in columns]

@@ -43,7 +43,7 @@ KEYS = {
     *("file", "group", "flip", "crease"),
 }
 # Version of the results in a store, incremented when the quantities or their form change.
-SCHEMA = 4
+SCHEMA = 5
 # A function of the last step, or of the list of all steps if its argument has the name `STEPS_ARGUMENT`.
 Measure = Callable[..., float]
 # Names of quantities, or functions by the name of their quantity.

@@ -12,10 +12,10 @@ from fastcontact.analytic._manufactured import HertzBox
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.arrays import Array
 from fastcontact.cases.case import Case
-from fastcontact.cases.checks import OF_PROBES, ONLY_IN_SPACE
+from fastcontact.cases.checks import OF_PAIRS, OF_PROBES, REQUIRED_OPTIONS, defined, kind_of_unit, measured
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.surface import Surface, surface
-from fastcontact.errors import CaseError, check_known
+from fastcontact.errors import CaseError, unknown
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import quality
@@ -36,6 +36,8 @@ LABELS = {
     "pressure_error": ("pressure against theory, relative L2 norm", ""),
     "pressure_error_equal_force": ("pressure against theory at equal force, relative L2 norm", ""),
 }
+# Standard quantities that are relative errors.
+RATIOS = tuple(name for name, (_, kind) in LABELS.items() if not kind)
 
 
 def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
@@ -44,22 +46,35 @@ def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
     quantities["von_mises_max"], position = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
     if pair is not None:
         quantities["von_mises_depth"] = _depth(case, pair, position)
-    for probe, point in case.probes.items():
-        probe_values = {f"{probe}.{kind}": OF_PROBES[kind][1](last, point) for kind in _kinds(case)}
-        quantities |= {name: float(v) for name, v in probe_values.items() if v is not None and np.isfinite(v)}
+    for name in _of_probes_and_pairs(case):
+        if np.isfinite(value := measured(name, last, case.probes)):
+            quantities[name] = value
     return quantities
 
 
 def check_names(case: Case, names: Iterable[str]) -> None:
     """Raise CaseError if a name is not that of a quantity that `measure` may return for the case."""
-    of_probes = [f"{probe}.{kind}" for probe in case.probes for kind in _kinds(case)]
+    known = [*LABELS, *_of_probes_and_pairs(case)]
     for name in names:
-        check_known("quantity", name, [*LABELS, *of_probes], CaseError)
+        if name not in known:
+            text = unknown("quantity", name, known)
+            further = "; those of probes and pairs are, for example, PROBE.stress.yy and PAIR.force.x"
+            raise CaseError(text if "did you mean" in text else text + further)
 
 
-def _kinds(case: Case) -> list[str]:
-    """Return the names of the quantities that can be evaluated at a probe of a case, such as ``"stress.yy"``."""
-    return [kind for kind in OF_PROBES if kind != "shear" and (case.mesh.dim == 3 or kind not in ONLY_IN_SPACE)]
+def _of_probes_and_pairs(case: Case) -> list[str]:
+    """Return the names of the quantities of the probes and contact pairs of a case, such as ``"fit.moment.z"``.
+
+    They are those of checks; pairs without the option that a quantity requires do not have it.
+    """
+    kinematics = case.model.kinematics
+    names = [f"{probe}.{kind}" for probe in case.probes for kind in defined(OF_PROBES, kinematics) if kind != "shear"]
+    for pair in case.model.contact:
+        options = {*pair.options, *(["rotation"] if pair.rotation else [])}
+        for kind in defined(OF_PAIRS, kinematics):
+            if kind not in REQUIRED_OPTIONS or REQUIRED_OPTIONS[kind][0] in options:
+                names.append(f"{pair.name}.{kind}")
+    return names
 
 
 def quantities_of_contacts(last: StepResult) -> dict[str, float]:
@@ -282,10 +297,10 @@ def unit(quantity: str, units: Mapping[str, str]) -> str:
 
 
 def _kind(quantity: str) -> str | None:
-    """Return the kind of unit of a quantity (length, force or pressure), an empty string for ratios, or None if unknown."""
+    """Return the kind of unit of a quantity, such as length or force, an empty string for ratios, or None if unknown."""
     if quantity in LABELS:
         return LABELS[quantity][1]
-    return None if "." not in quantity else "length" if ".displacement." in quantity else "pressure"
+    return kind_of_unit(quantity)
 
 
 def column(label: str, quantity: str, units: Mapping[str, str]) -> str:

@@ -191,13 +191,13 @@ def level_job(case: Case, setup: Settings, member: Combination, level: int) -> J
 def study_of_runs(case: Case, jobs: Sequence[Job], results: Sequence[Result], further: Sequence[str]) -> Study:
     """Return the study of finished runs.
 
-    The quantities in `further` are fitted in addition to the standard quantities and to those of the checks of the case.
+    The quantities in `further` are fitted in addition to the standard quantities and to those of the checks of probes.
     """
     by_combination: dict[Combination, list[tuple[int, Result]]] = {}
     for job, result in zip(jobs, results, strict=True):
         member = Combination(job.marks["element"], job.marks["formulation"])
         by_combination.setdefault(member, []).append((job.marks["level"], result))
-    checked = [check.quantity for check in case.checks]
+    checked = [name for check in case.checks if (name := check.quantity).partition(".")[0] in case.probes]
     theories = case.theories.get(settings(case).pair or "", {})
     theory, share = theories.get("theory"), theories.get("share", 1.0)
     compared = "at equal approach" if settings(case).pair in case.approach else "under the given load"

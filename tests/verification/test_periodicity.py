@@ -220,6 +220,25 @@ def test_the_two_nodes_of_one_place_have_one_pressure(divisions):
     assert end.active[shifted][[0, -1]].all()
 
 
+@pytest.mark.filterwarnings("ignore:.*past each other at the periodic ends", "ignore:a displacement of")
+@pytest.mark.parametrize("formulation", [None, "node_to_segment"])
+def test_a_closed_node_that_slides_past_the_end_has_the_gap_of_its_twin(formulation):
+    mesh = fc.generate.block_on_block(
+        "quad4", size_lower=(6.0, 2.0), size_upper=(6.0, 2.0), divisions_lower=(6, 2), divisions_upper=(6, 2)
+    )
+    model = fc.Model(mesh, kinematics="plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("LOWER_BOTTOM", "xy")
+    for side in ("LOWER", "UPPER"):
+        model.add_periodicity(f"{side}_LEFT", f"{side}_RIGHT")
+    model.add_pressure("UPPER_TOP", 5.0)
+    model.prescribe("UPPER_TOP", x=0.2)
+    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation)
+    contact = fc.solve(model, 1)[-1].contact["pair"]
+    assert contact.active.all()
+    assert np.abs(contact.gap).max() < 1e-4
+
+
 def fitted(sectors, cells, element, **options):
     """A sector of two rings with an interference."""
     angle, parts = 2.0 * np.pi / sectors, []

@@ -237,6 +237,35 @@ def test_a_coarse_contact_that_has_opened_is_told_for_the_step_with_its_largest_
     )
 
 
+def pushed_nose(n, **options):
+    """The contact of a nose of radius 4.5, with n facets of length 6 / n, and a ball of radius 2 that touches it aslant."""
+    mesh = fc.generate.block((6.0, 2.0), (n, 4), "quad8", (-3.0, 0.0))
+    x, y = mesh.points.T
+    bottom = 4.5 - np.sqrt(4.5**2 - x**2)
+    model = elastic_model(mesh.replace(points=np.column_stack([x, bottom + 0.5 * y * (4.0 - bottom)])), "plane_strain")
+    model.fix("TOP", "xy")
+    ball = fc.obstacles.Sphere((0.15, 4.52 - np.sqrt(6.5**2 - 0.15**2)), 2.0)
+    model.add_obstacle("ball", secondary="BOTTOM", obstacle=ball, **options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fc.FastcontactWarning)
+        step = fc.solve(model, 1)[-1]
+    return step.contact["ball"].force, [text for text in step.warnings if "across its radius" in text]
+
+
+def test_contacts_smaller_than_a_facet_have_inaccurate_forces():
+    exact, _ = pushed_nose(96, formulation="continuous")
+    force, (text,) = pushed_nose(12, formulation="mortar", multipliers="dual", friction=0.0)
+    other, (plain,) = pushed_nose(12, formulation="continuous")
+    assert (
+        "with fewer than 2 the force and its direction may be inaccurate, too; refine 'BOTTOM', or use formulation 'con"
+        in text
+    )
+    assert plain.endswith("refine 'BOTTOM'")
+    assert np.linalg.norm(other - exact) < 0.1 * np.linalg.norm(exact) < np.linalg.norm(force - exact)
+    _, (rough,) = pushed_nose(12, formulation="continuous", friction=0.1)
+    assert "its direction and the work of friction may be inaccurate" in rough
+
+
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 
 

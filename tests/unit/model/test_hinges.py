@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from models import body_of, elastic_model, united
+from scipy.sparse import csr_array
 
 import fastcontact as fc
+from fastcontact.contact.constraints import Constraints
 from fastcontact.model import rigid_motions
 
 
@@ -142,3 +144,27 @@ def test_the_rotation_about_a_hinge_is_about_its_line():
     model = elastic_model(box.with_groups(points={"EDGE": edge}), "3d", EDGE="xyz")
     with pytest.raises(fc.ModelError, match=r"rotation about the line through \(0, 1, 0\.5\) along \(0, 0, 1\)\."):
         fc.solve(model, 1)
+
+
+def test_all_bodies_that_friction_cannot_hold_are_named():
+    """A wedge lifts a weight: the wedge moves at half the speed of the weight, and only the wedge is pushed."""
+    labels = [rigid_motions.Label(f"body '{name}'", "translation along x") for name in ("WEDGE", "WEIGHT")]
+    motions = rigid_motions.FreeMotions(np.eye(2), np.eye(2), labels)
+    lifted, along = csr_array([[0.0, 0.5]]), csr_array([[1.0, 0.0]])
+    options = {"tangents": (along,), "directions": (np.array([[1.0, 0.0]]),), "friction": np.ones(1)}
+    wedge = Constraints(lifted, np.zeros(1), np.zeros((1, 2)), **options, slip0=np.zeros((1, 1)))
+    factor, named = rigid_motions.needed_friction(wedge, motions, np.zeros(2), np.array([1.0, -0.45]), 1.0)
+    assert factor == pytest.approx(0.5 / 0.45, rel=2e-3)
+    assert named == ["body 'WEDGE'", "body 'WEIGHT'"]
+
+
+def test_halves_of_a_cut_bolt_have_its_name_and_each_motion_is_listed_once():
+    bolt = fc.generate.block((1.0, 2.0), (1, 2), "quad4", name="BOLT")
+    bolt = bolt.with_facet_group("CUT", lambda x: np.abs(x[:, 1] - 1.0) < 1e-9, between=True)
+    nut = fc.generate.block((1.0, 1.0), (1, 1), origin=(3.0, 0.0), name="NUT")
+    mesh = united(BOLT_=fc.generate.cut(bolt, "CUT"), NUT_=nut)
+    names = rigid_motions.free_motions(mesh, "plane_strain", np.zeros((mesh.n_points, 2), bool)).names()
+    assert len(names) == len(set(names)) == 9
+    parts = [name.partition(": ")[0] for name in names]
+    for part in ("'BOLT', the part around (0.5, 0.5)", "'BOLT', the part around (0.5, 1.5)", "'NUT'"):
+        assert parts.count(f"body {part}") == 3

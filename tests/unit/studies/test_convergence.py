@@ -11,6 +11,7 @@ from fastcontact.cases.case import read_case
 from fastcontact.cli import main
 from fastcontact.studies import runs as convergence
 from fastcontact.studies import settings as levels
+from fastcontact.studies.convergence_report import limit_rows
 from fastcontact.studies.settings import combinations, settings
 
 FORCE, PRESSURE = 600_000.0, 2900.0  # of theory
@@ -122,6 +123,19 @@ def test_without_theory_the_mesh_error_is_all_there_is(case):
     assert entry["model_error"] is None
     assert entry["mesh_error"] == pytest.approx(0.1 * 0.25**3, abs=3e-4)
     assert "the mesh error of the contact force is" in "\n".join(study.lines())
+
+
+def test_errors_relative_to_a_limit_near_zero_are_absolute(case):
+    """The relative L2 norm of a pressure error is a relative error already; a stress may vanish in the limit."""
+    levels = [made_up(k) for k in range(4)]
+    for k, level in enumerate(levels):
+        level["values"] |= {"pressure_error": 0.001 + 0.1 * 0.25**k, "C1.stress.xy": 8.0 * 0.25**k}
+    study = gathered(case, [levels], wanted=("C1.stress.yy", "C1.stress.xy"))
+    header, *rows = limit_rows(study.best, {})
+    errors = {row[0]: row[header.index("mesh error")] for row in rows}
+    assert float(errors["pressure against theory, relative L2 norm [1]"]) == pytest.approx(0.1 / 64.0, rel=0.2)
+    assert float(errors["C1.stress.xy"]) == pytest.approx(8.0 / 64.0, rel=0.2)
+    assert errors["C1.stress.yy"].endswith(" %")
 
 
 def test_a_mesh_that_agrees_with_theory_by_chance_is_told(case):

@@ -88,6 +88,23 @@ def test_a_study_with_an_obstacle_measures_its_contact(ball, tmp_path):
     assert two / one == pytest.approx(2.0, rel=1e-6)
 
 
+def test_quantities_of_checks_can_be_studied(ball):
+    """Those of contact pairs as well as those of probes, in their units."""
+    case = read_case(ball)
+    sweep = fc.parameter_sweep(
+        case, {"obstacle.ball.motion.y": [-0.1]}, quantities=["ball.force.y"], level=0, workers=1
+    )
+    (point,) = sweep.points
+    assert abs(point.values["ball.force.y"]) == pytest.approx(point.values["force"])
+    assert quantities.unit("ball.force.y", {"force": "N"}) == "N"
+    quantities.check_names(case, ["ball.radius"])
+    for name in ("ball.torque", "ball.force.z", "ball.moment.z"):  # it does not rotate; components of other kinematics
+        with pytest.raises(fc.CaseError, match="unknown quantity 'ball"):
+            quantities.check_names(case, [name])
+    with pytest.raises(fc.CaseError, match=r"for example, PROBE.stress.yy and PAIR.force.x"):
+        quantities.check_names(case, ["bulge"])
+
+
 def test_an_obstacle_takes_every_formulation(ball):
     chosen = settings(read_case(ball))
     every = [c.formulation for c in combinations(chosen, None, ["all"])]
