@@ -35,9 +35,6 @@ RELATIVE_ERROR_LIMIT = {1: 0.2, 2: 0.1}
 # node to node.
 MEAN_GAP_FACTOR = 2.0
 
-# Error of tangential forces over the friction limit above which a warning is given.
-FRICTION_ERROR_LIMIT = 0.1
-
 
 def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, str]:
     """Return, by name, a warning for each pair with a large pressure error due to sag in the `last` step."""
@@ -90,7 +87,7 @@ def _inclination(pair: Formulation, configuration: Configuration, contact: Conta
     along = contact.shear / np.maximum(traction, TINY)[:, None]
     inclination = ((contact.normal - smooth) * along).sum(axis=1)
     share = abs(float(force @ inclination)) / max(pair.friction * float(force.sum()), TINY)
-    if share <= FRICTION_ERROR_LIMIT:
+    if share <= RELATIVE_ERROR_LIMIT[1]:
         return ""
     return (
         f"facets of the primary side are inclined to the smooth surface, by {np.abs(inclination).max():.2g} radian along the "
