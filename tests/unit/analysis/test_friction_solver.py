@@ -159,6 +159,7 @@ def test_a_kept_pairing_forgets_the_steps_and_a_new_one_does_not():
     assert np.abs(renewed[0] - renewed[1]).max() > 1e-6 * size
 
 
+@pytest.mark.filterwarnings("ignore:.*inclined to the smooth surface")
 def test_a_kept_pairing_serves_friction_through_steps():
     model = spheres(friction=0.02)
     (along,) = model.bind(model.contact[0]).constraints(Configuration.undeformed(model.mesh.points)).directions
