@@ -264,6 +264,34 @@ def test_a_driven_stack_slides_where_friction_is_least(dim, weakest, angle, opti
             np.testing.assert_allclose(force, [np.sign(drive) * 0.5 * weights[-1], weights[i + 1 :].sum()], rtol=1e-3)
 
 
+def test_a_crate_on_a_driven_one_settles_while_both_slide_on_the_floor():
+    """Only the direction of friction restrains both crates sideways; near equilibrium the linear response is exact."""
+    lower = fc.generate.box((2.0, 1.2, 0.8), (6, 4, 3), "hex8", (-1.0, -0.6, 0.0))
+    upper = fc.generate.box((1.6, 1.0, 0.8), (5, 4, 3), "hex8", (-0.8, -0.5, 0.8))
+    model = made_of(united(A_=lower, B_=upper), "3d", fc.LinearElastic(E=30e9, nu=0.2, density=2400.0))
+    model.add_gravity(z=-9.81, ramp=[(0, 0), (1, 1), (2, 1)])
+    model.prescribe("B_XMIN", x=4e-4, ramp=[(0, 0), (1, 0), (2, 1)])
+    floor = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    model.add_obstacle("floor", secondary="A_ZMIN", obstacle=floor, friction=0.2)
+    model.add_contact("AB", secondary="B_ZMIN", primary="A_ZMAX", friction=0.5)
+    weight = 2400.0 * 9.81 * (1.92 + 1.28)
+    force = fc.solve(model, [1.0, 2.0])[-1].contact["floor"].force
+    np.testing.assert_allclose(force, [-0.2 * weight, 0.0, weight], rtol=1e-6, atol=1e-6 * weight)
+
+
+@pytest.mark.parametrize(("divisions", "friction"), [((30, 5), None), ((60, 6), 0.1)])
+def test_a_beam_moves_with_the_roller_that_loads_it_until_the_other_roller_holds_it(divisions, friction):
+    """When a node of the beam reaches the lower roller, the largest elongation grows, but the norm of both decreases."""
+    model = elastic_model(fc.generate.block((60.0, 10.0), divisions, "quad8"), "plane_stress", E=2e5, LEFT="x")
+    low, up = fc.obstacles.Sphere((50.0, -4.0), 4.0), fc.obstacles.Sphere((20.0, 16.0), 6.0)
+    model.add_obstacle("low", secondary="BOTTOM", obstacle=low, friction=friction)
+    model.add_obstacle("up", secondary="TOP", obstacle=up, friction=friction, force={"y": -100.0})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fc.FastcontactWarning)  # of the coarse mesh
+        contact = fc.solve(model, 1)[-1].contact
+    np.testing.assert_allclose([contact[name].force[1] for name in ("low", "up")], [100.0, -100.0], rtol=1e-6)
+
+
 @pytest.mark.parametrize(("angle", "stiffness"), first_of(2, [(-12.0, 5e3), (-3.0, 5e5), (12.0, 5e3), (-12.0, 5e5)]))
 def test_a_crate_slides_on_a_driven_incline_until_a_spring_holds_it(angle, stiffness):
     """Base driven along an incline of `angle` (positive: downwards); the spring acts along x, and only contact along y."""
