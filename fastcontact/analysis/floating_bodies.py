@@ -131,7 +131,8 @@ class PositionResponse:
         if not held:
             motion = elongation - self._inverse @ (self.elongation_rates @ elongation)
             approach, threshold = -self.gap_rates[0] @ motion, LENGTH_ROUND_OFF * remaining
-            closing = (solution.gap > 0.0) & (approach > threshold)
+            # Gaps of active constraints are round-off.
+            closing = ~solution.active & (solution.gap > 0.0) & (approach > threshold)
             if closing.any():
                 change += motion * np.min(solution.gap[closing] / approach[closing])
             change += motion

@@ -80,7 +80,7 @@ def test_newton_steps_that_overshoot_are_halved(start):
 
 
 def test_a_body_moves_on_to_the_gap_that_stops_it():
-    """A gap of a thousand times the elongation of a spring under the load; a gap behind the body does not stop it."""
+    """A gap of a thousand times the elongation of a spring; gaps behind the body and of closed contact do not stop it."""
     gap, stiffness, calls = 1000.0, 10.0, []
 
     def solve_at(anchor):
@@ -88,15 +88,15 @@ def test_a_body_moves_on_to_the_gap_that_stops_it():
         # A spring of stiffness 1 bears the load 1, with contact of `stiffness` beside it.
         pressed = anchor[0] + 1.0 > gap
         elongation = (1.0 - stiffness * (anchor[0] - gap) * pressed) / (1.0 + stiffness * pressed)
-        gaps = np.array([max(gap - anchor[0] - elongation, 0.0), 5.0])
-        opened, none = np.zeros(2, bool), np.zeros((2, 0))
-        contact = {"active": opened, "sticking": opened, "slip": none, "tangential": none}
+        gaps = np.array([max(gap - anchor[0] - elongation, 0.0), 5.0, 1e-16])
+        closed, none = np.array([False, False, True]), np.zeros((3, 0))
+        contact = {"active": closed, "sticking": closed, "slip": none, "tangential": none}
         return dataclasses.replace(solution(elongation), gap=gaps, response=lambda: None, **contact)
 
     def freed(held):
         closed = calls[-1] + 1.0 > gap
         stretched = np.array([[-stiffness / (1.0 + stiffness) if closed else 0.0]])
-        return PositionResponse(held, np.eye(1), stretched, DOFS, np.array([[[-1.0], [1.0]]]), 1.0)
+        return PositionResponse(held, np.eye(1), stretched, DOFS, np.array([[[-1.0], [1.0], [-1e-6]]]), 1.0)
 
     found = bodies_at(DOFS).settle(solve_at, freed, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
     assert found.slack
