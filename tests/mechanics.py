@@ -116,8 +116,7 @@ def friction(settled, sizes: Sizes) -> tuple[float, float]:
     rubbing = np.linalg.norm(state.tangential, axis=1)
     outside = (rubbing - constraints.friction * state.multiplier).max(initial=0.0)
     # In steps that are solved in increments, slips may turn round between them.
-    by_slip, integrals = -np.einsum("mk,mk->m", state.tangential, state.slip), state.integrals
-    work = by_slip if integrals is None else integrals[0]
+    work = -np.einsum("mk,mk->m", state.tangential, state.slip) if state.integrals is None else state.integrals[0]
     driving = -work.min(initial=0.0)
     return float(outside / sizes.force), float(driving / (sizes.force * sizes.length))
 

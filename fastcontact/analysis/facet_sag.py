@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Mask
@@ -86,8 +87,9 @@ def _inclination(pair: Formulation, configuration: Configuration, contact: Conta
     force, traction = (contact.force_vectors * contact.normal).sum(axis=1), np.linalg.norm(contact.shear, axis=1)
     along = contact.shear / np.maximum(traction, TINY)[:, None]
     inclination = ((contact.normal - smooth) * along).sum(axis=1)
-    share = abs(float(force @ inclination)) / max(pair.friction * float(force.sum()), TINY)
-    if share <= RELATIVE_ERROR_LIMIT[1]:
+    error, total = abs(float(force @ inclination)), float(force.sum())
+    share = error / max(pair.friction * total, TINY)
+    if share <= RELATIVE_ERROR_LIMIT[1] or error <= NOTABLE * total:
         return ""
     return (
         f"facets of the primary side are inclined to the smooth surface, by {np.abs(inclination).max():.2g} radian along the "

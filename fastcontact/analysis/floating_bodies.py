@@ -10,8 +10,8 @@ the stiffness of the springs.
 
 Otherwise the springs are soft compared with the body, and the new position is that at which they would be slack without
 contact. This is the proximal point method for the minimum of the energy under the inequalities of contact (Rockafellar,
-1976). If contact restrains the bodies, each solution reduces the forces of the springs by about the ratio of their stiffness
-to that of the contact.
+1976), in which the norm of the elongations, unlike the largest one, never increases. If contact restrains the bodies, each
+solution reduces the forces of the springs by about the ratio of their stiffness to that of the contact.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.linalg import LinAlgError
+from numpy.linalg import LinAlgError, norm
 from scipy.linalg import qr
 from scipy.sparse import bsr_array
 
@@ -111,23 +111,28 @@ class PositionResponse:
 
         In motions that contact hardly restrains, bodies slide until friction balances the springs, if this change exceeds
         the elongations. Otherwise they move by the elongations in motions that contact does not restrain at all, and then
-        further until the first gap of the `solution` closes. The largest elongation that remains according to the linear
+        further until the first gap of the `solution` closes. The norm of the elongations that remain according to the linear
         response is returned as well; it is infinite if bodies slide, because the linear response does not include sliding.
         """
         resolved, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
-        remaining = largest(elongation - self.elongation_rates @ resolved)
-        U, s, V = np.linalg.svd(self.elongation_rates)
-        # Singular values are about 1 for motions that contact restrains. Smaller ones hardly restrain a motion, for example
-        # only because the friction force turns with the slip direction (a box that rides on a driven one in 3D).
-        firm = s > NOTABLE
-        slide = self._slide(V[~firm].T, elongation, solution, sliding)
-        if largest(slide) > largest(elongation):
-            return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), np.inf
+        remaining = float(norm(elongation - self.elongation_rates @ resolved))
+        held = remaining <= SINGLE_PRECISION * norm(elongation)
+        # The linear response is more accurate than the least work of friction if it hardly changes the slips.
+        slip_change = largest(self.gap_rates[1:, sliding] @ resolved)
+        if not held or slip_change > NOTABLE * largest(solution.slip[sliding]):
+            U, s, V = np.linalg.svd(self.elongation_rates)
+            # Singular values are about 1 for motions that contact restrains. Smaller ones hardly restrain a motion, for
+            # example only because the friction force turns with the slip direction (a box that rides on a driven one in 3D).
+            firm = s > NOTABLE
+            slide = self._slide(V[~firm].T, elongation, solution, sliding)
+            if largest(slide) > largest(elongation):
+                return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), np.inf
         change = -resolved
-        if remaining > SINGLE_PRECISION * largest(elongation):
+        if not held:
             motion = elongation - self._inverse @ (self.elongation_rates @ elongation)
             approach, threshold = -self.gap_rates[0] @ motion, LENGTH_ROUND_OFF * remaining
-            closing = (solution.gap > 0.0) & (approach > threshold)
+            # Gaps of active constraints are round-off.
+            closing = ~solution.active & (solution.gap > 0.0) & (approach > threshold)
             if closing.any():
                 change += motion * np.min(solution.gap[closing] / approach[closing])
             change += motion
@@ -386,7 +391,7 @@ class FloatingBodies:
         for positions in range(1, MAX_NEWTON_ITERATIONS + 1):
             state = solve_at(anchor)
             elongation, iterations = state.u[springs], iterations + state.iterations
-            stretch = float(np.abs(elongation).max())
+            stretch = float(norm(elongation))
             load_stretch = max(load, float(np.abs(state.multiplier).max(initial=0.0))) / self.stiffness
             # Springs are slack if their forces are round-off of the loads and of the contact forces (the only forces if
             # prescribed displacements move the bodies), as small as the accuracy of the linear solver allows, or round-off of

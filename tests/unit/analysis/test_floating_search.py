@@ -80,7 +80,7 @@ def test_newton_steps_that_overshoot_are_halved(start):
 
 
 def test_a_body_moves_on_to_the_gap_that_stops_it():
-    """A gap of a thousand times the elongation of a spring under the load; a gap behind the body does not stop it."""
+    """A gap of a thousand times the elongation of a spring; gaps behind the body and of closed contact do not stop it."""
     gap, stiffness, calls = 1000.0, 10.0, []
 
     def solve_at(anchor):
@@ -88,15 +88,15 @@ def test_a_body_moves_on_to_the_gap_that_stops_it():
         # A spring of stiffness 1 bears the load 1, with contact of `stiffness` beside it.
         pressed = anchor[0] + 1.0 > gap
         elongation = (1.0 - stiffness * (anchor[0] - gap) * pressed) / (1.0 + stiffness * pressed)
-        gaps = np.array([max(gap - anchor[0] - elongation, 0.0), 5.0])
-        opened, none = np.zeros(2, bool), np.zeros((2, 0))
-        contact = {"active": opened, "sticking": opened, "slip": none, "tangential": none}
+        gaps = np.array([max(gap - anchor[0] - elongation, 0.0), 5.0, 1e-16])
+        closed, none = np.array([False, False, True]), np.zeros((3, 0))
+        contact = {"active": closed, "sticking": closed, "slip": none, "tangential": none}
         return dataclasses.replace(solution(elongation), gap=gaps, response=lambda: None, **contact)
 
     def freed(held):
         closed = calls[-1] + 1.0 > gap
         stretched = np.array([[-stiffness / (1.0 + stiffness) if closed else 0.0]])
-        return PositionResponse(held, np.eye(1), stretched, DOFS, np.array([[[-1.0], [1.0]]]), 1.0)
+        return PositionResponse(held, np.eye(1), stretched, DOFS, np.array([[[-1.0], [1.0], [-1e-6]]]), 1.0)
 
     found = bodies_at(DOFS).settle(solve_at, freed, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
     assert found.slack
@@ -262,6 +262,34 @@ def test_a_driven_stack_slides_where_friction_is_least(dim, weakest, angle, opti
         for i, contact in enumerate(step.contact.values()):
             force = (contact.force @ turn)[[0, -1]]
             np.testing.assert_allclose(force, [np.sign(drive) * 0.5 * weights[-1], weights[i + 1 :].sum()], rtol=1e-3)
+
+
+def test_a_crate_on_a_driven_one_settles_while_both_slide_on_the_floor():
+    """Only the direction of friction restrains both crates sideways; near equilibrium the linear response is exact."""
+    lower = fc.generate.box((2.0, 1.2, 0.8), (6, 4, 3), "hex8", (-1.0, -0.6, 0.0))
+    upper = fc.generate.box((1.6, 1.0, 0.8), (5, 4, 3), "hex8", (-0.8, -0.5, 0.8))
+    model = made_of(united(A_=lower, B_=upper), "3d", fc.LinearElastic(E=30e9, nu=0.2, density=2400.0))
+    model.add_gravity(z=-9.81, ramp=[(0, 0), (1, 1), (2, 1)])
+    model.prescribe("B_XMIN", x=4e-4, ramp=[(0, 0), (1, 0), (2, 1)])
+    floor = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    model.add_obstacle("floor", secondary="A_ZMIN", obstacle=floor, friction=0.2)
+    model.add_contact("AB", secondary="B_ZMIN", primary="A_ZMAX", friction=0.5)
+    weight = 2400.0 * 9.81 * (1.92 + 1.28)
+    force = fc.solve(model, [1.0, 2.0])[-1].contact["floor"].force
+    np.testing.assert_allclose(force, [-0.2 * weight, 0.0, weight], rtol=1e-6, atol=1e-6 * weight)
+
+
+@pytest.mark.parametrize(("divisions", "friction"), [((30, 5), None), ((60, 6), 0.1)])
+def test_a_beam_moves_with_the_roller_that_loads_it_until_the_other_roller_holds_it(divisions, friction):
+    """When a node of the beam reaches the lower roller, the largest elongation grows, but the norm of both decreases."""
+    model = elastic_model(fc.generate.block((60.0, 10.0), divisions, "quad8"), "plane_stress", E=2e5, LEFT="x")
+    low, up = fc.obstacles.Sphere((50.0, -4.0), 4.0), fc.obstacles.Sphere((20.0, 16.0), 6.0)
+    model.add_obstacle("low", secondary="BOTTOM", obstacle=low, friction=friction)
+    model.add_obstacle("up", secondary="TOP", obstacle=up, friction=friction, force={"y": -100.0})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fc.FastcontactWarning)  # of the coarse mesh
+        contact = fc.solve(model, 1)[-1].contact
+    np.testing.assert_allclose([contact[name].force[1] for name in ("low", "up")], [100.0, -100.0], rtol=1e-6)
 
 
 @pytest.mark.parametrize(("angle", "stiffness"), first_of(2, [(-12.0, 5e3), (-3.0, 5e5), (12.0, 5e3), (-12.0, 5e5)]))
