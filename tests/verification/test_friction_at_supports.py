@@ -7,6 +7,7 @@ import pytest
 from models import elastic_model, supported, united
 
 import fastcontact as fc
+from fastcontact.analysis.convergence_messages import friction_exceeded
 
 pytestmark = pytest.mark.each_value
 
@@ -124,22 +125,32 @@ def test_a_block_within_the_cone_is_held_whatever_the_direction_of_its_load(azim
     assert force == pytest.approx(0.25 * np.array([*-along, 1.0]), abs=1e-8)
 
 
-@pytest.mark.parametrize(
-    ("push", "told", "needed"),
-    [
-        (0.5, "cannot hold", r"0\.\d+ where the largest is 0\.3"),
-        (0.3003, "cannot hold", r"0\.3003 where the largest is 0\.3"),
-        (0.2995, "hardly holds", r"0\.299\d* where the largest is 0\.3, if the bodies were rigid"),
-    ],
-)
-def test_a_push_beyond_friction_is_told_as_such(push, told, needed):
+def pushed(push):
+    """A cube on a floor, with a coefficient of friction of 0.3, under a unit pressure and a tangential force."""
     model = elastic_model(fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), "hex8"), "3d")
     model.add_pressure("ZMAX", 1.0, ramp=[(0, 0), (1, 1), (2, 1)])
     model.add_traction("XMIN", x=push, ramp=[(0, 0), (1, 0), (2, 1)])
     floor = fc.obstacles.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
     model.add_obstacle("floor", secondary="ZMIN", obstacle=floor, friction=0.3)
-    with pytest.raises(fc.ConvergenceError, match=f"friction {told} body .* coefficient of about {needed}"):
-        fc.solve(model, [1.0, 2.0])
+    return model
+
+
+@pytest.mark.parametrize(("push", "needed"), [(0.5, r"0\.\d+"), (0.3003, r"0\.3003")])
+def test_a_push_beyond_friction_is_told_as_such(push, needed):
+    told = f"friction cannot hold body .* coefficient of about {needed} where the largest is 0\\.3"
+    with pytest.raises(fc.ConvergenceError, match=told):
+        fc.solve(pushed(push), [1.0, 2.0])
+
+
+def test_a_push_just_below_the_friction_limit_converges():
+    floor = fc.solve(pushed(0.2999), [1.0, 2.0])[-1].contact["floor"]
+    assert floor.force == pytest.approx([-0.2999, 0.0, 1.0], abs=1e-9)
+
+
+def test_friction_that_would_hold_rigid_bodies_is_told_as_such():
+    told = friction_exceeded(0.95, ["body 'B'"], np.array([0.3, 0.3]))
+    assert "friction hardly holds body 'B'" in told
+    assert "about 0.285 where the largest is 0.3, if the bodies were rigid, and more for elastic bodies" in told
 
 
 @pytest.mark.parametrize("along", [0.31, 0.35])
