@@ -352,9 +352,8 @@ def sliding_load(
     """
     # If the step is solved at once, slips of sticking constraints are elastic. If it is solved in increments, a constraint
     # that sticks at the end may have slid before.
-    sliding = (
-        slip_integrals if solution.integrals is not None else np.where(solution.sticking[rows], 0.0, slip_integrals)
-    )
+    at_once = solution.integrals is None
+    sliding = np.where(solution.sticking[rows], 0.0, slip_integrals) if at_once else slip_integrals
     return np.maximum(closed_node_pressures(constraints, constraints.normal_forces(sliding), closed, side)[1], 0.0)
 
 

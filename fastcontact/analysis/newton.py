@@ -328,10 +328,8 @@ class _Newton:
         # The contact geometry is iterated no further than the linearisation of the bodies is accurate.
         tolerance = min(max(problem.criteria.geometry, MAX_TOLERANCE * changes[-1]), NOTABLE)
         inner_problem = replace(problem, criteria=replace(problem.criteria, geometry=tolerance))
-        loaded, step = (
-            with_loads(problem, load),
-            replace(self._begin, problem=inner_problem, extrapolation=Extrapolation()),
-        )
+        loaded = with_loads(problem, load)
+        step = replace(self._begin, problem=inner_problem, extrapolation=Extrapolation())
         paired = self._settled if self._moved_fully and problem.linearised_at is None else None
         settled = _contact(step, load, loaded, iterate, paired)
         solution = solve_displacements(problem, load, loaded, settled, u, self._linear_tolerance)

@@ -445,6 +445,7 @@ def _unresolved(pair: Formulation, contact: ContactResult, state: State) -> Iter
             # contact. On linear facets, none of the formulations is generally more accurate.
             if pair.weighs_gaps and pair.secondary.order == 2:
                 remedy += ", or use formulation 'continuous', which is more accurate on such facets"
+            remedy += ". At a sharp corner, refinement does not widen the contact; compare forces there"
         yield f"contact '{contact.name}' has only {resolution}: {needed}; {remedy}"
 
 

@@ -20,13 +20,13 @@ from scipy.sparse import csr_array, diags_array
 
 from fastcontact._tools.neighbours import nearest
 from fastcontact.analysis.solution import Solution
-from fastcontact.arrays import AnyArray, Array
+from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.results.step import ContactResult
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,37 +193,14 @@ def contact_work(
             after, positions=after.positions[:0], rows=(np.empty(0), np.empty(0, np.int32), np.zeros(1, np.int32)),
             energy=after.energy[:0], tangential=0.0 * after.tangential, pressing=0.0 * after.pressing, stored=0.0,
         )  # fmt: skip
-    areas = constraints.finite_areas
     pressure, traction = before.at(constraints.positions)
-    ratio = np.divide(pressure * areas, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
-    work_at_end, work_at_begin = (-0.5 * np.einsum("md,md->m", f, slips) for f in (force, areas[:, None] * traction))
-    mu, normal_before = constraints.friction, pressure * areas
-    closing = pressure == 0.0
-    moved, moved_away = _moved(normal, normal_before)
-    if (
-        solution.integrals is not None
-    ):  # the work of all increments, in which constraints carry no force before they close
-        (work, mean_force), closing = solution.integrals[:, rows], np.zeros_like(closing)
-        mean_total = 0.5 * float((normal_before + normal).sum())
-        work = work * (1.0 + moved * (mean_total / float(mean_force.sum()) - 1.0) if mean_total else 1.0)
-    else:
-        mobilised = np.linalg.norm(force, axis=1).sum() / max(float(mu @ normal), np.finfo(float).tiny)
-        leaving = 0.5 * moved_away * mobilised * mu * normal_before * np.linalg.norm(slips, axis=1)
-        work = np.where(normal != 0.0, (1.0 + ratio) * work_at_end, np.maximum(work_at_begin, leaving))
-    if work_at_end[closing].any():
-        # A constraint was open at the beginning of the step if this holds for the nearest secondary node that faced the other
-        # side at that time.
-        gap = pair.nodal_gap(replace(configuration, displacement=configuration.start, pose=configuration.pose_start))[0]
-        facing = np.isfinite(gap)
-        if facing.any():
-            open_before = gap[facing] > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
-            closing &= open_before[nearest(pair.points[pair.secondary.points[facing]], constraints.positions)[1]]
-    friction, touching = float(work.sum()), (1.0 - moved) * float(work_at_end[closing].sum())
-    if not normal.any():  # the contact is lost at an unknown instant
-        touching += friction
-    slip_integrals = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(slips, axis=1)
-    np.divide(work, mu, out=slip_integrals, where=mu > 0.0)
-    sliding = float((work_at_end + work_at_begin).sum())
+    areas = constraints.finite_areas
+    normals, tangential = (pressure * areas, normal), (areas[:, None] * traction, force)
+    integrals = None if solution.integrals is None else solution.integrals[:, rows]
+    work, touching, slip_integrals = _frictional_work(
+        pair, configuration, constraints, integrals, normals, tangential, slips
+    )
+    sliding = -0.5 * float(((tangential[0] + tangential[1]) * slips).sum())
     displacement = configuration.displacement - configuration.start
     if isinstance(pair.primary, RigidSide):  # relative to the obstacle
         displacement[pair.secondary.points] -= pair.rigid_motion(pair.at_nodes, configuration)
@@ -234,7 +211,74 @@ def contact_work(
     added_gap = np.where((after.pressing != 0.0) & (before.pressing != 0.0), after.added - before.added, 0.0)
     gained -= 0.5 * float((after.pressing + before.pressing) @ added_gap)
     gained -= 0.5 * float(((after.tangential + before.tangential) * displacement).sum())
-    return after, (friction, touching, gained - (after.stored - before.stored) - sliding), slip_integrals
+    return after, (float(work.sum()), touching, gained - (after.stored - before.stored) - sliding), slip_integrals
+
+
+def _frictional_work(
+    pair: Formulation, configuration: Configuration, constraints: Constraints, integrals: Array | None,
+    normals: tuple[Array, Array], tangential: tuple[Array, Array], slips: Array,
+) -> tuple[Array, float, Array]:  # fmt: skip
+    """Return the frictional work in a step, its part at constraints that close or open, and integrals of normal forces.
+
+    Parameters
+    ----------
+    pair : Formulation
+    configuration : Configuration
+        Configuration of the pair in the step.
+    constraints : Constraints
+        The m constraints of the pair.
+    integrals : ndarray (2, m), optional
+        `Solution.integrals` of these constraints.
+    normals, tangential : (ndarray (m,), ndarray (m,)), (ndarray (m, dim), ndarray (m, dim))
+        Normal and tangential forces at the beginning and at the end of the step [force].
+    slips : ndarray (m, dim)
+        Slip vectors [length].
+
+    Returns
+    -------
+    work : ndarray (m,)
+        Frictional work [energy].
+    touching : float
+        See `Work.touching` [energy].
+    slip_integrals : ndarray (m,)
+        Integrals of the normal forces over the slips [energy].
+    """
+    (normal_before, normal), mu = normals, constraints.friction
+    work_at_begin, work_at_end = (-0.5 * np.einsum("md,md->m", forces, slips) for forces in tangential)
+    ratio = np.divide(normal_before, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
+    moved, moved_away = _moved(normal, normal_before)
+    # The work of all increments, in which constraints carry no force before they close.
+    if integrals is not None:
+        work, mean_force = integrals
+        mean_total = 0.5 * float((normal_before + normal).sum())
+        work = work * (1.0 + moved * (mean_total / float(mean_force.sum()) - 1.0) if mean_total else 1.0)
+        touching = 0.0
+    else:
+        mobilised = np.linalg.norm(tangential[1], axis=1).sum() / max(float(mu @ normal), TINY)
+        leaving = 0.5 * moved_away * mobilised * mu * normal_before * np.linalg.norm(slips, axis=1)
+        work = np.where(normal != 0.0, (1.0 + ratio) * work_at_end, np.maximum(work_at_begin, leaving))
+        closing = _closing(pair, configuration, constraints, (normal_before == 0.0) & (work_at_end != 0.0))
+        touching = (1.0 - moved) * float(work_at_end[closing].sum())
+    if not normal.any():  # the contact is lost at an unknown instant
+        touching += float(work.sum())
+    slip_integrals = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(slips, axis=1)
+    np.divide(work, mu, out=slip_integrals, where=mu > 0.0)
+    return work, touching, slip_integrals
+
+
+def _closing(pair: Formulation, configuration: Configuration, constraints: Constraints, candidates: Mask) -> Mask:
+    """Return which of the candidates (m,) were open at the beginning of the step.
+
+    A constraint was open if this holds for the nearest secondary node that faced the other side at that time.
+    """
+    if not candidates.any():
+        return candidates
+    gap = pair.nodal_gap(replace(configuration, displacement=configuration.start, pose=configuration.pose_start))[0]
+    facing = np.isfinite(gap)
+    if not facing.any():
+        return candidates
+    was_open = gap[facing] > LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
+    return candidates & was_open[nearest(pair.points[pair.secondary.points[facing]], constraints.positions)[1]]
 
 
 def _moved(normal: Array, before: Array) -> tuple[float, float]:
@@ -244,7 +288,7 @@ def _moved(normal: Array, before: Array) -> tuple[float, float]:
     a surface leaves as much force behind as it gains ahead. Such a force acts during the complete step.
     """
     increase, decrease = (float(np.maximum(change, 0.0).sum()) for change in (normal - before, before - normal))
-    largest = max(increase, decrease, np.finfo(float).tiny)
+    largest = max(increase, decrease, TINY)
     return decrease / largest, increase / largest
 
 
