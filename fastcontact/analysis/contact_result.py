@@ -45,10 +45,8 @@ def contact_results(
     paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
     results = {}
     for name, rows in settled.constraints.rows.items():
-        constraints, configuration = (
-            settled.constraints.parts[name],
-            problem.configuration(name, start, load, paired_at, end.u),
-        )
+        constraints = settled.constraints.parts[name]
+        configuration = problem.configuration(name, start, load, paired_at, end.u)
         arguments = constraints, settled.solution, rows, configuration, end.first_contact.get(name), displacement
         results[name] = contact_result(name, problem.pairs[name], *arguments)
     if problem.model.periodic_interfaces:

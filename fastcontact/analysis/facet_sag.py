@@ -46,9 +46,8 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
         if corrected or pair.options.kind in ("tied", "gap_only") or not (contact.pressure > 0.0).any():
             continue
         configuration = problem.configuration(name, state, load, displacement, state.u)
-        text = _warning(pair, *_sag(pair, configuration, contact.active), contact) or _inclination(
-            pair, configuration, contact
-        )
+        text = _warning(pair, *_sag(pair, configuration, contact.active), contact)
+        text = text or _inclination(pair, configuration, contact)
         if text:
             warnings[name] = f"contact '{name}': {text}"
     return warnings

@@ -245,10 +245,8 @@ def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
     if constraints.compliance is not None and len(rows):
         # C couples force vectors. Their components along normals and tangents are coupled by the scalar products of these
         # directions, which vary from one constraint to the next.
-        C, along = (
-            constraints.compliance.block(rows),
-            np.stack(constraints.coupled_directions or constraints.directions)[:, rows],
-        )
+        C = constraints.compliance.block(rows)
+        along = np.stack(constraints.coupled_directions or constraints.directions)[:, rows]
         normal = normals(list(along))
         normal[~along.any(axis=(0, 2)), 0] = 1.0  # any unit vector, for constraints without friction
         frame = np.concatenate([normal[None], along]).reshape(-1, normal.shape[1])

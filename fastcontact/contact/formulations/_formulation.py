@@ -359,10 +359,8 @@ class Formulation(ABC):
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
         added = self.added_gap(candidates, pairing, config)
         gap0 += added if self.smoothing is None else added - self.smoothing_overlap(candidates, pairing, config)
-        constraints, directions = (
-            Constraints(B, gap0, candidates.positions(self.points), compliance),
-            tuple[Array, ...](),
-        )
+        constraints = Constraints(B, gap0, candidates.positions(self.points), compliance)
+        directions: tuple[Array, ...] = ()
         if self.has_tangents:
             projectors = None
             if self.friction and self.held is not None and len(self.held.nodes):
