@@ -9,7 +9,8 @@ Format Specification 3.0, sections II.A and III.A):
 2. the superblock with the end of the file;
 3. nodes of indices from the root down, so that entries are in their new node before they are removed from the old one;
 4. all other writes;
-5. name tables.
+5. name tables;
+6. the object header with the number of steps, which completes a step.
 
 HDF5 writes entire nodes of indices and parts of tables, although a step changes only a few of their bytes. The class writes
 only the range from the first to the last changed byte.
@@ -36,6 +37,7 @@ from fastcontact.results import journal
 
 # Signatures of the superblock, of nodes of indices and of name tables in HDF5.
 SUPERBLOCK, NODE, NAMES = b"\x89HDF\r\n\x1a\n", b"TREE", b"SNOD"
+N_STEPS = b"NSteps\0"  # name of the attribute with the number of steps
 # Longest write that is compared with the file [bytes]. In longer writes, which contain data, all bytes change.
 LONGEST_COMPARED = 1 << 16
 SIGNALS = tuple(map(int, signal.valid_signals()))
@@ -171,13 +173,15 @@ class CommittedFile(DriverFile):
         self._file.truncate(size)
 
     def _order(self, offset: int, data: bytes) -> tuple[int, int, int]:
-        """Return the sort key of a write: new blocks, superblock, nodes from the root down, other writes, name tables."""
+        """Return the sort key of a write, in the order in which the description of the module lists them."""
         if not self._overlaps(offset, offset + len(data)):
             return 0, 0, offset
         if offset == 0:
             return 1, 0, 0
         if data.startswith(NODE):
             return 2, -data[5], offset
+        if N_STEPS in data:
+            return 5, 0, offset
         return (4 if data.startswith(NAMES) else 3), 0, offset
 
     def _overlaps(self, start: int, end: int) -> bool:

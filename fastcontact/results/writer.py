@@ -1,7 +1,7 @@
 """Writing of result files, in which a crash does not damage completed steps.
 
-The fields and tables of a step are written and flushed before the number of steps, beyond which nothing is read. Data
-of completed steps are never moved: uncompressed tables and small fields grow in place, and larger fields have a
+Each step is flushed once. `CommittedFile` writes the number of steps last, and nothing beyond it is read. Data of completed
+steps are never moved: uncompressed tables and small fields grow in place, and larger fields have a
 separate chunk for each step. If the disk is full, the new blocks cannot be written. Since no other data refer to them
 yet, the file remains as it was.
 """
@@ -236,8 +236,6 @@ class ResultWriter:
             write_arrays.append_tables(self._objects, self._mesh, self.n_steps, step, self._pairs, self._notes)
             write_arrays.set_restart(self._objects, self.n_steps, restart)
             write_arrays.append_offsets(self._objects, self._mesh, self.n_steps, step, self._cell_fields)
-            if not self._committed.synchronised:  # otherwise a journal contains the step and the number of steps
-                self._flush()
             self._objects["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))
             self._flush()
             self.n_steps += 1
