@@ -211,6 +211,10 @@ class ScaledMatrix:
         self.combine(1.0, u, 0.0, out, out)
         return out
 
+    def forces_of(self, dofs: Indices, u: Array) -> Array:
+        """Return the forces (n,) of displacements u (m,) of the unknowns `dofs` (m,), the others being zero [force]."""
+        return np.asarray(u @ self.scaled.rows_of(dofs) / self.unit)
+
     def forces_at(self, dofs: Indices, u: Array, f: Array) -> Array:
         """Return ``(K @ u - f)[dofs]`` (m,) [force]."""
         return np.asarray(self.scaled.rows_of(dofs) @ u / self.unit - f[dofs])

@@ -430,9 +430,7 @@ class Multigrid:
         """Return the 2-norm of the right-hand side, including forces due to the offsets of eliminated unknowns [force]."""
         square = self._cg.dot(f, f)
         if elimination is not None and elimination.offset.any():
-            offset = np.zeros(len(f))
-            offset[elimination.pivots] = elimination.offset
-            forces = self.K @ offset
+            forces = self.K.forces_of(elimination.pivots, elimination.offset)
             square += self._cg.dot(forces, forces)
         return float(np.sqrt(square))
 
