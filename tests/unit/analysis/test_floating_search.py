@@ -174,6 +174,18 @@ def test_slack_is_in_units_of_the_contact_forces(force):
     assert found.anchor[0] > 0.5
 
 
+def test_bodies_do_not_slide_back():
+    """Friction of one constraint drives a body, and that of the other, which has slipped by 2, brakes it."""
+    on, rates = np.array([True, True]), np.array([[[0.0], [0.0]], [[1.0], [-1.0]]])
+    sliding = Solution.frictionless(np.zeros(1), np.zeros(2), np.zeros(2), on, on)
+    sliding = dataclasses.replace(sliding, sticking=~on, slip=np.array([[1.0], [2.0]]), tangential=np.ones((2, 1)))
+    response = PositionResponse(lambda force, gaps: force, np.eye(1), np.array([[-0.01]]), DOFS, rates, 1.0)
+    for last_slide, change, remaining in ((0.0, 2.0, np.inf), (5.0, 2.0, np.inf), (-5.0, 10.0, 0.0)):
+        found = response.slack_position_change(np.array([0.1]), sliding, np.array([last_slide]))
+        assert found[0] == pytest.approx([change], rel=1e-6)
+        assert found[1] == remaining
+
+
 def carried(dim, options, angle):
     """A box on a wider one, which is driven sideways by much more than it deforms, and the matrix that turns both."""
     box = fc.generate.block if dim == 2 else fc.generate.box
