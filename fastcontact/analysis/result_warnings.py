@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 from fastcontact.analysis.criteria import NOTABLE, Criteria
 from fastcontact.analysis.facet_sag import facet_length, sag_warnings
 from fastcontact.analysis.interpenetration import Peak, interpenetration
-from fastcontact.analysis.locking import ALTERNATING, locking_warning, nonlinear_scatter_warnings, scatter_warnings
+from fastcontact.analysis.locking import ALTERNATING, locking_warnings
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import stability_ratio
@@ -31,6 +31,7 @@ from fastcontact.contact.pair_options import ALWAYS_CLOSED
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.energy import slopes_at
+from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.mass import portions
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
@@ -85,10 +86,7 @@ def result_warnings(
     warnings = [*inside, *_carrying_springs(problem, state), *_undetermined(last, free)]
     if problem.model.strain == "small":
         warnings += [*_large_strain(problem, last), *_large_rotation(problem, state, last)]
-    if problem.bodies is None:
-        warnings += locking_warning(problem, state.u) or scatter_warnings(problem, state, last)
-    else:
-        warnings += nonlinear_scatter_warnings(problem, state, last) or scatter_warnings(problem, state, last)
+    warnings += locking_warnings(problem, state, last)
     if problem.solver.replacement_reason:
         warnings.append(
             f'{problem.solver.replacement_reason}. linear_solver="direct" factorises the matrix from the start'
@@ -305,11 +303,10 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
         interior[interface.points] = False
         strain = float((recovery.von_mises(interface.stress) / (3 * shear[interface.material])).max())
     for name, block in problem.model.mesh.solids.items():
-        for number in np.unique(field.material_numbers[name]):
-            nodes = np.unique(block[field.material_numbers[name] == number])
-            stress = last.von_mises[nodes[interior[nodes]]]
-            strain = max(strain, float(stress.max(initial=0.0) / (3 * shear[number])))
-        others = np.flatnonzero(np.isinf(shear[field.material_numbers[name]]))
+        shear_of_cells = shear[field.material_numbers[name]]
+        at_nodes = last.von_mises[block] * interior[block] / (3 * shear_of_cells[:, None])
+        strain = max(strain, float(at_nodes.max(initial=0.0)))
+        others = np.flatnonzero(np.isinf(shear_of_cells))
         mean = last.stress[block[others]].mean(axis=1)
         strains = np.einsum("cij,cj->ci", field.compliance[field.rows[name][others]], mean)
         strain = max(strain, float(recovery.equivalent_strain(strains).max(initial=0.0)))
@@ -628,10 +625,9 @@ def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
 
 def _works_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
     """Return the work of the stresses on neglected strains, and its absolute value on strains, both (n_bodies,) [energy]."""
-    mesh, dim, axisymmetric = problem.model.mesh, problem.model.mesh.dim, problem.model.kinematics == "axisymmetric"
+    mesh, axisymmetric = problem.model.mesh, problem.model.kinematics == "axisymmetric"
     count, body = bodies(mesh)
     neglected, strain_works = np.zeros((2, count))
-    pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]
     for name, block in mesh.solids.items():
         element = elements.get(name)
         xi, weights = element.quadrature
@@ -639,10 +635,7 @@ def _works_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]
         for cells in np.array_split(block, len(block) * dN.nbytes // BATCH + 1):
             slope, volume = slopes_at(last.displacement[cells], mesh.points[cells], dN)
             stress, volume = N @ last.stress[cells], np.abs(volume) * weights
-            tensor = np.zeros_like(slope)
-            for column, (i, j) in enumerate(pairs[: stress.shape[2]]):
-                if max(i, j) < dim:
-                    tensor[..., i, j] = tensor[..., j, i] = stress[..., column]
+            tensor = stress[..., PAIRS[mesh.dim]]
             strain_work = np.einsum("cqij,cqij->cq", tensor, slope)
             if axisymmetric:
                 radius, radial_u = (values[cells][..., 0] @ N.T for values in (mesh.points, last.displacement))
