@@ -322,7 +322,7 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
         area = facet_measure(block.facets, block.element, mesh.points, xi, model.kinematics == "axisymmetric") * weights
         normals = area_vectors(mesh.points[block.facets], reference.gradient(xi))
         normals /= np.linalg.norm(normals, axis=2, keepdims=True)
-        number = cells_of_outer[block.element][same_facets(outer[block.element], block.facets)]
+        number = cells_of_outer[block.element][same_facets(outer[block.element], block.facets)].astype(np.intp)
         for name, (facet, cell) in zip(mesh.cells, by_block(number, sizes), strict=True):
             if not len(facet):
                 continue
