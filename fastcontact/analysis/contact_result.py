@@ -45,10 +45,9 @@ def contact_results(
     paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
     results = {}
     for name, rows in settled.constraints.rows.items():
-        constraints = settled.constraints.parts[name]
         configuration = problem.configuration(name, start, load, paired_at, end.u)
-        arguments = constraints, settled.solution, rows, configuration, end.first_contact.get(name), displacement
-        results[name] = contact_result(name, problem.pairs[name], *arguments)
+        arguments = settled.constraints.parts[name], settled.solution, rows, configuration, displacement
+        results[name] = contact_result(name, problem.pairs[name], *arguments, end.first_contact.get(name))
     if problem.model.periodic_interfaces:
         results = _with_periodic_nodes(problem, results)
     if problem.model.strain == "small":
@@ -58,7 +57,7 @@ def contact_results(
 
 def contact_result(
     name: str, pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, configuration: Configuration,
-    axis: tuple[Array, Array] | None = None, displacement: Array | None = None,
+    displacement: Array, axis: tuple[Array, Array] | None,
 ) -> ContactResult:  # fmt: skip
     """Return the result of one pair at the end of a load step.
 
@@ -74,10 +73,10 @@ def contact_result(
         Rows of this pair in the solution.
     configuration : Configuration
         Configuration of the last pairing of the step.
+    displacement : ndarray (n_points, dim)
+        Displacement at which gaps are evaluated [length].
     axis : (ndarray (dim,), ndarray (dim,)), optional
         In 3D, the point of first contact [length] and the normal there [-].
-    displacement : ndarray (n_points, dim), optional
-        Displacement at which gaps are evaluated, by default that of `configuration` [length].
     """
     points = pair.secondary.points
     coordinates = pair.points[points]
@@ -98,9 +97,7 @@ def contact_result(
     middle = contact_middle(pair, finite_normal, np.einsum("nd,nd->n", forces, finite_normal), closed, gap)
     place, tangent = middle.places(constraints.positions), middle.tangent
     along_tangent = place if tangent is None else (constraints.positions - middle.position) @ tangent
-    fluid = None if pair.options.source is None else np.zeros(len(points))
-    if constraints.wetted is not None:
-        fluid = constraints.wetted.pressure
+    dry = None if pair.options.source is None else np.zeros(len(points))
     abscissa, obstacle_results = pair.secondary.abscissa, dict[str, Any]()
     if axis is not None:  # distance from the axis
         offset = coordinates - axis[0]
@@ -132,7 +129,7 @@ def contact_result(
         tangent=tangent,
         primary_points=primary_points,
         primary_force_vectors=primary_forces,
-        fluid_pressure=fluid,
+        fluid_pressure=dry if constraints.wetted is None else constraints.wetted.pressure,
         **obstacle_results,
     )
 
@@ -265,9 +262,7 @@ def closed_node_pressures(constraints: Constraints, forces: Array, closed: Mask,
         receivers = closed & with_area
         excess = np.where(closed, shares - nodal_pressure * areas, shares)
         excess[receivers | (np.abs(excess) <= SUM_ROUND_OFF * np.abs(shares).max(initial=0.0))] = 0.0
-        pressure = nodal_pressure + (
-            _received_pressures(receivers, excess, areas, side) if excess.any() else np.zeros_like(excess)
-        )
+        pressure = nodal_pressure + _received_pressures(receivers, excess, areas, side)
         tension = closed & (pressure < 0.0)
         if may_pull or not tension.any():
             return closed, np.where(closed, pressure, 0.0)
