@@ -118,11 +118,10 @@ class MovingContact:
     @cached_property
     def step(self) -> float:
         """Increment by which points are moved [length]."""
-        edges = [np.inf]
-        for block in (block for side in self._surfaces() for block in side.blocks):
-            corners = self.problem.model.mesh.points[block.facets]
-            edges.append(float(np.linalg.norm(np.ptp(corners, axis=1), axis=1).min()))
-        return DIFFERENCES * min(edges)
+        points = self.problem.model.mesh.points
+        facets = [corners for side in self._surfaces() for corners in side.corners(points)]
+        sizes = [float(np.linalg.norm(np.ptp(corners, axis=1), axis=1).min()) for corners in facets]
+        return DIFFERENCES * min(sizes, default=np.inf)
 
     def _surfaces(self) -> list[Surface]:
         pairs = self.problem.pairs.values()
