@@ -11,7 +11,7 @@ from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
-from fastcontact.arrays import Array, Indices, Mask, Numbers
+from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.contact_middle import ContactMiddle, contact_middle
@@ -21,7 +21,6 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
 from fastcontact.contact.pairing import normals
 from fastcontact.contact.surface import Surface
-from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.results.step import ContactResult, half_width
 from fastcontact.round_off import LENGTH_ROUND_OFF, SUM_ROUND_OFF
 
@@ -48,11 +47,11 @@ def contact_results(
         configuration = problem.configuration(name, start, load, paired_at, end.u)
         arguments = settled.constraints.parts[name], settled.solution, rows, configuration, displacement
         results[name] = contact_result(name, problem.pairs[name], *arguments, end.first_contact.get(name))
-    if problem.model.periodic_interfaces:
-        results = _with_periodic_nodes(problem, results)
-    if problem.model.strain == "small":
-        return results
-    return {name: _on_deformed_surface(problem.pairs[name], result, displacement) for name, result in results.items()}
+        if problem.model.periodic_interfaces:
+            results[name] = _with_periodic_nodes(problem.pairs[name], results[name])
+        if problem.model.strain == "finite":
+            results[name] = _on_deformed_surface(problem.pairs[name], results[name], displacement)
+    return results
 
 
 def contact_result(
@@ -394,33 +393,21 @@ def _stretch(contact: ContactResult, displacement: Array, before: Array, after: 
     return low, high
 
 
-def _with_periodic_nodes(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
-    """Return contact results in which both nodes of a periodic pair have the same traction and contact status.
+def _with_periodic_nodes(pair: Formulation, contact: ContactResult) -> ContactResult:
+    """Return a contact result in which both nodes of a periodic pair have the same traction and contact status.
 
     If only one of the nodes has an opposite facet, because the sides slide past the ends, both have its gap.
     """
-    merged_results = dict(results)
-    for name, contact in results.items():
-        pair = problem.pairs[name]
-        areas = lumped_areas(pair.secondary, pair.points, pair.axisymmetric)
-        pressure, shear, active = contact.pressure.copy(), contact.shear.copy(), contact.active.copy()
-        gap = contact.gap.copy()
-        for interface in problem.model.periodic_interfaces:
-            a, b = _common_rows(problem, contact, interface)
-            weight = areas[a] / (areas[a] + areas[b])
-            rotation = np.eye(shear.shape[1]) if interface.turn is None else interface.turn
-            pressure[a] = pressure[b] = weight * pressure[a] + (1.0 - weight) * pressure[b]
-            shear[a] = weight[:, None] * shear[a] + (1.0 - weight[:, None]) * (shear[b] @ rotation)
-            shear[b] = shear[a] @ rotation.T
-            active[a] = active[b] = active[a] | active[b]
-            gap[a], gap[b] = np.where(np.isinf(gap[a]), gap[b], gap[a]), np.where(np.isinf(gap[b]), gap[a], gap[b])
-        merged_results[name] = replace(contact, pressure=pressure, shear=shear, active=active, gap=gap)
-    return merged_results
-
-
-def _common_rows(problem: Problem, contact: ContactResult, interface: PeriodicInterface) -> tuple[Indices, Indices]:
-    """Return the rows, in a contact result, of the node pairs of a periodic interface with both nodes in the contact."""
-    row_of_node = np.full(problem.model.mesh.n_points, -1, np.intp)
-    row_of_node[contact.points] = np.arange(len(contact.points))
-    on_side = (row_of_node[interface.first] >= 0) & (row_of_node[interface.second] >= 0)
-    return row_of_node[interface.first[on_side]], row_of_node[interface.second[on_side]]
+    areas = lumped_areas(pair.secondary, pair.points, pair.axisymmetric)
+    pressure, shear, active = contact.pressure.copy(), contact.shear.copy(), contact.active.copy()
+    gap = contact.gap.copy()
+    for a, b, rotation in pair.secondary.periodic_ends:
+        if a is b:  # nodes in a plane of symmetry
+            continue
+        weight = areas[a] / (areas[a] + areas[b])
+        pressure[a] = pressure[b] = weight * pressure[a] + (1.0 - weight) * pressure[b]
+        shear[a] = weight[:, None] * shear[a] + (1.0 - weight[:, None]) * (shear[b] @ rotation)
+        shear[b] = shear[a] @ rotation.T
+        active[a] = active[b] = active[a] | active[b]
+        gap[a], gap[b] = np.where(np.isinf(gap[a]), gap[b], gap[a]), np.where(np.isinf(gap[b]), gap[a], gap[b])
+    return replace(contact, pressure=pressure, shear=shear, active=active, gap=gap)
