@@ -83,9 +83,7 @@ def contact_result(
     active = active if constraints.wetted is None else active & ~constraints.wetted.rows
     gap, normal = pair.nodal_gap(configuration, displacement=displacement)
     active_gaps = active[: len(constraints.normal_forces(multiplier))]
-    closed, pressure, nodal_multiplier, scale = _closed_nodes(
-        pair, constraints, multiplier, active_gaps, gap, configuration
-    )
+    closed, pressure, field, scale = _closed_nodes(pair, constraints, multiplier, active_gaps, gap, configuration)
     if pair.options.kind == "tied":  # normals of the undeformed configuration
         normal = pair.nodal_gap(replace(configuration, displacement=np.zeros_like(configuration.displacement)))[1]
     shear, sticking, tangential = _tangential_results(constraints, solution, rows, normal, closed, scale)
@@ -115,7 +113,7 @@ def contact_result(
         abscissa=abscissa,
         gap=gap,
         pressure=pressure,
-        multiplier=nodal_multiplier,
+        multiplier=field,
         force_vectors=forces,
         normal=normal,
         active=closed,
@@ -306,9 +304,7 @@ def _nodal_shear(
     return traction - np.einsum("nd,nd->n", traction, normal)[:, None] * normal
 
 
-def mean_slip_before_closing(
-    constraints: Constraints, solution: Solution, rows: slice, contact: ContactResult
-) -> Array:
+def mean_slip_before_closing(constraints: Constraints, solution: Solution, rows: slice, result: ContactResult) -> Array:
     """Return the part (n_nodes, dim) of the nodal slips in this step that precedes the closing of the nodes [length].
 
     It is a mean over the constraints near each node, weighted by their contact forces, if the step was solved in increments.
@@ -318,7 +314,7 @@ def mean_slip_before_closing(
     assert constraints.nodal is not None
     forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
     slips = np.einsum("mk,kmd->md", solution.slip_before_closing[rows], np.stack(constraints.directions))
-    pressure, mean = constraints.nodal.pressure(forces)[:, None], np.zeros_like(contact.coordinates)
+    pressure, mean = constraints.nodal.pressure(forces)[:, None], np.zeros_like(result.coordinates)
     np.divide(constraints.nodal.traction(forces[:, None] * slips), pressure, out=mean, where=pressure > 0.0)
     # The nodal values of a field may exceed the values from which it is computed.
     largest, length = np.linalg.norm(slips, axis=1).max(initial=0.0), np.linalg.norm(mean, axis=1)

@@ -119,9 +119,8 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
         nodes, pose = points.nodes[rows], configuration.pose
         node_gaps = pair.primary.facing(deformed[nodes].reshape(-1, deformed.shape[1]), pose)[0].reshape(nodes.shape)
         point_gaps = pair.primary.facing(points.positions(deformed)[rows], pose)[0]
-        facing = np.isfinite(node_gaps).all(axis=1) & np.isfinite(
-            point_gaps
-        )  # gaps are infinite beyond the edge of a punch
+        # Gaps are infinite beyond the edge of a punch.
+        facing = np.isfinite(node_gaps).all(axis=1) & np.isfinite(point_gaps)
         sag = np.einsum("nk,nk->n", points.shape[rows[facing]], node_gaps[facing]) - point_gaps[facing]
         spread = float(np.ptp(sag)) if len(sag) else 0.0
         return spread, spread / extent

@@ -251,9 +251,7 @@ class Comparison:
             np.add.at(sums[1], nodes[name], (volume * pressure[name])[:, None])
         mean = sums[1] / np.where(sums[0] > 0.0, sums[0], 1.0)
         for name in pressure:
-            deviation = np.where(
-                self._suspicious[field.rows[name]], pressure[name] - mean[nodes[name]].mean(axis=1), 0.0
-            )
+            deviation = (pressure[name] - mean[nodes[name]].mean(axis=1)) * self._suspicious[field.rows[name]]
             excess[name][..., :3] += deviation[:, None, None]
 
 

@@ -88,10 +88,8 @@ def result_warnings(
     if problem.model.strain == "small":
         warnings += [*_large_strain(problem, last), *_large_rotation(problem, state, last)]
     warnings += locking_warnings(problem, state, last)
-    if problem.solver.replacement_reason:
-        warnings.append(
-            f'{problem.solver.replacement_reason}. linear_solver="direct" factorises the matrix from the start'
-        )
+    if reason := problem.solver.replacement_reason:
+        warnings.append(f'{reason}. linear_solver="direct" factorises the matrix from the start')
     load = problem.load_at(last.load_factor)
     loaded, sag = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)
     clearances = _open_clearances(problem, state)
@@ -204,13 +202,11 @@ def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
     work = state.work
     if work is not None and work.touching > max(NEGLECTED * work.friction, NOTABLE**2 * work.largest, 0.0):
         share = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
-        remedy = (
-            "" if criteria.friction_while_touching else ", or Criteria(friction_while_touching=0.01) if nodes close"
-        )
+        hint = "" if criteria.friction_while_touching else ", or Criteria(friction_while_touching=0.01) if nodes close"
         yield (
             f"{share:.0%} of the work of friction is done at nodes in the load step in which they "
             "close, or contact is lost, where the slip of the complete step counts, not that in contact: the work of "
-            f"friction, and the tractions at nodes that close, are inaccurate. Use more load steps{remedy}"
+            f"friction, and the tractions at nodes that close, are inaccurate. Use more load steps{hint}"
         )
 
 
