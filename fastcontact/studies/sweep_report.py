@@ -231,8 +231,8 @@ class Sweep(Report):
         rows = pandas.concat([solved, pandas.DataFrame([choice | {"failed": text} for choice, text in self.failed])])
         choices = list(itertools.product(*self.parameters.values()))
         of_rows = rows[list(self.parameters)].itertuples(index=False, name=None)
-        rows["position"] = [choices.index(choice) for choice in of_rows]
-        rows = rows.sort_values("position", ignore_index=True).drop(columns="position")
+        order = np.argsort([choices.index(choice) for choice in of_rows], kind="stable")
+        rows = rows.iloc[order].reset_index(drop=True)
         rows.attrs = solved.attrs
         return rows
 
