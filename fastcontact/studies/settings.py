@@ -164,12 +164,11 @@ def combinations(
     selected = [settings.case_combination.element] if element_names is None else list(element_names)
     if selected == ["all"]:
         selected = [name for name in ALL_ELEMENTS if can_make(settings, name)]
-    if formulations is None:
-        return tuple(_make_combination(element, settings.case_combination.formulation) for element in selected)
-    if settings.pair is None:
+    if formulations is not None and settings.pair is None:
         raise CaseError("this case has no contact pair, so there are no formulations to compare")
-    formulations = list(formulations)
-    compared = list(FORMULATIONS) if formulations == ["all"] else formulations
+    compared = [settings.case_combination.formulation] if formulations is None else list(formulations)
+    if compared == ["all"]:
+        compared = list(FORMULATIONS)
     return tuple(_make_combination(element, formulation) for element in selected for formulation in compared)
 
 
