@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.resultants import pose_of
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.surface import Surface
@@ -142,10 +143,8 @@ def _through_obstacles(problem: Problem, displacement: Array, contact: Contacts)
         if not len(points):
             continue
         at_rest = pair.primary.facing(mesh.points[points], Pose(np.zeros(mesh.dim)))[0]
-        motion = contact[name].obstacle_displacement
-        assert motion is not None
-        pose = Pose(motion, contact[name].obstacle_angle or 0.0)
         # Depths are those of the geometry, of which a clearance is not part.
+        pose = pose_of(contact[name])
         gap, contact_gap = (pair.primary.facing(mesh.points[at] + u[at], pose)[0] for at in (points, nodes))
         facing = np.isfinite(contact[name].gap)
         contact_depth = -float(np.min(contact_gap, initial=0.0, where=facing))

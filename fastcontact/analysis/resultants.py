@@ -327,14 +327,15 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
 
 def end_of(before: StepResult | None, step: StepResult, name: str) -> Configuration:
     """Return the configuration of a contact pair at the end of a step that follows the step `before`, or starts at rest."""
-    end = Configuration.displaced(step.displacement)
-    end = replace(end, pose=_pose(step, name))
-    return end if before is None else replace(end, start=before.displacement, pose_start=_pose(before, name))
+    end = replace(Configuration.displaced(step.displacement), pose=pose_of(step.contact[name]))
+    if before is None:
+        return end
+    return replace(end, start=before.displacement, pose_start=pose_of(before.contact[name]))
 
 
-def _pose(step: StepResult, name: str) -> Pose:
-    """Return the pose of the obstacle of a pair; zero if the pair has no obstacle."""
-    contact, zero = step.contact[name], np.zeros(step.displacement.shape[1])
+def pose_of(contact: ContactResult) -> Pose:
+    """Return the pose of the obstacle of a contact pair; zero if the pair has no obstacle."""
+    zero = np.zeros(contact.coordinates.shape[1])
     displacement = zero if contact.obstacle_displacement is None else np.asarray(contact.obstacle_displacement)
     return Pose(displacement, contact.obstacle_angle or 0.0)
 
