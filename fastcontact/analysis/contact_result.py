@@ -11,7 +11,7 @@ from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
-from fastcontact.arrays import Array, Indices, Mask, Numbers
+from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.contact_middle import ContactMiddle, contact_middle
@@ -21,7 +21,6 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import ALWAYS_CLOSED
 from fastcontact.contact.pairing import normals
 from fastcontact.contact.surface import Surface
-from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.results.step import ContactResult, half_width
 from fastcontact.round_off import LENGTH_ROUND_OFF, SUM_ROUND_OFF
 
@@ -45,20 +44,19 @@ def contact_results(
     paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
     results = {}
     for name, rows in settled.constraints.rows.items():
-        constraints = settled.constraints.parts[name]
         configuration = problem.configuration(name, start, load, paired_at, end.u)
-        arguments = constraints, settled.solution, rows, configuration, end.first_contact.get(name), displacement
-        results[name] = contact_result(name, problem.pairs[name], *arguments)
-    if problem.model.periodic_interfaces:
-        results = _with_periodic_nodes(problem, results)
-    if problem.model.strain == "small":
-        return results
-    return {name: _on_deformed_surface(problem.pairs[name], result, displacement) for name, result in results.items()}
+        arguments = settled.constraints.parts[name], settled.solution, rows, configuration, displacement
+        results[name] = contact_result(name, problem.pairs[name], *arguments, end.first_contact.get(name))
+        if problem.model.periodic_interfaces:
+            results[name] = _with_periodic_nodes(problem.pairs[name], results[name])
+        if problem.model.strain == "finite":
+            results[name] = _on_deformed_surface(problem.pairs[name], results[name], displacement)
+    return results
 
 
 def contact_result(
     name: str, pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, configuration: Configuration,
-    axis: tuple[Array, Array] | None = None, displacement: Array | None = None,
+    displacement: Array, axis: tuple[Array, Array] | None,
 ) -> ContactResult:  # fmt: skip
     """Return the result of one pair at the end of a load step.
 
@@ -74,10 +72,10 @@ def contact_result(
         Rows of this pair in the solution.
     configuration : Configuration
         Configuration of the last pairing of the step.
+    displacement : ndarray (n_points, dim)
+        Displacement at which gaps are evaluated [length].
     axis : (ndarray (dim,), ndarray (dim,)), optional
         In 3D, the point of first contact [length] and the normal there [-].
-    displacement : ndarray (n_points, dim), optional
-        Displacement at which gaps are evaluated, by default that of `configuration` [length].
     """
     points = pair.secondary.points
     coordinates = pair.points[points]
@@ -85,9 +83,7 @@ def contact_result(
     active = active if constraints.wetted is None else active & ~constraints.wetted.rows
     gap, normal = pair.nodal_gap(configuration, displacement=displacement)
     active_gaps = active[: len(constraints.normal_forces(multiplier))]
-    closed, pressure, nodal_multiplier, scale = _closed_nodes(
-        pair, constraints, multiplier, active_gaps, gap, configuration
-    )
+    closed, pressure, field, scale = _closed_nodes(pair, constraints, multiplier, active_gaps, gap, configuration)
     if pair.options.kind == "tied":  # normals of the undeformed configuration
         normal = pair.nodal_gap(replace(configuration, displacement=np.zeros_like(configuration.displacement)))[1]
     shear, sticking, tangential = _tangential_results(constraints, solution, rows, normal, closed, scale)
@@ -98,9 +94,7 @@ def contact_result(
     middle = contact_middle(pair, finite_normal, np.einsum("nd,nd->n", forces, finite_normal), closed, gap)
     place, tangent = middle.places(constraints.positions), middle.tangent
     along_tangent = place if tangent is None else (constraints.positions - middle.position) @ tangent
-    fluid = None if pair.options.source is None else np.zeros(len(points))
-    if constraints.wetted is not None:
-        fluid = constraints.wetted.pressure
+    dry = None if pair.options.source is None else np.zeros(len(points))
     abscissa, obstacle_results = pair.secondary.abscissa, dict[str, Any]()
     if axis is not None:  # distance from the axis
         offset = coordinates - axis[0]
@@ -119,7 +113,7 @@ def contact_result(
         abscissa=abscissa,
         gap=gap,
         pressure=pressure,
-        multiplier=nodal_multiplier,
+        multiplier=field,
         force_vectors=forces,
         normal=normal,
         active=closed,
@@ -132,7 +126,7 @@ def contact_result(
         tangent=tangent,
         primary_points=primary_points,
         primary_force_vectors=primary_forces,
-        fluid_pressure=fluid,
+        fluid_pressure=dry if constraints.wetted is None else constraints.wetted.pressure,
         **obstacle_results,
     )
 
@@ -265,9 +259,7 @@ def closed_node_pressures(constraints: Constraints, forces: Array, closed: Mask,
         receivers = closed & with_area
         excess = np.where(closed, shares - nodal_pressure * areas, shares)
         excess[receivers | (np.abs(excess) <= SUM_ROUND_OFF * np.abs(shares).max(initial=0.0))] = 0.0
-        pressure = nodal_pressure + (
-            _received_pressures(receivers, excess, areas, side) if excess.any() else np.zeros_like(excess)
-        )
+        pressure = nodal_pressure + _received_pressures(receivers, excess, areas, side)
         tension = closed & (pressure < 0.0)
         if may_pull or not tension.any():
             return closed, np.where(closed, pressure, 0.0)
@@ -312,9 +304,7 @@ def _nodal_shear(
     return traction - np.einsum("nd,nd->n", traction, normal)[:, None] * normal
 
 
-def mean_slip_before_closing(
-    constraints: Constraints, solution: Solution, rows: slice, contact: ContactResult
-) -> Array:
+def mean_slip_before_closing(constraints: Constraints, solution: Solution, rows: slice, result: ContactResult) -> Array:
     """Return the part (n_nodes, dim) of the nodal slips in this step that precedes the closing of the nodes [length].
 
     It is a mean over the constraints near each node, weighted by their contact forces, if the step was solved in increments.
@@ -324,7 +314,7 @@ def mean_slip_before_closing(
     assert constraints.nodal is not None
     forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
     slips = np.einsum("mk,kmd->md", solution.slip_before_closing[rows], np.stack(constraints.directions))
-    pressure, mean = constraints.nodal.pressure(forces)[:, None], np.zeros_like(contact.coordinates)
+    pressure, mean = constraints.nodal.pressure(forces)[:, None], np.zeros_like(result.coordinates)
     np.divide(constraints.nodal.traction(forces[:, None] * slips), pressure, out=mean, where=pressure > 0.0)
     # The nodal values of a field may exceed the values from which it is computed.
     largest, length = np.linalg.norm(slips, axis=1).max(initial=0.0), np.linalg.norm(mean, axis=1)
@@ -399,33 +389,21 @@ def _stretch(contact: ContactResult, displacement: Array, before: Array, after: 
     return low, high
 
 
-def _with_periodic_nodes(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
-    """Return contact results in which both nodes of a periodic pair have the same traction and contact status.
+def _with_periodic_nodes(pair: Formulation, contact: ContactResult) -> ContactResult:
+    """Return a contact result in which both nodes of a periodic pair have the same traction and contact status.
 
     If only one of the nodes has an opposite facet, because the sides slide past the ends, both have its gap.
     """
-    merged_results = dict(results)
-    for name, contact in results.items():
-        pair = problem.pairs[name]
-        areas = lumped_areas(pair.secondary, pair.points, pair.axisymmetric)
-        pressure, shear, active = contact.pressure.copy(), contact.shear.copy(), contact.active.copy()
-        gap = contact.gap.copy()
-        for interface in problem.model.periodic_interfaces:
-            a, b = _common_rows(problem, contact, interface)
-            weight = areas[a] / (areas[a] + areas[b])
-            rotation = np.eye(shear.shape[1]) if interface.turn is None else interface.turn
-            pressure[a] = pressure[b] = weight * pressure[a] + (1.0 - weight) * pressure[b]
-            shear[a] = weight[:, None] * shear[a] + (1.0 - weight[:, None]) * (shear[b] @ rotation)
-            shear[b] = shear[a] @ rotation.T
-            active[a] = active[b] = active[a] | active[b]
-            gap[a], gap[b] = np.where(np.isinf(gap[a]), gap[b], gap[a]), np.where(np.isinf(gap[b]), gap[a], gap[b])
-        merged_results[name] = replace(contact, pressure=pressure, shear=shear, active=active, gap=gap)
-    return merged_results
-
-
-def _common_rows(problem: Problem, contact: ContactResult, interface: PeriodicInterface) -> tuple[Indices, Indices]:
-    """Return the rows, in a contact result, of the node pairs of a periodic interface with both nodes in the contact."""
-    row_of_node = np.full(problem.model.mesh.n_points, -1, np.intp)
-    row_of_node[contact.points] = np.arange(len(contact.points))
-    on_side = (row_of_node[interface.first] >= 0) & (row_of_node[interface.second] >= 0)
-    return row_of_node[interface.first[on_side]], row_of_node[interface.second[on_side]]
+    areas = lumped_areas(pair.secondary, pair.points, pair.axisymmetric)
+    pressure, shear, active = contact.pressure.copy(), contact.shear.copy(), contact.active.copy()
+    gap = contact.gap.copy()
+    for a, b, rotation in pair.secondary.periodic_ends:
+        if a is b:  # nodes in a plane of symmetry
+            continue
+        weight = areas[a] / (areas[a] + areas[b])
+        pressure[a] = pressure[b] = weight * pressure[a] + (1.0 - weight) * pressure[b]
+        shear[a] = weight[:, None] * shear[a] + (1.0 - weight[:, None]) * (shear[b] @ rotation)
+        shear[b] = shear[a] @ rotation.T
+        active[a] = active[b] = active[a] | active[b]
+        gap[a], gap[b] = np.where(np.isinf(gap[a]), gap[b], gap[a]), np.where(np.isinf(gap[b]), gap[a], gap[b])
+    return replace(contact, pressure=pressure, shear=shear, active=active, gap=gap)

@@ -119,9 +119,8 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
         nodes, pose = points.nodes[rows], configuration.pose
         node_gaps = pair.primary.facing(deformed[nodes].reshape(-1, deformed.shape[1]), pose)[0].reshape(nodes.shape)
         point_gaps = pair.primary.facing(points.positions(deformed)[rows], pose)[0]
-        facing = np.isfinite(node_gaps).all(axis=1) & np.isfinite(
-            point_gaps
-        )  # gaps are infinite beyond the edge of a punch
+        # Gaps are infinite beyond the edge of a punch.
+        facing = np.isfinite(node_gaps).all(axis=1) & np.isfinite(point_gaps)
         sag = np.einsum("nk,nk->n", points.shape[rows[facing]], node_gaps[facing]) - point_gaps[facing]
         spread = float(np.ptp(sag)) if len(sag) else 0.0
         return spread, spread / extent
@@ -135,27 +134,25 @@ def _sag(pair: Formulation, configuration: Configuration, active: Mask) -> tuple
     sag[rows] = smoothing.overlap((points.facet[rows], points.xi[rows]), (pairing.facet[rows], pairing.xi[rows]), axes)
     sag_in_contact = sag[rows[in_contact]]
     spread, offset = float(np.ptp(sag_in_contact)), abs(float(sag_in_contact.mean())) / extent
-    ratio = spread / facet_length(pair) if pair.secondary.order == 2 else max(offset, _slope(pair, rules, sag, closed))
-    return spread, ratio
+    if pair.secondary.order == 2:
+        return spread, spread / facet_length(pair)
+    blocks = zip(pair.secondary.blocks, rules, strict=True)
+    weights = [np.repeat(_lengths(pair, block), len(w)) * np.tile(w, len(block.facets)) for block, (_, w) in blocks]
+    return spread, max(offset, _slope(pair, points, np.concatenate(weights), sag, closed))
 
 
-def _slope(pair: Formulation, rules: list[quadrature.Rule], sag: Array, closed: Mask) -> float:
+def _slope(pair: Formulation, points: Candidates, weights: Array, sag: Array, closed: Mask) -> float:
     """Return the largest difference of the sags of the nodes of a closed linear facet, divided by its length [-].
 
-    `sag` (n,) is the sag at the points of the `rules` of all facets, NaN where there is no opposite facet [length]. The sag
-    of a node is the mean weighted by its shape function, multiplied by MEAN_GAP_FACTOR. With node-to-segment contact, whose
-    points are the nodes, it is the value at the node.
+    `sag` (n,) is the sag at the `points` with integration `weights` (n,), NaN where there is no opposite facet [length]. The
+    sag of a node is the mean weighted by its shape function, multiplied by MEAN_GAP_FACTOR. With node-to-segment contact,
+    whose points are the nodes, it is the value at the node.
     """
-    sums, weights, first, largest = np.zeros(len(pair.points)), np.zeros(len(pair.points)), 0, 0.0
-    for block, (xi, w) in zip(pair.secondary.blocks, rules, strict=True):
-        nodes = block.facets
-        sag_of_facets = sag[first : first + len(nodes) * len(xi)].reshape(len(nodes), len(xi))
-        first += sag_of_facets.size
-        portions = w[:, None] * elements.get(block.element).shape(xi) * _lengths(pair, block)[:, None, None]
-        portions = np.where(np.isnan(sag_of_facets)[:, :, None], 0.0, portions)
-        np.add.at(weights, nodes, portions.sum(axis=1))
-        np.add.at(sums, nodes, np.einsum("fqk,fq->fk", portions, np.nan_to_num(sag_of_facets)))
-    mean = np.divide(sums, weights, out=np.full(len(sums), np.nan), where=weights > 0.0)
+    nodes, n, largest = points.nodes.ravel(), len(pair.points), 0.0
+    portions = np.where(np.isnan(sag), 0.0, weights)[:, None] * points.shape
+    total = np.bincount(nodes, portions.ravel(), n)
+    sums = np.bincount(nodes, (portions * np.nan_to_num(sag)[:, None]).ravel(), n)
+    mean = np.divide(sums, total, out=np.full(n, np.nan), where=total > 0.0)
     for block in pair.secondary.blocks:
         slopes = np.ptp(mean[block.facets], axis=1) / _lengths(pair, block)
         largest = max(largest, float(np.nan_to_num(slopes[closed[block.facets].any(axis=1)]).max(initial=0.0)))

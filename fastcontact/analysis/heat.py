@@ -214,9 +214,7 @@ class Heat:
             )
 
 
-def prepared_heat(
-    model: Model, ramp: Ramp, criteria: Criteria, linear_solver: str, linear_tolerance: float
-) -> Heat | None:
+def prepared_heat(model: Model, ramp: Ramp, criteria: Criteria, linear_solver: str, tolerance: float) -> Heat | None:
     """Return the heat conduction of a checked model; None if the model does not conduct heat."""
     if not model.conducts:
         return None
@@ -224,5 +222,5 @@ def prepared_heat(
     merged = csr_array((np.ones(n), merged_node, np.arange(n + 1)), shape=(n, n))
     return Heat(
         model, ramp, criteria, conduction, conduction.matrix(), thermal_loads(model), merged, bodies(model.mesh)[1],
-        *model.fixed_temperatures(), linear_solver, linear_tolerance,
+        *model.fixed_temperatures(), linear_solver, tolerance,
     )  # fmt: skip

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.resultants import pose_of
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh.topology import bodies, outer_facets
 from fastcontact.model.body_overlap import depths
 from fastcontact.model.rigid_motions import body_name
-from fastcontact.results.step import ContactResult
+from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 Indices = NDArray[np.signedinteger]
@@ -28,32 +29,29 @@ Peak = tuple[int, Array, Contacts]
 DEPTH_RATIO = 2.0
 
 
-def interpenetration(problem: Problem, displacement: Array, contact: Contacts, peaks: Sequence[Peak] = ()) -> list[str]:
+def interpenetration(problem: Problem, last: StepResult, peaks: Sequence[Peak]) -> list[str]:
     """Return warnings about bodies inside each other or inside rigid obstacles.
 
     Parameters
     ----------
     problem : Problem
-    displacement : ndarray (n_points, dim)
-        Displacements at the end of the last step [length].
-    contact : dict of str to ContactResult
-        Contact results at the end of the last step.
+    last : StepResult
+        The last step.
     peaks : list of (int, ndarray (n_points, dim), dict of str to ContactResult)
         Numbers, displacements and contact results of earlier steps in which the forces of contact pairs are largest.
     """
     mesh, pairs_between = problem.model.mesh, _pairs_between(problem)
-
-    def lacking(u: Array, contact: Contacts, overlaps: Sequence[Overlap]) -> list[str]:
-        beside = _beside_contact(problem, u, contact, pairs_between, overlaps)
-        return [*beside, *_through_obstacles(problem, u, contact)]
-
-    overlaps = list(depths(mesh, problem.model.kinematics, mesh.points + displacement))
-    texts = lacking(displacement, contact, overlaps)
-    for index, u, contact_at_peak in peaks if not texts else ():
-        overlaps_at_peak = list(depths(mesh, problem.model.kinematics, mesh.points + u))
-        warnings = lacking(u, contact_at_peak, overlaps_at_peak)
-        texts += [f"in load step {index}, where its force is largest, {text}" for text in warnings]
-    return [*_without_contact(problem, pairs_between, overlaps), *texts]
+    warnings: list[str] = []
+    for index, u, contact in ((last.index, last.displacement, last.contact), *peaks):
+        overlaps = list(depths(mesh, problem.model.kinematics, mesh.points + u))
+        texts = _beside_contact(problem, u, contact, pairs_between, overlaps) + _through_obstacles(problem, u, contact)
+        if index != last.index:
+            warnings += [f"in load step {index}, where its force is largest, {text}" for text in texts]
+            continue
+        warnings = _without_contact(problem, pairs_between, overlaps) + texts
+        if texts:
+            break
+    return warnings
 
 
 def _pairs_between(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
@@ -145,10 +143,8 @@ def _through_obstacles(problem: Problem, displacement: Array, contact: Contacts)
         if not len(points):
             continue
         at_rest = pair.primary.facing(mesh.points[points], Pose(np.zeros(mesh.dim)))[0]
-        motion = contact[name].obstacle_displacement
-        assert motion is not None
-        pose = Pose(motion, contact[name].obstacle_angle or 0.0)
         # Depths are those of the geometry, of which a clearance is not part.
+        pose = pose_of(contact[name])
         gap, contact_gap = (pair.primary.facing(mesh.points[at] + u[at], pose)[0] for at in (points, nodes))
         facing = np.isfinite(contact[name].gap)
         contact_depth = -float(np.min(contact_gap, initial=0.0, where=facing))

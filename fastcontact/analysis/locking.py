@@ -22,6 +22,8 @@ Engng 14, 1998).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fastcontact.analysis.problem import Problem
@@ -54,89 +56,64 @@ NOTABLE_ENERGY = 0.1
 SIMPLICES = ("tri3", "tet4")
 
 
-class StressScatter:
-    """Energy and mean stress of linear cells, and their difference from the recovered stresses.
+def _stress_scatter(problem: Problem, state: State, step: StepResult, names: Sequence[str]) -> tuple[float, float]:
+    """Return the differences of the stress and of the mean stress in elements called `names` from recovered ones [-].
 
-    Parameters
-    ----------
-    problem : Problem
-    state : State
-    step : StepResult
-        The last step, which ended in this state.
+    The first is the energy norm of the difference between recovered and computed stress, over that of the computed one. It is
+    the largest of the ratios of all bodies together and of single bodies with a notable part of the energy. Where bodies
+    yield, it is the ratio of all bodies, relative to the root of twice the elastic and plastic work: the residual stresses of
+    unloaded bodies scatter by 72 % about recovered ones also where eight cells across a beam bend right.
 
-    Attributes
-    ----------
-    elements : list of str
-        Names of the linear elements without incompatible modes; may be empty.
-    energy : float
-        Energy norm of the difference between recovered and computed stress, over that of the computed one [-]. It is the
-        largest of the ratios of all bodies together and of single bodies with a notable part of the energy. Where bodies
-        yield, it is the ratio of all bodies, relative to the root of twice the elastic and plastic work: the residual
-        stresses of unloaded bodies scatter by 72 % about recovered ones also where eight cells across a beam bend right.
-    pressure : float
-        The same for the root mean square of the mean stress in nearly incompressible triangles and tetrahedra [-].
-    nu : float
-        The largest Poisson's ratio of all materials [-].
+    The second is the same for the root mean square of the mean stress in nearly incompressible triangles and tetrahedra.
     """
+    model, field, mesh = problem.model, problem.field, problem.model.mesh
+    thermal, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
+    offset = model.stress_offset(thermal, initial, field, step.temperature)
+    if not names or offset is not None:  # free thermal expansion only causes round-off stresses
+        return 0.0, 0.0
+    stress: CellStress | PointStress
+    plastic_work, largest_work = 0.0, state.work.largest if state.work else 0.0
+    if problem.bodies is None:
+        stress = CellStress(mesh, model.kinematics, field.moduli, step.displacement, field.treatment)
+    else:
+        deformed = problem.deformed(state.u, state, None, tangent=False)
+        stress, plastic_work = PointStress(deformed.stress), deformed.plastic_work
+    recovered = smoothed_stress(mesh, field, stress)
+    sums = np.sum([_scatter_integrals(problem, stress, name, recovered[name]) for name in names], axis=0)
+    difference, energy, mean_difference, mean = np.sqrt(sums.sum(axis=0))
+    size = np.ptp(mesh.points, axis=0)
+    strain = 1.0 if model.strain == "finite" else np.abs(step.displacement).max() / size.max()
+    # Root of the energy if the bounding box were filled with the stiffest material under this strain, or rotated.
+    energy_scale = strain * np.sqrt(field.moduli.max() * np.prod(size))
+    if energy <= max(LENGTH_ROUND_OFF * energy_scale, np.sqrt(LENGTH_ROUND_OFF * largest_work)):
+        return 0.0, 0.0
+    ratio = float(difference / np.sqrt(energy**2 + 2.0 * plastic_work))
+    if not plastic_work:  # a thin part may bend on a body that stores more energy
+        notable = sums[sums[:, 1] > NOTABLE_ENERGY * energy**2]
+        ratio = float(np.sqrt(notable[:, 0] / notable[:, 1]).max(initial=ratio))
+    return ratio, float(mean_difference / mean) if mean > 0.0 else 0.0
 
-    def __init__(self, problem: Problem, state: State, step: StepResult) -> None:
-        field, mesh = problem.field, problem.model.mesh
-        has_modes = all(material.incompatible_modes for material, _ in problem.model.materials)
-        self.elements = [
-            name for name in mesh.solids
-            if elements.get(name).order == 1 and not (has_modes and name in BENDING_ELEMENTS)
-        ]  # fmt: skip
-        self.energy = self.pressure = 0.0
-        nu, self._nearly_incompressible = _poisson_ratios(problem.model, field)
-        self.nu = float(nu.max(initial=-1.0))
-        thermal, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
-        offset = problem.model.stress_offset(thermal, initial, field, step.temperature)
-        if not self.elements or offset is not None:  # free thermal expansion only causes round-off stresses
-            return
-        stress: CellStress | PointStress
-        plastic_work, largest_work = 0.0, state.work.largest if state.work else 0.0
-        if problem.bodies is None:
-            stress = CellStress(mesh, problem.model.kinematics, field.moduli, step.displacement, field.treatment)
-        else:
-            deformed = problem.deformed(state.u, state, None, tangent=False)
-            stress, plastic_work = PointStress(deformed.stress), deformed.plastic_work
-        recovered = smoothed_stress(mesh, field, stress)
-        sums = np.sum([self._sums(problem, stress, name, recovered[name]) for name in self.elements], axis=0)
-        difference, energy, mean_difference, mean = np.sqrt(sums.sum(axis=0))
-        size = np.ptp(mesh.points, axis=0)
-        strain = 1.0 if problem.model.strain == "finite" else np.abs(step.displacement).max() / size.max()
-        # Root of the energy if the bounding box were filled with the stiffest material under this strain, or rotated.
-        energy_scale = strain * np.sqrt(field.moduli.max() * np.prod(size))
-        if energy > max(LENGTH_ROUND_OFF * energy_scale, np.sqrt(LENGTH_ROUND_OFF * largest_work)):
-            self.energy = float(difference / np.sqrt(energy**2 + 2.0 * plastic_work))
-            if not plastic_work:  # a thin part may bend on a body that stores more energy
-                notable = sums[sums[:, 1] > NOTABLE_ENERGY * energy**2]
-                self.energy = float(np.sqrt(notable[:, 0] / notable[:, 1]).max(initial=self.energy))
-            self.pressure = float(mean_difference / mean) if mean > 0.0 else 0.0
 
-    def _sums(self, problem: Problem, stress: CellStress | PointStress, name: str, recovered: Array) -> Array:
-        """Return integrals (n_bodies, 4) of energies and of squared mean stresses, of the difference and of the stress."""
-        mesh, field, element = problem.model.mesh, problem.field, elements.get(name)
-        xi, weights = integration_rule(element, 2)
-        N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
-        simplex, body = element.n_corners == element.dim + 1, bodies(mesh)[1]
-        sums = np.zeros((body.max() + 1, 4))
-        n = len(mesh.cells[name])
-        for rows in np.array_split(np.arange(n), n * dN.nbytes // BATCH + 1):
-            cells, numbers = mesh.cells[name][rows], field.rows[name][rows]
-            computed = stress.at(name, xi, cells, field.moduli_rows[name][rows], rows)
-            difference = N @ recovered[rows] - computed
-            volume = cell_volumes(mesh.points[cells], N, dN, problem.model.kinematics == "axisymmetric") * weights
-            compliance = field.compliance[numbers][:, None]
-            mean_weights = volume * (self._nearly_incompressible[numbers] & simplex)[:, None]
-            integrals = [
-                elastic_energy(difference, compliance) * volume,
-                elastic_energy(computed, compliance) * volume,
-                difference[..., :3].mean(axis=2) ** 2 * mean_weights,
-                computed[..., :3].mean(axis=2) ** 2 * mean_weights,
-            ]
-            np.add.at(sums, body[cells[:, 0]], np.sum(integrals, axis=2).T)
-        return sums
+def _scatter_integrals(problem: Problem, stress: CellStress | PointStress, name: str, recovered: Array) -> Array:
+    """Return integrals (n_bodies, 4) of energies and of squared mean stresses, of the difference and of the stress."""
+    mesh, field, element = problem.model.mesh, problem.field, elements.get(name)
+    xi, weights = integration_rule(element, 2)
+    N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
+    body, n = bodies(mesh)[1], len(mesh.cells[name])
+    averaged = _poisson_ratios(problem.model, field)[1] & (element.n_corners == element.dim + 1)
+    sums = np.zeros((body.max() + 1, 4))
+    for rows in np.array_split(np.arange(n), n * dN.nbytes // BATCH + 1):
+        cells, numbers = mesh.cells[name][rows], field.rows[name][rows]
+        computed = stress.at(name, xi, cells, field.moduli_rows[name][rows], rows)
+        difference = N @ recovered[rows] - computed
+        volume = cell_volumes(mesh.points[cells], N, dN, problem.model.kinematics == "axisymmetric") * weights
+        compliance, mean_weights = field.compliance[numbers][:, None], volume * averaged[numbers, None]
+        integrals = [
+            *(elastic_energy(values, compliance) * volume for values in (difference, computed)),
+            *(values[..., :3].mean(axis=2) ** 2 * mean_weights for values in (difference, computed)),
+        ]
+        np.add.at(sums, body[cells[:, 0]], np.sum(integrals, axis=2).T)
+    return sums
 
 
 def _poisson_ratios(model: Model, field: MaterialField) -> tuple[Array, Mask]:
@@ -149,18 +126,27 @@ def _poisson_ratios(model: Model, field: MaterialField) -> tuple[Array, Mask]:
     return nu, (nu >= SUSPICIOUS) & (model.kinematics != "plane_stress")
 
 
-def nonlinear_scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[str]:
+def locking_warnings(problem: Problem, state: State, step: StepResult) -> list[str]:
+    """Return a warning where cells are too stiff, because they lock or bend."""
+    if problem.bodies is None:
+        volumetric = locking_warning(problem, state.u)
+    else:
+        volumetric = _alternating_mean_stress(problem, state, step)
+    return volumetric or _scatter_warnings(problem, state, step)
+
+
+def _alternating_mean_stress(problem: Problem, state: State, step: StepResult) -> list[str]:
     """Return a warning where the mean stress of nearly incompressible nonlinear triangles and tetrahedra alternates."""
     mesh = problem.model.mesh
     names = [name for name in SIMPLICES if name in mesh.solids]
     selected = problem.field.averaged & (problem.model.kinematics != "plane_stress")
-    if problem.bodies is None or not names or not selected.any():
+    if not names or not selected.any():
         return []
     rise = problem.model.expanding_rise(step.iterations.get("temperature_factors", ()), step.temperature)
     stress, difference, norm = problem.deformed(state.u, state, rise, tangent=False).stress, 0.0, 0.0
     for name in names:
-        cells = mesh.cells[name][selected[problem.field.rows[name]]]
-        mean = stress[name][selected[problem.field.rows[name]]][..., :3].mean(axis=(1, 2))
+        rows = selected[problem.field.rows[name]]
+        cells, mean = mesh.cells[name][rows], stress[name][rows][..., :3].mean(axis=(1, 2))
         total, count = (np.bincount(cells.ravel(), w, mesh.n_points) for w in (mean.repeat(cells.shape[1]), None))
         smooth = (total / np.maximum(count, 1))[cells].mean(axis=1)
         difference, norm = difference + float(((mean - smooth) ** 2).sum()), norm + float((mean**2).sum())
@@ -173,26 +159,31 @@ def nonlinear_scatter_warnings(problem: Problem, state: State, step: StepResult)
     ]
 
 
-def scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[str]:
+def _scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[str]:
     """Return a warning where the stresses of linear cells differ much from recovered ones."""
     linear, axisymmetric = problem.bodies is None, problem.model.kinematics == "axisymmetric"
     if axisymmetric and not linear:
         return []
-    measure = StressScatter(problem, state, step)
-    names = " and ".join(measure.elements)
-    if measure.pressure > ALTERNATING and linear:
+    has_modes = all(material.incompatible_modes for material, _ in problem.model.materials)
+    names = [
+        name for name in problem.model.mesh.solids
+        if elements.get(name).order == 1 and not (has_modes and name in BENDING_ELEMENTS)
+    ]  # fmt: skip
+    energy, pressure = _stress_scatter(problem, state, step, names)
+    if pressure > ALTERNATING and linear:
+        nu = _poisson_ratios(problem.model, problem.field)[0].max()
         return [
-            f"{names} cells lock: at nu = {measure.nu:g} their mean stress scatters by {measure.pressure:.0%} about its "
+            f"{' and '.join(names)} cells lock: at nu = {nu:g} their mean stress scatters by {pressure:.0%} about its "
             "averages at the nodes, and contact pressures with it; use quadrangles or hexahedra, or quadratic elements "
             "(generate.to_quadratic)"
         ]
-    if measure.energy > BENDING and not axisymmetric:  # stresses at the axis scatter in any case
-        projected = any(elements.get(name).dilatation is not None for name in measure.elements)
+    if energy > BENDING and not axisymmetric:  # stresses at the axis scatter in any case
+        projected = any(elements.get(name).dilatation is not None for name in names)
         soft = " or, with their mean dilatation, too soft" if projected and problem.field.averaged.any() else ""
         modes = "hexahedra or quadrangles with LinearElastic(incompatible_modes=True), " if linear else ""
         return [
-            f"{names} cells are too stiff{soft}, as in thin parts that bend: the error of their stress is "
-            f"{measure.energy:.0%} (energy norm of the difference from stress recovered at the nodes); use {modes}quadratic "
+            f"{' and '.join(names)} cells are too stiff{soft}, as in thin parts that bend: the error of their stress is "
+            f"{energy:.0%} (energy norm of the difference from stress recovered at the nodes); use {modes}quadratic "
             "elements (generate.to_quadratic), or smaller ones"
         ]
     return []
@@ -222,9 +213,9 @@ class Comparison:
     def __init__(self, model: Model) -> None:
         self._model, self._field = model, model.material_field()
         nu, self._suspicious = _poisson_ratios(model, self._field)
-        self._cells = {name: rows for name in model.mesh.solids if (rows := self._may_lock(name)).any()}
-        self.elements, numbers = list(self._cells), self._field.rows
-        self.nu = max((float(nu[numbers[name][rows]].max()) for name, rows in self._cells.items()), default=0.0)
+        self.elements = [name for name in model.mesh.solids if self._may_lock(name).any()]
+        nu_by_element = (float(nu[self._field.rows[name][self._may_lock(name)]].max()) for name in self.elements)
+        self.nu = max(nu_by_element, default=0.0)
 
     def _may_lock(self, name: str) -> Mask:
         """Return which cells (n_cells,) of an element may lock."""
@@ -239,35 +230,29 @@ class Comparison:
         arguments = mesh, kinematics, field.moduli, field.rows, displacement
         stress = recovery.stress_at_points(*arguments, field.treatment)
         reference = recovery.stress_at_points(*arguments, field.treatment | self._suspicious)
-        excess = {name: np.zeros_like(stress[name]) for name in self._cells}
-        for name in self._cells:
+        excess = {name: np.zeros_like(stress[name]) for name in self.elements}
+        for name in self.elements:
             excess[name][..., :3] = (stress[name] - reference[name])[..., :3].mean(axis=2, keepdims=True)
         self._add_deviation_from_nodal_mean(reference, excess)
         return recovery.internal_force(mesh, kinematics, excess)
 
     def _add_deviation_from_nodal_mean(self, reference: dict[str, Array], excess: dict[str, Array]) -> None:
-        """Add to `excess` the deviation of cell mean pressures from the nodal means, material by material."""
-        mesh, names = self._model.mesh, [name for name in self._cells if name in AT_NODES]
-        volume, pressure = {}, {}
-        for name in names:
+        """Add to `excess` the deviation of the mean pressures of cells from their means at the nodes of each material."""
+        mesh, field, n = self._model.mesh, self._field, self._model.mesh.n_points
+        nodes, pressure, sums = {}, {}, np.zeros((2, n * len(field.materials)))
+        for name in (name for name in self.elements if name in AT_NODES):
             N, dN, weights = elements.get(name).tables
-            corners = mesh.points[mesh.cells[name]]
-            volumes = cell_volumes(corners, N, dN, self._model.kinematics == "axisymmetric") * weights
-            volume[name] = volumes.sum(axis=1)
-            mean_stress = reference[name][..., :3].mean(axis=2)
-            pressure[name] = (mean_stress * volumes).sum(axis=1) / volume[name]
-        owner = self._field.owner
-        for number in np.unique(owner[self._suspicious]):
-            nodal_volume, volume_pressure = np.zeros((2, mesh.n_points))
-            rows = {name: np.flatnonzero(owner[self._field.rows[name]] == number) for name in names}
-            for name in names:
-                cells = mesh.cells[name][rows[name]]
-                np.add.at(nodal_volume, cells, volume[name][rows[name], None])
-                np.add.at(volume_pressure, cells, (volume[name] * pressure[name])[rows[name], None])
-            mean = volume_pressure / np.where(nodal_volume > 0.0, nodal_volume, 1.0)
-            for name in names:
-                deviation = pressure[name][rows[name]] - mean[mesh.cells[name][rows[name]]].mean(axis=1)
-                excess[name][rows[name], :, :3] += deviation[:, None, None]
+            axisymmetric = self._model.kinematics == "axisymmetric"
+            volumes = cell_volumes(mesh.points[mesh.cells[name]], N, dN, axisymmetric) * weights
+            volume = volumes.sum(axis=1)
+            pressure[name] = (reference[name][..., :3].mean(axis=2) * volumes).sum(axis=1) / volume
+            nodes[name] = mesh.cells[name] + n * field.material_numbers[name][:, None]
+            np.add.at(sums[0], nodes[name], volume[:, None])
+            np.add.at(sums[1], nodes[name], (volume * pressure[name])[:, None])
+        mean = sums[1] / np.where(sums[0] > 0.0, sums[0], 1.0)
+        for name in pressure:
+            deviation = (pressure[name] - mean[nodes[name]].mean(axis=1)) * self._suspicious[field.rows[name]]
+            excess[name][..., :3] += deviation[:, None, None]
 
 
 def excess_of_stiffness(problem: Problem, u: Array, comparison: Comparison) -> float:

@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 from fastcontact.analysis.criteria import NOTABLE, Criteria
 from fastcontact.analysis.facet_sag import facet_length, sag_warnings
 from fastcontact.analysis.interpenetration import Peak, interpenetration
-from fastcontact.analysis.locking import ALTERNATING, locking_warning, nonlinear_scatter_warnings, scatter_warnings
+from fastcontact.analysis.locking import ALTERNATING, locking_warnings
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import stability_ratio
@@ -31,6 +31,7 @@ from fastcontact.contact.pair_options import ALWAYS_CLOSED
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.energy import slopes_at
+from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.mass import portions
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
@@ -56,11 +57,12 @@ NEGLECTED = 0.1
 # bodies that rotate, moments are therefore out of balance by about the angle divided by the coefficient of friction.
 OUT_OF_BALANCE = 0.03
 # Largest recommended factor on the number of steps. A larger factor indicates a wrong coefficient of wear.
-MANY_STEPS = 1000
-# Alternation of nodal pressures on quadratic lines above which a warning is given, see `oscillating`; elsewhere ALTERNATING.
+LARGEST_STEP_FACTOR = 1000
+# Alternation of nodal pressures on quadratic lines above which a warning is given, see `pressure_oscillation`. On other
+# facets the limit is ALTERNATING.
 ALTERNATING_ON_LINES = 0.13
 # Smallest number of elements across the radius of a contact that resolves its pressure.
-ACROSS = 4
+MIN_FACETS_ACROSS_RADIUS = 4
 # Relative residual of the displacement or of the forces above which a warning is given.
 NOTABLE_RESIDUAL = 1e-4
 # Sliding past periodic ends, relative to the length of facets, above which a warning is given. On a strip with friction 0.3
@@ -68,55 +70,51 @@ NOTABLE_RESIDUAL = 1e-4
 # with standard ones; in press fits with these, by 1.7 times.
 SLIDE_PAST_ENDS, SLIDE_PAST_ENDS_DUAL = 0.01, 0.3
 # Smallest number of nodes for which the median is meaningful.
-ENOUGH_NODES = 10
+MIN_NODES = 10
 
 
 def result_warnings(
-    problem: Problem, state: State, last: StepResult, free: tuple[int, dict[str, list[str]]] | None = None,
-    peaks: Mapping[str, Peak] | None = None,
+    problem: Problem, state: State, last: StepResult, free: tuple[int, dict[str, list[str]]] | None,
+    peaks: Mapping[str, Peak],
 ) -> list[str]:  # fmt: skip
     """Return the warnings about an analysis whose `last` step ended in a state.
 
     `free` is the number of the first step in which nothing determines the position of bodies, and their free motions;
     `peaks` are, for each pair, the number, displacements and contact results of the step with its largest normal force.
     """
-    earlier = {peak[0]: peak for peak in (peaks or {}).values() if peak[0] != last.index}
-    inside = interpenetration(problem, last.displacement, last.contact, list(earlier.values()))
-    warnings = [*inside, *_carrying_springs(problem, state), *_undetermined(last, free)]
+    earlier = {peak[0]: peak for peak in peaks.values() if peak[0] != last.index}
+    warnings = interpenetration(problem, last, list(earlier.values()))
+    warnings += [*_loaded_springs(problem, state), *_undetermined_positions(last, free)]
     if problem.model.strain == "small":
         warnings += [*_large_strain(problem, last), *_large_rotation(problem, state, last)]
-    if problem.bodies is None:
-        warnings += locking_warning(problem, state.u) or scatter_warnings(problem, state, last)
-    else:
-        warnings += nonlinear_scatter_warnings(problem, state, last) or scatter_warnings(problem, state, last)
-    if problem.solver.replacement_reason:
-        warnings.append(
-            f'{problem.solver.replacement_reason}. linear_solver="direct" factorises the matrix from the start'
-        )
+    warnings += locking_warnings(problem, state, last)
+    if reason := problem.solver.replacement_reason:
+        warnings.append(f'{reason}. linear_solver="direct" factorises the matrix from the start')
     load = problem.load_at(last.load_factor)
     loaded, sag = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)
-    clearances = _clearances(problem, state)
+    clearances = _open_clearances(problem, state)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
         if pair.options.kind == "gap_only":
             continue
-        without_force = [] if name in clearances else _without_force(problem, name, last, name in state.touched, loaded)
+        without_force = [] if name in clearances else _open_contact(problem, name, last, name in state.touched, loaded)
         configuration = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
         undetermined = _undetermined_tractions(pair, contact, pair.undetermined(configuration))
         warnings += [*_deep_penetration(pair, contact, state.u), *without_force, *undetermined]
-        unresolved = [sag[name]] if name in sag else _unresolved(pair, contact, state)
-        pressures = [*unresolved, *oscillating(pair, contact, problem.model)]
-        index, _, at_peak = (peaks or {}).get(name, (last.index, last.displacement, last.contact))
+        unresolved = [sag[name]] if name in sag else _coarse_contact(pair, contact, state)
+        pressures = [*unresolved, *pressure_oscillation(pair, contact, problem.model)]
+        index, _, contacts = peaks[name]
         if not pressures and index != last.index:
-            texts = [*_unresolved(pair, at_peak[name], state), *oscillating(pair, at_peak[name], problem.model)]
+            peak = contacts[name]
+            texts = [*_coarse_contact(pair, peak, state), *pressure_oscillation(pair, peak, problem.model)]
             pressures = [f"in load step {index}, where its force is largest, {text}" for text in texts]
-        warnings += [*pressures, *_peak_at_edge(pair, last, contact), *_beyond_ends(pair, contact)]
-        warnings += _too_fast(name, pair, state)
-    warnings += [*_unconverged_geometry(state), *_loose_criteria(problem, last), *_unbalanced(state)]
-    return [*warnings, *_slip_before_contact(problem.criteria, state), *_changing_flow(state)]
+        warnings += [*pressures, *_pressure_peak_at_edge(pair, last, contact), *_sliding_past_ends(pair, contact)]
+        warnings += _unstable_wear(name, pair, state)
+    warnings += [*_unconverged_geometry(state), *_loose_criteria(problem, last), *_energy_imbalance(state)]
+    return [*warnings, *_slip_before_contact(problem.criteria, state), *_turning_flow(state)]
 
 
-def _beyond_ends(pair: Formulation, contact: ContactResult) -> Iterator[str]:
+def _sliding_past_ends(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     """Yield a warning if surfaces slide past each other at periodic ends, beyond which there is no opposite facet."""
     if isinstance(pair.primary, RigidSide):  # it continues beyond the ends
         return
@@ -164,12 +162,12 @@ def _undetermined_tractions(pair: Formulation, contact: ContactResult, undetermi
         )
 
 
-def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
+def _unstable_wear(name: str, pair: Formulation, state: State) -> Iterator[str]:
     """Yield a warning where a contact wears faster than its load steps can follow."""
     if name not in state.worn or (factor := stability_ratio(pair, state.worn[name])) <= 1.0:
         return
     depth, size = float(state.worn[name].depth.max()), float(np.ptp(pair.points, axis=0).max())
-    if factor > MANY_STEPS or depth > NEGLECTED * size:
+    if factor > LARGEST_STEP_FACTOR or depth > NEGLECTED * size:
         yield (
             f"contact '{name}' has a wear depth of {depth:.3g}, {depth / size:.2g} times the size of the model, and load "
             f"steps that are {factor:.2g} times too large for this wear: is the option 'wear' Archard's coefficient divided "
@@ -182,7 +180,7 @@ def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
         )
 
 
-def _unbalanced(state: State) -> Iterator[str]:
+def _energy_imbalance(state: State) -> Iterator[str]:
     """Yield a warning where the energy balance of all steps is violated by more than round-off."""
     work, round_off = state.work, LENGTH_ROUND_OFF * state.largest_force * float(np.abs(state.u).max(initial=0.0))
     if work is not None and abs(work.imbalance) > 2 * NOTABLE * work.largest and work.largest > round_off:
@@ -204,13 +202,11 @@ def _slip_before_contact(criteria: Criteria, state: State) -> Iterator[str]:
     work = state.work
     if work is not None and work.touching > max(NEGLECTED * work.friction, NOTABLE**2 * work.largest, 0.0):
         share = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
-        remedy = (
-            "" if criteria.friction_while_touching else ", or Criteria(friction_while_touching=0.01) if nodes close"
-        )
+        hint = "" if criteria.friction_while_touching else ", or Criteria(friction_while_touching=0.01) if nodes close"
         yield (
             f"{share:.0%} of the work of friction is done at nodes in the load step in which they "
             "close, or contact is lost, where the slip of the complete step counts, not that in contact: the work of "
-            f"friction, and the tractions at nodes that close, are inaccurate. Use more load steps{remedy}"
+            f"friction, and the tractions at nodes that close, are inaccurate. Use more load steps{hint}"
         )
 
 
@@ -224,7 +220,7 @@ def _unconverged_geometry(state: State) -> Iterator[str]:
         )
 
 
-def _changing_flow(state: State) -> Iterator[str]:
+def _turning_flow(state: State) -> Iterator[str]:
     """Yield a warning where the plastic flow changes its direction notably within load steps.
 
     The change in a single step depends on whether the edge of the contact crosses a node. Its mean decreases: under a
@@ -272,7 +268,7 @@ def _loose_criteria(problem: Problem, last: StepResult) -> Iterator[str]:
         )
 
 
-def _carrying_springs(problem: Problem, state: State) -> Iterator[str]:
+def _loaded_springs(problem: Problem, state: State) -> Iterator[str]:
     if problem.floating_bodies is None or state.rigid is None:
         return
     report = problem.floating_bodies.report(state.rigid, state.largest_rigid_force)
@@ -283,7 +279,7 @@ def _carrying_springs(problem: Problem, state: State) -> Iterator[str]:
         )
 
 
-def _undetermined(last: StepResult, free: tuple[int, dict[str, list[str]]] | None) -> Iterator[str]:
+def _undetermined_positions(last: StepResult, free: tuple[int, dict[str, list[str]]] | None) -> Iterator[str]:
     """Yield a warning about bodies whose position is undetermined in a step; for `free` see `result_warnings`."""
     if free is not None:
         index, bodies = free
@@ -305,11 +301,10 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
         interior[interface.points] = False
         strain = float((recovery.von_mises(interface.stress) / (3 * shear[interface.material])).max())
     for name, block in problem.model.mesh.solids.items():
-        for number in np.unique(field.material_numbers[name]):
-            nodes = np.unique(block[field.material_numbers[name] == number])
-            stress = last.von_mises[nodes[interior[nodes]]]
-            strain = max(strain, float(stress.max(initial=0.0) / (3 * shear[number])))
-        others = np.flatnonzero(np.isinf(shear[field.material_numbers[name]]))
+        shear_of_cells = shear[field.material_numbers[name]]
+        at_nodes = last.von_mises[block] * interior[block] / (3 * shear_of_cells[:, None])
+        strain = max(strain, float(at_nodes.max(initial=0.0)))
+        others = np.flatnonzero(np.isinf(shear_of_cells))
         mean = last.stress[block[others]].mean(axis=1)
         strains = np.einsum("cij,cj->ci", field.compliance[field.rows[name][others]], mean)
         strain = max(strain, float(recovery.equivalent_strain(strains).max(initial=0.0)))
@@ -319,7 +314,7 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
             "accurate"
         )
     else:
-        yield from _large_stress_free_strain(problem, last)
+        yield from _large_free_strain(problem, last)
     plastic = last.cell_fields.get("plastic_strain")
     if plastic is not None and (largest := float(plastic.max())) > LARGEST_PLASTIC_STRAIN:
         yield (
@@ -329,7 +324,7 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
         )
 
 
-def _large_stress_free_strain(problem: Problem, last: StepResult) -> Iterator[str]:
+def _large_free_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     """Yield a warning where temperatures or initial states cause large strains, which stresses need not show."""
     model = problem.model
     if not (model.temperatures or model.initial_states or model.conducts):
@@ -352,7 +347,7 @@ def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterato
             f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
         )
     elif angle > 0.5 * OUT_OF_BALANCE * min((pair.friction or 1.0 for pair in problem.pairs.values()), default=1.0):
-        yield from neglected_rotation(problem, last, angle)
+        yield from _neglected_rotation(problem, last, angle)
 
 
 def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
@@ -371,7 +366,7 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
     return float(square**0.5), point
 
 
-def _clearances(problem: Problem, state: State) -> set[str]:
+def _open_clearances(problem: Problem, state: State) -> set[str]:
     """Return the names of automatically detected pairs that begin open and never close, such as a shank in its hole."""
     gap_by_pair = {pair.name: pair.found_gap for pair in problem.model.contact if pair.found_gap is not None}
     if not state.touched & gap_by_pair.keys():
@@ -380,7 +375,7 @@ def _clearances(problem: Problem, state: State) -> set[str]:
     return {name for name, gap in gap_by_pair.items() if gap > least_gap and name not in state.touched}
 
 
-def _without_force(problem: Problem, name: str, last: StepResult, touched: bool, loaded: bool) -> Iterator[str]:
+def _open_contact(problem: Problem, name: str, last: StepResult, touched: bool, loaded: bool) -> Iterator[str]:
     """Yield a warning if a pair never closed, or is open although loads still act."""
     pair, contact = problem.pairs[name], last.contact[name]
     search_distance, facing = pair.options.search_distance, contact.gap[np.isfinite(contact.gap)]
@@ -421,7 +416,7 @@ def _depth_of_primary(problem: Problem, pair: Formulation, last: StepResult) -> 
     return max((float(depth.max(initial=0.0)) for depth in inside), default=0.0)
 
 
-def _unresolved(pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:
+def _coarse_contact(pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:
     """Yield a warning where too few elements lie across the radius of a contact that carries a force."""
     if pair.options.kind in ALWAYS_CLOSED or largest(contact.force_vectors) <= SINGLE_PRECISION * state.largest_force:
         return
@@ -429,10 +424,10 @@ def _unresolved(pair: Formulation, contact: ContactResult, state: State) -> Iter
         if contact.fluid_pressure is not None and (contact.fluid_pressure > 0.0).all():
             yield f"contact '{contact.name}' is blown open: the fluid acts on all of its nodes, so that a seal leaks"
         return
-    count = across(pair.secondary, contact.active, pair.excluded[pair.secondary.points])
-    if count is not None and count < ACROSS:
+    count = facets_across_radius(pair.secondary, contact.active, pair.excluded[pair.secondary.points])
+    if count is not None and count < MIN_FACETS_ACROSS_RADIUS:
         resolution = f"{count} {'elements' if count > 1 else 'element'} across its radius"
-        needed, remedy = f"its pressure needs {ACROSS} or more", f"refine '{pair.secondary.group}'"
+        needed, remedy = f"its pressure needs {MIN_FACETS_ACROSS_RADIUS} or more", f"refine '{pair.secondary.group}'"
         if count == 1:
             friction = ", its direction and the work of friction" if pair.friction else " and its direction"
             needed += f", and with fewer than 2 the force{friction} may be inaccurate, too"
@@ -444,7 +439,7 @@ def _unresolved(pair: Formulation, contact: ContactResult, state: State) -> Iter
         yield f"contact '{contact.name}' has only {resolution}: {needed}; {remedy}"
 
 
-def across(side: Surface, closed: Mask, excluded: Mask) -> int | None:
+def facets_across_radius(side: Surface, closed: Mask, excluded: Mask) -> int | None:
     """Return the number of facets between the innermost closed node and the edge of the contact; None without an edge.
 
     This is the radius in elements, for any shape of the contact, and also where symmetry cuts it. The edge lies within
@@ -470,7 +465,7 @@ def across(side: Surface, closed: Mask, excluded: Mask) -> int | None:
     return count
 
 
-def oscillating(pair: Formulation, contact: ContactResult, model: Model) -> Iterator[str]:
+def pressure_oscillation(pair: Formulation, contact: ContactResult, model: Model) -> Iterator[str]:
     """Yield a warning where pressures of nodes whose neighbours are all closed oscillate by a large fraction of their mean.
 
     Open nodes between closed ones count as closed with zero pressure: with wear, every second node may be open.
@@ -494,7 +489,7 @@ def oscillating(pair: Formulation, contact: ContactResult, model: Model) -> Iter
     count = np.asarray(others.sum(axis=1)).ravel()
     closed = contact.active | ((others @ ~contact.active == 0) & (count > 0))
     inside = closed & (side.beside @ ~closed == 0) & (count > 0)
-    if inside.sum() < ENOUGH_NODES:
+    if inside.sum() < MIN_NODES:
         return
     pressure, mean = contact.pressure[inside], (others @ contact.pressure)[inside] / count[inside]
     difference = np.abs(pressure - mean)
@@ -505,11 +500,11 @@ def oscillating(pair: Formulation, contact: ContactResult, model: Model) -> Iter
     yield (
         f"contact '{contact.name}': nodal pressures oscillate from node to node, typically by {0.5 * ratio:.0%} above and "
         f"below their local mean, and by up to {0.5 * difference.max():.3g}: trust means over neighbouring nodes, or "
-        f"{_smoother(pair, model)}"
+        f"{_oscillation_remedy(pair, model)}"
     )
 
 
-def _smoother(pair: Formulation, model: Model) -> str:
+def _oscillation_remedy(pair: Formulation, model: Model) -> str:
     """Return what reduces the oscillation of the pressures of a pair."""
     side, primary = pair.secondary, pair.primary
     if isinstance(primary, Surface):
@@ -531,7 +526,7 @@ def _modulus(model: Model, points: NDArray[np.integer]) -> float:
     return float(np.concatenate(beside).mean())
 
 
-def _peak_at_edge(pair: Formulation, last: StepResult, contact: ContactResult) -> Iterator[str]:
+def _pressure_peak_at_edge(pair: Formulation, last: StepResult, contact: ContactResult) -> Iterator[str]:
     """Yield a warning where bodies yield and the largest nodal pressure overshoots near the edge of the contact.
 
     In elastic bodies without corners, the pressure decreases towards the edge of the contact. Past yield it does not, but
@@ -572,7 +567,7 @@ def _alternation_matrix(side: Surface) -> csr_array:
     return csr_array((adjacency.data[differ], (row[differ], column[differ])), shape=adjacency.shape)
 
 
-def neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Iterator[str]:
+def _neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Iterator[str]:
     """Yield a warning for the body in which linear kinematics neglect most; `angle` is the largest rotation [radian]."""
     mesh = problem.model.mesh
     neglected, strain_works = _works_on_strains(problem, last)
@@ -628,10 +623,9 @@ def _frictional_capacity(problem: Problem, last: StepResult) -> Array:
 
 def _works_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]:
     """Return the work of the stresses on neglected strains, and its absolute value on strains, both (n_bodies,) [energy]."""
-    mesh, dim, axisymmetric = problem.model.mesh, problem.model.mesh.dim, problem.model.kinematics == "axisymmetric"
+    mesh, axisymmetric = problem.model.mesh, problem.model.kinematics == "axisymmetric"
     count, body = bodies(mesh)
     neglected, strain_works = np.zeros((2, count))
-    pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]
     for name, block in mesh.solids.items():
         element = elements.get(name)
         xi, weights = element.quadrature
@@ -639,10 +633,7 @@ def _works_on_strains(problem: Problem, last: StepResult) -> tuple[Array, Array]
         for cells in np.array_split(block, len(block) * dN.nbytes // BATCH + 1):
             slope, volume = slopes_at(last.displacement[cells], mesh.points[cells], dN)
             stress, volume = N @ last.stress[cells], np.abs(volume) * weights
-            tensor = np.zeros_like(slope)
-            for column, (i, j) in enumerate(pairs[: stress.shape[2]]):
-                if max(i, j) < dim:
-                    tensor[..., i, j] = tensor[..., j, i] = stress[..., column]
+            tensor = stress[..., PAIRS[mesh.dim]]
             strain_work = np.einsum("cqij,cqij->cq", tensor, slope)
             if axisymmetric:
                 radius, radial_u = (values[cells][..., 0] @ N.T for values in (mesh.points, last.displacement))

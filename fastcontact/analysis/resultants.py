@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +20,7 @@ from fastcontact.contact.integration import lumped_areas
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.springs import ground_force
-from fastcontact.errors import ContactError, ModelError, unknown
+from fastcontact.errors import ContactError, ModelError, check_known
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -77,9 +77,6 @@ class ContactResultants:
     ----------
     force : ndarray (dim,)
         Resultant force on the secondary side [force].
-    normal_force : float
-        Sum of the nodal forces, each along its own normal [force]. Multiplied by the coefficient of friction, it is
-        the friction capacity of a press fit, whose resultant force vanishes.
     moment : ndarray (1,) or (3,)
         Moment of the contact forces about the middle of the contact, see `contact_moment`; zero in axisymmetry
         [force times length].
@@ -91,6 +88,9 @@ class ContactResultants:
     centre : ndarray (dim,)
         Centre of pressure of the normal forces; NaN without contact [length]. In axisymmetry its radial component is NaN,
         since the resultant acts along the axis.
+    normal_force : float
+        Sum of the nodal forces, each along its own normal [force]. Multiplied by the coefficient of friction, it is
+        the friction capacity of a press fit, whose resultant force vanishes.
     mean_gap : float
         Mean gap over the area that faces the other side [length]; NaN if there is none.
     pressure_mean, pressure_max : float
@@ -115,10 +115,10 @@ class ContactResultants:
     """
 
     force: Array
-    normal_force: float
     moment: Array
     area: float
     centre: Array
+    normal_force: float
     mean_gap: float
     pressure_mean: float
     pressure_max: float
@@ -202,23 +202,16 @@ def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: 
         centre[0] = np.nan
     return ContactResultants(
         force=contact.force,
-        normal_force=contact.normal_force,
         moment=np.zeros_like(moment) if axisymmetric else moment,
         area=area,
         centre=centre,
+        normal_force=contact.normal_force,
         mean_gap=float(areas[facing] @ contact.gap[facing] / areas[facing].sum()) if facing.any() else float("nan"),
         pressure_mean=total / area if area else 0.0,
         pressure_max=contact.pressure_max,
         dissipation=contact.dissipation,
         friction_work=work,
     )
-
-
-# Quantities of `contact_history`, in the order of its columns.
-QUANTITIES = (
-    "force", "moment", "area", "centre", "normal_force", "mean_gap", "pressure_mean", "pressure_max", "dissipation",
-    "friction_work",
-)  # fmt: skip
 
 
 @typed(ContactError)
@@ -255,9 +248,10 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
     """
     axes = "xyz"[: model.mesh.dim]
     vectors = {"force": axes, "moment": "z" if model.mesh.dim == 2 else axes, "centre": axes}
-    columns = [f"{name}_{axis}" if axis else name for name in QUANTITIES for axis in vectors.get(name, [""])]
+    quantities = [field.name for field in fields(ContactResultants)]
+    columns = [f"{name}_{axis}" if axis else name for name in quantities for axis in vectors.get(name, [""])]
     rows = [
-        (step.index, step.load_factor, *np.hstack([getattr(resultants, quantity) for quantity in QUANTITIES]))
+        (step.index, step.load_factor, *np.hstack([getattr(resultants, quantity) for quantity in quantities]))
         for step, resultants in zip(steps, contact_resultants(model, steps, name), strict=True)
     ]
     return np.array(rows, [("step", int), *((column, float) for column in ("load_factor", *columns))])
@@ -333,14 +327,15 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
 
 def end_of(before: StepResult | None, step: StepResult, name: str) -> Configuration:
     """Return the configuration of a contact pair at the end of a step that follows the step `before`, or starts at rest."""
-    end = Configuration.displaced(step.displacement)
-    end = replace(end, pose=_pose(step, name))
-    return end if before is None else replace(end, start=before.displacement, pose_start=_pose(before, name))
+    end = replace(Configuration.displaced(step.displacement), pose=pose_of(step.contact[name]))
+    if before is None:
+        return end
+    return replace(end, start=before.displacement, pose_start=pose_of(before.contact[name]))
 
 
-def _pose(step: StepResult, name: str) -> Pose:
-    """Return the pose of the obstacle of a pair; zero if the pair has no obstacle."""
-    contact, zero = step.contact[name], np.zeros(step.displacement.shape[1])
+def pose_of(contact: ContactResult) -> Pose:
+    """Return the pose of the obstacle of a contact pair; zero if the pair has no obstacle."""
+    zero = np.zeros(contact.coordinates.shape[1])
     displacement = zero if contact.obstacle_displacement is None else np.asarray(contact.obstacle_displacement)
     return Pose(displacement, contact.obstacle_angle or 0.0)
 
@@ -357,10 +352,9 @@ def _result_of_pair(pair: Formulation, step: StepResult, name: str) -> ContactRe
 
 def _formulation(model: Model, name: str) -> Formulation:
     """Return the formulation of a contact pair; ContactError if the model has none of that name."""
-    for pair in model.contact:
-        if pair.name == name:
-            return model.bind(pair)
-    raise ContactError(unknown("contact pair", name, [pair.name for pair in model.contact]))
+    pairs = {pair.name: pair for pair in model.contact}
+    check_known("contact pair", name, pairs, ContactError)
+    return model.bind(pairs[name])
 
 
 @typed(ModelError)

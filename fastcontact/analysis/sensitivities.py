@@ -256,7 +256,7 @@ def checked_margin(contact: MovingContact, least: float) -> float:
         If it is less than `least`.
     """
     constraints, solution = contact.constraints, contact.solution
-    largest_displacement = float(np.abs(contact.u).max(initial=0.0))
+    largest_u = float(np.abs(contact.u).max(initial=0.0))
     gap = constraints.gap0 + constraints.B @ contact.u
     distance = np.full(len(constraints), np.inf)
     for name, rows in constraints.rows.items():
@@ -265,9 +265,7 @@ def checked_margin(contact: MovingContact, least: float) -> float:
         areas = constraints.parts[name].areas
         force = solution.multiplier[rows] / (1.0 if areas is None else areas)
         largest_force = float(np.abs(force).max(initial=0.0)) or 1.0
-        distance[rows] = np.where(
-            active, force / largest_force, np.where(usable, gap[rows] / largest_displacement, np.inf)
-        )
+        distance[rows] = np.where(active, force / largest_force, np.where(usable, gap[rows] / largest_u, np.inf))
     distance[constraints.equality] = np.inf
     critical = np.flatnonzero(~(distance >= least))
     if len(critical):

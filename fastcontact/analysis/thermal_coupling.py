@@ -140,16 +140,14 @@ def _steady_temperatures(
     settled, u = equilibrium.settled, equilibrium.u
     heat, displacement = problem.heat, problem.displacement(u)
     assert heat is not None
-    if settled is None or not heat.depends_on_contact:
-        steady = heat.temperatures(instant, displacement)
-        return HeatSolution(steady.rise, steady.reaction, {**steady.balance, "contacts": {}}, {})
-    n, solution, laws = problem.model.mesh.n_points, settled.solution, problem.model.conductances()
-    matrix, friction_power, crossings = csr_array((n, n)), np.zeros(n), {}
-    obstacles, obstacle_power = csr_array((n, n)), np.zeros(n)
-    for name, rows in settled.constraints.rows.items():
-        pair, law = problem.pairs[name], laws.get(name)
-        if law is None and not pair.options.friction_heat:
+    n, laws, crossings = problem.model.mesh.n_points, problem.model.conductances(), {}
+    matrix, obstacles = csr_array((n, n)), csr_array((n, n))
+    friction_power, obstacle_power = np.zeros((2, n))
+    for name, pair in problem.pairs.items():
+        law = laws.get(name)
+        if settled is None or (law is None and not pair.options.friction_heat):
             continue
+        rows, solution = settled.constraints.rows[name], settled.solution
         configuration = problem.configuration(name, start, load, displacement, u)
         constraints, force, gap = _normal_state(problem, settled, name, rows, configuration)
         assert constraints.nodal is not None

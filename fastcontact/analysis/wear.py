@@ -38,14 +38,12 @@ class Worn(NamedTuple):
         """Return zero wear for `count` nodes, the state before the first step."""
         return cls(np.zeros(count), np.zeros(count))
 
-    def after(
-        self, pair: Formulation, configuration: Configuration, contact: ContactResult, coefficient: float
-    ) -> Worn:
+    def after(self, pair: Formulation, configuration: Configuration, result: ContactResult, coefficient: float) -> Worn:
         """Return the wear after one more load step; for parameters see `wear_depth_in_step`."""
-        depth = wear_depth_in_step(pair, configuration, contact, self.pressure, coefficient)
-        mean = _linear_on_facets(pair, 0.5 * np.maximum(contact.pressure + self.pressure, 0.0))
+        depth = wear_depth_in_step(pair, configuration, result, self.pressure, coefficient)
+        mean = _linear_on_facets(pair, 0.5 * np.maximum(result.pressure + self.pressure, 0.0))
         largest_rate = np.divide(depth, mean, out=np.zeros_like(depth), where=mean > 0.0)
-        return Worn(self.depth + depth, contact.pressure, max(self.largest_rate, float(largest_rate.max(initial=0.0))))
+        return Worn(self.depth + depth, result.pressure, max(self.largest_rate, float(largest_rate.max(initial=0.0))))
 
 
 def wear_depth_in_step(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -29,44 +29,71 @@ def sentences(series: Series) -> list[str]:
     if not series.limits:
         return [f"{series.combination}: {_without_limits(series)}."]
     names = [name for name in series.shown(MAIN) if name in series.limits]
-    texts = [text for name in names for text in _quantity_sentences(series, name)]
-    return texts + _equal_force_sentences(series)
+    return [*(text for name in names for text in _quantity_sentences(series, name)), *_equal_force_sentences(series)]
 
 
 def _without_limits(series: Series) -> str:
     return f"{len(series.levels)} levels were solved, and an extrapolated limit needs three"
 
 
-def _quantity_sentences(series: Series, quantity: str) -> list[str]:
-    """Return the sentences on a quantity with a limit."""
-    split, name = series.split(quantity), title(quantity)
+def _quantity_sentences(series: Series, quantity: str) -> Iterator[str]:
+    """Yield the sentences on a quantity with a limit."""
+    limit, split, reference = series.limits[quantity], series.split(quantity), series.reference.get(quantity)
     if split is None:
-        text = (
-            f"{series.combination}: the mesh error of the {name} is {_errors(series, quantity)[-1]} on the finest mesh."
+        error = _errors(series, quantity)[-1]
+        yield f"{series.combination}: the mesh error of the {title(quantity)} is {error} on the finest mesh."
+    else:
+        yield f"{series.combination}: {_comparison_with_theory(series, quantity, split)}"
+    if not limit.converging:
+        yield (
+            f"The {title(quantity)} does not converge: its changes do not decrease on the finest mesh, and its error bar is "
+            "meaningless. It may have no limit, or finer meshes are needed."
         )
-        return [text, *_convergence_sentences(series, quantity, name)]
-    start = f"{series.combination}: " + ("" if series.exact_theory else f"{series.compared} ") + f"the {name}"
-    bar, mesh_error = f"+- {100 * split.uncertainty:.2g} %", f"{percent(split.mesh)} is mesh error on the finest mesh"
-    mesh_error += f" ({series.finest.n_dofs} degrees of freedom)"
+    if split is None:
+        return
+    differences = series.from_theory(quantity)
+    closest = int(np.nanargmin(np.abs(differences)))
+    difference, level = differences[closest], series.levels[closest]
+    has_notable_error = split.resolved and not series.exact_theory and series.has_model_error(quantity)
+    if has_notable_error and abs(difference) < 0.5 * abs(split.model):
+        yield (
+            f"Level {level.number} ({level.n_dofs} degrees of freedom) lies only {percent(difference)} from theory because "
+            f"its mesh error of {percent(difference - split.model)} cancels model error: the agreement does not prove a good "
+            "mesh."
+        )
+    if reference is not None:
+        yield (
+            f"The case's mesh-converged solution lies {'inside' if limit.contains(reference) else 'OUTSIDE'} the error bar "
+            f"of the limit ({CONFIDENCE:.0%}), {percent(limit.value / reference - 1.0)} from the limit."
+        )
+
+
+def _comparison_with_theory(series: Series, quantity: str, split: Split) -> str:
+    """Return a sentence on the difference of a quantity from theory, which consists of model error and mesh error."""
+    limit = series.limits[quantity]
+    start = ("" if series.exact_theory else f"{series.compared} ") + f"the {title(quantity)}"
+    bar, dofs = f"+- {100 * split.uncertainty:.2g} %", f"({series.finest.n_dofs} degrees of freedom)"
+    mesh_error = f"{percent(split.mesh)} is mesh error on the finest mesh {dofs}"
     if series.converges_to_theory(quantity) is False:
-        text = _not_to_theory(series, quantity, start, split)
-    elif not series.has_model_error(quantity):
-        orders = ", ".join(f"{order:.2g}" for order in series.orders(quantity)[1:])
-        text = (
-            f"{start} differs from theory by {percent(split.total)} on the finest mesh ({series.finest.n_dofs} degrees of "
-            f"freedom). Its values do not change monotonically with the mesh size (observed orders {orders}): they do not "
-            "support an extrapolation, and no model error is stated. Compute more levels."
+        return (
+            f"{start} tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)} where the theory has "
+            f"{number(split.theory, 6)}. That theory is exact for the bodies of the model, so this is not a model error: "
+            f"{series.combination} does not converge to it on these meshes. Compare formulations (--formulations all), or "
+            "let the meshes of the two sides match."
         )
-    elif split.resolved and not series.exact_theory:
-        text = (
+    if not series.has_model_error(quantity):
+        orders = ", ".join(f"{order:.2g}" for order in series.orders(quantity)[1:])
+        return (
+            f"{start} differs from theory by {percent(split.total)} on the finest mesh {dofs}. Its values do not change "
+            f"monotonically with the mesh size (observed orders {orders}): they do not support an extrapolation, and no "
+            "model error is stated. Compute more levels."
+        )
+    if split.resolved and not series.exact_theory:
+        return (
             f"{start} differs from theory by {percent(split.total)}. Of that, {percent(split.model, split.uncertainty)} "
             f"({bar}) is model error, which no mesh removes, and {mesh_error}, which goes to zero."
         )
-    else:
-        model_error = f"{percent(split.model)} {bar}"
-        text = f"{start} agrees with theory within the error bar of its limit, {model_error}; {mesh_error}."
-    texts = [text, *_convergence_sentences(series, quantity, name)]
-    return texts + _cancellation_sentences(series, quantity, split) + _reference_sentences(series, quantity)
+    return f"{start} agrees with theory within the error bar of its limit, {percent(split.model)} {bar}; {mesh_error}."
 
 
 def _errors(series: Series, quantity: str) -> list[str]:
@@ -81,65 +108,20 @@ def _errors(series: Series, quantity: str) -> list[str]:
     return [f"{difference:+.3g}" if math.isfinite(difference) else "-" for difference in differences]
 
 
-def _convergence_sentences(series: Series, quantity: str, name: str) -> list[str]:
-    """Return a warning if the values of a quantity, whose title is `name`, do not converge."""
-    if series.limits[quantity].converging:
-        return []
-    return [
-        f"The {name} does not converge: its changes do not decrease on the finest mesh, and its error bar is meaningless. It "
-        "may have no limit, or finer meshes are needed."
-    ]
-
-
-def _not_to_theory(series: Series, quantity: str, start: str, split: Split) -> str:
-    """Return the sentence for a formulation that does not converge to a theory that is exact for the model."""
-    limit = series.limits[quantity]
-    return (
-        f"{start} tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)} where the theory has "
-        f"{number(split.theory, 6)}. That theory is exact for the bodies of the model, "
-        f"so this is not a model error: {series.combination} does not converge to it on these meshes. Compare formulations "
-        "(--formulations all), or let the meshes of the two sides match."
-    )
-
-
-def _cancellation_sentences(series: Series, quantity: str, split: Split) -> list[str]:
-    """Return a warning if the mesh error of a level cancels more than half of the model error."""
-    differences = series.from_theory(quantity)
-    closest = int(np.nanargmin(np.abs(differences)))
-    difference, level = differences[closest], series.levels[closest]
-    stated = split.resolved and not series.exact_theory and series.has_model_error(quantity)
-    if not stated or not abs(difference) < 0.5 * abs(split.model):
-        return []
-    return [
-        f"Level {level.number} ({level.n_dofs} degrees of freedom) lies only {percent(difference)} from theory because its "
-        f"mesh error of {percent(difference - split.model)} cancels model error: the agreement does not prove a good mesh."
-    ]
-
-
-def _reference_sentences(series: Series, quantity: str) -> list[str]:
-    """Return a sentence on the mesh-converged solution that the case states, if there is one."""
-    reference, limit = series.reference.get(quantity), series.limits[quantity]
-    if reference is None:
-        return []
-    where = "inside" if limit.contains(reference) else "OUTSIDE"
-    return [
-        f"The case's mesh-converged solution lies {where} the error bar of the limit ({CONFIDENCE:.0%}), "
-        f"{percent(limit.value / reference - 1.0)} from the limit."
-    ]
-
-
-def _equal_force_sentences(series: Series) -> list[str]:
-    """Return a sentence on the model errors at equal force, if they are known."""
+def _equal_force_sentences(series: Series) -> Iterator[str]:
+    """Yield a sentence on the model errors at equal force, if they are known."""
     at_force, at_approach = series.split_equal_force("pressure_max"), series.split("pressure_max")
     if at_force is None or at_approach is None:
-        return []
-    of_radius = series.split_equal_force("contact_radius")
-    splits = {"of the largest pressure is": at_force, ", that of the contact radius": of_radius}
+        return
+    splits = {
+        "of the largest pressure is": at_force,
+        ", that of the contact radius": series.split_equal_force("contact_radius"),
+    }
     errors = [f"{name} {percent(s.model)} (+- {100 * s.uncertainty:.2g} %)" for name, s in splits.items() if s]
     text = f"{series.combination}: at equal force the model error {''.join(errors)}"
     if abs(at_force.model) < 0.3 * abs(at_approach.model) and at_approach.resolved:
         text += ": most of the difference at equal approach is in the force, not in its distribution"
-    return [text + "."]
+    yield text + "."
 
 
 # Standard quantities in the tables of levels. The tables of limits contain all quantities.
@@ -173,16 +155,17 @@ def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
 
 def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], units: Mapping[str, str]) -> Rows:
     """Return a header and a row for each combination with the limits, mesh errors and model errors of the quantities."""
-    header, cells = ["combination", "levels", "finest DOF"], []  # type: list[str], list[tuple[str, str]]
+    columns = ("limit", "+-", "order alone", "mesh error", "model error")
+    header = ["combination", "levels", "finest DOF"]
     for name in quantities:
         header += [column(name, name, units), "+-", "order", "mesh error", "model error"]
-        cells += [(name, text) for text in ("limit", "+-", "order alone", "mesh error", "model error")]
-    if "pressure_max" in quantities:
-        header.append("p at equal force")
-        cells.append(("pressure_max", "at equal force"))
-    sizes = [[str(series.combination), str(len(series.levels)), str(series.finest.n_dofs)] for series in all_series]
-    limits = [[_cells(series, name, [text])[0] for name, text in cells] for series in all_series]
-    return [header, *(size + row for size, row in zip(sizes, limits, strict=True))]
+    at_force = ["p at equal force"] if "pressure_max" in quantities else []
+    rows = []
+    for series in all_series:
+        rows.append([str(series.combination), str(len(series.levels)), str(series.finest.n_dofs)])
+        rows[-1] += [text for name in quantities for text in _cells(series, name, columns)]
+        rows[-1] += _cells(series, "pressure_max", ["at equal force"] * len(at_force))
+    return [header + at_force, *rows]
 
 
 def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
@@ -212,13 +195,12 @@ def csv_columns(all_series: Sequence[Series]) -> dict[str, list[Any]]:
         "element": [combination.element or "" for combination, _ in levels],
         "formulation": [combination.formulation or "" for combination, _ in levels],
         "level": [level.number for _, level in levels],
+        **{name: [getattr(level, name) for _, level in levels] for name in ("h", "n_dofs", "seconds")},
     }
-    columns |= {name: [getattr(level, name) for _, level in levels] for name in ("h", "n_dofs", "seconds")}
+    kinds = {"": Series.values, "_error": Series.errors, "_order": Series.orders, "_from_theory": Series.from_theory}
     for name in dict.fromkeys(name for series in all_series for name in series.quantities):
-        columns[name] = [value for series in all_series for value in series.values(name)]
-        for kind in ("errors", "orders", "from_theory"):
-            values = [value for series in all_series for value in getattr(series, kind)(name)]
-            columns[f"{name}_{kind.removesuffix('s')}"] = values
+        for ending, values in kinds.items():
+            columns[name + ending] = [value for series in all_series for value in values(series, name)]
     return columns
 
 

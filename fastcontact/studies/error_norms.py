@@ -22,7 +22,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact._tools.html_table import fields_table
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.integration import facet_measure, fine_rule
-from fastcontact.contact.surface import surface
+from fastcontact.contact.surface import by_block, surface
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.initial_states import StressOffset
@@ -33,7 +33,7 @@ from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.mesh.mesh import starts_of
-from fastcontact.mesh.topology import same_facets
+from fastcontact.mesh.topology import cells_of_outer_facets, outer_facets, same_facets
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -309,11 +309,11 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
 
 def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], contact: Array) -> None:
     """Add h / E times the squared difference between pressure and smoothed normal stress to `contact` (n_solids,)."""
-    mesh = model.mesh
+    mesh, outer, cells_of_outer = model.mesh, outer_facets(model.mesh), cells_of_outer_facets(model.mesh)
     pair = next(pair for pair in model.contact if pair.name == result.name)
     nodal = np.zeros(mesh.n_points)
     nodal[result.points] = result.pressure
-    starts = starts_of(mesh.solids)
+    starts, sizes = starts_of(mesh.solids), [len(cells) for cells in mesh.cells.values()]
     E, material = np.array([law.young[0] for law, _ in model.materials]), model.material_field().material_numbers
     for block in surface(mesh, pair.secondary).blocks:
         xi, weights = fine_rule(block.element)
@@ -322,10 +322,11 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
         area = facet_measure(block.facets, block.element, mesh.points, xi, model.kinematics == "axisymmetric") * weights
         normals = area_vectors(mesh.points[block.facets], reference.gradient(xi))
         normals /= np.linalg.norm(normals, axis=2, keepdims=True)
-        for name in mesh.solids:
-            facet, cell, local = _cells_of_facets(name, mesh.cells[name], block.facets)
+        number = cells_of_outer[block.element][same_facets(outer[block.element], block.facets)].astype(np.intp)
+        for name, (facet, cell) in zip(mesh.cells, by_block(number, sizes), strict=True):
             if not len(facet):
                 continue
+            local = np.argmax(mesh.cells[name][cell][:, None] == block.facets[facet][:, :, None], axis=2)
             at_nodes = smooth[name][cell[:, None], local]
             tensor = np.einsum("qa,fai->fqi", N, at_nodes)[..., PAIRS[mesh.dim]]
             traction = (tensor * normals[facet][..., None, :]).sum(axis=-1)
@@ -334,14 +335,3 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
             h = np.linalg.norm(np.ptp(mesh.points[block.facets[facet]], axis=1), axis=1)
             square = h / E[material[name][cell]] * (jump**2 * area[facet]).sum(axis=1)
             np.add.at(contact, starts[name] + cell, np.where(area[facet].sum(axis=1) > 0, square, 0.0))
-
-
-def _cells_of_facets(name: str, cells: Numbers, facets: Numbers) -> tuple[Indices, Indices, Indices]:
-    """Return, for each facet of a cell of one element type, the facet, the cell, and the local nodes of the facet."""
-    adjacent = np.flatnonzero(np.isin(cells, facets).sum(axis=1) >= facets.shape[1])
-    sides = [list(side) for side in elements.get(name).facets if len(side) == facets.shape[1]]
-    rows = np.array([same_facets(facets, cells[adjacent][:, side]) for side in sides], np.intp)
-    rows = rows.reshape(len(sides), len(adjacent))
-    cell, side = np.nonzero(rows.T >= 0)
-    nodes, row = cells[adjacent[cell]], rows[side, cell]
-    return row, adjacent[cell], np.argmax(nodes[:, None] == facets[row][:, :, None], axis=2)

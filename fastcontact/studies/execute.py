@@ -114,9 +114,8 @@ def run_study(
                 raise CaseError(f"{jobs[index].label}: {result['error']}")  # it would fail for the other runs as well
             results[index], label, left = result, waiting.pop(index), tuple(waiting.values())
             seconds = 0.0 if index in stored else float(result.get("seconds", 0.0))
-            state = Progress(
-                label, len(results), len(jobs), left, seconds, str(result.get("error", "")), stored=index in stored
-            )
+            counts, error = (len(results), len(jobs)), str(result.get("error", ""))
+            state = Progress(label, *counts, left, seconds, error, stored=index in stored)
             line(state)
             if on_progress is not None:
                 on_progress(state)

@@ -15,7 +15,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -123,9 +123,7 @@ class Job(Run):
 class FunctionRun(Run):
     """A run that calls a function, which returns a model or the steps of its solution."""
 
-    function: Function
-    positional: tuple[Any, ...]  # positional arguments
-    named: Mapping[str, Any]  # keyword arguments
+    function: partial[Any]  # the function with its arguments
 
     def solve_run(self) -> tuple[Case | None, Sequence[StepResult]]:
         """See `Run`."""
@@ -145,7 +143,7 @@ class FunctionRun(Run):
     def _call(self) -> Any:
         """Return the result of the function; CaseError, with the line of the error, if it fails."""
         try:
-            return self.function(*self.positional, **self.named)
+            return self.function()
         except FastcontactError:
             raise
         except Exception as error:

@@ -7,6 +7,7 @@ import itertools
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
+from functools import partial
 from itertools import pairwise
 from math import prod
 from multiprocessing.reduction import ForkingPickler
@@ -160,13 +161,14 @@ def _study_of_function(
     descending = sorted(map(float, sizes), reverse=True)
     if not descending or len({*descending}) < len(descending) or not (descending[-1] > 0 and descending[0] < np.inf):
         raise CaseError(f"the mesh sizes must be positive and all different, not {[*sizes]}")
-    name, measures = function_name(function), measures_of(quantities)
-    shared: Any = {"name": name, "function": function, "measures": measures, "named": {}}
-    labels = [f"{first_parameter(function)} = {size:g}" for size in descending]
+    name, measures, parameter = function_name(function), measures_of(quantities), first_parameter(function)
     runs = [
-        FunctionRun(label=labels[level], marks={"level": level}, positional=(size,), size=level, **shared)
+        FunctionRun(
+            label=f"{parameter} = {size:g}", name=name, marks={"level": level}, size=level, measures=measures,
+            function=partial(function, size),
+        )
         for level, size in enumerate(descending)
-    ]
+    ]  # fmt: skip
     results = run_functions(runs, "no size could be solved", **options)
     solved = [(level, {**result, "h": descending[level], "theory": {**theory}}) for level, result in enumerate(results)]
     no_theory = None, 1.0, "under the given load"
@@ -359,11 +361,10 @@ def _sweep_of_function(
     named = isinstance(parameters, Mapping)
     values = parameters if isinstance(parameters, Mapping) else {first_parameter(function): [*parameters]}
     choices, name, measures = _choices(values), function_name(function), measures_of(quantities)
-    shared: Any = {"name": name, "function": function, "measures": measures}
-    arguments = [((), choice) if named else (tuple(choice.values()), {}) for choice in choices]
+    calls = (partial(function, **choice) if named else partial(function, *choice.values()) for choice in choices)
     runs = [
-        FunctionRun(label=label_of(choice), marks=choice, positional=positional, named=by_name, **shared)
-        for choice, (positional, by_name) in zip(choices, arguments, strict=True)
+        FunctionRun(label=label_of(choice), name=name, marks=choice, measures=measures, function=call)
+        for choice, call in zip(choices, calls, strict=True)
     ]
     results = run_functions(runs, "no point of the sweep could be solved", **options)
     points = _points(values, choices, results)
@@ -481,7 +482,7 @@ def run_functions(
 def _check_picklable(run: FunctionRun) -> None:
     """Raise CaseError if a function cannot be sent to another process or cannot be imported there."""
     try:
-        if any(function.__module__ == "__main__" for function in (run.function, *run.measures.values())):
+        if any(function.__module__ == "__main__" for function in (run.function.func, *run.measures.values())):
             inspect.getfile(sys.modules["__main__"])  # TypeError without a file, as in notebooks
         ForkingPickler.dumps(run)
     except Exception as error:

@@ -35,9 +35,8 @@ class Combination:
     function: str = ""
 
     def __str__(self) -> str:
-        return (
-            self.function or f"{self.element or 'mixed cells'} {(self.formulation or 'no contact').replace('_', '-')}"
-        )
+        formulation = (self.formulation or "no contact").replace("_", "-")
+        return self.function or f"{self.element or 'mixed cells'} {formulation}"
 
     @property
     def rank(self) -> tuple[int, int, int]:
@@ -165,12 +164,11 @@ def combinations(
     selected = [settings.case_combination.element] if element_names is None else list(element_names)
     if selected == ["all"]:
         selected = [name for name in ALL_ELEMENTS if can_make(settings, name)]
-    if formulations is None:
-        return tuple(_make_combination(element, settings.case_combination.formulation) for element in selected)
-    if settings.pair is None:
+    if formulations is not None and settings.pair is None:
         raise CaseError("this case has no contact pair, so there are no formulations to compare")
-    formulations = list(formulations)
-    compared = list(FORMULATIONS) if formulations == ["all"] else formulations
+    compared = [settings.case_combination.formulation] if formulations is None else list(formulations)
+    if compared == ["all"]:
+        compared = list(FORMULATIONS)
     return tuple(_make_combination(element, formulation) for element in selected for formulation in compared)
 
 
@@ -247,18 +245,16 @@ def _half_space_rule(element: str, arguments: Mapping[str, Any]) -> Rule:
 RULES: dict[str, Callable[[str, Mapping[str, Any]], Rule]] = {
     "half-spheres": _sphere_rule,
     "quarter-disc": _sphere_rule,
-    "cylinder-on-block": lambda _, arguments: _round_body_rule(arguments, 10, 100),
+    "cylinder-on-block": lambda _, given: _round_body_rule(given, 10, 100),
     "block-on-block": lambda *_: Rule(double=("divisions_lower", "divisions_upper")),
     **dict.fromkeys(("block", "box"), lambda *_: Rule(double=("divisions",))),
     "rings": lambda *_: Rule(double=("divisions_inner", "divisions_outer")),
     "graded-block": _half_space_rule,
-    "punched-block": lambda _, arguments: Rule(
-        {"edge_size": float(arguments.get("punch_radius", 1.0)) / 200}, ("edge_size",), root=("growth",)
+    "punched-block": lambda _, given: Rule(
+        {"edge_size": float(given.get("punch_radius", 1.0)) / 200}, ("edge_size",), root=("growth",)
     ),
     "crowned-blocks": lambda *_: Rule(halve=("contact_size",), root=("growth",)),
-    **dict.fromkeys(
-        ("sphere-on-block", "sphere-octant"), lambda _, arguments: _round_body_rule(arguments, 4, 50, "growth")
-    ),
+    **dict.fromkeys(("sphere-on-block", "sphere-octant"), lambda _, given: _round_body_rule(given, 4, 50, "growth")),
 }
 
 

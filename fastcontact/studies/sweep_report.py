@@ -77,39 +77,40 @@ class Drawing:
 
     def __init__(self, sweep: Sweep) -> None:
         self.first, self.others = abscissa_of(sweep.parameters)
-        self.points, self.theories, self.units = sweep.points, sweep.theories, sweep.units
-        self.theory = f"theory {sweep.compared}".strip()
+        self.sweep, self.theory = sweep, f"theory {sweep.compared}".strip()
         values = sweep.parameters[self.first]
         numbers = [float(v) for v in values if not isinstance(v, (str, bool))]
         wide = len(numbers) == len(values) and min(numbers) > 0 and max(numbers) >= WIDE * min(numbers)
         self.scale = "plain log" if wide else "linear"
+        self.points_of: dict[str, list[Point]] = {}  # points of each curve, by its label
+        for point in sweep.points:
+            self.points_of.setdefault(label_of(point.parameters, self.others), []).append(point)
 
     def draw_values(self, ax: Any, quantity: str) -> None:
         """Draw a quantity and its theory over the parameter; both axes are logarithmic if all values are positive."""
-        for k, (label, x, points) in enumerate(self._curves()):
+        for k, (label, points) in enumerate(self.points_of.items()):
             y = [point.values.get(quantity, math.nan) for point in points]
-            ax.plot(x, y, marker(k), ms=5, label=label or "computed", color=f"C{k}")
-            self._draw_theory(ax, quantity, k)
-        positive = all(point.values.get(quantity, 1.0) > 0 for point in self.points)
+            ax.plot(self._x(points), y, marker(k), ms=5, label=label or "computed", color=f"C{k}")
+            name = (self.theory + self._constant_note(quantity)) if k == 0 else None
+            style = {"label": name, "color": f"C{k}" if self.others else "black"}
+            curves = (curve for curve in self.sweep.theories if curve.label == label and quantity in curve.values)
+            exact = [point.theory.get(quantity, math.nan) for point in points]
+            if (curve := next(curves, None)) is not None:
+                ax.plot(curve.x, curve.values[quantity], "--", lw=1.1, **style)
+            elif np.isfinite(exact).any():
+                ax.plot(self._x(points), exact, "_", ms=9, **style)
+        positive = all(point.values.get(quantity, 1.0) > 0 for point in self.sweep.points)
         scale = self.scale if positive else "linear"
-        self._frame(ax, title(quantity), column(title(quantity), quantity, self.units), scale)
+        self._frame(ax, title(quantity), column(title(quantity), quantity, self.sweep.units), scale)
 
-    def _draw_theory(self, ax: Any, quantity: str, k: int) -> None:
-        """Draw the theory for choice `k` of the other parameters, as a curve or at the points."""
-        label, x, points = self._curves()[k]
-        name = (self.theory + self._constant_note(quantity)) if k == 0 else None
-        color = "black" if not self.others else f"C{k}"
-        for curve in self.theories:
-            if curve.label == label and quantity in curve.values:
-                ax.plot(curve.x, curve.values[quantity], "--", lw=1.1, label=name, color=color)
-                return
-        exact = [point.theory.get(quantity, math.nan) for point in points]
-        if np.isfinite(exact).any():
-            ax.plot(x, exact, "_", ms=9, label=name, color=color)
+    def _x(self, points: Sequence[Point]) -> list[Any]:
+        """Return the values of the parameter on the x axis, as strings if one of them is a string."""
+        x = [point.parameters[self.first] for point in points]
+        return list(map(str, x)) if any(isinstance(value, str) for value in x) else x
 
     def _constant_note(self, quantity: str) -> str:
         """Return a note if the theory does not depend on the parameter, and otherwise an empty string."""
-        curves = [points for _, _, points in self._curves()]
+        curves = self.points_of.values()
         values = [{point.theory[quantity] for point in points if quantity in point.theory} for points in curves]
         constant = all(len(entries) == 1 for entries in values) and any(len(points) > 1 for points in curves)
         return f"\n(the same for every {self.first})" if constant else ""
@@ -118,13 +119,13 @@ class Drawing:
         """Draw the ratios of a quantity to theory, at equal approach and at equal force, over the parameter."""
         styles = {"theory": ("-", self.theory), "equal_force": ("--", "theory at equal force")}
         n_lines = 0
-        for k, (label, x, points) in enumerate(self._curves()):
+        for k, (label, points) in enumerate(self.points_of.items()):
             for other, (style, name) in styles.items():
                 ratios = [point.ratio(quantity, other) for point in points]
                 if np.isfinite(ratios).any() and (other, quantity) != ("equal_force", "force"):
                     name = f"to {name}" + (f"\n{label}" if label else "")
                     color = f"C{k if self.others else n_lines}"
-                    ax.plot(x, ratios, f"{marker(k)}{style}", ms=4, lw=1.0, label=name, color=color)
+                    ax.plot(self._x(points), ratios, f"{marker(k)}{style}", ms=4, lw=1.0, label=name, color=color)
                     n_lines += 1
         if not n_lines:
             return message(ax, f"no theory of the {title(quantity)}")
@@ -133,22 +134,10 @@ class Drawing:
 
     def _frame(self, ax: Any, heading: str, y_label: str, y_scale: str = "linear") -> None:
         """Set scales, title, labels and legend; the legend is beside the axes if there are several curves."""
-        labels = parameter_label(self.first, self.units), y_label
+        labels = parameter_label(self.first, self.sweep.units), y_label
         frame(ax, heading, labels, scales=(self.scale, y_scale), title_size=10)
         if self.others:
             ax.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-
-    def _curves(self) -> list[tuple[str, Sequence[Any], list[Point]]]:
-        """Return, for each choice of the other parameters, the label, the values of the parameter and the points."""
-        by_label: dict[str, list[Point]] = {}
-        for point in self.points:
-            by_label.setdefault(label_of(point.parameters, self.others), []).append(point)
-        curves: list[tuple[str, Sequence[Any], list[Point]]] = []
-        for label, points in by_label.items():
-            x = [point.parameters[self.first] for point in points]
-            numeric = all(isinstance(value, (int, float)) for value in x)
-            curves.append((label, x if numeric else list(map(str, x)), points))
-        return curves
 
 
 def label_of(parameters: Mapping[str, Value], others: Sequence[str] | None = None) -> str:
@@ -242,8 +231,8 @@ class Sweep(Report):
         rows = pandas.concat([solved, pandas.DataFrame([choice | {"failed": text} for choice, text in self.failed])])
         choices = list(itertools.product(*self.parameters.values()))
         of_rows = rows[list(self.parameters)].itertuples(index=False, name=None)
-        rows["position"] = [choices.index(choice) for choice in of_rows]
-        rows = rows.sort_values("position", ignore_index=True).drop(columns="position")
+        order = np.argsort([choices.index(choice) for choice in of_rows], kind="stable")
+        rows = rows.iloc[order].reset_index(drop=True)
         rows.attrs = solved.attrs
         return rows
 

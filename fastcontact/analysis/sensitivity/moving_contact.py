@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_array, eye_array, hstack
+from scipy.sparse import csr_array, eye_array, hstack, kron, vstack
 
 from fastcontact.analysis.contact_result import closed_node_pressures
 from fastcontact.analysis.inequalities import Iterate, pair_surfaces
@@ -118,11 +118,10 @@ class MovingContact:
     @cached_property
     def step(self) -> float:
         """Increment by which points are moved [length]."""
-        edges = [np.inf]
-        for block in (block for side in self._surfaces() for block in side.blocks):
-            corners = self.problem.model.mesh.points[block.facets]
-            edges.append(float(np.linalg.norm(np.ptp(corners, axis=1), axis=1).min()))
-        return DIFFERENCES * min(edges)
+        points = self.problem.model.mesh.points
+        facets = [corners for side in self._surfaces() for corners in side.corners(points)]
+        sizes = [float(np.linalg.norm(np.ptp(corners, axis=1), axis=1).min()) for corners in facets]
+        return DIFFERENCES * min(sizes, default=np.inf)
 
     def _surfaces(self) -> list[Surface]:
         pairs = self.problem.pairs.values()
@@ -142,10 +141,10 @@ class MovingContact:
             nodes = len(self.problem.pairs[self.pair].secondary.points) if self.pair else 0
             shape = len(self.u) + len(self.active) + nodes, len(self.u) + len(lifts)
             return csr_array(shape), csr_array(shape)
-        dofs, dependence = self._moving_dofs(), self._dependence()
-        derivatives = self._differences(_independent_groups(dofs, dependence, self.problem.model.mesh.dim), dependence)
+        dofs = self._moving_dofs()
+        derivatives = self._differences(_independent_groups(dofs, self._pattern, self.problem.model.mesh.dim))
         if not self._is_consistent(0.5 * (derivatives[0] + derivatives[1]), dofs):
-            derivatives = self._differences([np.array([dof]) for dof in dofs], dependence)
+            derivatives = self._differences([np.array([dof]) for dof in dofs])
         along_lifts = [self._one_sided(lift / (largest(lift) or 1.0)) for lift in lifts]
         forward, backward = (
             csr_array(hstack([of_unknowns, *(csr_array(columns[side][:, None]) for columns in along_lifts)]))
@@ -168,23 +167,23 @@ class MovingContact:
     def _moving_dofs(self) -> Indices:
         """Return the unknowns that active constraints may depend on."""
         dim, contact_dofs = self.problem.model.mesh.dim, self.problem.contact_dofs
-        points = np.unique(self._dependence().nonzero()[1])
+        points = np.unique(self._pattern.nonzero()[1])
         obstacle_dofs = contact_dofs[contact_dofs >= self.problem.model.n_dofs]
         dofs = (points[:, None] * dim + np.arange(dim)).ravel()
         dofs = np.concatenate([dofs, obstacle_dofs]).astype(np.intp)
         return dofs[self.problem.system.free[dofs]]
 
     @cached_property
-    def _involved(self) -> csr_array:
-        """Incidence matrix (k, n_points), 0 or 1, of active constraints and the points that they involve."""
-        dim, B = self.problem.model.mesh.dim, csr_array(self.constraints.B[self.active])
-        keep = (B.indices < self.problem.model.n_dofs) & (B.data != 0.0)
-        entries, n_points = (entry_rows(B)[keep], B.indices[keep] // dim), self.problem.model.mesh.n_points
-        return _with_unit_entries(csr_array((np.ones(keep.sum()), entries), shape=(len(self.active), n_points)))
+    def _pattern(self) -> csr_array:
+        """Pattern (n, n_points) of the derivatives of `at`: the points on whose unknowns each value may depend.
 
-    def _dependence(self) -> csr_array:
-        """Return the incidence (k, n_points) of active constraints and the points on whose unknowns they may depend."""
-        n = self.problem.model.mesh.n_points
+        Forces on obstacles are omitted, which may depend on all points.
+        """
+        dim, n = self.problem.model.mesh.dim, self.problem.model.mesh.n_points
+        B = csr_array(self.constraints.B[self.active])
+        keep = (B.indices < self.problem.model.n_dofs) & (B.data != 0.0)
+        nonzero = entry_rows(B)[keep], B.indices[keep] // dim
+        involved = csr_array((np.ones(keep.sum()), nonzero), shape=(len(self.active), n))
         neighbours = eye_array(n, format="csr")
         for side in self._surfaces():
             m = len(side.points)
@@ -194,24 +193,28 @@ class MovingContact:
         for name, pair in self.problem.pairs.items():
             if pair.options.kind == "tied":  # paired once, before any load
                 moving[self.constraints.rows[name]] = 0.0
-        dependence = csr_array((self._involved * moving[self.active, None]) @ neighbours)
+        of_gaps = csr_array((involved * moving[self.active, None]) @ neighbours)
         if (T := self.problem.system.T) is not None:
-            dim = self.problem.model.mesh.dim
             entries = T[: n * dim, : n * dim].tocoo()
             points = entries.row // dim, entries.col // dim
-            dependence = csr_array(dependence @ _with_unit_entries(csr_array((np.ones(entries.nnz), points), (n, n))))
-        return _with_unit_entries(dependence)
+            of_gaps = csr_array(of_gaps @ csr_array((np.ones(entries.nnz), points), shape=(n, n)))
+        of_points = csr_array(involved.T @ of_gaps)
+        nodes = self.problem.pairs[self.pair].secondary.points if self.pair else np.empty(0, np.intp)
+        of_obstacles = csr_array((len(self.u) - n * dim, n))
+        return csr_array(vstack([kron(of_points, np.ones((dim, 1))), of_obstacles, of_gaps, of_points[nodes]]))
 
-    def _differences(self, groups: list[Indices], dependence: csr_array) -> tuple[csr_array, csr_array]:
-        n, size = len(self.u), len(self._base)
+    def _differences(self, groups: list[Indices]) -> tuple[csr_array, csr_array]:
+        """Return the forward and backward derivatives (n, n_dofs), given groups of unknowns that are moved simultaneously."""
+        dim, n, size = self.problem.model.mesh.dim, len(self.u), len(self._base)
         sums = [csr_array((size, n)), csr_array((size, n))]
         for dofs in groups:
             unknowns = np.zeros(n)
             unknowns[dofs] = 1.0
             for side, changed in enumerate(self._one_sided(self.problem.system.displacement(unknowns, np.zeros(n)))):
-                rows = np.flatnonzero(changed)
-                column = self._sources(rows, dofs, dependence) if len(dofs) > 1 else np.full(len(rows), dofs[0])
-                sums[side] = csr_array(sums[side] + csr_array((changed[rows], (rows, column)), shape=(size, n)))
+                rows, columns = np.flatnonzero(changed), np.zeros(np.count_nonzero(changed), np.intp)
+                if len(dofs) > 1:
+                    rows, columns = self._pattern[:, dofs // dim].nonzero()
+                sums[side] += csr_array((changed[rows], (rows, dofs[columns])), shape=(size, n))
         return sums[0], sums[1]
 
     @cached_property
@@ -230,22 +233,6 @@ class MovingContact:
 
         return (at(increment) - self._base) / increment, (self._base - at(-increment)) / increment
 
-    def _sources(self, rows: Indices, dofs: Indices, dependence: csr_array) -> Indices:
-        """Return, for each value in `rows`, the one of the simultaneously moved components `dofs` that changes it."""
-        dim, n = self.problem.model.mesh.dim, len(self.u)
-        by_constraint = np.full(dependence.shape[0], dofs[0])
-        by_point = np.full(self.problem.model.mesh.n_points, dofs[0])
-        dependence_on_group = csr_array(dependence[:, dofs // dim])
-        first = entry_rows(dependence_on_group)
-        by_constraint[first] = dofs[dependence_on_group.indices]
-        for constraint in np.unique(first):
-            begin, end = self._involved.indptr[constraint : constraint + 2]
-            by_point[self._involved.indices[begin:end]] = by_constraint[constraint]
-        nodes = self.problem.pairs[self.pair].secondary.points if self.pair else np.empty(0, np.intp)
-        others = np.full(n - dim * len(by_point), dofs[0])
-        dof_of_value = np.concatenate([np.repeat(by_point, dim), others, by_constraint, by_point[nodes]])
-        return dof_of_value[rows].astype(np.intp)
-
     def _is_consistent(self, derivative: csr_array, dofs: Indices) -> bool:
         """Return whether the derivative agrees with that along a direction in which all points move."""
         shift = np.zeros(len(self.u))
@@ -258,12 +245,11 @@ class MovingContact:
         return all(largest(error[block]) <= INCREMENT**2 * largest(difference[block]) for block in blocks)
 
 
-def _independent_groups(dofs: Indices, dependence: csr_array, dim: int) -> list[Indices]:
-    """Return groups of components, no two of which affect the same constraint or constraints that share points."""
-    n_points = dependence.shape[1]
+def _independent_groups(dofs: Indices, pattern: csr_array, dim: int) -> list[Indices]:
+    """Return groups of components, no two of which affect the same value; `pattern` is `MovingContact._pattern`."""
+    n_points = pattern.shape[1]
     points = np.unique(dofs[dofs < n_points * dim] // dim)
-    adjacent = _with_unit_entries(csr_array(dependence.T @ dependence))
-    dependent = _with_unit_entries(csr_array(adjacent @ adjacent))
+    dependent = csr_array(pattern.T @ pattern)
     colour: dict[int, int] = {}
     for point in points.tolist():
         neighbours = dependent.indices[dependent.indptr[point] : dependent.indptr[point + 1]].tolist()
@@ -274,10 +260,3 @@ def _independent_groups(dofs: Indices, dependence: csr_array, dim: int) -> list[
         group = np.array([p for p, colour_of_p in colour.items() if colour_of_p == c], np.intp)
         groups += [np.intersect1d(group * dim + axis, dofs) for axis in range(dim)]
     return [group for group in groups if len(group)] + [np.array([dof]) for dof in dofs[dofs >= n_points * dim]]
-
-
-def _with_unit_entries(pattern: csr_array) -> csr_array:
-    """Return the matrix `pattern` with ones in place of its nonzero entries; it is modified."""
-    pattern.eliminate_zeros()
-    pattern.data[:] = 1.0
-    return pattern

@@ -20,7 +20,7 @@ from fastcontact.elasticity.loads import Load
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.elasticity.varying_constants import varying
-from fastcontact.errors import ModelError, unknown
+from fastcontact.errors import ModelError, check_known, unknown
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
 from fastcontact.model.parts.base import Support, displacement_name
@@ -80,8 +80,7 @@ def _component(parameter: Label, names: Sequence[str]) -> int | None:
         return None
     if len(parameter) == 2:
         raise ModelError(f"{parameter[0]} of the material {parameter[1]!r} has components: request (..., '{names[0]}')")
-    if str(parameter[2]) not in names:
-        raise ModelError(unknown(f"component of {parameter[0]}", str(parameter[2]), names))
+    check_known(f"component of {parameter[0]}", str(parameter[2]), names, ModelError)
     return names.index(str(parameter[2]))
 
 
@@ -144,8 +143,7 @@ def check_parameter(model: Model, parameter: Label) -> None:
             "results have no sensitivity to friction: if all nodes stick they do not depend on it, and if nodes slip they "
             "depend on all load steps. Use finite differences of two solutions"
         )
-    if kind not in KINDS:
-        raise ModelError(unknown("parameter", kind, KINDS))
+    check_known("parameter", kind, KINDS, ModelError)
     form, check, _ = KINDS[kind]
     if len(parameter) not in (2, 3 if kind in WITH_COMPONENT else 2):
         raise ModelError(f"the parameter {parameter} must have the form {form}")
@@ -154,8 +152,7 @@ def check_parameter(model: Model, parameter: Label) -> None:
 
 def _item(kind: str, items: Mapping[str, Any], parameter: Label) -> Any:
     """Return the item whose name is `parameter[1]`; ModelError if there is none."""
-    if parameter[1] not in items:
-        raise ModelError(unknown(kind, str(parameter[1]), items))
+    check_known(kind, parameter[1], items, ModelError)
     return items[str(parameter[1])]
 
 
@@ -270,22 +267,15 @@ def _prescribed_parts(model: Model, parameter: Label) -> tuple[list[Support], li
 
 def _prescribed_derivatives(contact: MovingContact, parameter: Label) -> Change:
     """Return the derivatives with respect to a factor of the prescribed displacements of a group."""
-    problem, instant = contact.problem, contact.instant
-    model = problem.model
-    supports, relation_numbers = _prescribed_parts(model, parameter)
-    if any(support.rotation is not None for support in supports):
+    problem, restricted = contact.problem, copy.copy(contact.problem.model)
+    restricted.supports, relation_numbers = _prescribed_parts(problem.model, parameter)
+    if any(support.rotation is not None for support in restricted.supports):
         raise ModelError(
             f"results are not linear in the rotation of '{parameter[1]}': its sensitivity is not available"
         )
     values = np.zeros(problem.shape)
-    for support in supports:
-        nodes = model.mesh.points_of(support.group)
-        values[nodes, support.component] = sum(
-            displacements * multiplier(history, problem.ramp, instant)
-            for history, displacements in support.by_history(model.mesh.points[nodes]).items()
-        )
-    if model.kinematics == "axisymmetric":
-        values[model.axis_nodes, 0] = 0.0
+    displacements, shape = restricted.prescribed_by_ramp()[1], restricted.mesh.points.shape
+    values[: len(restricted.mesh.points)] = combined(displacements, problem.ramp, contact.instant, shape)
     return _prescribed_value_derivatives(contact, values, relation_numbers)
 
 
@@ -295,10 +285,8 @@ def _prescribed_value_derivatives(contact: MovingContact, values: Array, relatio
     `values` (n_points, dim) are the displacements [length], and `relation_numbers` the numbers of the constraints.
     """
     problem = contact.problem
-    factors = [
-        multiplier(relation.ramp, problem.ramp, contact.instant) if i in relation_numbers else 0.0
-        for i, relation in enumerate(problem.model.relations)
-    ]
+    all_factors = problem.factors(problem.model.relations, contact.instant)
+    factors = [factor if i in relation_numbers else 0.0 for i, factor in enumerate(all_factors)]
     return replace(_zero_change(contact), lift=problem.system.lift(values.ravel(), factors))
 
 

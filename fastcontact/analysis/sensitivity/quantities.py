@@ -8,7 +8,7 @@ import numpy as np
 
 from fastcontact.analysis.sensitivity.adjoint import Gradient
 from fastcontact.analysis.sensitivity.moving_contact import INCREMENT, MovingContact
-from fastcontact.errors import ModelError, unknown
+from fastcontact.errors import ModelError, check_known
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 
@@ -25,16 +25,15 @@ FORMS = {
 def check_quantity(model: Model, quantity: Label) -> None:
     """Raise ModelError or MeshError if there is no such quantity of a model."""
     kind = str(quantity[0]) if quantity else ""
-    if kind not in FORMS:
-        raise ModelError(unknown("quantity", kind, FORMS))
+    check_known("quantity", kind, FORMS, ModelError)
     if len(quantity) != FORMS[kind].count(",") + 1:
         raise ModelError(f"the quantity {quantity} must have the form {FORMS[kind]}")
     if kind == "displacement":
         _point(model, quantity[1])
     elif kind == "reaction":
         model.mesh.points_of(str(quantity[1]))
-    elif quantity[1] not in [pair.name for pair in model.contact]:
-        raise ModelError(unknown("contact pair", str(quantity[1]), [pair.name for pair in model.contact]))
+    else:
+        check_known("contact pair", quantity[1], [pair.name for pair in model.contact], ModelError)
     if kind == "pressure":
         _point(model, quantity[2])
     if kind in ("displacement", "reaction", "contact_force"):
@@ -60,9 +59,8 @@ def with_gradient(contact: MovingContact, step: StepResult, quantity: Label) -> 
 
 
 def _axis(model: Model, quantity: Label) -> int:
-    axes = "xyz"[: model.mesh.dim]
-    if quantity[-1] not in list(axes):
-        raise ModelError(unknown(f"component of the quantity {quantity}", str(quantity[-1]), list(axes)))
+    axes = list("xyz"[: model.mesh.dim])
+    check_known(f"component of the quantity {quantity}", quantity[-1], axes, ModelError)
     return axes.index(str(quantity[-1]))
 
 
