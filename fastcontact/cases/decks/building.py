@@ -20,7 +20,7 @@ from fastcontact.cases.decks.content import Content, Material, Pair, Section
 from fastcontact.cases.decks.fields import add_initial_stresses
 from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
 from fastcontact.cases.decks.histories import ByShape, Period
-from fastcontact.cases.decks.loads import add_forces, add_temperatures, body_forces, heat_loads, point_group, pressures
+from fastcontact.cases.decks.loads import add_forces, add_temperatures, distributed_loads, heat_loads, point_group
 from fastcontact.cases.decks.materials import law_of, strain_of
 from fastcontact.cases.decks.meshing import deck_mesh_of, group_of_surface, secondary_group
 from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections, sections_by_point
@@ -78,8 +78,8 @@ class Building:
         conditions = Conditions(self.assembly)
         self._check_contact_pairs()
         conditions.run()
-        loads = [*pressures(self.assembly, conditions), *body_forces(self.assembly, conditions)]
-        heat = heat_loads(self.assembly, conditions, self.thickness)
+        loads = distributed_loads(self.assembly, conditions.loads) + distributed_loads(self.assembly, conditions.fluxes)
+        loads += heat_loads(self.assembly, conditions, self.thickness)
         gaps = [] if only_heat else gap_groups(self.assembly)
         mesh = self.assembly.mesh() if only_heat else cut_sections(self.assembly, self.assembly.mesh())
         strain, self.linearised = strain_of(content, [law for law, _ in materials])
@@ -95,7 +95,7 @@ class Building:
             add_sectors(self.model, self.assembly)
         else:
             self._mechanics(conditions)
-        for add in [*loads, *heat]:
+        for add in loads:
             add(self.model)
         self._contact()
         self.gap_ends: dict[str, dict[int, int]] = {}
