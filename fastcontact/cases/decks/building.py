@@ -18,7 +18,7 @@ from fastcontact.cases.decks.conditions import Component, Conditions
 from fastcontact.cases.decks.constraints import make_rotations, relations_of
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
 from fastcontact.cases.decks.fields import add_initial_stresses
-from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
+from fastcontact.cases.decks.gaps import add_gap_facets, add_gaps, check_discrete
 from fastcontact.cases.decks.histories import ByShape, Period
 from fastcontact.cases.decks.loads import add_forces, add_temperatures, distributed_loads, heat_loads, point_group
 from fastcontact.cases.decks.materials import law_of, strain_of
@@ -80,7 +80,8 @@ class Building:
         conditions.run()
         loads = distributed_loads(self.assembly, conditions.loads) + distributed_loads(self.assembly, conditions.fluxes)
         loads += heat_loads(self.assembly, conditions, self.thickness)
-        gaps = [] if only_heat else gap_groups(self.assembly)
+        if not only_heat:
+            add_gap_facets(self.assembly)
         mesh = self.assembly.mesh() if only_heat else cut_sections(self.assembly, self.assembly.mesh())
         strain, self.linearised = strain_of(content, [law for law, _ in materials])
         options: dict[str, Any] = {"strain": strain, "reference_temperature": conditions.reference}
@@ -98,9 +99,7 @@ class Building:
         for add in loads:
             add(self.model)
         self._contact()
-        self.gap_ends: dict[str, dict[int, int]] = {}
-        for gap in gaps:
-            self.gap_ends.update(add_gap(self.model, self.assembly, gap, conditions))
+        self.gap_ends = {} if only_heat else add_gaps(self.model, self.assembly, conditions)
         self.ramp = self._ramp(conditions)
 
     def _mechanics(self, conditions: Conditions) -> None:
@@ -242,12 +241,10 @@ class Building:
 
     def _springs(self) -> None:
         """Add the springs. Raises CaseError if an element of *SPRING is not a spring, or a spring has no stiffness."""
-        for name, (location, stiffness) in self.content.springs.items():
-            for element in self.assembly.elements_of(name, location):
-                if element.cell.type != "SPRINGA":
-                    raise location.refuse(f"element {element.number} is not a spring of type SPRINGA")
-                self.model.add_spring(element.points[0], element.points[1], axial=stiffness / self.thickness)
         check_discrete(self.assembly, "SPRINGA", self.content.springs, "*SPRING")
+        for name, spring in self.content.springs.items():
+            for element in self.assembly.elements_of(name, spring.location):
+                self.model.add_spring(element.points[0], element.points[1], axial=spring.stiffness / self.thickness)
 
     def _contact(self) -> None:
         """Add the contact pairs and ties of the deck."""

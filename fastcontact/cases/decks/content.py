@@ -210,6 +210,21 @@ class PretensionSection(Item):
 
 
 @dataclass(frozen=True)
+class Gap(Item):
+    """Properties of gap elements: initial clearance [length], and vector from the first to the second node."""
+
+    clearance: float
+    direction: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Spring(Item):
+    """Properties of springs: axial stiffness [force / length]."""
+
+    stiffness: float
+
+
+@dataclass(frozen=True)
 class Axes(Item):
     """Local axes of nodes or materials.
 
@@ -279,8 +294,8 @@ class Content:
     orientations: dict[str, Axes] = field(default_factory=dict)
     distributions: dict[str, Block] = field(default_factory=dict)
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
-    gaps: dict[str, tuple[Location, float, tuple[float, ...]]] = field(default_factory=dict)
-    springs: dict[str, tuple[Location, float]] = field(default_factory=dict)
+    gaps: dict[str, Gap] = field(default_factory=dict)
+    springs: dict[str, Spring] = field(default_factory=dict)
     supports: list[Condition] = field(default_factory=list)
     initial_temperatures: list[Block] = field(default_factory=list)
     initial_stresses: list[Block] = field(default_factory=list)
