@@ -6,7 +6,7 @@ loads then lie inside the cone of the contact forces (Fichera, 1964; Lions and S
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -71,6 +71,15 @@ class FreeMotions:
     def combined(self, coefficients: Array) -> FreeMotions:
         """Return the motions ``displacement @ coefficients``, coefficients (k, j)."""
         return replace(self, displacement=self.displacement @ coefficients, parts=self.parts @ coefficients)
+
+    def with_translations(self, dofs: Indices, labels: Sequence[Label], n_dofs: int) -> FreeMotions:
+        """Return these motions, and a unit displacement along each of the components `dofs` (j,) of `n_dofs`."""
+        k, j = len(self), len(dofs)
+        displacement = np.zeros((n_dofs, k + j))
+        displacement[: len(self.displacement), :k] = self.displacement
+        displacement[dofs, k + np.arange(j)] = 1.0
+        parts = np.asarray(block_diag(self.parts, np.eye(j)), float)
+        return FreeMotions(displacement, parts, [*self.labels, *labels], self.hinges)
 
     def names(self) -> list[str]:
         """Return the motions of all bodies, each with the name of its body; see `by_body`."""
@@ -178,16 +187,13 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
     Parts of a body that are connected only at single or collinear nodes can rotate about these nodes. `relations` (m, n_dofs)
     are the rows R of constraints ``R u = 0``. Points that belong to no body are included if constraints contain them.
     """
-    dofs = mesh.n_points * mesh.dim
     motions = _body_motions(mesh, kinematics, fixed)
     if relations is None:
         return motions
     without_body = bodies(mesh)[1][relations.indices // mesh.dim] < 0
     points = np.unique(relations.indices[without_body & ~fixed.ravel()[relations.indices]])
-    columns = [motions.displacement, *(np.eye(dofs, 1, -int(dof)) for dof in points)]
     labels = [Label(f"point {dof // mesh.dim}", f"translation along {'xyz'[dof % mesh.dim]}") for dof in points]
-    parts = np.asarray(block_diag(motions.parts, np.eye(len(points))), float)
-    motions = FreeMotions(np.hstack(columns), parts, [*motions.labels, *labels], motions.hinges)
+    motions = motions.with_translations(points, labels, mesh.points.size)
     if not relations.shape[0] or not len(motions):
         return motions
     return motions.combined(_null_space(relations @ motions.displacement))
