@@ -22,7 +22,7 @@ from fastcontact.cases.decks.gaps import add_gap_facets, add_gaps, check_discret
 from fastcontact.cases.decks.histories import ByShape, Period
 from fastcontact.cases.decks.loads import add_forces, add_temperatures, distributed_loads, heat_loads, point_group
 from fastcontact.cases.decks.materials import law_of, strain_of
-from fastcontact.cases.decks.meshing import deck_mesh_of, group_of_surface, secondary_group
+from fastcontact.cases.decks.meshing import check_nodes, deck_mesh_of, group_of_surface
 from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections, sections_by_point
 from fastcontact.cases.decks.steps import MOST_INCREMENTS
 from fastcontact.contact.integration import all_nodes_carry
@@ -121,7 +121,9 @@ class Building:
         thickness: float | None = None
         for scope in self.assembly.scopes:
             for section in self.assembly.part(scope).sections:
-                self._material(section)
+                material: Material = look_up("material", section.material, self.content.materials, section)
+                if material.law is None and self.content.heat != "alone":
+                    raise material.refuse(f"material '{material.name}' has no *ELASTIC")
                 if self.assembly.dim == 2 and self.assembly.kinematics != "axisymmetric":
                     section_thickness = 1.0 if section.thickness is None else section.thickness
                     if thickness is not None and section_thickness != thickness:
@@ -171,18 +173,11 @@ class Building:
             return CylindricalAxes(tuple(a.tolist()), tuple((b - a).tolist()))
         return tuple(tuple(row) for row in local_axes(axes, np.zeros(3)).tolist())
 
-    def _material(self, section: Section) -> Material:
-        """Return the material of a section. Raises CaseError if it is undefined or lacks elastic constants."""
-        material: Material = look_up("material", section.material, self.content.materials, section)
-        if material.law is None and self.content.heat != "alone":
-            raise material.refuse(f"material '{material.name}' has no *ELASTIC")
-        return material
-
     def _check_contact_pairs(self) -> None:
         """Raise CaseError if a pair is defined twice or has an undefined surface or interaction."""
         pair_names: set[str] = set()
         for pair in self.content.pairs:
-            secondary_group(self.assembly, pair.secondary, pair.location)
+            check_nodes(self.assembly, pair.secondary, pair.location)
             self.assembly.faces(pair.primary, pair.location)
             if not pair.tied:
                 look_up("surface interaction", pair.interaction, self.content.interactions, pair)

@@ -105,7 +105,10 @@ def add_gaps(model: Model, deck_mesh: DeckMesh, conditions: Conditions) -> dict[
                 )  # fmt: skip
             continue
         level = float((points[ends[:, 0]] @ direction).mean()) + gap.clearance
-        plane, history = HalfSpace(tuple(level * direction), tuple(-direction)), _motion(gap, ends, direction, conditions)
+        plane, history = (
+            HalfSpace(tuple(level * direction), tuple(-direction)),
+            _motion(gap, ends, direction, conditions),
+        )
         motion: dict[str, Any] = {}
         if any(value for _, value in history):
             motion = {"motion": dict(zip("xyz", direction.tolist(), strict=False)), "ramp": history}
@@ -122,9 +125,7 @@ def _distance(vectors: Array, direction: Array, tolerance: float, gap: Gap) -> f
     distances = vectors @ direction
     tangential = np.abs(vectors - np.outer(distances, direction)).max()
     if max(np.ptp(distances), tangential, -distances.mean()) > tolerance:
-        raise gap.refuse(
-            "gap elements between bodies are supported along their direction, in planes normal to it only"
-        )
+        raise gap.refuse("gap elements between bodies are supported along their direction, in planes normal to it only")
     return float(distances.mean())
 
 
