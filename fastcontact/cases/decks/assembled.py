@@ -389,14 +389,11 @@ def _coordinates_in_assembly(part: Part, instance: Instance | None) -> Array:
     return points
 
 
-# For each keyword, the letter of its loads on faces, and its loads on elements with the number of their further entries.
-BODY_FORCES = {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}
-ON_ELEMENTS: dict[str, tuple[str, dict[str, int]]] = {
-    "DLOAD": ("P", BODY_FORCES),
-    "DFLUX": ("S", {"BF": 0}),
-    "FILM": ("F", {}),
-}
+# Labels of loads on faces by keyword; those of elements are followed by the number of the face.
 ON_SURFACES = {"DSLOAD": "P", "DSFLUX": "S", "SFILM": "F"}
+ON_FACES = {"DLOAD": "P", "DFLUX": "S", "FILM": "F"}
+# Labels of loads on elements by keyword, with the number of their further entries.
+ON_ELEMENTS = {"DLOAD": {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}, "DFLUX": {"BF": 0}, "FILM": {}}
 
 
 @dataclass(frozen=True, slots=True)
@@ -428,7 +425,7 @@ def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> li
             raise row.refuse(f"{load}{label[:40]} on a surface is not supported, only {letter}")
         faces = assembly.faces(row.text(0), row.location)
         return [Target(keyword, row.location, letter, face, (), numbers) for face in faces]
-    letter, element_loads = ON_ELEMENTS[keyword]
+    letter, element_loads = ON_FACES[keyword], ON_ELEMENTS[keyword]
     on_all_solids = keyword == "DLOAD" and not row.text(0)
     elements = assembly.solids if on_all_solids else assembly.elements_of(row.text(0), row.location)
     if label[:1] == letter and label[1:].isdigit():

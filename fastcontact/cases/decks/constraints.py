@@ -23,7 +23,7 @@ from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows,
 
 # Smallest number of nodes of those kinds of *MPC whose number of nodes is not fixed.
 LEAST = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
-# Tolerance of the tests for collinear points and for points on the axis, relative to squared distances.
+# Tolerance of the tests for collinear points, and for points on the axis relative to squared distances.
 FLAT = 1e-9
 
 
@@ -152,26 +152,18 @@ def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[T
     coordinates = deck_mesh.points[nodes]
     if constraint.kind == "MEANROT":
         return [_mean_rotation(constraint, nodes, coordinates)]
-    relative = coordinates - coordinates[0]
-    first = relative[1]
-    if constraint.kind == "STRAIGHT":
-        if not first.any():
-            raise constraint.refuse("the first two nodes of STRAIGHT coincide")
-        normals = np.linalg.svd(first[None])[2][1:]
-        along = relative @ first / (first @ first)
-        weights = np.column_stack([1.0 - along, along])
-    else:
-        normals = np.cross(first, relative[2])[None]
-        if np.linalg.norm(normals) <= FLAT * (first @ first):
-            raise constraint.refuse("the first three nodes of PLANE lie on a line")
-        in_plane = np.linalg.lstsq(relative[1:3].T, relative.T, rcond=None)[0].T
-        weights = np.column_stack([1.0 - in_plane.sum(axis=1), in_plane])
-    k = weights.shape[1]  # the first k nodes determine the line or the plane
-    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    relative, k = coordinates - coordinates[0], LEAST[constraint.kind] - 1
+    basis = relative[1:k]  # from the first node to the others of the k nodes that determine the line or the plane
+    _, sizes, directions = np.linalg.svd(basis)
+    if sizes[-1] <= FLAT * sizes[0]:
+        degenerate = "two nodes of STRAIGHT coincide" if k == 2 else "three nodes of PLANE lie on a line"
+        raise constraint.refuse(f"the first {degenerate}")
+    components = np.linalg.lstsq(basis.T, relative.T, rcond=None)[0].T
+    weights = np.column_stack([1.0 - components.sum(axis=1), components])
     return [
         _terms([nodes[i], *nodes[:k]], np.outer([1.0, *-weights[i]], normal))
         for i in range(k, len(nodes))
-        for normal in normals
+        for normal in directions[k - 1 :]
     ]
 
 
