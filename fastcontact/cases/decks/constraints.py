@@ -113,22 +113,19 @@ def _coupling_rows(deck_mesh: DeckMesh, mesh: Mesh, coupling: Coupling) -> csr_a
     The nodes follow the reference point or, if the coupling is distributing, the reference point has the area-weighted mean
     motion of a surface.
     """
-    n_dofs = mesh.points.size
     point = deck_mesh.node(coupling.reference, coupling.location)
-    position = tuple(deck_mesh.points[point][: deck_mesh.dim].tolist())
-    reference = ReferencePoint(point, deck_mesh.rotations[point], position)
+    reference = ReferencePoint(point, deck_mesh.rotations[point])
     points = np.array(_points(deck_mesh, coupling), np.intp)
-    coordinates = deck_mesh.points[points, : deck_mesh.dim]
     if not coupling.distributing:
         directions = np.array([_directions(deck_mesh, coupling, follower) for follower in points.tolist()])
-        return rigid_rows(reference, points, coordinates, directions, n_dofs)
+        return rigid_rows(mesh.points, reference, points, directions)
     deck_mesh.faces(coupling.group, coupling.location)
     surface = Traction(group_of_surface(deck_mesh, coupling.group), {0: 1.0}, None)
     areas = surface.vector(mesh, deck_mesh.kinematics)[:, 0]
     weight = areas[points] / areas[points].sum()
     directions = _directions(deck_mesh, coupling, point)
     with refusing(coupling):
-        return distributing_rows(reference, points, coordinates, weight, directions, n_dofs)
+        return distributing_rows(mesh.points, reference, points, weight, directions)
 
 
 def _directions(deck_mesh: DeckMesh, coupling: Coupling, point: int) -> Array:
