@@ -92,16 +92,12 @@ class FreeMotions:
         """
         by_body: dict[str, list[str]] = {}
         for column in _column_echelon_form(self.parts).T:
-            for body, motion in self._body_terms(column):
-                by_body.setdefault(body, []).append(motion)
+            rows_of_body: dict[str, list[int]] = {}
+            for i in np.flatnonzero(np.abs(column) > 1e-6 * np.abs(column).max()).tolist():
+                rows_of_body.setdefault(self.labels[i].body, []).append(i)
+            for body, rows in rows_of_body.items():
+                by_body.setdefault(body, []).append(self._motion_of_body(column, rows))
         return {body: list(dict.fromkeys(motions)) for body, motions in by_body.items()}
-
-    def _body_terms(self, column: Array) -> list[tuple[str, str]]:
-        """Return the name of each body that takes part in a motion (p,), with the description of its motion."""
-        rows_of: dict[str, list[int]] = {}
-        for i in np.flatnonzero(np.abs(column) > 1e-6 * np.abs(column).max()):
-            rows_of.setdefault(self.labels[i].body, []).append(int(i))
-        return [(body, self._motion_of_body(column, rows)) for body, rows in rows_of.items()]
 
     def _motion_of_body(self, column: Array, rows: list[int]) -> str:
         """Return the name of the motion of a body: a rotation about a point or line if possible, else elementary motions."""

@@ -70,7 +70,7 @@ class Building:
     def __init__(self, content: Content, case_text: str) -> None:
         self.content = content
         self.assembly = deck_mesh_of(content)
-        only_heat = content.heat == "alone"
+        only_heat = content.heat == "uncoupled"
         if not only_heat:
             make_rotations(self.assembly)
         materials, self.thickness = self._materials()
@@ -91,8 +91,8 @@ class Building:
         self.local_supports: list[MultiPointConstraint] = []
         self.driven: dict[tuple[int, int], Table] = {}
         if only_heat:
-            held = point_group(self.model, self.assembly, "held", range(mesh.n_points))
-            self.model.fix(held, "xyz"[: mesh.dim])
+            all_points = point_group(self.model, self.assembly, "held", range(mesh.n_points))
+            self.model.fix(all_points, "xyz"[: mesh.dim])
             add_sectors(self.model, self.assembly)
         else:
             self._mechanics(conditions)
@@ -122,7 +122,7 @@ class Building:
         for scope in self.assembly.scopes:
             for section in self.assembly.part(scope).sections:
                 material: Material = look_up("material", section.material, self.content.materials, section)
-                if material.law is None and self.content.heat != "alone":
+                if material.law is None and self.content.heat != "uncoupled":
                     raise material.refuse(f"material '{material.name}' has no *ELASTIC")
                 if self.assembly.dim == 2 and self.assembly.kinematics != "axisymmetric":
                     section_thickness = 1.0 if section.thickness is None else section.thickness
@@ -265,7 +265,7 @@ class Building:
 
     def _pair_options(self, pair: Pair) -> dict[str, Any]:
         """Return the options of a contact pair or a tie. Raises CaseError if its interaction is not supported."""
-        only_heat = self.content.heat == "alone"
+        only_heat = self.content.heat == "uncoupled"
         if pair.tied:
             options: dict[str, Any] = {"kind": "gap_only" if only_heat else "tied"}
             if self.content.heat:

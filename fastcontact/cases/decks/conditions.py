@@ -57,11 +57,11 @@ class Conditions:
         self.supports: Histories[Component] = Histories(content)
         self.forces: Histories[Component] = Histories(content)
         self.loads: Histories[Target] = Histories(content)
-        self.given_temperatures: Histories[int] = Histories(content, rest=initial)
-        self.fixed_temperatures: Histories[int] = Histories(content, rest=uniform)
+        self.given_temperatures: Histories[int] = Histories(content, baseline=initial)
+        self.fixed_temperatures: Histories[int] = Histories(content, baseline=uniform)
         self.powers: Histories[int] = Histories(content)
         self.fluxes: Histories[Target] = Histories(content)
-        self.films: Histories[Target] = Histories(content, rest=self.absent_films)
+        self.films: Histories[Target] = Histories(content, baseline=self.absent_films)
         self.film_of: dict[tuple[str, Face | None], Target] = {}
         self.of_keyword: dict[str, Histories[Any]] = {
             "CLOAD": self.forces, "TEMPERATURE": self.given_temperatures, "CFLUX": self.powers,

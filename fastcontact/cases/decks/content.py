@@ -268,7 +268,9 @@ class Step(Located):
     increment: float = 1.0
     has_procedure: bool = False
     perturbation: bool = False
-    heat: str = ""  # "alone"; "coupled" with displacements; empty if temperatures are not computed
+    heat: str = (
+        ""  # conduction "uncoupled" from or "coupled" with displacements; empty if temperatures are not computed
+    )
     n_modes: int = 0
     conditions: list[Condition] = field(default_factory=list)
 

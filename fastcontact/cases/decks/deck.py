@@ -28,6 +28,9 @@ from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult, Steps
 
+# Attributes of `ContactResult` that are proportional to the thickness of a plane model.
+FORCES = ("force", "force_vectors", "dissipation", "primary_force_vectors")
+
 
 @dataclass(frozen=True, eq=False)
 class Deck:
@@ -163,12 +166,9 @@ class Deck:
         if t == 1.0:
             return replace(step, reaction=reaction)
         contacts = {
-            name: replace(
-                c, force=t * c.force, force_vectors=t * c.force_vectors, dissipation=t * c.dissipation,
-                primary_force_vectors=t * c.primary_force_vectors,
-            )
-            for name, c in step.contact.items()
-        }  # fmt: skip
+            name: replace(contact, **{key: t * getattr(contact, key) for key in FORCES})
+            for name, contact in step.contact.items()
+        }
         sums = {name: _scaled(t, step.iterations[name]) for name in ("work", "heat") if step.iterations.get(name)}
         heat = None if step.heat_reaction is None else t * step.heat_reaction
         iterations = step.iterations | sums

@@ -227,7 +227,7 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
             convention = "pressure, as in CalculiX" if variable == "pressure" else "clearance, as in Abaqus"
             content.note(block, f"the conductance depends on {convention}")
         tables[variable] = rows if variable == "pressure" else [*rows, (rows[-1][0] * JUST_BEYOND, 0.0)]
-        if variable == "pressure" and content.heat == "alone":
+        if variable == "pressure" and content.heat == "uncoupled":
             content.note(block, "steps with heat alone have no pressures: closed contact conducts as at zero pressure")
     if constant is not None and tables:
         raise law.conductance[0].refuse("a constant conductance and a table are given: leave out one of them")
@@ -260,4 +260,4 @@ def perfect_conductance(content: Content, model: Model, location: Location) -> A
     h = PERFECT * float(largest) / float(np.ptp(model.mesh.points, axis=0).max())
     difference = "the temperatures of the sides differ by about 1e-8 of their variation"
     content.note(location, f"the conductance is {h:.3g}; {difference}")
-    return (lambda pressure, gap: np.full(gap.shape, h)) if content.heat == "alone" else h
+    return (lambda pressure, gap: np.full(gap.shape, h)) if content.heat == "uncoupled" else h

@@ -61,7 +61,8 @@ def distributed_loads(deck_mesh: DeckMesh, histories: Histories[Target]) -> list
                 by_shape.add((load.keyword, load.kind, load.numbers, cell), scaled, rows)
     adders: list[Adder] = []
     for number, ((_, kind, vector, cell), indices, value, table) in enumerate(by_shape, start=1):
-        group = deck_mesh.add_cells(f"{GROUP_NAMES.get(kind, 'load')} {number}", cell, indices)
+        group = f"{GROUP_NAMES.get(kind, 'load')} {number}"
+        deck_mesh.groups[group] = {cell: indices.tolist()}
         if any(multiplier for _, multiplier in table):
             adders.append(partial(_add_load, kind=kind, vector=vector, group=group, value=value, table=table))
     return adders

@@ -75,11 +75,6 @@ class DeckMesh(Assembly):
             rows.setdefault(name, []).append(row)
         return rows
 
-    def add_cells(self, group: str, cell: str, rows: Indices) -> str:
-        """Make a group of cells of one type, given by their rows, and return its name."""
-        self.groups[group] = {cell: rows.tolist()}
-        return group
-
     def add_solids(self, group: str, solids: Iterable[Element]) -> str:
         """Make a group of solids and return its name."""
         self.groups[group] = rows_by_type(solids)
@@ -147,7 +142,7 @@ def deck_mesh_of(content: Content) -> DeckMesh:
             raise element.cell.refuse(
                 f"elements of type {element.solid.name} and {first.name} ({first.kinematics}) cannot be in one model"
             )
-        if element.solid.conducts and content.heat != "alone":
+        if element.solid.conducts and content.heat != "uncoupled":
             raise element.cell.refuse(
                 f"elements of type {element.solid.name} conduct heat alone: they need steps with *HEAT TRANSFER, all of them"
             )

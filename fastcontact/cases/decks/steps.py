@@ -48,7 +48,7 @@ def heat_procedure(content: Content, step: Step, block: Block) -> None:
     if "STEADY STATE" not in block.parameters:
         raise block.refuse("only STEADY STATE is supported, not transient heat conduction")
     static(content, step, block)
-    step.heat = "alone" if block.keyword == "HEAT TRANSFER" else "coupled"
+    step.heat = "uncoupled" if block.keyword == "HEAT TRANSFER" else "coupled"
     if block.keyword[:2] == "UN":
         content.note(block, "temperatures and displacements are solved together")
 
@@ -78,7 +78,7 @@ def end_step(content: Content, step: Step | None, block: Block) -> None:
     content.steps.pop()
     if not content.steps:
         raise step.refuse("*FREQUENCY needs a step with *STATIC before it: modes are vibrations about its last state")
-    if content.steps[-1].heat == "alone":
+    if content.steps[-1].heat == "uncoupled":
         raise step.refuse("*FREQUENCY after *HEAT TRANSFER is not supported: displacements are fixed there")
     stiffening = step.perturbation or any(earlier.nonlinear for earlier in content.steps)
     content.modes = {"n": step.n_modes, "stress_stiffening": stiffening}
