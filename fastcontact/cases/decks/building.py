@@ -274,23 +274,12 @@ class Building:
         law = self.content.interactions[key_of(pair.interaction)]
         options = interactions.conductance_of(self.content, law) if self.content.heat else {}
         if only_heat:
-            return {**options, "kind": "gap_only", **self._clearance_option(pair)}
-        if law.cohesion:
-            return {
-                **options,
-                **interactions.cohesion_of(self.content, law),
-                **self._clearance_option(pair, glued=True),
-            }
-        if law.kind != "unilateral":
-            if law.friction or law.friction_changes:
-                raise law.refuse(f"friction with {law.kind} contact is not supported")
-            options["kind"] = law.kind
-        if law.penalty is not None and law.kind != "tied":
-            options["penalty"] = law.penalty
-        options.update(interactions.friction_of(law, len(self.content.steps)))
-        if "friction" in options and self.content.heat:
-            options.update(interactions.friction_heat_of(self.content, law))
-        return {**options, **self._clearance_option(pair)}
+            options["kind"] = "gap_only"
+        elif law.cohesion:
+            options |= interactions.cohesion_of(self.content, law)
+        else:
+            options |= interactions.kind_and_friction_of(self.content, law)
+        return options | self._clearance_option(pair, glued=bool(law.cohesion) and not only_heat)
 
     def _clearance_option(self, pair: Pair, glued: bool = False) -> dict[str, Any]:
         """Return the option `clearance` that ADJUST or *CLEARANCE requires, or an empty dictionary if none is required.
