@@ -249,15 +249,6 @@ class Amplitude(Item):
     total: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Condition:
-    """A block of supports, loads or temperatures; `new` is true for OP=NEW, which removes earlier blocks."""
-
-    block: Block
-    new: bool
-    amplitude: str = ""
-
-
 @dataclass(slots=True)
 class Step(Located):
     """A load step of the deck."""
@@ -272,7 +263,7 @@ class Step(Located):
         ""  # conduction "uncoupled" from or "coupled" with displacements; empty if temperatures are not computed
     )
     n_modes: int = 0
-    conditions: list[Condition] = field(default_factory=list)
+    conditions: list[Block] = field(default_factory=list)  # blocks of supports, loads and temperatures
 
 
 @dataclass
@@ -298,7 +289,7 @@ class Content:
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
     gaps: dict[str, Gap] = field(default_factory=dict)
     springs: dict[str, Spring] = field(default_factory=dict)
-    supports: list[Condition] = field(default_factory=list)
+    supports: list[Block] = field(default_factory=list)  # before all steps
     initial_temperatures: list[Block] = field(default_factory=list)
     initial_stresses: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)

@@ -87,7 +87,7 @@ def check_steps(content: Content) -> None:
                 "*HEAT TRANSFER cannot be combined with other procedures, and *COUPLED TEMPERATURE-DISPLACEMENT cannot "
                 "precede them: use *HEAT TRANSFER for all steps, or *COUPLED TEMPERATURE-DISPLACEMENT for all"
             )
-        for block in (condition.block for condition in step.conditions):
+        for block in step.conditions:
             if block.keyword in OF_HEAT and not step.heat:
                 raise block.refuse("needs a step with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT")
             if block.keyword == "TEMPERATURE" and first:

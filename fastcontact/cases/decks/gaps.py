@@ -105,10 +105,8 @@ def add_gaps(model: Model, deck_mesh: DeckMesh, conditions: Conditions) -> dict[
                 )  # fmt: skip
             continue
         level = float((points[ends[:, 0]] @ direction).mean()) + gap.clearance
-        plane, history = (
-            HalfSpace(tuple(level * direction), tuple(-direction)),
-            _motion(gap, ends, direction, conditions),
-        )
+        plane = HalfSpace(tuple(level * direction), tuple(-direction))
+        history = _motion(gap, ends, direction, conditions)
         motion: dict[str, Any] = {}
         if any(value for _, value in history):
             motion = {"motion": dict(zip("xyz", direction.tolist(), strict=False)), "ramp": history}

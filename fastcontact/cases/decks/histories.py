@@ -12,8 +12,8 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.cases.decks.blocks import Location, key_of
-from fastcontact.cases.decks.content import Amplitude, Condition, Content, Step
+from fastcontact.cases.decks.blocks import Block, Location, key_of
+from fastcontact.cases.decks.content import Amplitude, Content, Step
 from fastcontact.model.ramp import Table
 
 Name = TypeVar("Name", bound=Hashable)
@@ -140,12 +140,12 @@ class Histories(Generic[Name]):
         self.removals.pop(name, None)
         self.kept.discard(name)
 
-    def record(self, condition: Condition, entries: Iterable[tuple[Iterable[Name], float, Location]]) -> None:
+    def record(self, block: Block, entries: Iterable[tuple[Iterable[Name], float, Location]]) -> None:
         """Set the values of the lines of a block; OP=NEW first removes the earlier values of its keyword."""
-        if condition.new:
-            self.remove_earlier(condition.block.keyword)
+        if block.removes_earlier:
+            self.remove_earlier(block.keyword)
         for names, value, location in entries:
-            shared = Value(value, condition.amplitude, location)
+            shared = Value(value, block.get("AMPLITUDE"), location)
             for name in names:
                 self.set_value(name, shared)
 

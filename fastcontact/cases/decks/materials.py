@@ -190,8 +190,8 @@ def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
         law = replace(law, incompatible_modes=True)
     if content.heat or material.conductivity is not None:
         law = _add_constants(material, law, axes, conductivity=_conductivity(content, material))
-    conditions = [condition for step in content.steps for condition in step.conditions]
-    heated = content.heat or any(condition.block.keyword == "TEMPERATURE" for condition in conditions)
+    blocks = (block for step in content.steps for block in step.conditions)
+    heated = content.heat or any(block.keyword == "TEMPERATURE" for block in blocks)
     if expansion is None:
         if heated:
             content.note(material, f"material '{material.name}' has no *EXPANSION: temperatures cause no strain")

@@ -53,8 +53,8 @@ def _locked_from(point: int, section: PretensionSection, conditions: Conditions)
     for period in (period for period in track.periods if period.keeps) if track else ():
         if period.ends < np.inf:
             step = conditions.assembly.content.steps[int(period.ends)]
-            supports = [condition for condition in step.conditions if condition.block.keyword == "BOUNDARY"]
-            raise max(supports, key=lambda condition: condition.new).block.refuse(
+            supports = [block for block in step.conditions if block.keyword == "BOUNDARY"]
+            raise max(supports, key=lambda block: block.removes_earlier).refuse(
                 f"node {section.node} of a pretension section is released here: a locked section stays locked"
             )
         return period.begins

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from fastcontact.cases.decks.blocks import Block, key_of, look_up
-from fastcontact.cases.decks.content import Amplitude, Condition, Content, Step
+from fastcontact.cases.decks.content import Amplitude, Content, Step
 
 # Largest number of increments into which a step of a path-dependent model is divided.
 MOST_INCREMENTS = 20
@@ -72,7 +72,7 @@ def end_step(content: Content, step: Step | None, block: Block) -> None:
             raise step.refuse("the step has no *STATIC or other procedure")
         return
     if step.conditions:
-        raise step.conditions[0].block.refuse(
+        raise step.conditions[0].refuse(
             "cannot be in a step with *FREQUENCY: the modes use the supports of the preceding steps"
         )
     content.steps.pop()
@@ -93,11 +93,11 @@ def condition(content: Content, step: Step | None, block: Block) -> None:
     """Store a block of supports or loads of a step, or a *BOUNDARY that precedes all steps."""
     if name := block.get("AMPLITUDE"):
         look_up("amplitude", name, content.amplitudes, block)
-    entry = Condition(block, block.choice("OP", ("MOD", "NEW")) == "NEW", name)
+    block.choice("OP", ("MOD", "NEW"))
     if step is not None:
-        step.conditions.append(entry)
+        step.conditions.append(block)
     elif block.keyword == "BOUNDARY":
-        content.supports.append(entry)
+        content.supports.append(block)
     else:
         raise block.refuse("loads belong in a step")
 
