@@ -164,15 +164,6 @@ class SectorEnds(Item):
 
 
 @dataclass(frozen=True)
-class Sectors(Item):
-    """Number of cyclic sectors, two points of their axis, and the name of the tie of their ends."""
-
-    count: int
-    tie: str
-    points: tuple[float, ...]
-
-
-@dataclass(frozen=True)
 class Equation(Item):
     """A linear multi-point constraint: node, component and coefficient of each term."""
 
@@ -278,7 +269,7 @@ class Content:
     interactions: dict[str, Interaction] = field(default_factory=dict)
     pairs: list[Pair] = field(default_factory=list)
     sector_ends: list[SectorEnds] = field(default_factory=list)
-    sectors: list[Sectors] = field(default_factory=list)
+    sectors: list[Block] = field(default_factory=list)
     equations: list[Equation] = field(default_factory=list)
     multi_points: list[MultiPoint] = field(default_factory=list)
     couplings: list[Coupling] = field(default_factory=list)

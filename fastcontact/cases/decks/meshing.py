@@ -189,12 +189,8 @@ def _add_node_based_surface(deck_mesh: DeckMesh, group: str, definition: Surface
 def check_nodes(deck_mesh: DeckMesh, name: str, location: Location) -> None:
     """Raise CaseError if a node of a node-based surface is on no outer face of a solid."""
     definition, scope = deck_mesh.surface(name, location)
-    if not definition.of_nodes:
-        return
-    complete, further, _ = deck_mesh.faces_of_nodes(definition, scope)
-    on_faces = {point for face in (*complete, *further) for point in facet_points(*face)}
-    for point in deck_mesh.surface_nodes(definition, scope):
-        if point not in on_faces:
+    for point in deck_mesh.surface_nodes(definition, scope) if definition.of_nodes else ():
+        if point not in deck_mesh.outer_faces:
             raise definition.refuse(
                 f"node {deck_mesh.number_of(point)} of surface '{definition.name}' is on no outer face of a solid: "
                 "contact needs nodes of bodies, so leave it out"
