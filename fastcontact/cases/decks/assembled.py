@@ -73,7 +73,7 @@ class Assembly:
     surfaces : dict of str to list of (Element, int)
         Faces of the surfaces that have been resolved so far.
     open : list of (str, str, str)
-        Sets that are being resolved, for the detection of a set that contains itself.
+        Sets that are being resolved, for the detection of sets that contain themselves.
     """
 
     content: Content
@@ -126,9 +126,7 @@ class Assembly:
     def members_of(self, kind: str, scope: str, name: str, location: Location, shown: str = "") -> list[Any]:
         """Return the points or elements of a set of an instance, including those of nested sets.
 
-        Raises CaseError if undefined.
-
-        Messages call the set `shown`.
+        Raises CaseError, with the name `shown`, if the set is not defined.
         """
         part, label = self.part(scope), (kind, scope, name)
         sets = part.node_sets if kind == "node" else part.element_sets
@@ -146,7 +144,7 @@ class Assembly:
         return self.resolved[label]
 
     def _members_of_entry(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
-        """Return the points or elements of one entry of a set; numbers of a range that are undefined are ignored."""
+        """Return the points or elements of one entry of a set; undefined numbers of a range are ignored."""
         scope = entry.instance or scope
         if scope:
             look_up("instance", scope, self.content.instances, entry)

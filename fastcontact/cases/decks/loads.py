@@ -1,7 +1,7 @@
 """Loads of the model of a deck: forces, pressures, body forces, given temperatures and heat loads, from their histories.
 
-Loads on cells and facets need groups of the mesh. Their functions create the groups before the mesh exists, and return
-functions that add the loads to the model later.
+Loads on cells and facets need groups of the mesh. The functions for these loads create the groups before the mesh exists, and
+return functions that add the loads to the model later.
 """
 
 from __future__ import annotations
