@@ -256,11 +256,11 @@ def _resolve(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
     file = entry.get("file")
     if file is None:
         return entry
-    names = [file] if isinstance(file, str) else file
-    if not all(isinstance(name, str) for name in names):
+    if isinstance(file, str):
+        return {**entry, "file": folder / file}
+    if not all(isinstance(name, str) for name in file):
         raise CaseError(f"'file' must be a path or a list of paths, not {repr(file)}")
-    paths = [folder / name for name in names]
-    return {**entry, "file": paths[0] if isinstance(file, str) else paths}
+    return {**entry, "file": [folder / name for name in file]}
 
 
 def _interpolant(where: str, value: Any) -> Any:

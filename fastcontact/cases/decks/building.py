@@ -18,7 +18,7 @@ from fastcontact.cases.decks.conditions import Component, Conditions
 from fastcontact.cases.decks.constraints import make_rotations, relations_of
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
 from fastcontact.cases.decks.fields import add_initial_stresses
-from fastcontact.cases.decks.gaps import add_gap_facets, add_gaps, check_discrete
+from fastcontact.cases.decks.gaps import TOUCHING, add_gap_facets, add_gaps, check_discrete
 from fastcontact.cases.decks.histories import ByShape, Period
 from fastcontact.cases.decks.loads import add_forces, add_temperatures, distributed_loads, heat_loads, point_group
 from fastcontact.cases.decks.materials import law_of, strain_of
@@ -33,8 +33,6 @@ from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
 from fastcontact.model.relation_rows import rows_along
 
-# Largest gap between the undeformed sides that counts as closed, relative to the size of the model.
-TOUCHING = 1e-6
 # Largest number of instants of a ramp. A larger number is treated as an error.
 LONGEST_RAMP = 100_000
 
@@ -332,7 +330,7 @@ class Building:
                 count = max(1, round(min(MOST_INCREMENTS, step.period / min(step.increment, step.period))))
                 instants.update(number + k / count for k in range(1, count))  # ends of equal increments
         for histories in conditions.histories:
-            for track in {id(track): track for track in histories.tracks.values()}.values():
+            for track in set(histories.tracks.values()):
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
             raise steps[0].refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")

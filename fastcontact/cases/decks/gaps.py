@@ -17,7 +17,7 @@ from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
-# Tolerance of distances relative to the size of the model.
+# Tolerance of gaps and distances, relative to the size of the model.
 TOUCHING = 1e-6
 
 
