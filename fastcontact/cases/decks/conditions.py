@@ -51,16 +51,14 @@ class Conditions:
         self.assembly, content = assembly, assembly.content
         initial = initial_temperatures(assembly, content.initial_temperatures)
         self.reference = reference_temperature(assembly, initial) if content.heat else 0.0
-        uniform = dict.fromkeys(range(len(assembly.points)), self.reference) if content.heat else {}
-        self.absent_films: dict[Target, float] = {}
         self.supports: Histories[Component] = Histories(content)
         self.forces: Histories[Component] = Histories(content)
         self.loads: Histories[Target] = Histories(content)
         self.given_temperatures: Histories[int] = Histories(content, baseline=initial)
-        self.fixed_temperatures: Histories[int] = Histories(content, baseline=uniform)
+        self.fixed_temperatures: Histories[int] = Histories(content, default=self.reference)
         self.powers: Histories[int] = Histories(content)
         self.fluxes: Histories[Target] = Histories(content)
-        self.films: Histories[Target] = Histories(content, baseline=self.absent_films)
+        self.films: Histories[Target] = Histories(content, default=self.reference)
         self.film_of: dict[tuple[str, Face | None], Target] = {}
         self.of_keyword: dict[str, Histories[Any]] = {
             "CLOAD": self.forces, "TEMPERATURE": self.given_temperatures, "CFLUX": self.powers,
@@ -136,7 +134,6 @@ class Conditions:
             raise row.refuse(f"the film coefficient {coefficient:g} must not be negative")
         names = targets(self.assembly, row, (coefficient,))
         for film in names:
-            self.absent_films[film] = self.reference
             earlier = self.film_of.get((film.keyword, film.face), film)
             if earlier != film and earlier in films.step_values:
                 raise row.refuse(

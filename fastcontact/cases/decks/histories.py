@@ -110,11 +110,13 @@ class Histories(Generic[Name]):
     removals : dict
         Names of earlier values that the current step removes.
     baseline : mapping
-        Values in the absence of a load or support, by default zero.
+        Values in the absence of a load or support, by name.
     initial : dict
         Values given before all steps by name, which the first step reaches unless it changes or removes them.
     kept : set
         Names of the values that the current step keeps (FIXED).
+    default : float
+        Value in the absence of a load or support of a name without `baseline`.
     time : float
         Total time [time] at the start of the current step.
     """
@@ -126,6 +128,7 @@ class Histories(Generic[Name]):
     baseline: Mapping[Name, float] = field(default_factory=dict)
     initial: dict[Name, Value] = field(default_factory=dict)
     kept: set[Name] = field(default_factory=set)
+    default: float = 0.0
     time: float = 0.0
 
     def set_value(self, name: Name, value: Value) -> None:
@@ -172,7 +175,7 @@ class Histories(Generic[Name]):
         current = self.initial | self.step_values if self.initial else self.step_values
         changed: dict[tuple[Any, ...], Track] = {}
         for name in (*current, *self.removals):
-            previous, baseline, new = self.tracks.get(name), self.baseline.get(name, 0.0), current.get(name)
+            previous, baseline, new = self.tracks.get(name), self.baseline.get(name, self.default), current.get(name)
             value, amplitude = new[:2] if new else (baseline, "")
             periods = self._periods(name, new, begin)
             key = previous, value, amplitude, baseline, periods
