@@ -160,7 +160,8 @@ def read_check(
         raise CaseError(f"{where} needs either 'theory', the name of a contact pair with a theory, or 'value'")
     owner, _, field = entry["quantity"].partition(".")
     check_known(f"contact pair or probe in {where}.quantity", owner, [*probes, *pairs], CaseError)
-    _check_quantity(where, field, OF_PROBES if owner in probes else OF_PAIRS, kinematics)
+    quantities = defined(OF_PROBES if owner in probes else OF_PAIRS, kinematics)
+    check_known(f"quantity in {where}", field, quantities, CaseError)
     if owner in pairs and field in REQUIRED_OPTIONS and REQUIRED_OPTIONS[field][0] not in pairs[owner]:
         raise CaseError(f"{where}: '{owner}' has no {field}: {REQUIRED_OPTIONS[field][1]}")
     base = field.split(".")[0]
@@ -186,11 +187,6 @@ def read_check(
         check_known(f"theory in {where}", check.theory, theories, CaseError)
         check_target(where, check, theories[check.theory]["theory"])
     return check
-
-
-def _check_quantity(where: str, field: str, allowed: Collection[str], kinematics: str) -> None:
-    """Raise CaseError unless `field` is allowed and defined by the kinematics."""
-    check_known(f"quantity in {where}", field, defined(allowed, kinematics), CaseError)
 
 
 def defined(names: Collection[str], kinematics: str) -> list[str]:

@@ -60,12 +60,6 @@ def _add_temperature(model: Model, **entry: Any) -> None:
         model.add_temperature_file(**entry)
 
 
-@functools.wraps(Model.add_coupling)
-def _add_coupling(model: Model, place: Any = None, **entry: Any) -> None:
-    """Add a coupling; `_add_references` has already added its reference point, at `place`, to the mesh."""
-    model.add_coupling(**entry)
-
-
 def _material_law(entry: dict[str, Any]) -> type[Material]:
     """Return the class of a material, which the key `law` states or, without this key, the other keys imply.
 
@@ -116,7 +110,6 @@ _SPECIAL: dict[str, Callable[..., None]] = {
     "support": Model.prescribe,
     "temperature": _add_temperature,
     "fixed_temperature": Model.fix_temperature,
-    "coupling": _add_coupling,
     "couple": Model.couple,
     "relation": Model.relate,
     "group_relation": Model.relate_groups,
@@ -263,11 +256,11 @@ def _resolve(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
     file = entry.get("file")
     if file is None:
         return entry
-    names = [file] if isinstance(file, str) else file
-    if not all(isinstance(name, str) for name in names):
+    if isinstance(file, str):
+        return {**entry, "file": folder / file}
+    if not all(isinstance(name, str) for name in file):
         raise CaseError(f"'file' must be a path or a list of paths, not {repr(file)}")
-    paths = [folder / name for name in names]
-    return {**entry, "file": paths[0] if isinstance(file, str) else paths}
+    return {**entry, "file": [folder / name for name in file]}
 
 
 def _interpolant(where: str, value: Any) -> Any:
@@ -337,7 +330,7 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
 
     Raises CaseError if one of these, or a term of a multi-point constraint, is invalid.
     """
-    arguments = dict(entry)
+    arguments = {key: value for key, value in entry.items() if key != "place"}  # `_add_references` has read the place
     if isinstance(entry.get("axes"), dict):
         arguments["axes"] = called(f"{where}.axes", CylindricalAxes, entry["axes"])
     if "rotation" in entry:

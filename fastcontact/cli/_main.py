@@ -88,12 +88,9 @@ class Parser(argparse.ArgumentParser):
         message = _SEVERAL.sub(r"\g<0>, separated by blanks", message)
         raise FastcontactError(f"{message}; see '{self.prog} --help'")
 
-    def print_help(self, file: Any = None) -> None:
-        """Print the help, and report write errors, which argparse ignores."""
-        if file is None:
-            say(self.format_help().rstrip("\n"))
-        else:
-            super().print_help(file)
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """Print the help or the version, and report write errors, which argparse ignores."""
+        say(message.rstrip("\n"))
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse arguments. Raises FastcontactError for an unknown argument, with the usage of this parser, not its parent."""
@@ -107,15 +104,6 @@ class Parser(argparse.ArgumentParser):
         return options, unparsed
 
 
-class PrintVersion(argparse.Action):
-    """Action of ``--version``: print the version and exit. Write errors, which argparse ignores, are reported."""
-
-    def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option_string: Any = None) -> None:
-        """Print the version and exit."""
-        say(f"fastcontact {__version__}")
-        parser.exit()
-
-
 def parser(command: str | None = None) -> argparse.ArgumentParser:
     """Return the parser of the subcommand `command`, or of all subcommands if none has this name.
 
@@ -123,7 +111,7 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     `mesh`.
     """
     top = Parser(prog="fastcontact", description="Finite-element analysis of elastic contact problems.")
-    top.add_argument("--version", action=PrintVersion, nargs=0, help="show program's version number and exit")
+    top.add_argument("--version", action="version", version=f"fastcontact {__version__}")
     top.add_argument(
         "--print-completion", metavar="SHELL", choices=SHELLS, action=PrintCompletion,
         help=f"print the completion script of a shell: {', '.join(SHELLS)}",

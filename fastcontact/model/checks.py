@@ -14,7 +14,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.body_overlap import penetration
 from fastcontact.model.ramp import Table
-from fastcontact.model.rigid_motions import FreeMotions, body_name, node_at
+from fastcontact.model.rigid_motions import FreeMotions, body_name, grouped, node_at
 from fastcontact.round_off import SINGLE_PRECISION
 
 if TYPE_CHECKING:
@@ -31,9 +31,8 @@ def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
             f". Parts of bodies are connected only at nodes (number: {len(motions.hinges)}, first: "
             f"{node_at(mesh, motions.hinges[0])}): merge whole facets, or leave the parts separate and define the contact"
         )
-    listing = "; ".join(f"{name}: {', '.join(motions_of_body)}" for name, motions_of_body in motions.by_body().items())
     raise ModelError(
-        f"{total} rigid-body motion{'s are' if total > 1 else ' is'} not supported: {listing}. "
+        f"{total} rigid-body motion{'s are' if total > 1 else ' is'} not supported: {grouped(motions.names())}. "
         "Fix or prescribe a displacement component that stops each, or let a load press the body against a contact"
         f"{hinges}"
     )

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -181,13 +182,11 @@ class Moment(Load):
         forces[points] += forces_of_moment(weight, mesh.points[points], moment, f"{self.name}: ")
 
 
-@dataclass(frozen=True)
-class ReferencePoint:
-    """A reference point: the numbers of its point and of the point that stores its rotation, and its position [length]."""
+class ReferencePoint(NamedTuple):
+    """The numbers of a reference point and of the point that stores its rotation."""
 
     point: int
     rotation: int
-    place: tuple[float, ...]
 
 
 def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
@@ -197,8 +196,7 @@ def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
             f"'{name}' is not a reference point: build the model on "
             f"fc.generate.with_reference_points(mesh, {{'{name}': (...)}})"
         )
-    point = mesh.point(name)
-    return ReferencePoint(point, mesh.point(name + ROTATION), tuple(mesh.points[point].tolist()))
+    return ReferencePoint(mesh.point(name), mesh.point(name + ROTATION))
 
 
 def relation(
@@ -218,33 +216,29 @@ def relation(
     return MultiPointConstraint(name, matrix, value, ramp)
 
 
-def rigid_rows(
-    reference: ReferencePoint, points: Indices, positions: Array, directions: Array, n_dofs: int
-) -> csr_array:
+def rigid_rows(x: Array, reference: ReferencePoint, points: Indices, directions: Array) -> csr_array:
     """Return the rows (n k, n_dofs) of a rigid coupling: points follow the translation and rotation of a reference point.
 
     Parameters
     ----------
+    x : ndarray (n_points, dim)
+        Reference coordinates of all points [length].
     reference : ReferencePoint
     points : ndarray of int (n,)
-    positions : ndarray (n, dim)
-        Reference coordinates of the points [length].
     directions : ndarray (n, k, dim)
         Unit vectors of the components that are coupled at each point [-].
-    n_dofs : int
     """
     n, k, dim = directions.shape
-    nodes = np.column_stack([points, np.tile([reference.point, reference.rotation], (n, 1))])
-    arms = directions @ rotation_displacement(positions - np.array(reference.place))
+    nodes = np.column_stack([points, np.tile(reference, (n, 1))])
+    arms = directions @ rotation_displacement(x[points] - x[reference.point])
     arms = np.pad(arms, ((0, 0), (0, 0), (0, dim - arms.shape[2])))
     values = np.stack([directions, -directions, -arms], axis=2)
-    return nodal_rows(np.repeat(nodes, k, axis=0), values.reshape(n * k, 3, dim), n_dofs)
+    return nodal_rows(np.repeat(nodes, k, axis=0), values.reshape(n * k, 3, dim), x.size)
 
 
 def distributing_rows(
-    reference: ReferencePoint, points: Indices, positions: Array, weight: Array, directions: Array, n_dofs: int,
-    caption: str = "",
-) -> csr_array:  # fmt: skip
+    x: Array, reference: ReferencePoint, points: Indices, weight: Array, directions: Array, caption: str = ""
+) -> csr_array:
     """Return the rows (m, n_dofs) of a distributing coupling: a reference point follows the mean motion of points.
 
     The rotation theta is determined by least squares, ``J theta = sum of w r x u``, where r is the arm from the weighted
@@ -252,15 +246,14 @@ def distributing_rows(
 
     Parameters
     ----------
+    x : ndarray (n_points, dim)
+        Reference coordinates of all points [length].
     reference : ReferencePoint
     points : ndarray of int (n,)
-    positions : ndarray (n, dim)
-        Reference coordinates of the points [length].
     weight : ndarray (n,)
         Weights of sum 1 [-].
     directions : ndarray (k, dim)
         Unit vectors of the components that are coupled [-].
-    n_dofs : int
     caption : str
         Beginning of error messages.
 
@@ -269,16 +262,16 @@ def distributing_rows(
     ModelError
         If the points coincide or, in 3D, are collinear.
     """
-    centroid, dim = weight @ positions, positions.shape[1]
-    rotation = mean_rotation(weight, positions - centroid, caption)
-    arms = directions @ rotation_displacement(np.array(reference.place) - centroid)
+    centroid, dim = weight @ x[points], x.shape[1]
+    rotation = mean_rotation(weight, x[points] - centroid, caption)
+    arms = directions @ rotation_displacement(x[reference.point] - centroid)
     # The coefficients of the translation and of the rotation of the reference point.
     reference_rows = np.zeros((len(rotation) + len(directions), 2, dim))
     reference_rows[: len(rotation), 1] = np.eye(len(rotation), dim)
     reference_rows[len(rotation) :, 0], reference_rows[len(rotation) :, 1, : len(rotation)] = directions, -arms
     means = np.concatenate([rotation, directions[:, None] * weight[:, None]])
-    nodes = np.tile([reference.point, reference.rotation, *points], (len(reference_rows), 1))
-    return nodal_rows(nodes, np.concatenate([reference_rows, -means], axis=1), n_dofs)
+    nodes = np.tile([*reference, *points], (len(reference_rows), 1))
+    return nodal_rows(nodes, np.concatenate([reference_rows, -means], axis=1), x.size)
 
 
 def coupling(
@@ -317,15 +310,14 @@ def coupling(
     if weighting != ("uniform", None):
         if kind == "rigid":
             raise ModelError(f"{name}: a rigid coupling has no weighting or radius, since all nodes follow the point")
-        spread = Spread(reference.place, *weighting)
+        spread = Spread(tuple(mesh.points[reference.point].tolist()), *weighting)
         spread.check(name, mesh.dim)
     points, weight = shares_of(mesh, kinematics, names[1], spread)
-    reference_nodes = np.isin(points, (reference.point, reference.rotation))
-    if reference_nodes.any() or not len(points):
+    if np.isin(points, reference).any() or not len(points):
         raise ModelError(f"{name}: the group must have points and must not contain the reference point")
-    positions, directions, n_dofs = mesh.points[points], np.eye(mesh.dim)[list(axes)], mesh.points.size
+    directions = np.eye(mesh.dim)[list(axes)]
     if kind == "rigid":
         at_points = np.tile(directions, (len(points), 1, 1))
-        return MultiPointConstraint(name, rigid_rows(reference, points, positions, at_points, n_dofs))
-    rows = distributing_rows(reference, points, positions, weight, directions, n_dofs, f"{name}: ")
+        return MultiPointConstraint(name, rigid_rows(mesh.points, reference, points, at_points))
+    rows = distributing_rows(mesh.points, reference, points, weight, directions, f"{name}: ")
     return MultiPointConstraint(name, rows)

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import block_diag
 from scipy.sparse import bsr_array, csr_array, hstack
 
 from fastcontact.arrays import Array, Indices, Mask
@@ -115,17 +114,12 @@ class ForceDrivenObstacles:
         if not self.pairs:
             return motions
         free = np.flatnonzero(self.without_stiffness)
-        count = len(motions)
-        displacement = np.zeros((self.n_dofs, count + len(free)))
-        displacement[: len(motions.displacement), :count] = motions.displacement
-        displacement[free, count + np.arange(len(free))] = 1.0
         n, dim = self.shape
         labels = [
             Label(f"obstacle '{self.pairs[dof // dim - n].name}'", f"translation along {'xyz'[dof % dim]}")
             for dof in free.tolist()
         ]
-        matrix = np.asarray(block_diag(motions.parts, np.eye(len(free))), float)
-        return FreeMotions(displacement, matrix, [*motions.labels, *labels], motions.hinges)
+        return motions.with_translations(free, labels, self.n_dofs)
 
     def near_nullspace(self, modes: Array) -> Array:
         """Return the near null space (n_dofs, k): `modes`, translations first, extended to the obstacles."""

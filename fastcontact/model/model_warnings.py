@@ -62,21 +62,9 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     texts = [*_moduli(model), *_units(model), *_proportions(model, float(motion.max())), poorest_cell(model.mesh)]
     texts += [hanging_nodes_warning(model), _close_nodes(model), *_friction(model), *_penetration(model, pairs, motion)]
     texts += [*_missing_ramps(model, ramp), *prescribed_overlap_warnings(pairs, supports), *_loads_on_supports(model)]
-    texts += [*_split_sides(model, pairs), *_sector_ends(model), *_shared_fluids(model), _stiffness(model.mesh)]
+    texts += [*split_side_warnings(pairs), *_sector_ends(model), *_shared_fluids(model), _stiffness(model.mesh)]
     texts += [text for load in model.loads for text in _load_quadrature(model, load)]
     return [text for text in texts if text]
-
-
-def _split_sides(model: Model, pairs: Pairs) -> Iterator[str]:
-    """Return the warnings about two contact pairs with adjoining sides; see `split_side_warnings`."""
-    nodes = {
-        pair.name: np.union1d(*(model.mesh.points_of(side) for side in (pair.secondary, pair.primary)))
-        for pair in model.contact
-        if pair.primary
-    }
-    points, count = np.unique(np.concatenate([*nodes.values(), np.empty(0, np.int32)]), return_counts=True)
-    adjacent = [name for name in nodes if np.isin(nodes[name], points[count > 1]).any()]
-    return split_side_warnings([(pair, bound) for pair, bound in pairs if pair.name in adjacent])
 
 
 def _sector_ends(model: Model) -> Iterator[str]:

@@ -92,10 +92,6 @@ class Pretension:
             constraints.append(TemporaryConstraint(name, self.row(n_dofs), begins=self.locked_from, keeps=True))
         return constraints
 
-    def shortening_at(self, displacement: Array) -> float:
-        """Return the approach of the sides at displacements (n_points, dim) [length]."""
-        return float((self.row(displacement.size) @ displacement.ravel())[0])
-
 
 @dataclass(frozen=True, eq=False)
 class PretensionForce(Load):
@@ -272,5 +268,6 @@ def section_results(
     results = {}
     for section, factor in zip(sections, factors, strict=True):
         force = float(reaction[section.nodes].sum(axis=0) @ section.normal) + factor * section.force
-        results[section.label] = {"force": force, "shortening": section.shortening_at(displacement)}
+        shortening = float((section.row(displacement.size) @ displacement.ravel())[0])
+        results[section.label] = {"force": force, "shortening": shortening}
     return results

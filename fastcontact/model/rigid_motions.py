@@ -6,7 +6,7 @@ loads then lie inside the cone of the contact forces (Fichera, 1964; Lions and S
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -72,6 +72,15 @@ class FreeMotions:
         """Return the motions ``displacement @ coefficients``, coefficients (k, j)."""
         return replace(self, displacement=self.displacement @ coefficients, parts=self.parts @ coefficients)
 
+    def with_translations(self, dofs: Indices, labels: Sequence[Label], n_dofs: int) -> FreeMotions:
+        """Return these motions, and a unit displacement along each of the components `dofs` (j,) of `n_dofs`."""
+        k, j = len(self), len(dofs)
+        displacement = np.zeros((n_dofs, k + j))
+        displacement[: len(self.displacement), :k] = self.displacement
+        displacement[dofs, k + np.arange(j)] = 1.0
+        parts = np.asarray(block_diag(self.parts, np.eye(j)), float)
+        return FreeMotions(displacement, parts, [*self.labels, *labels], self.hinges)
+
     def names(self) -> list[str]:
         """Return the motions of all bodies, each with the name of its body; see `by_body`."""
         return [f"{body}: {motion}" for body, motions in self.by_body().items() for motion in motions]
@@ -83,16 +92,12 @@ class FreeMotions:
         """
         by_body: dict[str, list[str]] = {}
         for column in _column_echelon_form(self.parts).T:
-            for body, motion in self._body_terms(column):
-                by_body.setdefault(body, []).append(motion)
+            rows_of_body: dict[str, list[int]] = {}
+            for i in np.flatnonzero(np.abs(column) > 1e-6 * np.abs(column).max()).tolist():
+                rows_of_body.setdefault(self.labels[i].body, []).append(i)
+            for body, rows in rows_of_body.items():
+                by_body.setdefault(body, []).append(self._motion_of_body(column, rows))
         return {body: list(dict.fromkeys(motions)) for body, motions in by_body.items()}
-
-    def _body_terms(self, column: Array) -> list[tuple[str, str]]:
-        """Return the name of each body that takes part in a motion (p,), with the description of its motion."""
-        rows_of: dict[str, list[int]] = {}
-        for i in np.flatnonzero(np.abs(column) > 1e-6 * np.abs(column).max()):
-            rows_of.setdefault(self.labels[i].body, []).append(int(i))
-        return [(body, self._motion_of_body(column, rows)) for body, rows in rows_of.items()]
 
     def _motion_of_body(self, column: Array, rows: list[int]) -> str:
         """Return the name of the motion of a body: a rotation about a point or line if possible, else elementary motions."""
@@ -178,16 +183,13 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
     Parts of a body that are connected only at single or collinear nodes can rotate about these nodes. `relations` (m, n_dofs)
     are the rows R of constraints ``R u = 0``. Points that belong to no body are included if constraints contain them.
     """
-    dofs = mesh.n_points * mesh.dim
     motions = _body_motions(mesh, kinematics, fixed)
     if relations is None:
         return motions
     without_body = bodies(mesh)[1][relations.indices // mesh.dim] < 0
     points = np.unique(relations.indices[without_body & ~fixed.ravel()[relations.indices]])
-    columns = [motions.displacement, *(np.eye(dofs, 1, -int(dof)) for dof in points)]
     labels = [Label(f"point {dof // mesh.dim}", f"translation along {'xyz'[dof % mesh.dim]}") for dof in points]
-    parts = np.asarray(block_diag(motions.parts, np.eye(len(points))), float)
-    motions = FreeMotions(np.hstack(columns), parts, [*motions.labels, *labels], motions.hinges)
+    motions = motions.with_translations(points, labels, mesh.points.size)
     if not relations.shape[0] or not len(motions):
         return motions
     return motions.combined(_null_space(relations @ motions.displacement))

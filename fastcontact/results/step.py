@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
@@ -650,22 +650,17 @@ class Steps(_Steps, list[StepResult]):
         return super().__getitem__(index)
 
     def __repr__(self) -> str:
-        lines = (f"  {step!r}" for step in _last_steps(self))
+        lines = (f"  {step!r}" for step in self[-MAX_SHOWN:])
         return "\n".join([f"{len(self)} steps", *(["  ..."] if len(self) > MAX_SHOWN else []), *lines])
 
     def _repr_html_(self) -> str:
         """Return an HTML table with a row for each contact pair of each step."""
-        rows = [row for step in _last_steps(self) for row in rows_of(step)]
+        rows = [row for step in self[-MAX_SHOWN:] for row in rows_of(step)]
         omitted = f", {len(self) - MAX_SHOWN} of them not shown" if len(self) > MAX_SHOWN else ""
         return html_table(rows, HEAD, f"{len(self)} steps{omitted}")
 
 
 HEAD = ("step", "load factor", "geometry updates", "contact", "force", "largest pressure", "closed", "contact radius")
-
-
-def _last_steps(steps: Steps) -> Iterable[StepResult]:
-    """Return the last MAX_SHOWN steps, which the repr of a list shows."""
-    return list(steps)[-MAX_SHOWN:]
 
 
 def rows_of(step: StepResult) -> list[tuple[str, ...]]:

@@ -8,6 +8,7 @@ import subprocess
 import numpy as np
 import pytest
 
+from fastcontact.cases.decks.assembled import corners_of_facets
 from fastcontact.cases.decks.element_types import element_type
 
 CCX = shutil.which("ccx")
@@ -75,9 +76,10 @@ def deck_of(mesh, bodies, sets=(), surfaces=(), types=TYPES):
     for body in bodies:
         for name, rows in mesh.split(mesh.cell_groups[body]).items():
             lines.append(f"*ELEMENT, TYPE={types[name]}, ELSET={body}")
+            faces = [corners_of_facets(name)[facet] for facet in element_type(types[name]).faces]
             for row in rows:
                 number = len(cells) + 1
-                cells[number] = (element_type(types[name]).faces, mesh.cells[name][row])
+                cells[number] = (faces, mesh.cells[name][row])
                 entries = [str(number), *(str(n + 1) for n in mesh.cells[name][row])]
                 lines += wrapped(entries)
     for name in sets:
@@ -86,7 +88,7 @@ def deck_of(mesh, bodies, sets=(), surfaces=(), types=TYPES):
         on = set(mesh.points_of(name).tolist())
         lines.append(f"*SURFACE, NAME=S_{name}, TYPE=ELEMENT")
         for number, (faces, nodes) in cells.items():
-            lines += [f"{number}, S{k}" for k, face in enumerate(faces, 1) if on.issuperset(nodes[list(face)].tolist())]
+            lines += [f"{number}, S{k}" for k, face in enumerate(faces, 1) if on.issuperset(nodes[face].tolist())]
     return "\n".join(lines) + "\n"
 
 

@@ -73,7 +73,7 @@ class Assembly:
     surfaces : dict of str to list of (Element, int)
         Faces of the surfaces that have been resolved so far.
     open : list of (str, str, str)
-        Sets that are being resolved, for the detection of a set that contains itself.
+        Sets that are being resolved, for the detection of sets that contain themselves.
     """
 
     content: Content
@@ -126,9 +126,7 @@ class Assembly:
     def members_of(self, kind: str, scope: str, name: str, location: Location, shown: str = "") -> list[Any]:
         """Return the points or elements of a set of an instance, including those of nested sets.
 
-        Raises CaseError if undefined.
-
-        Messages call the set `shown`.
+        Raises CaseError, with the name `shown`, if the set is not defined.
         """
         part, label = self.part(scope), (kind, scope, name)
         sets = part.node_sets if kind == "node" else part.element_sets
@@ -146,7 +144,7 @@ class Assembly:
         return self.resolved[label]
 
     def _members_of_entry(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
-        """Return the points or elements of one entry of a set; numbers of a range that are undefined are ignored."""
+        """Return the points or elements of one entry of a set; undefined numbers of a range are ignored."""
         scope = entry.instance or scope
         if scope:
             look_up("instance", scope, self.content.instances, entry)
@@ -252,28 +250,27 @@ class Assembly:
             raise location.refuse(
                 f"element {element.number} of type {solid.name} has no face {label}, only 1 to {len(solid.faces)}"
             )
-        return facets_of_faces(solid.element)[label - 1]
+        return solid.faces[label - 1]
 
     def _faces_of(self, element: Element, entry: SurfaceEntry) -> Iterator[Face]:
         """Yield the face of an element that an entry of a surface selects, or its faces that no other solid shares."""
         if entry.label:
             yield element, self.facet(element, int(entry.label[1:]), entry.location)
             return
-        name = self._type_of_solid(element, entry.location).element
-        for face in np.flatnonzero(self.free_faces[name][element.row]).tolist():
-            yield element, facets_of_faces(name)[face]
+        solid = self._type_of_solid(element, entry.location)
+        is_outer = self.outer_facets[solid.element][element.row]
+        yield from ((element, facet) for facet in solid.faces if is_outer[facet])
 
     @cached_property
-    def free_faces(self) -> dict[str, Mask]:
-        """Masks (n_elements, n_faces), by type of mesh element, of the faces that no other solid shares."""
+    def outer_facets(self) -> dict[str, Mask]:
+        """Masks (n_elements, n_facets), by type of mesh element, of the facets that no other solid shares."""
         corners, shapes = [], {}
         for name, members in self.solids_by_type.items():
-            points = np.array([element.points for element in members], np.int32)
-            faces = members[0].solid.faces
-            shapes[name] = len(members), len(faces)
-            sorted_corners = np.full((len(members), len(faces), 4), -1, np.int32)
-            for k, face in enumerate(faces):
-                sorted_corners[:, k, : len(face)] = np.sort(points[:, list(face)], axis=1)
+            points, facets = np.array([element.points for element in members], np.int32), corners_of_facets(name)
+            shapes[name] = len(members), len(facets)
+            sorted_corners = np.full((*shapes[name], 4), -1, np.int32)
+            for k, facet in enumerate(facets):
+                sorted_corners[:, k, : len(facet)] = np.sort(points[:, facet], axis=1)
             corners.append(sorted_corners.reshape(-1, 4))
         _, inverse, count = np.unique(np.concatenate(corners), axis=0, return_inverse=True, return_counts=True)
         masks = np.split(count[inverse.ravel()] == 1, np.cumsum([n * m for n, m in shapes.values()])[:-1])
@@ -291,13 +288,12 @@ class Assembly:
     def outer_faces(self) -> dict[int, list[tuple[Face, frozenset[int]]]]:
         """The outer faces at each point, with their corner points."""
         by_point: dict[int, list[tuple[Face, frozenset[int]]]] = {}
-        for name, members in self.solids_by_type.items():
-            facets, faces = facets_of_faces(name), members[0].solid.faces
-            for row, k in np.argwhere(self.free_faces[name]).tolist():
-                face = members[row], facets[k]
-                corners = frozenset(members[row].points[i] for i in faces[k])
-                for point in facet_points(*face):
-                    by_point.setdefault(point, []).append((face, corners))
+        for element in self.solids:
+            name = element.solid.element
+            for facet in np.flatnonzero(self.outer_facets[name][element.row]).tolist():
+                corners = frozenset(element.points[i] for i in corners_of_facets(name)[facet])
+                for point in facet_points(element, facet):
+                    by_point.setdefault(point, []).append(((element, facet), corners))
         return by_point
 
     def _faces_at(self, points: set[int]) -> Iterable[tuple[Face, frozenset[int]]]:
@@ -347,11 +343,11 @@ def facet_points(element: Element, facet: int) -> tuple[int, ...]:
 
 
 @cache
-def facets_of_faces(element: str) -> tuple[int, ...]:
-    """Return, for each face label 1, 2, ... of decks, the index of the facet of a mesh element."""
-    facets = [frozenset(facet) for facet in elements.get(element).facets]
-    faces = ElementType("", element, "").faces
-    return tuple(next(i for i, facet in enumerate(facets) if facet >= frozenset(face)) for face in faces)
+def corners_of_facets(name: str) -> list[list[int]]:
+    """Return the local nodes at the corners of each facet of a mesh element."""
+    element = elements.get(name)
+    facets = zip(element.facets, element.facet_elements, strict=True)
+    return [list(facet[: elements.get(kind).n_corners]) for facet, kind in facets]
 
 
 def assemble(assembly: Assembly) -> None:
@@ -391,14 +387,11 @@ def _coordinates_in_assembly(part: Part, instance: Instance | None) -> Array:
     return points
 
 
-# For each keyword, the letter of its loads on faces, and its loads on elements with the number of their further entries.
-BODY_FORCES = {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}
-ON_ELEMENTS: dict[str, tuple[str, dict[str, int]]] = {
-    "DLOAD": ("P", BODY_FORCES),
-    "DFLUX": ("S", {"BF": 0}),
-    "FILM": ("F", {}),
-}
+# Labels of loads on faces by keyword; those of elements are followed by the number of the face.
 ON_SURFACES = {"DSLOAD": "P", "DSFLUX": "S", "SFILM": "F"}
+ON_FACES = {"DLOAD": "P", "DFLUX": "S", "FILM": "F"}
+# Labels of loads on elements by keyword, with the number of their further entries.
+ON_ELEMENTS = {"DLOAD": {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}, "DFLUX": {"BF": 0}, "FILM": {}}
 
 
 @dataclass(frozen=True, slots=True)
@@ -430,7 +423,7 @@ def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> li
             raise row.refuse(f"{load}{label[:40]} on a surface is not supported, only {letter}")
         faces = assembly.faces(row.text(0), row.location)
         return [Target(keyword, row.location, letter, face, (), numbers) for face in faces]
-    letter, element_loads = ON_ELEMENTS[keyword]
+    letter, element_loads = ON_FACES[keyword], ON_ELEMENTS[keyword]
     on_all_solids = keyword == "DLOAD" and not row.text(0)
     elements = assembly.solids if on_all_solids else assembly.elements_of(row.text(0), row.location)
     if label[:1] == letter and label[1:].isdigit():

@@ -134,6 +134,11 @@ class Block(Item):
         return self.location.keyword
 
     @property
+    def removes_earlier(self) -> bool:
+        """Whether OP=NEW removes earlier supports, loads or temperatures of the keyword."""
+        return self.choice("OP", ("MOD", "NEW")) == "NEW"
+
+    @property
     def rows(self) -> list[Row]:
         """The data lines that are not empty."""
         return list(self.iter_rows())

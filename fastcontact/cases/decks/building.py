@@ -18,11 +18,11 @@ from fastcontact.cases.decks.conditions import Component, Conditions
 from fastcontact.cases.decks.constraints import make_rotations, relations_of
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
 from fastcontact.cases.decks.fields import add_initial_stresses
-from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
+from fastcontact.cases.decks.gaps import TOUCHING, add_gap_facets, add_gaps, check_discrete
 from fastcontact.cases.decks.histories import ByShape, Period
-from fastcontact.cases.decks.loads import add_forces, add_temperatures, body_forces, heat_loads, point_group, pressures
+from fastcontact.cases.decks.loads import add_forces, add_temperatures, distributed_loads, heat_loads, point_group
 from fastcontact.cases.decks.materials import law_of, strain_of
-from fastcontact.cases.decks.meshing import deck_mesh_of, group_of_surface, secondary_group
+from fastcontact.cases.decks.meshing import check_nodes, deck_mesh_of, group_of_surface
 from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections, sections_by_point
 from fastcontact.cases.decks.steps import MOST_INCREMENTS
 from fastcontact.contact.integration import all_nodes_carry
@@ -33,8 +33,6 @@ from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
 from fastcontact.model.relation_rows import rows_along
 
-# Largest gap between the undeformed sides that counts as closed, relative to the size of the model.
-TOUCHING = 1e-6
 # Largest number of instants of a ramp. A larger number is treated as an error.
 LONGEST_RAMP = 100_000
 
@@ -70,7 +68,7 @@ class Building:
     def __init__(self, content: Content, case_text: str) -> None:
         self.content = content
         self.assembly = deck_mesh_of(content)
-        only_heat = content.heat == "alone"
+        only_heat = content.heat == "uncoupled"
         if not only_heat:
             make_rotations(self.assembly)
         materials, self.thickness = self._materials()
@@ -78,9 +76,10 @@ class Building:
         conditions = Conditions(self.assembly)
         self._check_contact_pairs()
         conditions.run()
-        loads = [*pressures(self.assembly, conditions), *body_forces(self.assembly, conditions)]
-        heat = heat_loads(self.assembly, conditions, self.thickness)
-        gaps = [] if only_heat else gap_groups(self.assembly)
+        loads = distributed_loads(self.assembly, conditions.loads) + distributed_loads(self.assembly, conditions.fluxes)
+        loads += heat_loads(self.assembly, conditions, self.thickness)
+        if not only_heat:
+            add_gap_facets(self.assembly)
         mesh = self.assembly.mesh() if only_heat else cut_sections(self.assembly, self.assembly.mesh())
         strain, self.linearised = strain_of(content, [law for law, _ in materials])
         options: dict[str, Any] = {"strain": strain, "reference_temperature": conditions.reference}
@@ -90,17 +89,15 @@ class Building:
         self.local_supports: list[MultiPointConstraint] = []
         self.driven: dict[tuple[int, int], Table] = {}
         if only_heat:
-            held = point_group(self.model, self.assembly, "held", range(mesh.n_points))
-            self.model.fix(held, "xyz"[: mesh.dim])
+            all_points = point_group(self.model, self.assembly, "held", range(mesh.n_points))
+            self.model.fix(all_points, "xyz"[: mesh.dim])
             add_sectors(self.model, self.assembly)
         else:
             self._mechanics(conditions)
-        for add in [*loads, *heat]:
+        for add in loads:
             add(self.model)
         self._contact()
-        self.gap_ends: dict[str, dict[int, int]] = {}
-        for gap in gaps:
-            self.gap_ends.update(add_gap(self.model, self.assembly, gap, conditions))
+        self.gap_ends = {} if only_heat else add_gaps(self.model, self.assembly, conditions)
         self.ramp = self._ramp(conditions)
 
     def _mechanics(self, conditions: Conditions) -> None:
@@ -122,7 +119,9 @@ class Building:
         thickness: float | None = None
         for scope in self.assembly.scopes:
             for section in self.assembly.part(scope).sections:
-                self._material(section)
+                material: Material = look_up("material", section.material, self.content.materials, section)
+                if material.law is None and self.content.heat != "uncoupled":
+                    raise material.refuse(f"material '{material.name}' has no *ELASTIC")
                 if self.assembly.dim == 2 and self.assembly.kinematics != "axisymmetric":
                     section_thickness = 1.0 if section.thickness is None else section.thickness
                     if thickness is not None and section_thickness != thickness:
@@ -172,18 +171,11 @@ class Building:
             return CylindricalAxes(tuple(a.tolist()), tuple((b - a).tolist()))
         return tuple(tuple(row) for row in local_axes(axes, np.zeros(3)).tolist())
 
-    def _material(self, section: Section) -> Material:
-        """Return the material of a section. Raises CaseError if it is undefined or lacks elastic constants."""
-        material: Material = look_up("material", section.material, self.content.materials, section)
-        if material.law is None and self.content.heat != "alone":
-            raise material.refuse(f"material '{material.name}' has no *ELASTIC")
-        return material
-
     def _check_contact_pairs(self) -> None:
         """Raise CaseError if a pair is defined twice or has an undefined surface or interaction."""
         pair_names: set[str] = set()
         for pair in self.content.pairs:
-            secondary_group(self.assembly, pair.secondary, pair.location)
+            check_nodes(self.assembly, pair.secondary, pair.location)
             self.assembly.faces(pair.primary, pair.location)
             if not pair.tied:
                 look_up("surface interaction", pair.interaction, self.content.interactions, pair)
@@ -242,12 +234,10 @@ class Building:
 
     def _springs(self) -> None:
         """Add the springs. Raises CaseError if an element of *SPRING is not a spring, or a spring has no stiffness."""
-        for name, (location, stiffness) in self.content.springs.items():
-            for element in self.assembly.elements_of(name, location):
-                if element.cell.type != "SPRINGA":
-                    raise location.refuse(f"element {element.number} is not a spring of type SPRINGA")
-                self.model.add_spring(element.points[0], element.points[1], axial=stiffness / self.thickness)
         check_discrete(self.assembly, "SPRINGA", self.content.springs, "*SPRING")
+        for name, spring in self.content.springs.items():
+            for element in self.assembly.elements_of(name, spring.location):
+                self.model.add_spring(element.points[0], element.points[1], axial=spring.stiffness / self.thickness)
 
     def _contact(self) -> None:
         """Add the contact pairs and ties of the deck."""
@@ -273,7 +263,7 @@ class Building:
 
     def _pair_options(self, pair: Pair) -> dict[str, Any]:
         """Return the options of a contact pair or a tie. Raises CaseError if its interaction is not supported."""
-        only_heat = self.content.heat == "alone"
+        only_heat = self.content.heat == "uncoupled"
         if pair.tied:
             options: dict[str, Any] = {"kind": "gap_only" if only_heat else "tied"}
             if self.content.heat:
@@ -282,23 +272,12 @@ class Building:
         law = self.content.interactions[key_of(pair.interaction)]
         options = interactions.conductance_of(self.content, law) if self.content.heat else {}
         if only_heat:
-            return {**options, "kind": "gap_only", **self._clearance_option(pair)}
-        if law.cohesion:
-            return {
-                **options,
-                **interactions.cohesion_of(self.content, law),
-                **self._clearance_option(pair, glued=True),
-            }
-        if law.kind != "unilateral":
-            if law.friction or law.friction_changes:
-                raise law.refuse(f"friction with {law.kind} contact is not supported")
-            options["kind"] = law.kind
-        if law.penalty is not None and law.kind != "tied":
-            options["penalty"] = law.penalty
-        options.update(interactions.friction_of(law, len(self.content.steps)))
-        if "friction" in options and self.content.heat:
-            options.update(interactions.friction_heat_of(self.content, law))
-        return {**options, **self._clearance_option(pair)}
+            options["kind"] = "gap_only"
+        elif law.cohesion:
+            options |= interactions.cohesion_of(self.content, law)
+        else:
+            options |= interactions.kind_and_friction_of(self.content, law)
+        return options | self._clearance_option(pair, glued=bool(law.cohesion) and not only_heat)
 
     def _clearance_option(self, pair: Pair, glued: bool = False) -> dict[str, Any]:
         """Return the option `clearance` that ADJUST or *CLEARANCE requires, or an empty dictionary if none is required.
@@ -351,7 +330,7 @@ class Building:
                 count = max(1, round(min(MOST_INCREMENTS, step.period / min(step.increment, step.period))))
                 instants.update(number + k / count for k in range(1, count))  # ends of equal increments
         for histories in conditions.histories:
-            for track in {id(track): track for track in histories.tracks.values()}.values():
+            for track in set(histories.tracks.values()):
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
             raise steps[0].refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")

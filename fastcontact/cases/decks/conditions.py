@@ -8,8 +8,7 @@ import numpy as np
 
 from fastcontact.cases.decks.assembled import Face, Target, targets
 from fastcontact.cases.decks.axes import local_directions
-from fastcontact.cases.decks.blocks import Location, Row
-from fastcontact.cases.decks.content import Condition
+from fastcontact.cases.decks.blocks import Block, Location, Row
 from fastcontact.cases.decks.fields import initial_temperatures, reference_temperature, temperature_of
 from fastcontact.cases.decks.histories import Histories, Value
 from fastcontact.cases.decks.meshing import DeckMesh
@@ -52,16 +51,14 @@ class Conditions:
         self.assembly, content = assembly, assembly.content
         initial = initial_temperatures(assembly, content.initial_temperatures)
         self.reference = reference_temperature(assembly, initial) if content.heat else 0.0
-        uniform = dict.fromkeys(range(len(assembly.points)), self.reference) if content.heat else {}
-        self.absent_films: dict[Target, float] = {}
         self.supports: Histories[Component] = Histories(content)
         self.forces: Histories[Component] = Histories(content)
         self.loads: Histories[Target] = Histories(content)
-        self.given_temperatures: Histories[int] = Histories(content, rest=initial)
-        self.fixed_temperatures: Histories[int] = Histories(content, rest=uniform)
+        self.given_temperatures: Histories[int] = Histories(content, baseline=initial)
+        self.fixed_temperatures: Histories[int] = Histories(content, default=self.reference)
         self.powers: Histories[int] = Histories(content)
         self.fluxes: Histories[Target] = Histories(content)
-        self.films: Histories[Target] = Histories(content, rest=self.absent_films)
+        self.films: Histories[Target] = Histories(content, default=self.reference)
         self.film_of: dict[tuple[str, Face | None], Target] = {}
         self.of_keyword: dict[str, Histories[Any]] = {
             "CLOAD": self.forces, "TEMPERATURE": self.given_temperatures, "CFLUX": self.powers,
@@ -80,17 +77,16 @@ class Conditions:
 
     def run(self) -> None:
         """Record the supports and loads of all steps."""
-        for condition in self.assembly.content.supports:
-            self._supports(condition, before=True)
+        for block in self.assembly.content.supports:
+            self._supports(block, before=True)
         for history in (self.supports, self.fixed_temperatures):
             history.initial, history.step_values = history.step_values, {}
         for number, step in enumerate(self.assembly.content.steps, start=1):
-            for condition in step.conditions:
-                if condition.block.keyword == "BOUNDARY":
-                    self._supports(condition)
+            for block in step.conditions:
+                if block.keyword == "BOUNDARY":
+                    self._supports(block)
                 else:
-                    histories = self.of_keyword[condition.block.keyword]
-                    histories.record(condition, map(self._load, condition.block.iter_rows()))
+                    self.of_keyword[block.keyword].record(block, map(self._load, block.iter_rows()))
             for history in self.histories:
                 history.advance(number, step)
 
@@ -138,7 +134,6 @@ class Conditions:
             raise row.refuse(f"the film coefficient {coefficient:g} must not be negative")
         names = targets(self.assembly, row, (coefficient,))
         for film in names:
-            self.absent_films[film] = self.reference
             earlier = self.film_of.get((film.keyword, film.face), film)
             if earlier != film and earlier in films.step_values:
                 raise row.refuse(
@@ -156,19 +151,18 @@ class Conditions:
             return f"rotation {axis + 1} of a reference node"
         return f"component {axis + 1} of node {self.assembly.number_of(point)}"
 
-    def _supports(self, condition: Condition, before: bool = False) -> None:
+    def _supports(self, block: Block, before: bool = False) -> None:
         """Record a block *BOUNDARY of the current step or, if `before` is true, a block that precedes all steps."""
-        block = condition.block
         kind = block.get("TYPE", "DISPLACEMENT").upper()
         if kind != "DISPLACEMENT":
             raise block.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
-        if condition.new:
+        if block.removes_earlier:
             self.supports.remove_earlier()
             self.fixed_temperatures.remove_earlier()
         driven = False
         for row in block.iter_rows():
             if row.text(1) == "11":
-                self._fix_temperature(condition, row)
+                self._fix_temperature(block, row)
                 continue
             points = self.assembly.nodes(row.text(0), row.location)
             components, value = NAMED.get(row.text(1).upper()), 0.0
@@ -181,23 +175,24 @@ class Conditions:
                     raise row.refuse(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
                 components = tuple(range(first, last + 1))
             driven = driven or bool(before and value)
-            prescribed = Value(value, condition.amplitude, row.location)
+            prescribed = Value(value, block.get("AMPLITUDE"), row.location)
             for point in points:
                 for component in components:
                     self._support(point, component, prescribed, "FIXED" in block.parameters)
         if driven:
             self.assembly.content.note(block, "a displacement prescribed before the first step is applied in that step")
 
-    def _fix_temperature(self, condition: Condition, row: Row) -> None:
+    def _fix_temperature(self, block: Block, row: Row) -> None:
         """Record the prescribed temperature of nodes in a line of *BOUNDARY."""
         if not self.assembly.content.heat:
             raise row.refuse(
                 "degree of freedom 11 (temperature) is not within 1 to 6: in static steps use *TEMPERATURE"
             )
-        if "FIXED" in condition.block.parameters:
+        if "FIXED" in block.parameters:
             raise row.refuse("FIXED is not supported for temperatures: give their values")
         for point in self._points_of_solids(row):
-            self.fixed_temperatures.set_value(point, Value(row.number(3, 0.0), condition.amplitude, row.location))
+            value = Value(row.number(3, 0.0), block.get("AMPLITUDE"), row.location)
+            self.fixed_temperatures.set_value(point, value)
 
     def _support(self, point: int, component: int, prescribed: Value, fixed: bool) -> None:
         """Record a support of a point; `fixed` is true for FIXED.

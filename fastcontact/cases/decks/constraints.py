@@ -23,7 +23,7 @@ from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows,
 
 # Smallest number of nodes of those kinds of *MPC whose number of nodes is not fixed.
 LEAST = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
-# Tolerance of the tests for collinear points and for points on the axis, relative to squared distances.
+# Tolerance of the tests for collinear points, and for points on the axis relative to squared distances.
 FLAT = 1e-9
 
 
@@ -113,22 +113,19 @@ def _coupling_rows(deck_mesh: DeckMesh, mesh: Mesh, coupling: Coupling) -> csr_a
     The nodes follow the reference point or, if the coupling is distributing, the reference point has the area-weighted mean
     motion of a surface.
     """
-    n_dofs = mesh.points.size
     point = deck_mesh.node(coupling.reference, coupling.location)
-    position = tuple(deck_mesh.points[point][: deck_mesh.dim].tolist())
-    reference = ReferencePoint(point, deck_mesh.rotations[point], position)
+    reference = ReferencePoint(point, deck_mesh.rotations[point])
     points = np.array(_points(deck_mesh, coupling), np.intp)
-    coordinates = deck_mesh.points[points, : deck_mesh.dim]
     if not coupling.distributing:
         directions = np.array([_directions(deck_mesh, coupling, follower) for follower in points.tolist()])
-        return rigid_rows(reference, points, coordinates, directions, n_dofs)
+        return rigid_rows(mesh.points, reference, points, directions)
     deck_mesh.faces(coupling.group, coupling.location)
     surface = Traction(group_of_surface(deck_mesh, coupling.group), {0: 1.0}, None)
     areas = surface.vector(mesh, deck_mesh.kinematics)[:, 0]
     weight = areas[points] / areas[points].sum()
     directions = _directions(deck_mesh, coupling, point)
     with refusing(coupling):
-        return distributing_rows(reference, points, coordinates, weight, directions, n_dofs)
+        return distributing_rows(mesh.points, reference, points, weight, directions)
 
 
 def _directions(deck_mesh: DeckMesh, coupling: Coupling, point: int) -> Array:
@@ -152,26 +149,18 @@ def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[T
     coordinates = deck_mesh.points[nodes]
     if constraint.kind == "MEANROT":
         return [_mean_rotation(constraint, nodes, coordinates)]
-    relative = coordinates - coordinates[0]
-    first = relative[1]
-    if constraint.kind == "STRAIGHT":
-        if not first.any():
-            raise constraint.refuse("the first two nodes of STRAIGHT coincide")
-        normals = np.linalg.svd(first[None])[2][1:]
-        along = relative @ first / (first @ first)
-        weights = np.column_stack([1.0 - along, along])
-    else:
-        normals = np.cross(first, relative[2])[None]
-        if np.linalg.norm(normals) <= FLAT * (first @ first):
-            raise constraint.refuse("the first three nodes of PLANE lie on a line")
-        in_plane = np.linalg.lstsq(relative[1:3].T, relative.T, rcond=None)[0].T
-        weights = np.column_stack([1.0 - in_plane.sum(axis=1), in_plane])
-    k = weights.shape[1]  # the first k nodes determine the line or the plane
-    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    relative, k = coordinates - coordinates[0], LEAST[constraint.kind] - 1
+    basis = relative[1:k]  # from the first node to the others of the k nodes that determine the line or the plane
+    _, sizes, directions = np.linalg.svd(basis)
+    if sizes[-1] <= FLAT * sizes[0]:
+        degenerate = "two nodes of STRAIGHT coincide" if k == 2 else "three nodes of PLANE lie on a line"
+        raise constraint.refuse(f"the first {degenerate}")
+    components = np.linalg.lstsq(basis.T, relative.T, rcond=None)[0].T
+    weights = np.column_stack([1.0 - components.sum(axis=1), components])
     return [
         _terms([nodes[i], *nodes[:k]], np.outer([1.0, *-weights[i]], normal))
         for i in range(k, len(nodes))
-        for normal in normals
+        for normal in directions[k - 1 :]
     ]
 
 

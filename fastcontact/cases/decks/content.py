@@ -164,15 +164,6 @@ class SectorEnds(Item):
 
 
 @dataclass(frozen=True)
-class Sectors(Item):
-    """Number of cyclic sectors, two points of their axis, and the name of the tie of their ends."""
-
-    count: int
-    tie: str
-    points: tuple[float, ...]
-
-
-@dataclass(frozen=True)
 class Equation(Item):
     """A linear multi-point constraint: node, component and coefficient of each term."""
 
@@ -210,6 +201,21 @@ class PretensionSection(Item):
 
 
 @dataclass(frozen=True)
+class Gap(Item):
+    """Properties of gap elements: initial clearance [length], and vector from the first to the second node."""
+
+    clearance: float
+    direction: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Spring(Item):
+    """Properties of springs: axial stiffness [force / length]."""
+
+    stiffness: float
+
+
+@dataclass(frozen=True)
 class Axes(Item):
     """Local axes of nodes or materials.
 
@@ -234,15 +240,6 @@ class Amplitude(Item):
     total: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Condition:
-    """A block of supports, loads or temperatures; `new` is true for OP=NEW, which removes earlier blocks."""
-
-    block: Block
-    new: bool
-    amplitude: str = ""
-
-
 @dataclass(slots=True)
 class Step(Located):
     """A load step of the deck."""
@@ -253,9 +250,11 @@ class Step(Located):
     increment: float = 1.0
     has_procedure: bool = False
     perturbation: bool = False
-    heat: str = ""  # "alone"; "coupled" with displacements; empty if temperatures are not computed
+    heat: str = (
+        ""  # conduction "uncoupled" from or "coupled" with displacements; empty if temperatures are not computed
+    )
     n_modes: int = 0
-    conditions: list[Condition] = field(default_factory=list)
+    conditions: list[Block] = field(default_factory=list)  # blocks of supports, loads and temperatures
 
 
 @dataclass
@@ -270,7 +269,7 @@ class Content:
     interactions: dict[str, Interaction] = field(default_factory=dict)
     pairs: list[Pair] = field(default_factory=list)
     sector_ends: list[SectorEnds] = field(default_factory=list)
-    sectors: list[Sectors] = field(default_factory=list)
+    sectors: list[Block] = field(default_factory=list)
     equations: list[Equation] = field(default_factory=list)
     multi_points: list[MultiPoint] = field(default_factory=list)
     couplings: list[Coupling] = field(default_factory=list)
@@ -279,9 +278,9 @@ class Content:
     orientations: dict[str, Axes] = field(default_factory=dict)
     distributions: dict[str, Block] = field(default_factory=dict)
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
-    gaps: dict[str, tuple[Location, float, tuple[float, ...]]] = field(default_factory=dict)
-    springs: dict[str, tuple[Location, float]] = field(default_factory=dict)
-    supports: list[Condition] = field(default_factory=list)
+    gaps: dict[str, Gap] = field(default_factory=dict)
+    springs: dict[str, Spring] = field(default_factory=dict)
+    supports: list[Block] = field(default_factory=list)  # before all steps
     initial_temperatures: list[Block] = field(default_factory=list)
     initial_stresses: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)

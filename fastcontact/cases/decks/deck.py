@@ -28,6 +28,9 @@ from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult, Steps
 
+# Attributes of `ContactResult` that are proportional to the thickness of a plane model.
+FORCES = ("force", "force_vectors", "dissipation", "primary_force_vectors")
+
 
 @dataclass(frozen=True, eq=False)
 class Deck:
@@ -72,7 +75,7 @@ class Deck:
     notes: tuple[str, ...]
     thickness: float = 1.0
     modes: dict[str, Any] | None = None
-    building: Building = field(default=None, repr=False)  # type: ignore[assignment]
+    building: Building = field(repr=False, kw_only=True)
 
     def _repr_html_(self) -> str:
         """Return the title, the notes and the model as HTML tables for notebooks."""
@@ -163,12 +166,9 @@ class Deck:
         if t == 1.0:
             return replace(step, reaction=reaction)
         contacts = {
-            name: replace(
-                c, force=t * c.force, force_vectors=t * c.force_vectors, dissipation=t * c.dissipation,
-                primary_force_vectors=t * c.primary_force_vectors,
-            )
-            for name, c in step.contact.items()
-        }  # fmt: skip
+            name: replace(contact, **{key: t * getattr(contact, key) for key in FORCES})
+            for name, contact in step.contact.items()
+        }
         sums = {name: _scaled(t, step.iterations[name]) for name in ("work", "heat") if step.iterations.get(name)}
         heat = None if step.heat_reaction is None else t * step.heat_reaction
         iterations = step.iterations | sums
@@ -191,25 +191,20 @@ class Deck:
         constraint_forces = sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(supported.size))
         return reaction - constraint_forces.reshape(reaction.shape)
 
-    def _largest_strain(self, step: StepResult) -> float:
-        """Return the largest equivalent strain [-] of the solid cells, computed from nodal stresses."""
+    def _warn_of_large_strains(self, step: StepResult) -> None:
+        """Warn, with the largest equivalent strain and rotation, if the deck has NLGEOM but small strains were assumed."""
+        if not self.building.linearised:
+            return
         field, largest = self.model.material_field(), 0.0
         for name, cells in self.model.mesh.solids.items():
             strains = np.einsum("cij,cnj->cni", field.compliance[field.rows[name]], step.stress[cells])
-            equivalent = recovery.equivalent_strain(strains.reshape(-1, strains.shape[2]))
-            largest = max(largest, float(equivalent.max(initial=0.0)))
-        return largest
-
-    def _warn_of_large_strains(self, step: StepResult) -> None:
-        """Warn, with the largest strain and rotation, if the deck has NLGEOM but small strains were assumed."""
-        if self.building.linearised:
-            nonlinear = next(s for s in self.building.content.steps if s.nonlinear)
-            angle, _ = largest_rotation(self.model.mesh, step.displacement)
-            warn(
-                f"{nonlinear.location}: NLGEOM, but small strains and rotations were assumed; the equivalent strain is up to "
-                f"{self._largest_strain(step):.3g} and the rotation up to {angle:.3g} radian, whose squares linear "
-                "kinematics neglect"
-            )
+            largest = max(largest, float(recovery.equivalent_strain(strains.reshape(-1, strains.shape[2])).max()))
+        nonlinear = next(s for s in self.building.content.steps if s.nonlinear)
+        angle, _ = largest_rotation(self.model.mesh, step.displacement)
+        warn(
+            f"{nonlinear.location}: NLGEOM, but small strains and rotations were assumed; the equivalent strain is up to "
+            f"{largest:.3g} and the rotation up to {angle:.3g} radian, whose squares linear kinematics neglect"
+        )
 
 
 @typed(FileError)

@@ -1,4 +1,4 @@
-"""Element types of decks with their mesh elements and kinematics, and the corner nodes of each face."""
+"""Element types of decks with their mesh elements, kinematics and faces."""
 
 from __future__ import annotations
 
@@ -7,13 +7,8 @@ from functools import cache
 
 from fastcontact.elasticity.incompatible_modes import BENDING
 
-# Corners of the faces 1, 2, ... of Abaqus and CalculiX.
-TETRAHEDRON = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
-HEXAHEDRON = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
-WEDGE = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
-TRIANGLE = ((0, 1), (1, 2), (2, 0))
-QUADRANGLE = ((0, 1), (1, 2), (2, 3), (3, 0))
-SHAPES = {"tet": TETRAHEDRON, "hex": HEXAHEDRON, "wed": WEDGE, "tri": TRIANGLE, "qua": QUADRANGLE}
+# Facets of the mesh element that are the faces 1, 2, ... of Abaqus and CalculiX, by the beginning of its name.
+FACES = {"tet": (3, 0, 1, 2), "hex": (4, 5, 2, 1, 3, 0), "wed": (0, 1, 2, 3, 4), "tri": (0, 1, 2), "qua": (0, 1, 2, 3)}
 SOLIDS = {"4": "tet4", "6": "wedge6", "8": "hex8", "10": "tet10", "15": "wedge15", "20": "hex20"}
 PLANES = {"3": "tri3", "4": "quad4", "6": "tri6", "8": "quad8"}
 FAMILIES = {"CPE": "plane_strain", "CPS": "plane_stress", "CAX": "axisymmetric"}
@@ -57,9 +52,9 @@ class ElementType:
     conducts: bool = False
 
     @property
-    def faces(self) -> tuple[tuple[int, ...], ...]:
-        """Corners of the faces 1, 2, ..., as indices into the connectivity of the element."""
-        return SHAPES[self.element[:3]]
+    def faces(self) -> tuple[int, ...]:
+        """Indices of the facets of the mesh element that are the faces 1, 2, ... of the deck."""
+        return FACES[self.element[:3]]
 
 
 @cache

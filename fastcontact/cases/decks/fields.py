@@ -82,19 +82,19 @@ def check_steps(content: Content) -> None:
     first = next((step for step in content.steps if step.heat), None)
     content.heat = first.heat if first else ""
     for number, step in enumerate(content.steps):
-        if first and step.heat != first.heat and (first.heat == "alone" or number > content.steps.index(first)):
+        if first and step.heat != first.heat and (first.heat == "uncoupled" or number > content.steps.index(first)):
             raise step.refuse(
                 "*HEAT TRANSFER cannot be combined with other procedures, and *COUPLED TEMPERATURE-DISPLACEMENT cannot "
                 "precede them: use *HEAT TRANSFER for all steps, or *COUPLED TEMPERATURE-DISPLACEMENT for all"
             )
-        for block in (condition.block for condition in step.conditions):
+        for block in step.conditions:
             if block.keyword in OF_HEAT and not step.heat:
                 raise block.refuse("needs a step with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT")
             if block.keyword == "TEMPERATURE" and first:
                 raise block.refuse(
                     "temperatures are computed in this deck: prescribe degree of freedom 11 by *BOUNDARY"
                 )
-            if block.keyword in ("CLOAD", "DLOAD", "DSLOAD") and step.heat == "alone":
+            if block.keyword in ("CLOAD", "DLOAD", "DSLOAD") and step.heat == "uncoupled":
                 raise block.refuse(
                     "is not a heat load: use *COUPLED TEMPERATURE-DISPLACEMENT in place of *HEAT TRANSFER"
                 )

@@ -3,54 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.cases.decks.assembled import Assembly, facet_points
-from fastcontact.cases.decks.blocks import Block, Located, Location, key_of, refusing
+from fastcontact.cases.decks.blocks import Block, key_of, refusing
 from fastcontact.cases.decks.conditions import Conditions
-from fastcontact.cases.decks.content import Content
+from fastcontact.cases.decks.content import Content, Gap, Spring
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
-# Tolerance of distances relative to the size of the model.
+# Tolerance of gaps and distances, relative to the size of the model.
 TOUCHING = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class GapGroup(Located):
-    """The gap elements of a set.
-
-    Attributes
-    ----------
-    name : str
-        Name of the element set.
-    location : Location
-        Line of the keyword *GAP.
-    clearance : float
-        Initial clearance [length].
-    direction : ndarray (dim,)
-        Unit vector from the first node to the second node [-].
-    ends : ndarray (n, 2) of int
-        Point numbers of the first and the second node of each element.
-    facets : str
-        Group of the facets with the first nodes.
-    opposite : str
-        Group of the facets with the second nodes; empty unless all second nodes belong to solids.
-    """
-
-    name: str
-    location: Location
-    clearance: float
-    direction: Array
-    ends: Indices
-    facets: str
-    opposite: str
 
 
 def gap(content: Content, block: Block) -> None:
@@ -59,7 +27,7 @@ def gap(content: Content, block: Block) -> None:
     direction = tuple(row.number(i, 0.0) for i in (1, 2, 3))
     if not any(direction):
         raise row.refuse("the direction of the gap elements is missing")
-    content.gaps[key_of(block.required("ELSET"))] = (block.location, row.number(0), direction)
+    content.gaps[key_of(block.required("ELSET"))] = Gap(block.location, row.number(0), direction)
 
 
 def spring(content: Content, block: Block) -> None:
@@ -69,101 +37,112 @@ def spring(content: Content, block: Block) -> None:
         raise block.refuse("linear springs along their axis need an empty line, followed by a line with the stiffness")
     if rows[0].text(1):
         raise rows[0].refuse("only linear springs are supported: one stiffness")
-    content.springs[key_of(block.required("ELSET"))] = (block.location, rows[0].positive(0, "stiffness"))
+    content.springs[key_of(block.required("ELSET"))] = Spring(block.location, rows[0].positive(0, "stiffness"))
 
 
-def check_discrete(assembly: Assembly, kind: str, properties: Mapping[str, Any], keyword: str) -> None:
-    """Raise CaseError if an element of the type `kind` is in none of the sets to which `keyword` gives properties."""
-    complete = {element for name, entry in properties.items() for element in assembly.elements_of(name, entry[0])}
+def check_discrete(assembly: Assembly, kind: str, properties: Mapping[str, Gap | Spring], keyword: str) -> None:
+    """Raise CaseError if `keyword` gives properties to elements not of type `kind`, or not to all elements of this type."""
+    complete = set()
+    for name, entry in properties.items():
+        for element in assembly.elements_of(name, entry.location):
+            if element.cell.type != kind:
+                raise entry.refuse(f"element {element.number} is not of type {kind}")
+            complete.add(element)
     for element in assembly.discrete:
         if element.cell.type == kind and element not in complete:
             raise element.cell.refuse(f"element {element.number} of type {kind} has no {keyword}")
 
 
-def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
-    """Create groups of the facets with the nodes of gap elements. Raises CaseError if the nodes do not fill whole facets."""
-    groups = []
+def add_gap_facets(deck_mesh: DeckMesh) -> None:
+    """Create groups of the facets with the nodes of gap elements; those with the second nodes only if these are in solids.
+
+    Raises CaseError if the nodes do not fill whole facets.
+    """
     check_discrete(deck_mesh, "GAPUNI", deck_mesh.content.gaps, "*GAP")
-    for name, (location, clearance, vector) in deck_mesh.content.gaps.items():
-        gap_elements = deck_mesh.elements_of(name, location)
-        if any(element.cell.type != "GAPUNI" for element in gap_elements):
-            raise location.refuse("acts on elements of type GAPUNI only")
-        set_name = deck_mesh.content.root.set_names.get(name, name)
-        ends = np.array([element.points for element in gap_elements], np.intp)
-        bodies = all(point in deck_mesh.solid_points for point in ends[:, 1].tolist())
-        groups.append(
-            GapGroup(
-                set_name, location, clearance, np.array(vector)[: deck_mesh.dim] / np.linalg.norm(vector), ends,
-                _facet_group(deck_mesh, f"{set_name} facets", ends[:, 0], location),
-                _facet_group(deck_mesh, f"{set_name} opposite facets", ends[:, 1], location) if bodies else "",
-            )
-        )  # fmt: skip
-    return groups
+    for key, gap in deck_mesh.content.gaps.items():
+        name, ends = _name_and_ends(deck_mesh, key, gap)
+        _add_facets(deck_mesh, f"{name} facets", ends[:, 0], gap)
+        if deck_mesh.solid_points.issuperset(ends[:, 1].tolist()):
+            _add_facets(deck_mesh, f"{name} opposite facets", ends[:, 1], gap)
 
 
-def _facet_group(deck_mesh: DeckMesh, group: str, points: Indices, location: Location) -> str:
+def _name_and_ends(deck_mesh: DeckMesh, key: str, gap: Gap) -> tuple[str, Indices]:
+    """Return the name of a set of gap elements and the points (n, 2) of their first and second nodes."""
+    ends = [element.points for element in deck_mesh.elements_of(key, gap.location)]
+    return deck_mesh.content.root.set_names.get(key, key), np.array(ends, np.intp)
+
+
+def _add_facets(deck_mesh: DeckMesh, group: str, points: Indices, gap: Gap) -> None:
     """Make a group of the facets whose nodes are all in `points`. Raises CaseError if a point belongs to no such facet."""
     selected = set(points.tolist())
     faces = deck_mesh.faces_within(selected)
     if {p for face in faces for p in facet_points(*face)} != selected:
-        raise location.refuse(
+        raise gap.refuse(
             "gap elements are supported on all nodes of whole faces only, from a body to another or to held nodes"
         )
-    return deck_mesh.add_facets(group, faces)
+    deck_mesh.add_facets(group, faces)
 
 
-def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Conditions) -> dict[str, dict[int, int]]:
+def add_gaps(model: Model, deck_mesh: DeckMesh, conditions: Conditions) -> dict[str, dict[int, int]]:
     """Add the contact of gap elements to a model.
 
-    Returns, by the name of the contact, the second node of each first node, or an empty dictionary if the second nodes belong
-    to solids. Raises CaseError if the nodes are not in planes normal to the direction of the elements.
+    Returns, by the name of each contact with a rigid plane, the second node of each first node. Raises CaseError if the nodes
+    are not in planes normal to the direction of the elements.
     """
-    first, second = model.mesh.points[gap.ends[:, 0]], model.mesh.points[gap.ends[:, 1]]
-    size = TOUCHING * float(np.ptp(model.mesh.points, axis=0).max())
-    if np.ptp(first @ gap.direction) > size:
-        raise gap.refuse("gap elements are supported if their nodes lie in a plane normal to their direction")
-    if gap.opposite:
-        vectors = second - first
-        distances = vectors @ gap.direction
-        tangential = np.abs(vectors - np.outer(distances, gap.direction)).max()
-        if max(np.ptp(distances), tangential, -distances.mean()) > size:
-            raise gap.refuse(
-                "gap elements between bodies are supported along their direction, in planes normal to it only"
-            )
-        with refusing(gap):
-            model.add_contact(
-                gap.name, secondary=gap.facets, primary=gap.opposite, formulation="node_to_segment",
-                clearance=gap.clearance - float(distances.mean()),
-            )  # fmt: skip
-        return {}
-    history = _prescribed_motion(gap, conditions)
-    wall = HalfSpace(
-        point=tuple((first @ gap.direction).mean() * gap.direction + gap.clearance * gap.direction),
-        normal=tuple(-gap.direction),
-    )
-    motion: dict[str, Any] = {}
-    if any(value for _, value in history):
-        motion = {"motion": dict(zip("xyz", gap.direction.tolist(), strict=False)), "ramp": history}
-    model.add_obstacle(gap.name, secondary=gap.facets, obstacle=wall, formulation="node_to_segment", **motion)
-    return {gap.name: dict(gap.ends.tolist())}
+    points, gap_ends = model.mesh.points, {}
+    tolerance = TOUCHING * float(np.ptp(points, axis=0).max())
+    for key, gap in deck_mesh.content.gaps.items():
+        name, ends = _name_and_ends(deck_mesh, key, gap)
+        direction = np.array(gap.direction)[: deck_mesh.dim] / np.linalg.norm(gap.direction)
+        if np.ptp(points[ends[:, 0]] @ direction) > tolerance:
+            raise gap.refuse("gap elements are supported if their nodes lie in a plane normal to their direction")
+        if (opposite := f"{name} opposite facets") in deck_mesh.groups:
+            distance = _distance(points[ends[:, 1]] - points[ends[:, 0]], direction, tolerance, gap)
+            with refusing(gap):
+                model.add_contact(
+                    name, secondary=f"{name} facets", primary=opposite, formulation="node_to_segment",
+                    clearance=gap.clearance - distance,
+                )  # fmt: skip
+            continue
+        level = float((points[ends[:, 0]] @ direction).mean()) + gap.clearance
+        plane = HalfSpace(tuple(level * direction), tuple(-direction))
+        history = _motion(gap, ends, direction, conditions)
+        motion: dict[str, Any] = {}
+        if any(value for _, value in history):
+            motion = {"motion": dict(zip("xyz", direction.tolist(), strict=False)), "ramp": history}
+        model.add_obstacle(name, secondary=f"{name} facets", obstacle=plane, formulation="node_to_segment", **motion)
+        gap_ends[name] = dict(ends.tolist())
+    return gap_ends
 
 
-def _prescribed_motion(gap: GapGroup, conditions: Conditions) -> Table:
+def _distance(vectors: Array, direction: Array, tolerance: float, gap: Gap) -> float:
+    """Return the common length [length] of the `vectors` (n, dim) from first to second nodes.
+
+    Raises CaseError unless they are equal and parallel to the direction.
+    """
+    distances = vectors @ direction
+    tangential = np.abs(vectors - np.outer(distances, direction)).max()
+    if max(np.ptp(distances), tangential, -distances.mean()) > tolerance:
+        raise gap.refuse("gap elements between bodies are supported along their direction, in planes normal to it only")
+    return float(distances.mean())
+
+
+def _motion(gap: Gap, ends: Indices, direction: Array, conditions: Conditions) -> Table:
     """Return the motion [length] of the second nodes along the direction.
 
     Raises CaseError unless it is prescribed and uniform.
     """
     supports = conditions.supports
     by_axis: list[tuple[float, Array]] = []
-    for axis in np.flatnonzero(gap.direction).tolist():
-        names = [(end, axis, False) for end in gap.ends[:, 1].tolist()]
+    for axis in np.flatnonzero(direction).tolist():
+        names = [(end, axis, False) for end in ends[:, 1].tolist()]
         prescribed = [name for name in names if name in supports.tracks and supports.tracks[name].periods[-1].always]
         tables = {supports.table(name) for name in prescribed}
         if len(tables) != 1 or len(prescribed) < len(names):
             raise gap.refuse(
                 "gap elements need second nodes that are fixed, or have the same prescribed motion, along their direction"
             )
-        by_axis.append((float(gap.direction[axis]), np.array(tables.pop())))
+        by_axis.append((float(direction[axis]), np.array(tables.pop())))
     times = np.unique(np.concatenate([table[:, 0] for _, table in by_axis]))
     motion = sum((cosine * np.interp(times, *table.T) for cosine, table in by_axis), np.zeros(len(times)))
     return tuple(zip(times.tolist(), motion.tolist(), strict=True))

@@ -12,8 +12,8 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.cases.decks.blocks import Location, key_of
-from fastcontact.cases.decks.content import Amplitude, Condition, Content, Step
+from fastcontact.cases.decks.blocks import Block, Location, key_of
+from fastcontact.cases.decks.content import Amplitude, Content, Step
 from fastcontact.model.ramp import Table
 
 Name = TypeVar("Name", bound=Hashable)
@@ -109,12 +109,14 @@ class Histories(Generic[Name]):
         Values of the current step by name.
     removals : dict
         Names of earlier values that the current step removes.
-    rest : mapping
-        Values in the absence of a load or support, by default zero.
+    baseline : mapping
+        Values in the absence of a load or support, by name.
     initial : dict
         Values given before all steps by name, which the first step reaches unless it changes or removes them.
     kept : set
         Names of the values that the current step keeps (FIXED).
+    default : float
+        Value in the absence of a load or support of a name without `baseline`.
     time : float
         Total time [time] at the start of the current step.
     """
@@ -123,9 +125,10 @@ class Histories(Generic[Name]):
     tracks: dict[Name, Track] = field(default_factory=dict)
     step_values: dict[Name, Value] = field(default_factory=dict)
     removals: dict[Name, None] = field(default_factory=dict)
-    rest: Mapping[Name, float] = field(default_factory=dict)
+    baseline: Mapping[Name, float] = field(default_factory=dict)
     initial: dict[Name, Value] = field(default_factory=dict)
     kept: set[Name] = field(default_factory=set)
+    default: float = 0.0
     time: float = 0.0
 
     def set_value(self, name: Name, value: Value) -> None:
@@ -140,12 +143,12 @@ class Histories(Generic[Name]):
         self.removals.pop(name, None)
         self.kept.discard(name)
 
-    def record(self, condition: Condition, entries: Iterable[tuple[Iterable[Name], float, Location]]) -> None:
+    def record(self, block: Block, entries: Iterable[tuple[Iterable[Name], float, Location]]) -> None:
         """Set the values of the lines of a block; OP=NEW first removes the earlier values of its keyword."""
-        if condition.new:
-            self.remove_earlier(condition.block.keyword)
+        if block.removes_earlier:
+            self.remove_earlier(block.keyword)
         for names, value, location in entries:
-            shared = Value(value, condition.amplitude, location)
+            shared = Value(value, block.get("AMPLITUDE"), location)
             for name in names:
                 self.set_value(name, shared)
 
@@ -172,12 +175,12 @@ class Histories(Generic[Name]):
         current = self.initial | self.step_values if self.initial else self.step_values
         changed: dict[tuple[Any, ...], Track] = {}
         for name in (*current, *self.removals):
-            before, rest, given = self.tracks.get(name), self.rest.get(name, 0.0), current.get(name)
-            value, amplitude = given[:2] if given else (rest, "")
-            periods = self._periods(name, given, begin)
-            key = before, value, amplitude, rest, periods
+            previous, baseline, new = self.tracks.get(name), self.baseline.get(name, self.default), current.get(name)
+            value, amplitude = new[:2] if new else (baseline, "")
+            periods = self._periods(name, new, begin)
+            key = previous, value, amplitude, baseline, periods
             if key not in changed:
-                numbers = array("d", (0.0, rest)) if before is None else before.numbers[:]
+                numbers = array("d", (0.0, baseline)) if previous is None else previous.numbers[:]
                 track = changed[key] = Track(numbers, periods)
                 track.add([(begin, track.last)])
                 if amplitude:
@@ -192,20 +195,20 @@ class Histories(Generic[Name]):
             track.add(_amplitude_points(*in_total_time[track], begin, start, step.period))
         self.step_values, self.initial, self.removals, self.kept = {}, {}, {}, set()
 
-    def _periods(self, name: Name, given: Value | None, begin: float) -> tuple[Period, ...]:
-        """Return the periods of a quantity with the value `given` in the current step, which begins at load factor `begin`.
+    def _periods(self, name: Name, new: Value | None, begin: float) -> tuple[Period, ...]:
+        """Return the periods of a quantity with the value `new` in the current step, which begins at load factor `begin`.
 
         A new value ends the period of a value with FIXED, and a new period begins.
         """
-        before, keeps = self.tracks.get(name), name in self.kept
-        periods = before.periods if before else ()
-        if before and before.alive:
-            if given is not None and (keeps or not periods[-1].keeps):
+        previous, keeps = self.tracks.get(name), name in self.kept
+        periods = previous.periods if previous else ()
+        if previous and previous.alive:
+            if new is not None and (keeps or not periods[-1].keeps):
                 return periods
             periods = (*periods[:-1], replace(periods[-1], ends=begin))
-        if given is None:
+        if new is None:
             return periods
-        return (*periods, Period(begin, location=given.location if begin else None, keeps=keeps))
+        return (*periods, Period(begin, location=new.location if begin else None, keeps=keeps))
 
     def table(self, name: Name) -> Table:
         """Return the history as pairs of load factor and value, up to the end of the last step of the deck."""

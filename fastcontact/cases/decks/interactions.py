@@ -110,7 +110,18 @@ def store(content: Content, current: Interaction, block: Block) -> None:
     current.cohesion[block.keyword] = block
 
 
-def friction_of(law: Interaction, n_steps: int) -> dict[str, Any]:
+def kind_and_friction_of(content: Content, law: Interaction) -> dict[str, Any]:
+    """Return the kind, the penalty and the friction of a pair without a cohesive layer."""
+    options: dict[str, Any] = {} if law.kind == "unilateral" else {"kind": law.kind}
+    if options and (law.friction or law.friction_changes):
+        raise law.refuse(f"friction with {law.kind} contact is not supported")
+    if law.penalty is not None and law.kind != "tied":
+        options["penalty"] = law.penalty
+    options |= _friction_of(law, len(content.steps))
+    return options | _friction_heat_of(content, law) if "friction" in options and content.heat else options
+
+
+def _friction_of(law: Interaction, n_steps: int) -> dict[str, Any]:
     """Return the friction options of a pair, whose coefficient *CHANGE FRICTION changes at the start of steps."""
     table, stick_slopes = [(0.0, law.friction)], {law.stick_slope} if law.friction else set()
     for n_before, changed in law.friction_changes:
@@ -227,7 +238,7 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
             convention = "pressure, as in CalculiX" if variable == "pressure" else "clearance, as in Abaqus"
             content.note(block, f"the conductance depends on {convention}")
         tables[variable] = rows if variable == "pressure" else [*rows, (rows[-1][0] * JUST_BEYOND, 0.0)]
-        if variable == "pressure" and content.heat == "alone":
+        if variable == "pressure" and content.heat == "uncoupled":
             content.note(block, "steps with heat alone have no pressures: closed contact conducts as at zero pressure")
     if constant is not None and tables:
         raise law.conductance[0].refuse("a constant conductance and a table are given: leave out one of them")
@@ -238,7 +249,7 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
     return {"conductance": tables or constant}
 
 
-def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
+def _friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
     """Return the option `friction_heat`: the fraction of the work that becomes heat, over the duration of a step.
 
     The division converts work per unit of the load factor, by which a step advances 1, to power.
@@ -260,4 +271,4 @@ def perfect_conductance(content: Content, model: Model, location: Location) -> A
     h = PERFECT * float(largest) / float(np.ptp(model.mesh.points, axis=0).max())
     difference = "the temperatures of the sides differ by about 1e-8 of their variation"
     content.note(location, f"the conductance is {h:.3g}; {difference}")
-    return (lambda pressure, gap: np.full(gap.shape, h)) if content.heat == "alone" else h
+    return (lambda pressure, gap: np.full(gap.shape, h)) if content.heat == "uncoupled" else h

@@ -193,9 +193,8 @@ def with_standard_blanks(block: Block) -> Block:
 def keyword_properties(block: Block, about: str) -> Keyword:
     """Return the properties of a keyword.
 
-    Raises CaseError if the keyword or one of its parameters is unknown or not supported.
-
-    `about` precedes messages about keywords outside the scope of the package.
+    Raises CaseError if the keyword or one of its parameters is unknown or not supported. Messages about keywords outside the
+    scope of the package begin with `about`.
     """
     keyword = block.keyword
     if keyword in REFUSED:

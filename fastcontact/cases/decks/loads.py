@@ -1,7 +1,7 @@
 """Loads of the model of a deck: forces, pressures, body forces, given temperatures and heat loads, from their histories.
 
-Loads on cells and facets need groups of the mesh. Their functions create the groups before the mesh exists, and return
-functions that add the loads to the model later.
+Loads on cells and facets need groups of the mesh. The functions for these loads create the groups before the mesh exists, and
+return functions that add the loads to the model later.
 """
 
 from __future__ import annotations
@@ -17,11 +17,13 @@ from fastcontact.cases.decks.assembled import Element, Face, Target
 from fastcontact.cases.decks.blocks import key_of
 from fastcontact.cases.decks.conditions import Conditions
 from fastcontact.cases.decks.histories import ByShape, Histories, Period
-from fastcontact.cases.decks.meshing import DeckMesh, rows_by_type
+from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
 Adder = Callable[[Model], None]
+# Names of groups of loaded cells by the kind of the load; the groups of all others are named "load".
+GROUP_NAMES = {"P": "pressure", "S": "heat flux", "BF": "heat source"}
 
 
 def point_group(model: Model, deck_mesh: DeckMesh, kind: str, points: Iterable[int]) -> str:
@@ -49,45 +51,44 @@ def add_forces(model: Model, deck_mesh: DeckMesh, conditions: Conditions, thickn
             model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: value})
 
 
-def _on_faces(deck_mesh: DeckMesh, histories: Histories[Target]) -> ByShape[tuple[str, str]]:
-    """Return the histories of the loads on faces by keyword and by type of facet."""
-    by_shape = ByShape[tuple[str, str]]()
+def distributed_loads(deck_mesh: DeckMesh, histories: Histories[Target]) -> list[Adder]:
+    """Return functions that add pressures, forces per volume, heat fluxes and heat sources."""
+    by_shape = ByShape[tuple[str, str, tuple[float, ...], str]]()
     for table, loads in histories.distinct():
         for load in loads:
-            for cell, rows in deck_mesh.facet_rows([load.face] if load.face else []).items():
-                by_shape.add((load.keyword, cell), table, rows)
-    return by_shape
-
-
-def pressures(deck_mesh: DeckMesh, conditions: Conditions) -> list[Adder]:
-    """Return functions that add the pressures."""
+            for cell, factor, rows in _cells_of(deck_mesh, load):
+                scaled = tuple((time, factor * value) for time, value in table)
+                by_shape.add((load.keyword, load.kind, load.numbers, cell), scaled, rows)
     adders: list[Adder] = []
-    for number, ((_, cell), rows, value, table) in enumerate(_on_faces(deck_mesh, conditions.loads), start=1):
-        group = deck_mesh.add_cells(f"pressure {number}", cell, rows)
-        if any(factor for _, factor in table):
-            adders.append(partial(Model.add_pressure, group=group, value=value, ramp=table))
+    for number, ((_, kind, vector, cell), indices, value, table) in enumerate(by_shape, start=1):
+        group = f"{GROUP_NAMES.get(kind, 'load')} {number}"
+        deck_mesh.groups[group] = {cell: indices.tolist()}
+        if any(multiplier for _, multiplier in table):
+            adders.append(partial(_add_load, kind=kind, vector=vector, group=group, value=value, table=table))
     return adders
 
 
-def body_forces(deck_mesh: DeckMesh, conditions: Conditions) -> list[Adder]:
-    """Return functions that add the body forces, weights and centrifugal forces as forces per volume."""
-    by_shape = ByShape[tuple[str, tuple[float, ...], str]]()
-    for table, loads in conditions.loads.distinct():
-        for load in (load for load in loads if load.face is None):
-            by_density: dict[tuple[str, float], list[int]] = {}
-            for element in load.elements:
-                if element.type is not None:
-                    key = element.type.element, _density(deck_mesh, element, load)
-                    by_density.setdefault(key, []).append(element.row)
-            for (cell, density), members in by_density.items():
-                scaled = tuple((time, density * value) for time, value in table)
-                by_shape.add((load.kind, load.numbers, cell), scaled, members)
-    adders: list[Adder] = []
-    for number, ((kind, vector, cell), rows, value, table) in enumerate(by_shape, start=1):
-        group = deck_mesh.add_cells(f"load {number}", cell, rows)
-        components = _body_force(kind, vector, value, deck_mesh.dim)
-        adders.append(partial(Model.add_body_force, groups=group, ramp=table, **components))
-    return adders
+def _cells_of(deck_mesh: DeckMesh, load: Target) -> Iterable[tuple[str, float, list[int]]]:
+    """Return the facets or solids on which a load acts, as type, factor of the load and rows of the type."""
+    if load.face is not None:
+        return [(cell, 1.0, rows) for cell, rows in deck_mesh.facet_rows([load.face]).items()]
+    by_density: dict[tuple[str, float], list[int]] = {}
+    for element in load.elements:
+        if element.type is not None:
+            by_density.setdefault((element.type.element, _density(deck_mesh, element, load)), []).append(element.row)
+    return [(cell, density, rows) for (cell, density), rows in by_density.items()]
+
+
+def _add_load(model: Model, kind: str, vector: tuple[float, ...], group: str, value: Any, table: Table) -> None:
+    """Add a distributed load of a `kind` of `Target` to a group."""
+    if kind == "P":
+        model.add_pressure(group, value, ramp=table)
+    elif kind == "S":
+        model.add_heat_flux(group, value, ramp=table)
+    elif kind == "BF":
+        model.add_heat_source(value, group, ramp=table)
+    else:
+        model.add_body_force(group, ramp=table, **_body_force(kind, vector, value, model.mesh.dim))
 
 
 def _density(deck_mesh: DeckMesh, element: Element, load: Target) -> float:
@@ -131,32 +132,28 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
     """
     fields = list(ByShape.of((_relative(table, table[0][1]), points) for table, points in histories.distinct()))
     times = sorted({time for *_, table in fields for time, _ in table})
-    if len(fields) <= len(times):
-        for _, points, values, table in fields:
-            change = np.zeros(model.mesh.n_points)
-            change[points] = values(points) if callable(values) else values
-            _add_field(model, change, table)
-        return
-    for k, time in enumerate(times):
-        corners = sorted({times[0], *times[max(k - 1, 0) : k + 2], times[-1]})
-        change = np.zeros(model.mesh.n_points)
-        for _, points, values, table in fields:
-            instants, factors = zip(*table, strict=True)
-            factor = np.interp(time, instants, factors)
-            change[points] = factor * (values(points) if callable(values) else values)
-        _add_field(model, change, tuple((corner, float(corner == time)) for corner in corners))
+    at_times = np.zeros((len(times), model.mesh.n_points))
+    for _, points, values, table in fields:
+        change = values(points) if callable(values) else values
+        if len(fields) > len(times):
+            at_times[:, points] = np.outer(np.interp(times, *np.transpose(table)), change)
+        elif any(factor for _, factor in table):
+            field = np.zeros(model.mesh.n_points)
+            field[points] = change
+            model.add_temperature(_on_both_sides(model, field), reference=0.0, ramp=table)
+    if len(fields) > len(times):
+        model.add_temperature(_on_both_sides(model, at_times), reference=0.0, times=times)
 
 
-def _add_field(model: Model, change: Array, ramp: Table) -> None:
-    """Add a field (n_points,) of temperature changes, unless it or its ramp is zero."""
-    for section in model.pretensions:  # the deck does not contain the opposite nodes of a section
-        change[section.opposite] = change[section.nodes]
-    if change.any() and any(factor for _, factor in ramp):
-        model.add_temperature(change, reference=0.0, ramp=ramp)
+def _on_both_sides(model: Model, values: Array) -> Array:
+    """Return nodal values (..., n_points), copied to the opposite sides of pretension sections, which the deck lacks."""
+    for section in model.pretensions:
+        values[..., section.opposite] = values[..., section.nodes]
+    return values
 
 
 def heat_loads(deck_mesh: DeckMesh, conditions: Conditions, thickness: float) -> list[Adder]:
-    """Return functions that add the prescribed temperatures, nodal heat flows, heat sources, heat fluxes and films.
+    """Return functions that add the prescribed temperatures, nodal heat flows and films.
 
     `thickness` [length] converts nodal heat flows to flows per unit thickness.
     """
@@ -167,37 +164,25 @@ def heat_loads(deck_mesh: DeckMesh, conditions: Conditions, thickness: float) ->
     for table, period, points in conditions.fixed_temperatures.in_periods():
         if period.ends > begin:
             rises.add(_span(period, begin), _relative(table, reference), points)
-    for span, nodes, value, table in rises:
+    for (begins, ends), nodes, value, table in rises:
         group = deck_mesh.add_points(f"temperature {len(adders)}", nodes)
-        fixed = {"value": _absolute_temperature(value, reference), "ramp": table, **_limits(span)}
-        adders.append(partial(Model.fix_temperature, group=group, **fixed))
+        fix = partial(Model.fix_temperature, begins=begins, ends=ends)
+        adders.append(partial(fix, group=group, value=_absolute_temperature(value, reference), ramp=table))
     for _, nodes, value, table in ByShape.of(conditions.powers.distinct()):
         group = deck_mesh.add_points(f"heat {len(adders)}", nodes)
         powers = tuple((time, power / thickness) for time, power in table)
         adders.append(partial(Model.add_nodal_heat, group=group, value=value, ramp=powers))
-    sources = ByShape[str]()
-    for table, fluxes in conditions.fluxes.distinct():
-        for flux in fluxes:
-            for cell, rows in rows_by_type(flux.elements).items():
-                sources.add(cell, table, rows)
-    on_faces = _on_faces(deck_mesh, conditions.fluxes)
-    for cell, indices, value, table in sources:
-        group = deck_mesh.add_cells(f"heat source {len(adders)}", cell, indices)
-        adders.append(partial(Model.add_heat_source, value=value, groups=group, ramp=table))
-    for (keyword, cell), indices, value, table in on_faces:
-        group = deck_mesh.add_cells(f"{keyword.lower()} {len(adders)}", cell, indices)
-        adders.append(partial(Model.add_heat_flux, group=group, value=value, ramp=table))
     faces_by_film: dict[tuple[Table, float, tuple[float, float]], list[Face | None]] = {}
     for table, period, films in conditions.films.in_periods():
         for film in films if period.ends > begin else ():
             faces_by_film.setdefault((table, film.numbers[0], _span(period, begin)), []).append(film.face)
-    for (table, coefficient, span), faces in faces_by_film.items():
+    for (table, coefficient, (begins, ends)), faces in faces_by_film.items():
         group = deck_mesh.add_facets(f"film {len(adders)}", filter(None, faces))
         rise = _relative(table, reference)
         size = max((value for _, value in rise), key=abs)
         ramp = tuple((time, value / size) for time, value in rise) if size else None
-        film_options: dict[str, Any] = {"ambient": reference + size, "ramp": ramp, **_limits(span)}
-        adders.append(partial(Model.add_film, group=group, coefficient=coefficient, **film_options))
+        add = partial(Model.add_film, begins=begins, ends=ends)
+        adders.append(partial(add, group=group, coefficient=coefficient, ambient=reference + size, ramp=ramp))
     return adders
 
 
@@ -209,11 +194,6 @@ def _relative(table: Table, reference: float) -> Table:
 def _span(period: Period, begin: float) -> tuple[float, float]:
     """Return the load factors of a period; the first is minus infinity if temperatures are computed only from it on."""
     return period.begins if period.begins > begin else -np.inf, period.ends
-
-
-def _limits(span: tuple[float, float]) -> dict[str, float]:
-    """Return the arguments `begins` and `ends` of methods of `Model` for an interval of load factors."""
-    return {name: limit for name, limit in zip(("begins", "ends"), span, strict=True) if np.isfinite(limit)}
 
 
 def _absolute_temperature(value: Any, reference: float) -> Any:

@@ -179,7 +179,7 @@ def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
 
 def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     """Return the model's material with the given `axes`; `modes` is true if its elements have incompatible modes."""
-    if content.heat == "alone":
+    if content.heat == "uncoupled":
         return _add_constants(material, ARBITRARY_LAW, axes, conductivity=_conductivity(content, material))
     assert material.law is not None
     law, expansion = material.law(axes), material.expansion
@@ -190,8 +190,8 @@ def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
         law = replace(law, incompatible_modes=True)
     if content.heat or material.conductivity is not None:
         law = _add_constants(material, law, axes, conductivity=_conductivity(content, material))
-    conditions = [condition for step in content.steps for condition in step.conditions]
-    heated = content.heat or any(condition.block.keyword == "TEMPERATURE" for condition in conditions)
+    blocks = (block for step in content.steps for block in step.conditions)
+    heated = content.heat or any(block.keyword == "TEMPERATURE" for block in blocks)
     if expansion is None:
         if heated:
             content.note(material, f"material '{material.name}' has no *EXPANSION: temperatures cause no strain")
@@ -237,7 +237,7 @@ def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
     """Return the strain measure of the model, and the reason why NLGEOM is ignored, or an empty string."""
     if any("small" not in getattr(law, "strains", nonlinear.STRAINS) for law in laws):
         return "finite", ""
-    if content.heat == "alone" or not any(step.nonlinear for step in content.steps):
+    if content.heat == "uncoupled" or not any(step.nonlinear for step in content.steps):
         return "small", ""
     plastic_laws = [law for law in laws if isinstance(law, nonlinear.ElasticPlastic)]
     reasons = {

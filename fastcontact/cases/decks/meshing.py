@@ -12,11 +12,9 @@ from fastcontact.arrays import Indices
 from fastcontact.cases.decks.assembled import Assembly, Element, Face, assemble, facet_points
 from fastcontact.cases.decks.blocks import Location, key_of
 from fastcontact.cases.decks.content import Content, Surface
-from fastcontact.mesh import topology
+from fastcontact.mesh import elements, topology
 from fastcontact.mesh.mesh import Mesh, starts_of
 
-# Type of a facet by the dimension of the mesh and the number of its nodes.
-FACETS = {2: {2: "line2", 3: "line3"}, 3: {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8"}}
 # Largest difference in z between the points of a plane model, relative to its size.
 FLAT = 1e-9
 
@@ -67,20 +65,15 @@ class DeckMesh(Assembly):
     def facet_rows(self, faces: Iterable[Face]) -> dict[str, list[int]]:
         """Return the rows of facets by facet type; facets that do not exist yet are created."""
         rows: dict[str, list[int]] = {}
-        for face in faces:
-            points = facet_points(*face)
-            name = FACETS[self.dim][len(points)]
+        for element, facet in faces:
+            points = facet_points(element, facet)
+            name = elements.get(element.solid.element).facet_elements[facet]
             facets = self.facets.setdefault(name, [])
             row = self.rows.setdefault(tuple(sorted(points)), len(facets))
             if row == len(facets):
                 facets.append(points)
             rows.setdefault(name, []).append(row)
         return rows
-
-    def add_cells(self, group: str, cell: str, rows: Indices) -> str:
-        """Make a group of cells of one type, given by their rows, and return its name."""
-        self.groups[group] = {cell: rows.tolist()}
-        return group
 
     def add_solids(self, group: str, solids: Iterable[Element]) -> str:
         """Make a group of solids and return its name."""
@@ -149,7 +142,7 @@ def deck_mesh_of(content: Content) -> DeckMesh:
             raise element.cell.refuse(
                 f"elements of type {element.solid.name} and {first.name} ({first.kinematics}) cannot be in one model"
             )
-        if element.solid.conducts and content.heat != "alone":
+        if element.solid.conducts and content.heat != "uncoupled":
             raise element.cell.refuse(
                 f"elements of type {element.solid.name} conduct heat alone: they need steps with *HEAT TRANSFER, all of them"
             )
@@ -193,23 +186,15 @@ def _add_node_based_surface(deck_mesh: DeckMesh, group: str, definition: Surface
         deck_mesh.excluded[group] = sorted(points.difference(deck_mesh.surface_nodes(definition, scope)))
 
 
-def secondary_group(deck_mesh: DeckMesh, name: str, location: Location) -> str:
-    """Return the group of a surface of faces or nodes.
-
-    Raises CaseError if one of its nodes is on no outer face of a solid.
-    """
+def check_nodes(deck_mesh: DeckMesh, name: str, location: Location) -> None:
+    """Raise CaseError if a node of a node-based surface is on no outer face of a solid."""
     definition, scope = deck_mesh.surface(name, location)
-    if not definition.of_nodes:
-        return group_of_surface(deck_mesh, name)
-    complete, further, _ = deck_mesh.faces_of_nodes(definition, scope)
-    on_faces = {point for face in (*complete, *further) for point in facet_points(*face)}
-    for point in deck_mesh.surface_nodes(definition, scope):
-        if point not in on_faces:
+    for point in deck_mesh.surface_nodes(definition, scope) if definition.of_nodes else ():
+        if point not in deck_mesh.outer_faces:
             raise definition.refuse(
                 f"node {deck_mesh.number_of(point)} of surface '{definition.name}' is on no outer face of a solid: "
                 "contact needs nodes of bodies, so leave it out"
             )
-    return group_of_surface(deck_mesh, name)
 
 
 def group_of_surface(deck_mesh: DeckMesh, name: str) -> str:

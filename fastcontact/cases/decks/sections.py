@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from fastcontact.cases.decks.assembled import Assembly, facet_points
 from fastcontact.cases.decks.blocks import Block, key_of, refusing
 from fastcontact.cases.decks.conditions import Conditions
-from fastcontact.cases.decks.content import Content, PretensionSection, SectorEnds, Sectors
+from fastcontact.cases.decks.content import Content, PretensionSection, SectorEnds
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.mesh.generate.cut import cut
@@ -53,8 +53,8 @@ def _locked_from(point: int, section: PretensionSection, conditions: Conditions)
     for period in (period for period in track.periods if period.keeps) if track else ():
         if period.ends < np.inf:
             step = conditions.assembly.content.steps[int(period.ends)]
-            supports = [condition for condition in step.conditions if condition.block.keyword == "BOUNDARY"]
-            raise max(supports, key=lambda condition: condition.new).block.refuse(
+            supports = [block for block in step.conditions if block.keyword == "BOUNDARY"]
+            raise max(supports, key=lambda block: block.removes_earlier).refuse(
                 f"node {section.node} of a pretension section is released here: a locked section stays locked"
             )
         return period.begins
@@ -113,46 +113,44 @@ MOST_SECTORS = 100_000
 
 
 def cyclic_symmetry_model(content: Content, block: Block) -> None:
-    """Read *CYCLIC SYMMETRY MODEL: the number of sectors, and two points of the axis."""
-    text = block.required("N")
-    if not text.isdecimal() or not 2 <= int(text) <= MOST_SECTORS:
-        raise block.refuse(f"N={text[:40]}: a whole number of sectors, 2 to {MOST_SECTORS}, is needed")
-    row = block.only()
-    points = tuple(row.number(i) for i in range(6))
-    if points[:3] == points[3:]:
-        raise block.refuse("the two points of the axis are the same")
-    content.sectors.append(Sectors(block.location, int(text), block.get("TIE"), points))
+    """Store *CYCLIC SYMMETRY MODEL: the number of sectors, and two points of the axis."""
+    content.sectors.append(block)
 
 
 def add_sectors(model: Model, deck_mesh: DeckMesh) -> None:
     """Add the cyclic symmetries of a deck to the model."""
-    content = deck_mesh.content
-    used: set[int] = set()
-    for sectors in content.sectors:
-        ends = _ends(content, sectors)
-        used.add(id(ends))
-        first, second = np.reshape(sectors.points, (2, 3))
+    unused = list(deck_mesh.content.sector_ends)
+    for block in deck_mesh.content.sectors:
+        text = block.required("N")
+        if not text.isdecimal() or not 2 <= int(text) <= MOST_SECTORS:
+            raise block.refuse(f"N={text[:40]}: a whole number of sectors, 2 to {MOST_SECTORS}, is needed")
+        row = block.only()
+        first, second = np.reshape([row.number(i) for i in range(6)], (2, 3))
+        if (first == second).all():
+            raise block.refuse("the two points of the axis are the same")
         direction = (second - first) / np.linalg.norm(second - first)
         if model.mesh.dim == 2 and np.abs(direction[:2]).max() > 1e-9:
-            raise sectors.refuse("the axis of a plane model is along z: give two points that differ in z only")
+            raise block.refuse("the axis of a plane model is along z: give two points that differ in z only")
+        ends = _ends(deck_mesh.content, block)
+        unused = [others for others in unused if others is not ends]
         for name in ends.surfaces:
             deck_mesh.faces(name, ends.location)
         groups = [group_of_surface(deck_mesh, name) for name in ends.surfaces]
-        with refusing(sectors):
+        with refusing(block):
             model.add_cyclic_symmetry(
-                groups[0], groups[1], sectors=sectors.count, origin=tuple(first[: model.mesh.dim].tolist()),
+                groups[0], groups[1], sectors=int(text), origin=tuple(first[: model.mesh.dim].tolist()),
                 direction=tuple(direction.tolist()),
             )  # fmt: skip
-    for ends in content.sector_ends:
-        if id(ends) not in used:
-            raise ends.refuse("no *CYCLIC SYMMETRY MODEL defines the number of sectors and the axis")
+    for ends in unused:
+        raise ends.refuse("no *CYCLIC SYMMETRY MODEL defines the number of sectors and the axis")
 
 
-def _ends(content: Content, sectors: Sectors) -> SectorEnds:
+def _ends(content: Content, block: Block) -> SectorEnds:
     """Return the sector ends of a *CYCLIC SYMMETRY MODEL: those of its TIE, or the only ones of the deck."""
-    matching = [ends for ends in content.sector_ends if not sectors.tie or key_of(ends.name) == key_of(sectors.tie)]
+    tie = block.get("TIE")
+    matching = [ends for ends in content.sector_ends if not tie or key_of(ends.name) == key_of(tie)]
     if len(matching) != 1:
         names = ", ".join(ends.name or f"that of line {ends.location.line}" for ends in content.sector_ends) or "none"
-        parameter = f"TIE={sectors.tie[:80]}" if sectors.tie else "TIE is not given"
-        raise sectors.refuse(f"{parameter}, and the ties with CYCLIC SYMMETRY are: {names}")
+        parameter = f"TIE={tie[:80]}" if tie else "TIE is not given"
+        raise block.refuse(f"{parameter}, and the ties with CYCLIC SYMMETRY are: {names}")
     return matching[0]

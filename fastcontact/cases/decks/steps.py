@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from fastcontact.cases.decks.blocks import Block, key_of, look_up
-from fastcontact.cases.decks.content import Amplitude, Condition, Content, Step
+from fastcontact.cases.decks.content import Amplitude, Content, Step
 
 # Largest number of increments into which a step of a path-dependent model is divided.
 MOST_INCREMENTS = 20
@@ -48,7 +48,7 @@ def heat_procedure(content: Content, step: Step, block: Block) -> None:
     if "STEADY STATE" not in block.parameters:
         raise block.refuse("only STEADY STATE is supported, not transient heat conduction")
     static(content, step, block)
-    step.heat = "alone" if block.keyword == "HEAT TRANSFER" else "coupled"
+    step.heat = "uncoupled" if block.keyword == "HEAT TRANSFER" else "coupled"
     if block.keyword[:2] == "UN":
         content.note(block, "temperatures and displacements are solved together")
 
@@ -72,13 +72,13 @@ def end_step(content: Content, step: Step | None, block: Block) -> None:
             raise step.refuse("the step has no *STATIC or other procedure")
         return
     if step.conditions:
-        raise step.conditions[0].block.refuse(
+        raise step.conditions[0].refuse(
             "cannot be in a step with *FREQUENCY: the modes use the supports of the preceding steps"
         )
     content.steps.pop()
     if not content.steps:
         raise step.refuse("*FREQUENCY needs a step with *STATIC before it: modes are vibrations about its last state")
-    if content.steps[-1].heat == "alone":
+    if content.steps[-1].heat == "uncoupled":
         raise step.refuse("*FREQUENCY after *HEAT TRANSFER is not supported: displacements are fixed there")
     stiffening = step.perturbation or any(earlier.nonlinear for earlier in content.steps)
     content.modes = {"n": step.n_modes, "stress_stiffening": stiffening}
@@ -93,11 +93,11 @@ def condition(content: Content, step: Step | None, block: Block) -> None:
     """Store a block of supports or loads of a step, or a *BOUNDARY that precedes all steps."""
     if name := block.get("AMPLITUDE"):
         look_up("amplitude", name, content.amplitudes, block)
-    entry = Condition(block, block.choice("OP", ("MOD", "NEW")) == "NEW", name)
+    block.choice("OP", ("MOD", "NEW"))
     if step is not None:
-        step.conditions.append(entry)
+        step.conditions.append(block)
     elif block.keyword == "BOUNDARY":
-        content.supports.append(entry)
+        content.supports.append(block)
     else:
         raise block.refuse("loads belong in a step")
 

@@ -312,7 +312,7 @@ def test_temperatures_of_nodes_that_each_go_their_own_way(tmp_path):
     given = [{n: 20.0 + 3.0 * n**k - 7.0 * k * n for n in nodes} | {7: 20.0} for k in range(3)]
     steps = ["*Temperature\n" + "".join(f"{n}, {value}\n" for n, value in values.items()) for values in given]
     deck = deck_of(tmp_path, heated(steps=steps))
-    assert len(deck.model.temperatures) == 3
+    assert len(deck.model.temperatures) == 4  # at the load factors 0, 1, 2 and 3
     for step, values in zip(deck.solve(), given, strict=True):
         rise = deck.model.temperature_rise(step.iterations["temperature_factors"])
         assert [rise[deck.point(n)] for n in nodes] == pytest.approx([values[n] - 20.0 for n in nodes])

@@ -213,10 +213,10 @@ RELATIONS = {
     "springs of two": (with_relation(SPRING + "*Spring, elset=springs\n\n1.\n2.\n"), "need an empty line, followed by"),
     "spring with a law": (with_relation(SPRING + "*Spring, elset=springs\n\n1., 2.\n"), "only linear springs are supp"),
     "spring of no stiffness": (with_relation(SPRING + "*Spring, elset=springs\n\n0.\n"), "the stiffness 0 must be"),
-    "spring of a solid": (with_relation("*Spring, elset=up\n\n1.\n"), "element 2 is not a spring of type SPRINGA"),
+    "spring of a solid": (with_relation("*Spring, elset=up\n\n1.\n"), "element 2 is not of type SPRINGA"),
     "spring without stiffness": (with_relation(SPRING), r"element 7 of type SPRINGA has no \*SPRING"),
     "gap without a direction": (with_relation(GAP + "*Gap, elset=gaps\n1.\n"), "the direction of the gap elements is"),
-    "gap of a solid": (with_relation("*Gap, elset=up\n1., 0., 0., 1.\n"), "acts on elements of type GAPUNI only"),
+    "gap of a solid": (with_relation("*Gap, elset=up\n1., 0., 0., 1.\n"), "element 2 is not of type GAPUNI"),
     "gap on one node": (
         with_relation(GAP + "*Gap, elset=gaps\n1., 0., 0., 1.\n"),
         "gap elements are supported on all nodes of whole faces only",
