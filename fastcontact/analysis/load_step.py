@@ -125,7 +125,10 @@ def _end_of_step(
     elif start.work is not None:
         end = replace(end, work=start.work.after(balance.energy, 0.0, (0.0, 0.0, 0.0)))
     if problem.extrapolates:
-        contact_data = {} if settled is None else settled.gaps_and_forces
+        contact_data = {}
+        if settled is not None:
+            gap, force = settled.solution.gap, settled.solution.multiplier
+            contact_data = {name: (gap[rows], force[rows]) for name, rows in settled.constraints.rows.items()}
         extrapolation = start.extrapolation.converged(u, contact_data, problem.bodies is not None)
         end = replace(end, extrapolation=extrapolation)
     if end.work is not None:
@@ -174,7 +177,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         if not (extrapolation.loads or state.u.any()):
             extrapolation = extrapolation.to(*map(np.zeros_like, quantities)).converged(state.u, {})
         start = replace(start, extrapolation=extrapolation.to(*quantities))
-    return StepContext(problem, start, load, loaded, problem.dofs, start.extrapolation, expected, index)
+    return StepContext(problem, start, load, loaded, expected, index)
 
 
 def _contact_at_end(

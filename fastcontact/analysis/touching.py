@@ -48,13 +48,16 @@ class Touching:
     _paired: StackedConstraints | None
 
     def step(
-        self, step: StepContext, constraints: StackedConstraints, iterate: Iterate, nodes: SharedNodes | None
+        self, step: StepContext, constraints: StackedConstraints, u: Array, nodes: SharedNodes | None
     ) -> StepContext:
-        """Return the step in which a pairing is solved: with a `Path` if increments are due, otherwise unchanged."""
+        """Return the step in which a pairing at displacements u (n_dofs,) is solved.
+
+        It has a `Path` if increments are due, and is unchanged otherwise.
+        """
         self.unfinished = False
-        if not (self.due or self._outdated(step, constraints, iterate.u)):
+        if not (self.due or self._outdated(step, constraints, u)):
             return step
-        path = _path(step, constraints, iterate, nodes)
+        path = _path(step, constraints, nodes)
         self.due, self.unfinished, self._paired = False, path is not None, constraints
         return step if path is None else replace(step, path=path)
 
@@ -108,9 +111,7 @@ def _slides(step: StepContext, constraints: StackedConstraints, solution: Soluti
     return bool(shear[frictional & (forces[0] == 0.0)].sum() > limit * capacity[frictional].sum())
 
 
-def _path(
-    step: StepContext, constraints: StackedConstraints, iterate: Iterate, nodes: SharedNodes | None
-) -> Path | None:
+def _path(step: StepContext, constraints: StackedConstraints, nodes: SharedNodes | None) -> Path | None:
     """Return the path of a step with the gaps and forces at its beginning.
 
     None if no constraint is open there, or if the forces are unknown.
@@ -119,7 +120,14 @@ def _path(
     if forces is None:
         return None
     normal, traction = forces
-    gap = np.where(normal != 0.0, 0.0, _gaps(step, constraints, iterate))
+    state, gaps = step.state, []  # in the configuration at the beginning of the step
+    begin = replace(step.load, obstacles=state.obstacles, angles=state.angles)
+    for name, part in pair_surfaces(step.problem, state, begin, Iterate.of(state)).parts.items():
+        current = constraints.parts[name]
+        initial = part if np.array_equal(part.positions, current.positions) else current
+        determined = np.isfinite(initial.gap0) & initial.usable
+        gaps.append(np.where(determined, initial.gaps(state.u), current.gaps(state.u)))
+    gap = np.where(normal != 0.0, 0.0, np.maximum(np.concatenate(gaps), 0.0))
     size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
     slips = _closing(step, constraints, gap)
     if nodes is not None:
@@ -158,17 +166,3 @@ def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, 
         elif name in step.state.touched and not part.equality.all():
             return None
     return normal, traction
-
-
-def _gaps(step: StepContext, constraints: StackedConstraints, iterate: Iterate) -> Array:
-    """Return the gaps (m,) at the beginning of the step, measured in the configuration at its beginning [length]."""
-    state = step.state
-    begin = replace(step.load, obstacles=state.obstacles, angles=state.angles)
-    initial = pair_surfaces(step.problem, state, begin, Iterate.of(state))
-    gaps = []
-    for name, part in initial.parts.items():
-        current = constraints.parts[name]
-        initial_part = part if np.array_equal(part.positions, current.positions) else current
-        determined, u = np.isfinite(initial_part.gap0) & initial_part.usable, state.u
-        gaps.append(np.where(determined, initial_part.gap0 + initial_part.B @ u, current.gap0 + current.B @ u))
-    return np.maximum(np.concatenate(gaps), 0.0)
