@@ -135,9 +135,8 @@ def _settle(
         # Constraints of several pairs, or of both ends of a period, may be at one node.
         ends = problem.model.periodic_interfaces
         nodes = SharedNodes.of(constraints, ends) if len(problem.pairs) > 1 or ends else None
-        merged, closed = (
-            (constraints, active) if nodes is None else (nodes.merged_constraints(constraints), nodes.closed(active))
-        )
+        merged = constraints if nodes is None else nodes.merged_constraints(constraints)
+        closed = active if nodes is None else nodes.summed(active) > 0.0
         step_on_path = touching.step(step, constraints, iterate.u, nodes)
         if touching.unfinished:
             accuracy = Accuracy(0.0, residual=problem.solver.tolerance)

@@ -110,15 +110,15 @@ def _end_of_step(
         start, u=u, largest_force=balance.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
         instant=instant[1], rise=None if heat_solution is None else heat_solution.rise,
     )  # fmt: skip
-    bodies = None if solution.terms is None else solution.terms.bodies.at(u)
-    if bodies is not None:
+    bodies = None
+    if problem.bodies is not None and solution.terms is not None:
+        bodies = solution.terms.bodies.at(u)
         end = replace(end, history=bodies.history)
-    # In the first step, which begins without a history, the path is unknown.
-    flows = problem.bodies is not None and problem.bodies.flows_freely and load.rise is None
-    if problem.bodies is not None and bodies is not None and flows and start.history:
-        displacements = problem.displacement(start.extrapolation.midway(start.u, u)), problem.displacement(u)
-        size, change = problem.bodies.change_if_halved(*displacements, start.history, bodies)
-        end = replace(end, flow=(start.flow[0] + size, start.flow[1] + change))
+        # In the first step, which begins without a history, the path is unknown.
+        if problem.bodies.flows_freely and load.rise is None and start.history:
+            displacements = problem.displacement(start.extrapolation.midway(start.u, u)), problem.displacement(u)
+            size, change = problem.bodies.change_if_halved(*displacements, start.history, bodies)
+            end = replace(end, flow=(start.flow[0] + size, start.flow[1] + change))
     contact: dict[str, ContactResult] = {}
     if settled is not None:
         end, contact = _contact_at_end(problem, start, load, settled, end, balance.energy)

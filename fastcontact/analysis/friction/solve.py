@@ -24,6 +24,7 @@ from fastcontact.analysis.friction.cone_newton import (
     aligning_rotation,
     compliance_of_each,
     held_tangents,
+    rotated,
 )
 from fastcontact.analysis.solution import Accuracy, Forces, Path, SlipSoFar, Solution, in_increments, response
 from fastcontact.arrays import Array, Indices, Mask
@@ -95,10 +96,7 @@ def _eliminated(
 
     def solve_eliminated(constraints: Constraints, closed: Mask, accuracy: Accuracy, forces: Array | None) -> Forces:
         nonlocal u
-        solution = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
-        if solution is None:
-            raise ConvergenceError("friction: the iteration on eliminated constraints did not converge")
-        u, result = solution
+        u, result = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
         result.gaps[:, ~usable] = 0.0
         return result
 
@@ -163,8 +161,8 @@ def _with_included(
         y0, closing = path.along(constraints.directions, rows)
     if Q is not None:
         F = np.asarray(Q @ (Q @ F).T)
-        free, y0, closing = ((Q @ values.ravel()).reshape(free.shape) for values in (free, y0, closing))
-        guess = None if guess is None else (Q @ guess.ravel()).reshape(free.shape)
+        free, y0, closing = (rotated(Q, values) for values in (free, y0, closing))
+        guess = None if guess is None else rotated(Q, guess)
     if len(held_rows):
         prescribed = held_slips & constraints.moved_past(rows, Q)
         F[held_rows], F[:, held_rows] = 0.0, 0.0
@@ -192,7 +190,7 @@ def _with_included(
         result, gaps_of_included, before = in_increments(lag, closing, y0, path.waiting[rows], increment)
     y = result.y
     if Q is not None:
-        y, gaps_of_included = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ gaps_of_included.ravel()).reshape(y.shape)
+        y, gaps_of_included = rotated(Q.T, y), rotated(Q.T, gaps_of_included)
     u = loaded.involved_solution(R.T @ y.ravel(), u)
     all_forces = np.zeros((1 + k, m))
     gaps = gaps_at_rest + (all_rows @ u).reshape(1 + k, m)
@@ -231,14 +229,13 @@ def _slip_so_far(
         All m constraints.
     """
     *components, integrals, normal, begin = before
+    if Q is not None:
+        no_gaps = np.zeros((1, len(rows)))
+        components = [rotated(Q.T, np.vstack([no_gaps, along]))[1:] for along in components]
     m, dim = constraints.positions.shape
     all_vectors, all_integrals, all_normal = np.zeros((3, m, dim)), np.zeros((2, m)), np.zeros(m)
-    for vectors, along in zip(all_vectors, components, strict=True):
-        unrotated = along
-        if Q is not None:
-            unrotated = (Q.T @ np.vstack([np.zeros(len(rows)), along]).ravel()).reshape(-1, len(rows))[1:]
-        tangents = np.stack([tangent[rows] for tangent in constraints.directions])
-        vectors[rows] = np.einsum("km,kmd->md", unrotated, tangents)
+    tangents = np.stack(constraints.directions)[:, rows]
+    all_vectors[:, rows] = np.einsum("pkm,kmd->pmd", np.stack(components), tangents)
     all_integrals[:, rows], all_normal[rows] = integrals, normal
     slip, slip_before_closing, traction = all_vectors
     return SlipSoFar(slip, slip_before_closing, traction, all_integrals, all_normal, begin)
