@@ -24,11 +24,11 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_moves, nearest_nodes
 from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.friction_increments import FrictionIncrements
 from fastcontact.analysis.inequalities import Iterate, StepContext, initially_active, pair_surfaces, solve_inequalities
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.tolerances import ScatterWindow, Tolerances
-from fastcontact.analysis.touching import Touching
 from fastcontact.arrays import Array, largest
 from fastcontact.contact.constraints import Linearised, StackedConstraints
 from fastcontact.errors import ConvergenceError
@@ -98,9 +98,9 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
         return None
     lift = step.load.lift if bodies is None else step.load.lift + bodies.rigid(u[bodies.dofs])
     step = replace(step, loaded=step.loaded.condensed(), condensed_size=problem.dofs.largest_condensed(u, lift))
-    touching = Touching(step)
+    increments = FrictionIncrements(step)
     try:
-        settled = _settle(step, iterate, touching, paired if step.linearises_contact else None)
+        settled = _settle(step, iterate, increments, paired if step.linearises_contact else None)
     except ConvergenceError as error:
         error.history = error.history or iterate.history
         raise
@@ -112,7 +112,7 @@ def settle_geometry(step: StepContext, iterate: Iterate, paired: SettledContact 
 
 
 def _settle(
-    step: StepContext, iterate: Iterate, touching: Touching, paired: SettledContact | None = None
+    step: StepContext, iterate: Iterate, increments: FrictionIncrements, paired: SettledContact | None = None
 ) -> SettledContact:
     """Return the result of `settle_geometry` before nodes in several pairs share their forces; `iterate` is modified."""
     problem, criteria = step.problem, step.problem.criteria
@@ -137,11 +137,11 @@ def _settle(
         nodes = SharedNodes.of(constraints, ends) if len(problem.pairs) > 1 or ends else None
         merged = constraints if nodes is None else nodes.merged_constraints(constraints)
         closed = active if nodes is None else nodes.summed(active) > 0.0
-        step_on_path = touching.step(step, constraints, iterate.u, nodes)
-        if touching.unfinished:
+        step_on_path = increments.with_path(step, constraints, iterate.u, nodes)
+        if increments.unfinished:
             accuracy = Accuracy(0.0, residual=problem.solver.tolerance)
         solution, displacement = solve_inequalities(step_on_path, merged, iterate, closed & merged.usable, accuracy)
-        if touching.unfinished:
+        if increments.unfinished:
             if not solution.settled:
                 raise ConvergenceError("an increment does not converge", iterate.history)
             step = replace(step, path=solution.slip_so_far)
@@ -157,12 +157,12 @@ def _settle(
         change, size = last_update.change, last_update.size
         enough = tolerances.enough(size)
         if not tolerances.inexact:
-            touching.check(step, constraints, solution, change - enough, size, iterate.u)
+            increments.check(constraints, solution, change - enough, size, iterate.u)
         paired_at = last_update.before[problem.dofs.compared]
         settled = SettledContact(constraints, solution, iterate, nodes=nodes, paired_at=paired_at)
         if not solution.settled or tolerances.inexact:
             window = ScatterWindow()
-        elif change <= enough and not (touching.due or touching.unfinished):
+        elif change <= enough and not (increments.due or increments.unfinished):
             return settled
         elif scatter := window.add(displacement, settled.force, change, size, mixing.contraction):
             log.info(
@@ -181,10 +181,10 @@ def _settle(
         changes = np.zeros_like(iterate.u)
         changes[problem.dofs.active] = displacement - last_update.before
         raise ConvergenceError(geometry_moves(problem, iterate.history, changes, limit), iterate.history)
-    touching.check(step, constraints, solution, 0.0, 0.0, iterate.u)
-    if touching.due or touching.unfinished:
+    increments.check(constraints, solution, 0.0, 0.0, iterate.u)
+    if increments.due or increments.unfinished:
         del iterate.history[-limit - 1 :]
-        return _settle(step, iterate, touching)
+        return _settle(step, iterate, increments)
     fixed = limit and not criteria.keep_pairing
     return SettledContact(constraints, solution, iterate, (limit, last_update.relative) if fixed else None, nodes=nodes)
 

@@ -21,7 +21,7 @@ from fastcontact.contact.surface import Surface
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
-class Touching:
+class FrictionIncrements:
     """Decision whether, and from which pairing on, friction of a load step is solved in increments; see `geometry_loop`.
 
     Parameters
@@ -39,7 +39,7 @@ class Touching:
     """
 
     def __init__(self, step: StepContext) -> None:
-        self._shear_limit = step.problem.friction_while_touching
+        self._step, self._shear_limit = step, step.problem.friction_while_touching
         self._near = NOTABLE if step.linearises_contact else 0.0
         self.due = self.unfinished = self._settled = False
         self._paired, self._shift = None, np.inf
@@ -47,7 +47,7 @@ class Touching:
     # Constraints of the last pairing that was solved in increments.
     _paired: StackedConstraints | None
 
-    def step(
+    def with_path(
         self, step: StepContext, constraints: StackedConstraints, u: Array, nodes: SharedNodes | None
     ) -> StepContext:
         """Return the step in which a pairing at displacements u (n_dofs,) is solved.
@@ -55,37 +55,34 @@ class Touching:
         It has a `Path` if increments are due, and is unchanged otherwise.
         """
         self.unfinished = False
-        if not (self.due or self._outdated(step, constraints, u)):
+        if not (self.due or self._outdated(constraints, u)):
             return step
         path = _path(step, constraints, nodes)
         self.due, self.unfinished, self._paired = False, path is not None, constraints
         return step if path is None else replace(step, path=path)
 
-    def check(
-        self, step: StepContext, constraints: StackedConstraints, solution: Solution, excess: float, size: float,
-        u: Array,
-    ) -> None:  # fmt: skip
+    def check(self, constraints: StackedConstraints, solution: Solution, excess: float, size: float, u: Array) -> None:
         """Set `due`, given the solution of a pairing with the displacements `u` (n_dofs,) [length].
 
         `excess` is the change of the displacements beyond the tolerance, and `size` the largest displacement [length].
         """
         self._settled = self._shear_limit < 1.0 and solution.settled and excess <= self._near * size
         self._active, self._size = solution.active, size
-        self.due = self._outdated(step, constraints, u)
+        self.due = self._outdated(constraints, u)
         if self._paired is None:
-            self.due = self._settled and _slides(step, constraints, solution, self._shear_limit)
+            self.due = self._settled and _slides(self._step, constraints, solution, self._shear_limit)
 
-    def _outdated(self, step: StepContext, constraints: StackedConstraints, u: Array) -> bool:
+    def _outdated(self, constraints: StackedConstraints, u: Array) -> bool:
         """Return whether the geometry has changed since the increments were solved, but by less than the last time.
 
         Slips of earlier increments are those of the pairing in which they were solved.
         """
-        before = self._paired
-        if before is None or not (self._settled and step.problem.until_settled):
+        before, start = self._paired, self._step.state.u
+        if before is None or not (self._settled and self._step.problem.until_settled):
             return False
         if not len(before) == len(constraints) == len(self._active):  # slips of other constraints cannot be used
             return True
-        difference = _gaps_and_slips(before, u, step.state.u) - _gaps_and_slips(constraints, u, step.state.u)
+        difference = _gaps_and_slips(before, u, start) - _gaps_and_slips(constraints, u, start)
         shift = largest(difference[self._active])
         outdated = SINGLE_PRECISION * self._size < shift < self._shift
         self._shift = shift if outdated else self._shift
