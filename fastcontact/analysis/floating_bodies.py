@@ -116,10 +116,10 @@ class PositionResponse:
         """
         resolved, sliding = self._inverse @ elongation, solution.active & ~solution.sticking
         remaining = float(norm(elongation - self.elongation_rates @ resolved))
-        held = remaining <= SINGLE_PRECISION * norm(elongation)
+        restrained = remaining <= SINGLE_PRECISION * norm(elongation)
         # The linear response is more accurate than the least work of friction if it hardly changes the slips.
         slip_change = largest(self.gap_rates[1:, sliding] @ resolved)
-        if not held or slip_change > NOTABLE * largest(solution.slip[sliding]):
+        if not restrained or slip_change > NOTABLE * largest(solution.slip[sliding]):
             U, s, V = np.linalg.svd(self.elongation_rates)
             # Singular values are about 1 for motions that contact restrains. Smaller ones hardly restrain a motion, for
             # example only because the friction force turns with the slip direction (a box that rides on a driven one in 3D).
@@ -128,7 +128,7 @@ class PositionResponse:
             if largest(slide) > largest(elongation):
                 return slide - V[firm].T @ ((U.T @ elongation)[firm] / s[firm]), np.inf
         change = -resolved
-        if not held:
+        if not restrained:
             motion = elongation - self._inverse @ (self.elongation_rates @ elongation)
             approach, threshold = -self.gap_rates[0] @ motion, LENGTH_ROUND_OFF * remaining
             # Gaps of active constraints are round-off.
